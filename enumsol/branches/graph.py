@@ -1,0 +1,433 @@
+"""BranchGraph: all solutions over an interval of alpha, and the questions it answers (theory, section 7)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.branches.algebraic import CriticalAlpha
+from enumsol.branches.assembly import make_branches, make_components, multigraph
+from enumsol.branches.fiber_roots import roots_of
+from enumsol.enumeration.exact_selections import rational
+from enumsol.errors import InvalidArgumentError
+from enumsol.problem import finite_alpha
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    import pandas as pd
+
+    from enumsol.branches.interval_search import SearchedPiece
+    from enumsol.branches.parts import Arc, Branch, Component, Vertex
+    from enumsol.branches.path import ExactPath
+    from enumsol.certification.proof import Proof
+    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.results import Root, RootFamily, RootSet
+
+
+@dataclass(frozen=True)
+class GraphStats:
+    """What the construction did.
+
+    Attributes
+    ----------
+    pieces : int
+        Parts of the interval, each searched by a tree of its own.
+    nodes : int
+        Nodes of all trees.
+    selections : int
+        Complete selections whose arcs were computed.
+    search_seconds, seconds : float
+        Wall time of the search, and of all.
+    """
+
+    pieces: int = 0
+    nodes: int = 0
+    selections: int = 0
+    search_seconds: float = 0.0
+    seconds: float = 0.0
+
+
+class BranchGraph:
+    """All solutions over an interval of alpha: arcs of single selections, glued at vertices (made by ``branch_graph``).
+
+    Attributes
+    ----------
+    problem : ContactProblem
+    interval : (float, float)
+    arithmetic : str
+    vertices : tuple of Vertex
+        In the order of alpha.
+    arcs : tuple of Arc
+    graph : networkx.MultiGraph
+        Nodes are the numbers of vertices (attributes alpha, kind, statuses, ..., vertex), edges the arcs, keyed by
+        their numbers (attributes statuses, alpha, index, values, ..., arc).
+    reasons : tuple of str
+        Why the graph is not complete: what was left out, stayed undecided or contradicts the balance of degrees.
+    stats : GraphStats
+    pieces : tuple of SearchedPiece
+        The search's leaves with their multipliers, piece by piece of the interval (empty after ``load``).
+    proof : Proof or None
+        In verified arithmetic: the search's leaves for ``enumsol.verify`` (None after ``load``, for a search that was
+        cut short, and where rationals had to decide about leaves).
+    """
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        path: ExactPath,
+        interval: tuple[Fraction, Fraction],
+        arithmetic: str,
+        vertices: Sequence[Vertex],
+        arcs: Sequence[Arc],
+        reasons: Sequence[str],
+        stats: GraphStats,
+        pieces: Sequence[SearchedPiece] = (),
+        proof: Proof | None = None,
+    ) -> None:
+        self.problem = problem
+        self.path = path
+        self.exact_interval = interval
+        self.interval = (float(interval[0]), float(interval[1]))
+        self.arithmetic = arithmetic
+        self.vertices = tuple(vertices)
+        self.arcs = tuple(arcs)
+        self.stats = stats
+        self.pieces = tuple(pieces)
+        self.proof = proof
+        self.graph = multigraph(self.vertices, self.arcs)
+        self.search_reasons = tuple(reasons)
+        self.reasons = (*reasons, *self._imbalances())
+
+    def _imbalances(self) -> list[str]:
+        """Violations of the balance of degrees (theory, section 7); each proves that something is missing."""
+        found = []
+        for v in self.vertices:
+            if v.index_left is None or v.index_right is None:
+                found.append(f"vertex {v.number} at alpha = {v.alpha:.17g}: the degree of an arc is not known")
+            elif not v.border and v.index_left != v.index_right:
+                found.append(
+                    f"vertex {v.number} at alpha = {v.alpha:.17g} ({v.kind}): degrees {v.index_left:+d} from the left "
+                    f"and {v.index_right:+d} to the right do not balance"
+                )
+        start = [v.index_right for v in self.vertices if v.border and v.alpha == self.interval[0]]
+        if None not in start and (total := sum(k for k in start if k is not None)) != 1:
+            found.append(f"the degrees of all arcs at alpha = {self.interval[0]:g} sum to {total:+d} and not to +1")
+        return found
+
+    @property
+    def complete(self) -> bool:
+        """Whether it is proven that no solution is missing: proven leaves, nothing undecided, degrees balanced."""
+        return self.arithmetic != "fast" and not self.reasons
+
+    @property
+    def certified_data(self) -> str:
+        """What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed)."""
+        return "problem" if self.path.condensed_exactly else "condensed"
+
+    # -- parts -----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def components(self) -> tuple[Component, ...]:
+        """Connected components in the order of their smallest alpha."""
+        return make_components(self.graph, self.vertices, self.arcs)
+
+    @cached_property
+    def branches(self) -> tuple[Branch, ...]:
+        """Components cut at bifurcations, families and sheets: paths and closed loops of arcs, and sheets."""
+        return make_branches(self.components, self.vertices)
+
+    @cached_property
+    def branch_of(self) -> dict[int, int]:
+        """Number of the branch of every arc, by the arc's number."""
+        return {arc.number: branch.number for branch in self.branches for arc in branch.arcs}
+
+    def _of_kind(self, *kinds: str) -> tuple[Vertex, ...]:
+        return tuple(v for v in self.vertices if v.kind in kinds)
+
+    @property
+    def transitions(self) -> tuple[Vertex, ...]:
+        """Vertices at which one arc goes on as another on the other side."""
+        return self._of_kind("transition")
+
+    @property
+    def folds(self) -> tuple[Vertex, ...]:
+        """Vertices at which two arcs meet on one side: alpha turns back."""
+        return self._of_kind("fold")
+
+    @property
+    def bifurcations(self) -> tuple[Vertex, ...]:
+        """Isolated points where other numbers of arcs meet, and families inside the interval that arcs reach."""
+        reached = {v for arc in self.arcs for v in (arc.tail, arc.head)}
+        return tuple(
+            v
+            for v in self.vertices
+            if v.kind == "bifurcation" or (v.kind == "family" and not v.border and v.number in reached)
+        )
+
+    @cached_property
+    def families(self) -> tuple[RootFamily, ...]:
+        """Continua of solutions at single alphas (vertical arcs); those of sheets are found by ``roots_at``."""
+        return tuple(v.family for v in self.vertices if v.family is not None and v.kind == "family")
+
+    @property
+    def sheets(self) -> tuple[Arc, ...]:
+        """Families over an interval of alpha."""
+        return tuple(arc for arc in self.arcs if arc.dimension)
+
+    @property
+    def jumps(self) -> tuple[Vertex, ...]:
+        """Vertices that no arc leaves to the right: where following a branch with increasing alpha must leave it."""
+        tails = {arc.tail for arc in self.arcs}
+        heads = {arc.head for arc in self.arcs}
+        return tuple(v for v in self.vertices if not v.border and v.number in heads and v.number not in tails)
+
+    # -- solutions at one alpha ------------------------------------------------------------------------------------
+
+    def _located(self, alpha: Alpha) -> tuple[list[Arc], list[Vertex]]:
+        """Arcs over an alpha and vertices at it, decided exactly."""
+        finite_alpha(alpha)
+        value = Fraction(alpha)
+        if not self.exact_interval[0] <= value <= self.exact_interval[1]:
+            raise InvalidArgumentError(
+                f"alpha is {float(value):.17g}; expected a value in the graph's interval "
+                f"[{self.interval[0]:g}, {self.interval[1]:g}]"
+            )
+        point = CriticalAlpha.rational(rational(value))
+        order = [v.exact.compare(point) for v in self.vertices]
+        arcs = [arc for arc in self.arcs if order[arc.tail] < 0 < order[arc.head]]
+        return arcs, [v for v, o in zip(self.vertices, order, strict=True) if o == 0]
+
+    def arcs_at(self, alpha: Alpha) -> tuple[Arc, ...]:
+        """Arcs and sheets that pass over an alpha inside the interval (vertices at it do not count)."""
+        return tuple(self._located(alpha)[0])
+
+    def roots_at(self, alpha: Alpha) -> RootSet:
+        """All solutions at one alpha, as enumerate_roots returns them.
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is outside the interval.
+        """
+        arcs, vertices = self._located(alpha)
+        codes = {c for arc in arcs for c in arc.selections} | {c for v in vertices for c in v.selections}
+        return roots_of(self, alpha, sorted(codes))
+
+    def multiplicity_at(self, alpha: Alpha) -> int:
+        """Number of isolated roots and of families at one alpha, together.
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is outside the interval.
+        """
+        arcs, vertices = self._located(alpha)
+        return len(arcs) + len(vertices)
+
+    @cached_property
+    def steps(self) -> tuple[list[Fraction], list[int], list[int]]:
+        """Multiplicity as a step function: critical alphas (rounded), values at them and on the intervals between."""
+        groups: list[list[Vertex]] = []
+        for v in self.vertices:
+            if groups and groups[-1][0].exact.compare(v.exact) == 0:
+                groups[-1].append(v)
+            else:
+                groups.append([v])
+        place = {v.number: k for k, group in enumerate(groups) for v in group}
+        change = np.zeros(len(groups) + 1, dtype=int)
+        through = np.zeros(len(groups) + 1, dtype=int)
+        for arc in self.arcs:
+            tail, head = place[arc.tail], place[arc.head]
+            change[tail] += 1
+            change[head] -= 1
+            through[tail + 1] += 1
+            through[head] -= 1
+        between = np.cumsum(change)[:-2].tolist()
+        at = [len(group) + int(k) for group, k in zip(groups, np.cumsum(through)[:-1], strict=True)]
+        return [Fraction(group[0].alpha) for group in groups], at, between
+
+    # -- answers ---------------------------------------------------------------------------------------------------
+
+    @property
+    def uniqueness_limit(self) -> float | None:
+        """The critical alpha: the solution is unique from the interval's first alpha up to it; None when throughout."""
+        alphas, at, between = self.steps
+        for k, (alpha, number) in enumerate(zip(alphas, at, strict=True)):
+            several = number != 1 or any(v.family is not None for v in self.vertices if v.alpha == alpha)
+            if several or (k < len(between) and between[k] != 1):
+                return float(alpha)
+        return None
+
+    @property
+    def uniqueness_bound(self) -> float | None:
+        """An alpha up to which uniqueness follows without any search (theory, section 5); None when for no alpha.
+
+        F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node; evaluated in floats.
+        """
+        condensed, p = self.problem.condensed, self.problem.p
+        inverse = np.linalg.inv(condensed.S)
+        product = np.linalg.eigvalsh(inverse[:p, :p])[-1] * np.linalg.eigvalsh(condensed.S[p:, p:])[-1]
+        largest = 1.0 / float(np.sqrt(product))
+        a, b = self.interval
+        if np.any(condensed.F0 + a * condensed.F1 >= largest):
+            return None
+        rising = condensed.F1 > 0
+        reached = (largest - condensed.F0[rising]) / condensed.F1[rising]
+        return min(b, float(np.min(reached, initial=np.inf)))
+
+    def starting_point(self, branch: Branch) -> Root | None:
+        """A regular root in the middle of the branch's longest arc; None when there is none at any float alpha."""
+        for arc in sorted(branch.arcs, key=lambda arc: -arc.length):
+            alpha = 0.5 * (arc.lo + arc.hi)
+            if arc.grazing or not arc.lo < alpha < arc.hi:
+                continue
+            roots = roots_of(self, alpha, arc.selections)
+            if len(roots) and roots[0].regular:
+                return roots[0]
+        return None
+
+    def starting_points(self) -> tuple[Root, ...]:
+        """One regular root on every branch that has any, as starting points of continuation, in order."""
+        found = (self.starting_point(branch) for branch in self.branches)
+        return tuple(root for root in found if root is not None)
+
+    # -- tables and files ------------------------------------------------------------------------------------------
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row an arc: its branch, component, ends and their kinds, index, dimension and statuses (node by node)."""
+        import pandas as pd
+
+        place = {arc.number: c.number for c in self.components for arc in c.arcs}
+        rows = [
+            {
+                "arc": arc.number,
+                "branch": self.branch_of[arc.number],
+                "component": place[arc.number],
+                "alpha_from": arc.lo,
+                "alpha_to": arc.hi,
+                "vertex_from": arc.tail,
+                "vertex_to": arc.head,
+                "kind_from": self.vertices[arc.tail].kind,
+                "kind_to": self.vertices[arc.head].kind,
+                "index": arc.index,
+                "dimension": arc.dimension,
+                "grazing": arc.grazing,
+                "statuses": " ".join(s.value for s in arc.statuses),
+            }
+            for arc in self.arcs
+        ]
+        return pd.DataFrame(rows)
+
+    def vertices_frame(self) -> pd.DataFrame:
+        """One row a vertex and contact node: alpha, kind, statuses that hold, and values."""
+        import pandas as pd
+
+        rows = [
+            {
+                "vertex": v.number,
+                "alpha": v.alpha,
+                "kind": v.kind,
+                "node": node,
+                "active": " ".join(sorted(s.value for s in v.active[i])),
+                "lambda_n": v.lambda_n[i],
+                "lambda_t": v.lambda_t[i],
+                "u_n": v.u_n[i],
+                "u_t": v.u_t[i],
+                "index_left": v.index_left,
+                "index_right": v.index_right,
+            }
+            for v in self.vertices
+            for i, node in enumerate(self.problem.node_ids)
+        ]
+        return pd.DataFrame(rows)
+
+    def save(self, file: str | Path) -> None:
+        """Write the graph with its problem to a JSON file, all numbers to the last bit; ``load`` reads it."""
+        from enumsol.branches.storage import save_graph
+
+        save_graph(self, file)
+
+    @classmethod
+    def load(cls, file: str | Path) -> BranchGraph:
+        """Read a graph that ``save`` wrote.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The file is not such a graph.
+        """
+        from enumsol.branches.storage import load_graph
+
+        return load_graph(file)
+
+    def write_graphml(self, file: str | Path) -> None:
+        """Write vertices and arcs as GraphML for other graph programs (values at the vertices, no functions)."""
+        from enumsol.branches.storage import write_graphml
+
+        write_graphml(self, file)
+
+    def plot(self, quantity: str = "lambda_n", nodes: Sequence[Any] | None = None, **options: Any) -> Any:
+        """A figure of alpha against lambda_n, lambda_t, u_n or u_t of chosen nodes; see enumsol.branches.plots."""
+        from enumsol.branches.plots import plot_graph
+
+        return plot_graph(self, quantity, nodes, **options)
+
+    # -- printing --------------------------------------------------------------------------------------------------
+
+    def completeness(self) -> str:
+        """The closing line of the printed summary."""
+        if self.reasons:
+            more = f" and {len(self.reasons) - 1} more" if len(self.reasons) > 1 else ""
+            return f"complete: no ({self.reasons[0]}{more})"
+        if not self.complete:
+            return "complete: not proven (degrees balance at every vertex)"
+        about = "" if self.certified_data == "problem" else " for S and g as computed"
+        return f"complete: yes (proven{about})"
+
+    def __repr__(self) -> str:
+        kinds = Counter(v.kind for v in self.vertices)
+        order = ("transition", "fold", "bifurcation", "family", "sheet", "touch", "point", "broken", "end")
+        numbers = ", ".join(f"{kinds[k]} {k}" for k in order if kinds[k])
+        a, b = self.interval
+        lines = [
+            f"BranchGraph for alpha in [{a:g}, {b:g}] ({self.arithmetic})",
+            f"  components {len(self.components)}, branches {len(self.branches)}, arcs {len(self.arcs)}",
+            f"  vertices {len(self.vertices)}: {numbers}",
+        ]
+        for branch in self.branches[:20]:
+            lo, hi = branch.interval
+            folds = ", ".join(f"{v.alpha:.6g}" for v in branch.folds)
+            shape = "sheet" if branch.sheet else ("closed" if branch.closed else "open")
+            width = f", length {hi - lo:.3g}" if f"{lo:.6g}" == f"{hi:.6g}" else ""
+            text = f"  branch {branch.number}: {shape}, {len(branch.arcs)} arcs, alpha in [{lo:.6g}, {hi:.6g}]{width}"
+            lines.append(text + (f", folds at {folds}" if folds else ""))
+        if len(self.branches) > 20:
+            lines.append(f"  ... {len(self.branches) - 20} more branches")
+        lines.append(self.completeness())
+        return "\n".join(lines)
+
+    def summary(self) -> dict[str, Any]:
+        """Counts and answers as plain values, for JSON."""
+        return {
+            "interval": list(self.interval),
+            "arithmetic": self.arithmetic,
+            "complete": self.complete,
+            "reasons": list(self.reasons),
+            "components": len(self.components),
+            "branches": len(self.branches),
+            "arcs": len(self.arcs),
+            "vertices": dict(Counter(v.kind for v in self.vertices)),
+            "folds": [v.alpha for v in self.folds],
+            "bifurcations": [v.alpha for v in self.bifurcations],
+            "jumps": [v.alpha for v in self.jumps],
+            "uniqueness_limit": self.uniqueness_limit,
+            "uniqueness_bound": self.uniqueness_bound,
+            "stats": asdict(self.stats),
+        }

@@ -1,0 +1,220 @@
+"""link_samples: roots at sampled alphas joined into a graph, and what sampling misses (theory, section 7)."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import networkx as nx
+
+from enumsol.enumeration import enumerate_roots
+from enumsol.errors import InvalidArgumentError
+from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.selections import ContactStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from enumsol.branches.graph import BranchGraph
+    from enumsol.condensed import CondensedProblem
+    from enumsol.problem import Alpha
+    from enumsol.results import Root, RootSet
+
+
+@dataclass(frozen=True)
+class Missed:
+    """What a sampled graph lacks, measured against the exact graph.
+
+    Attributes
+    ----------
+    arcs : tuple of int
+        Numbers of the exact graph's arcs that no sample lies on.
+    branches : tuple of int
+        Numbers of its branches none of whose arcs has a sample.
+    components : tuple of int
+        Numbers of its components without any sample.
+    families : int
+        Families at single alphas, none of them a sample.
+    shortest_seen : float
+        Length in alpha of the shortest arc that has a sample (nan when there is none).
+    """
+
+    arcs: tuple[int, ...]
+    branches: tuple[int, ...]
+    components: tuple[int, ...]
+    families: int
+    shortest_seen: float
+
+
+@dataclass(frozen=True)
+class SampledGraph:
+    """Roots at sampled alphas, linked from each sample to the next.
+
+    Attributes
+    ----------
+    graph : networkx.Graph
+        Nodes (sample, root) with alpha, statuses, lambda_n, lambda_t, index and root; edges with ``rule`` "selection"
+        (the same selection at both samples) or "flip" (neighbouring selections that share a vanishing test function),
+        and ``heuristic`` True: only the exact graph proves a link.
+    root_sets : tuple of RootSet
+    ambiguous : tuple of pairs of nodes
+        Pairs between which a link is possible but not the only one; they are not linked.
+    """
+
+    graph: Any
+    root_sets: tuple[RootSet, ...]
+    ambiguous: tuple[tuple[tuple[int, int], tuple[int, int]], ...]
+
+    @property
+    def alphas(self) -> tuple[float, ...]:
+        """The samples, increasing."""
+        return tuple(float(roots.alpha) for roots in self.root_sets)
+
+    @property
+    def branches(self) -> tuple[frozenset[tuple[int, int]], ...]:
+        """Linked sets of nodes, in the order of their first sample."""
+        return tuple(frozenset(group) for group in sorted(nx.connected_components(self.graph), key=min))
+
+    def missed(self, exact: BranchGraph) -> Missed:
+        """What the samples miss of the exact graph."""
+        seen: set[int] = set()
+        for alpha in self.alphas:
+            if exact.interval[0] <= alpha <= exact.interval[1]:
+                seen.update(arc.number for arc in exact.arcs_at(alpha))
+        arcs = tuple(arc.number for arc in exact.arcs if arc.number not in seen)
+        lengths = [arc.length for arc in exact.arcs if arc.number in seen]
+        return Missed(
+            arcs,
+            tuple(b.number for b in exact.branches if not any(arc.number in seen for arc in b.arcs)),
+            tuple(c.number for c in exact.components if not any(arc.number in seen for arc in c.arcs)),
+            sum(family.alpha not in self.alphas for family in exact.families),
+            min(lengths, default=float("nan")),
+        )
+
+    def __repr__(self) -> str:
+        return (
+            f"SampledGraph of {len(self.root_sets)} samples: {self.graph.number_of_nodes()} roots, "
+            f"{self.graph.number_of_edges()} links (heuristic), {len(self.ambiguous)} ambiguous pairs left open"
+        )
+
+
+def link_samples(
+    problem: ContactProblem,
+    alphas: Iterable[Alpha],
+    *,
+    arithmetic: str = "fast",
+    progress: Callable[[int, int], object] | None = None,
+) -> SampledGraph:
+    """Roots at the samples, linked into branches by their selections.
+
+    Two roots at neighbouring samples are linked when they have the same statuses. Of the roots left over, two are
+    linked when their statuses differ at one node only and the test function that separates them is predicted to
+    vanish between the samples (one step more allowed), by the derivatives at both roots. Where a root has several
+    such partners none is chosen and the pairs are marked as ambiguous. What happens between samples is not seen: use
+    ``branch_graph``.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    alphas : iterable of float or Fraction
+        Sorted by the function; at least one.
+    arithmetic : str
+        Of ``enumerate_roots``.
+    progress : callable, optional
+        Called with the numbers of samples done and of all.
+
+    Returns
+    -------
+    SampledGraph
+
+    Raises
+    ------
+    InvalidArgumentError
+        There is no alpha, or one is not a finite number.
+    """
+    if not isinstance(problem, ContactProblem):
+        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
+    samples = sorted(set(alphas))
+    if not samples:
+        raise InvalidArgumentError("alphas is empty; expected at least one number")
+    for alpha in samples:
+        finite_alpha(alpha)
+    root_sets = []
+    for k, alpha in enumerate(samples):
+        root_sets.append(enumerate_roots(problem, alpha, arithmetic))  # type: ignore[arg-type]
+        if progress is not None:
+            progress(k + 1, len(samples))
+    graph = nx.Graph()
+    for s, roots in enumerate(root_sets):
+        for r, root in enumerate(roots):
+            graph.add_node(
+                (s, r),
+                alpha=float(root.alpha),
+                statuses=root.statuses,
+                lambda_n=root.lambda_n,
+                lambda_t=root.lambda_t,
+                index=root.index,
+                root=root,
+            )
+    ambiguous: list[tuple[tuple[int, int], tuple[int, int]]] = []
+    for s, (left, right) in enumerate(itertools.pairwise(root_sets)):
+        ambiguous += _link(graph, problem.condensed, s, left, right)
+    return SampledGraph(graph, tuple(root_sets), tuple(ambiguous))
+
+
+def _link(
+    graph: Any, condensed: CondensedProblem, sample: int, left: RootSet, right: RootSet
+) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """Link neighbouring samples; returns the pairs left open."""
+    free_left, free_right = set(range(len(left))), set(range(len(right)))
+    for i, root in enumerate(left):
+        partners = [j for j in free_right if right[j].statuses == root.statuses]
+        if len(partners) == 1:
+            graph.add_edge((sample, i), (sample + 1, partners[0]), rule="selection", heuristic=True)
+            free_left.discard(i)
+            free_right.discard(partners[0])
+    pairs = [(i, j) for i in sorted(free_left) for j in sorted(free_right) if _may_flip(condensed, left[i], right[j])]
+    # two roots of one sample that differ by a flip may belong to a fold between the samples instead
+    open_pairs = []
+    for i, j in pairs:
+        alone = sum(a == i for a, _ in pairs) == 1 and sum(b == j for _, b in pairs) == 1
+        if alone and left[i].index == right[j].index:
+            graph.add_edge((sample, i), (sample + 1, j), rule="flip", heuristic=True)
+        else:
+            open_pairs.append(((sample, i), (sample + 1, j)))
+    return open_pairs
+
+
+def _may_flip(condensed: CondensedProblem, a: Root, b: Root) -> bool:
+    """Whether the statuses differ at one node by a flip that both roots predict to happen between the samples."""
+    nodes = [i for i, (x, y) in enumerate(zip(a.statuses, b.statuses, strict=True)) if x is not y]
+    if len(nodes) != 1:
+        return False
+    step = float(b.alpha) - float(a.alpha)
+    for root, other in ((a, b), (b, a)):
+        at = _vanishing(condensed, root, nodes[0], other.statuses[nodes[0]])
+        if at is not None and not float(a.alpha) - step <= at <= float(b.alpha) + step:
+            return False
+    return True
+
+
+def _vanishing(condensed: CondensedProblem, root: Root, node: int, target: ContactStatus) -> float | None:
+    """Predicted alpha at which the condition that keeps the node from status ``target`` vanishes; None when unknown."""
+    if root.dlambda_dalpha is None:
+        return None
+    p, alpha, change = condensed.problem.p, float(root.alpha), root.dlambda_dalpha
+    dw = condensed.g1 - condensed.S @ change.T.ravel()
+    F, dF = float(condensed.F0[node] + alpha * condensed.F1[node]), float(condensed.F1[node])
+    status = root.statuses[node]
+    if status is ContactStatus.OPEN:
+        value, rate = root.u_n[node], dw[node]
+    elif target is ContactStatus.OPEN or (status is not ContactStatus.STICK and target is not ContactStatus.STICK):
+        value, rate = root.lambda_n[node], change[node, 0]
+    elif status is ContactStatus.STICK:
+        sign = 1.0 if target is ContactStatus.SLIP_PLUS else -1.0
+        value = F * root.lambda_n[node] - sign * root.lambda_t[node]
+        rate = F * change[node, 0] + dF * root.lambda_n[node] - sign * change[node, 1]
+    else:
+        value, rate = root.u_t[node], dw[p + node]
+    return None if rate == 0 else alpha - float(value) / float(rate)

@@ -1,0 +1,242 @@
+"""Branch graphs as JSON files, read back to the last bit, and as GraphML for other programs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import networkx as nx
+import numpy as np
+import scipy.sparse as sp
+from flint import fmpq, fmpz, fmpz_poly
+
+from enumsol.branches.algebraic import CriticalAlpha
+from enumsol.branches.graph import BranchGraph, GraphStats
+from enumsol.branches.parts import Arc, Vertex
+from enumsol.branches.path import ExactPath
+from enumsol.errors import InvalidArgumentError
+from enumsol.problem import ContactProblem
+from enumsol.results import Polytope, RootFamily
+from enumsol.selections import ContactStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+FORMAT, VERSION = "enumsol-branch-graph", 1
+
+
+def save_graph(graph: BranchGraph, file: str | Path) -> None:
+    """Write a graph and its problem as JSON (see BranchGraph.save)."""
+    record = {
+        "format": FORMAT,
+        "version": VERSION,
+        "problem": _problem_record(graph.problem),
+        "condensed_exactly": graph.path.condensed_exactly,
+        "interval": [str(end) for end in graph.exact_interval],
+        "arithmetic": graph.arithmetic,
+        "reasons": list(graph.search_reasons),
+        "stats": asdict(graph.stats),
+        "vertices": [_vertex_record(v) for v in graph.vertices],
+        "arcs": [_arc_record(arc) for arc in graph.arcs],
+    }
+    Path(file).write_text(json.dumps(record), encoding="utf-8")
+
+
+def load_graph(file: str | Path) -> BranchGraph:
+    """Read a graph that save_graph wrote (see BranchGraph.load).
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file cannot be read or is not such a graph.
+    """
+    try:
+        record = json.loads(Path(file).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidArgumentError(f"graph {file} cannot be read ({error.strerror}); expected a saved graph") from error
+    except ValueError as error:
+        raise InvalidArgumentError(f"graph {file} is not a JSON file ({error}); expected a saved graph") from error
+    if not isinstance(record, dict) or record.get("format") != FORMAT or record.get("version") != VERSION:
+        raise InvalidArgumentError(f"graph {file} has another format; expected {FORMAT}, version {VERSION}")
+    try:
+        return _from_record(record)
+    except (KeyError, TypeError, IndexError) as error:
+        raise InvalidArgumentError(f"graph {file} is damaged (at {error}); expected a saved graph") from error
+
+
+def _from_record(record: dict[str, Any]) -> BranchGraph:
+    problem = _problem(record["problem"])
+    path = ExactPath.from_problem(problem, exact=record["condensed_exactly"])
+    first, last = (Fraction(end) for end in record["interval"])
+    vertices = [_vertex(k, item) for k, item in enumerate(record["vertices"])]
+    arcs = [_arc(k, item, vertices, path) for k, item in enumerate(record["arcs"])]
+    stats = GraphStats(**record["stats"])
+    return BranchGraph(problem, path, (first, last), record["arithmetic"], vertices, arcs, record["reasons"], stats)
+
+
+# -- the problem -------------------------------------------------------------------------------------------------------
+
+
+def _problem_record(problem: ContactProblem) -> dict[str, Any]:
+    return {
+        **{name: _matrix_record(getattr(problem, name)) for name in ("A", "Bn", "Bt")},
+        **{name: getattr(problem, name).tolist() for name in ("f", "gap", "slip_offset")},
+        "friction": [part.tolist() for part in problem.friction],
+        "load_slope": None if problem.load_slope is None else problem.load_slope.tolist(),
+        "node_ids": list(problem.node_ids),
+        "coordinates": None if problem.coordinates is None else problem.coordinates.tolist(),
+    }
+
+
+def _matrix_record(matrix: Any) -> dict[str, Any]:
+    coo = sp.coo_array(matrix)
+    rows, columns = coo.coords
+    return {"shape": list(coo.shape), "row": rows.tolist(), "col": columns.tolist(), "value": coo.data.tolist()}
+
+
+def _problem(record: dict[str, Any]) -> ContactProblem:
+    def matrix(item: dict[str, Any]) -> sp.csc_array:
+        return sp.csc_array(sp.coo_array((item["value"], (item["row"], item["col"])), shape=tuple(item["shape"])))
+
+    friction = tuple(np.array(part, dtype=np.float64) for part in record["friction"])
+    return ContactProblem(
+        matrix(record["A"]),
+        matrix(record["Bn"]),
+        matrix(record["Bt"]),
+        record["f"],
+        gap=record["gap"],
+        friction=(friction[0], friction[1]),
+        load_slope=record["load_slope"],
+        slip_offset=record["slip_offset"],
+        node_ids=record["node_ids"],
+        coordinates=record["coordinates"],
+    )
+
+
+# -- vertices and arcs -------------------------------------------------------------------------------------------------
+
+
+def _names(statuses: Sequence[ContactStatus]) -> list[str]:
+    return [status.value for status in statuses]
+
+
+def _statuses(names: Sequence[str]) -> tuple[ContactStatus, ...]:
+    return tuple(ContactStatus(name) for name in names)
+
+
+def _vertex_record(v: Vertex) -> dict[str, Any]:
+    lo, hi = v.enclosure
+    family = None
+    if v.family is not None:
+        family = [
+            {"statuses": _names(part.statuses), "vertices": part.vertices.tolist(), "dimension": part.dimension}
+            for part in v.family.polytopes
+        ]
+    return {
+        "alpha": v.alpha,
+        "lo": str(lo),
+        "hi": str(hi),
+        "polynomial": None if v.exact.poly is None else [str(c) for c in v.exact.poly.coeffs()],
+        "kind": v.kind,
+        "border": v.border,
+        "statuses": _names(v.statuses),
+        "active": [sorted(_names(tuple(names))) for names in v.active],
+        **{name: getattr(v, name).tolist() for name in ("lambda_n", "lambda_t", "u_n", "u_t")},
+        "family": family,
+        "family_index": None if v.family is None else v.family.index,
+        "index_left": v.index_left,
+        "index_right": v.index_right,
+        "selections": [list(codes) for codes in v.selections],
+    }
+
+
+def _vertex(number: int, item: dict[str, Any]) -> Vertex:
+    lo, hi = (fmpq(*Fraction(item[end]).as_integer_ratio()) for end in ("lo", "hi"))
+    coefficients = item["polynomial"]
+    poly = None if coefficients is None else fmpz_poly([fmpz(c) for c in coefficients])
+    family = None
+    if item["family"] is not None:
+        parts = [
+            Polytope(_statuses(part["statuses"]), np.array(part["vertices"]), part["dimension"])
+            for part in item["family"]
+        ]
+        family = RootFamily(item["alpha"], tuple(parts), item["family_index"], vertices_proven=True)
+    return Vertex(
+        number,
+        item["alpha"],
+        item["kind"],
+        item["border"],
+        _statuses(item["statuses"]),
+        tuple(frozenset(_statuses(names)) for names in item["active"]),
+        np.array(item["lambda_n"]),
+        np.array(item["lambda_t"]),
+        np.array(item["u_n"]),
+        np.array(item["u_t"]),
+        family,
+        item["index_left"],
+        item["index_right"],
+        tuple(tuple(codes) for codes in item["selections"]),
+        CriticalAlpha(poly, lo, hi),
+    )
+
+
+def _arc_record(arc: Arc) -> dict[str, Any]:
+    return {
+        "statuses": _names(arc.statuses),
+        "tail": arc.tail,
+        "head": arc.head,
+        "index": arc.index,
+        "dimension": arc.dimension,
+        "grazing": arc.grazing,
+        "selections": [list(codes) for codes in arc.selections],
+        "sample": str(arc.sample),
+    }
+
+
+def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], path: ExactPath) -> Arc:
+    return Arc(
+        number,
+        _statuses(item["statuses"]),
+        vertices[item["tail"]].alpha,
+        vertices[item["head"]].alpha,
+        item["tail"],
+        item["head"],
+        item["index"],
+        item["dimension"],
+        item["grazing"],
+        tuple(tuple(codes) for codes in item["selections"]),
+        Fraction(item["sample"]),
+        path,
+    )
+
+
+# -- other programs ----------------------------------------------------------------------------------------------------
+
+
+def write_graphml(graph: BranchGraph, file: str | Path) -> None:
+    """Write vertices and arcs as GraphML, arrays as text."""
+    plain = nx.MultiGraph()
+    for v in graph.vertices:
+        plain.add_node(
+            v.number,
+            alpha=v.alpha,
+            kind=v.kind,
+            statuses=" ".join(_names(v.statuses)),
+            **{name: " ".join(map(repr, getattr(v, name).tolist())) for name in ("lambda_n", "lambda_t", "u_n", "u_t")},
+        )
+    for arc in graph.arcs:
+        plain.add_edge(
+            arc.tail,
+            arc.head,
+            key=arc.number,
+            alpha_from=arc.lo,
+            alpha_to=arc.hi,
+            statuses=" ".join(_names(arc.statuses)),
+            index="" if arc.index is None else str(arc.index),
+            dimension=arc.dimension,
+            branch=graph.branch_of[arc.number],
+        )
+    nx.write_graphml(plain, file)

@@ -1,0 +1,161 @@
+"""multiplicity_table: the roots at many alphas, counted (theory, sections 2 and 6)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from concurrent.futures import FIRST_COMPLETED, wait
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from enumsol.enumeration import enumerate_roots
+from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.selections import STATUSES, ContactStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+    from concurrent.futures import Executor, Future
+
+    import pandas as pd
+
+    from enumsol.problem import Alpha
+    from enumsol.results import RootSet
+
+#: Tasks handed to an executor ahead of the one that is awaited; keeps an interruption from waiting for all of them.
+_AHEAD = 64
+
+
+@dataclass
+class _Rows:
+    """Rows of the table by the place of their alpha."""
+
+    alphas: Sequence[Alpha]
+    done: dict[int, dict[str, Any]] = field(default_factory=dict)
+
+    def frame(self) -> pd.DataFrame:
+        import pandas as pd
+
+        columns = [
+            "alpha",
+            "roots",
+            "families",
+            *_KINDS.values(),
+            "index_sum",
+            "complete",
+            "undecided",
+            "nodes",
+            "seconds",
+        ]
+        return pd.DataFrame([self.done[k] for k in sorted(self.done)], columns=columns)
+
+
+#: Columns with the number of roots at which at least one node has the status.
+_KINDS = {status: f"with_{status.name.lower()}" for status in STATUSES}
+
+
+def multiplicity_table(
+    problem: ContactProblem,
+    alphas: Iterable[Alpha],
+    *,
+    arithmetic: str = "verified",
+    executor: Executor | None = None,
+    progress: Callable[[int, int], object] | None = None,
+    **options: Any,
+) -> pd.DataFrame:
+    """Table of the number of solutions at many alphas.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    alphas : iterable of float or Fraction
+    arithmetic : str
+        Of ``enumerate_roots``.
+    executor : concurrent.futures.Executor, optional
+        Enumerates at several alphas at a time: a process pool, or a dask Client's ``get_executor()``.
+    progress : callable, optional
+        Called with the numbers of alphas done and of all.
+    **options
+        Further keyword arguments of ``enumerate_roots``, such as ``time_limit`` for each alpha.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row an alpha, in the order given: alpha, roots, families, with_open, with_stick, with_slip_plus and
+        with_slip_minus (isolated roots at which at least one node has the status), index_sum (missing where a degree is
+        not known), complete, undecided, nodes of the search, and seconds.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An alpha is not a finite number, or makes a friction coefficient negative.
+    Interrupted
+        On Ctrl-C; ``partial`` is the table of what was done.
+    """
+    if not isinstance(problem, ContactProblem):
+        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
+    rows = _Rows(list(alphas))
+    for alpha in rows.alphas:
+        finite_alpha(alpha)
+        problem.friction_at(alpha)
+    options = {"arithmetic": arithmetic, **options}
+    try:
+        if executor is None:
+            for k, alpha in enumerate(rows.alphas):
+                rows.done[k] = table_row(problem, alpha, options)
+                if progress is not None:
+                    progress(k + 1, len(rows.alphas))
+        else:
+            _spread(problem, rows, executor, progress, options)
+    except KeyboardInterrupt as interruption:
+        done = len(rows.done)
+        raise Interrupted(
+            f"multiplicity_table was interrupted after {done} of {len(rows.alphas)} alphas", rows.frame()
+        ) from interruption
+    return rows.frame()
+
+
+def _spread(
+    problem: ContactProblem,
+    rows: _Rows,
+    executor: Executor,
+    progress: Callable[[int, int], object] | None,
+    options: dict[str, Any],
+) -> None:
+    """Hand the alphas to the executor, a limited number ahead of those awaited."""
+    running: dict[Future[dict[str, Any]], int] = {}
+    waiting = list(enumerate(rows.alphas))[::-1]
+    try:
+        while waiting or running:
+            while waiting and len(running) < _AHEAD:
+                k, alpha = waiting.pop()
+                running[executor.submit(table_row, problem, alpha, options)] = k
+            finished, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in finished:
+                rows.done[running.pop(future)] = future.result()
+                if progress is not None:
+                    progress(len(rows.done), len(rows.alphas))
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def table_row(problem: ContactProblem, alpha: Alpha, options: dict[str, Any]) -> dict[str, Any]:
+    """One row of the table (a function of the module, so that other processes can be asked for it)."""
+    roots = enumerate_roots(problem, alpha, **options)
+    counts = kinds(roots)
+    return {
+        "alpha": float(alpha),
+        "roots": len(roots),
+        "families": len(roots.families),
+        **{name: counts[status] for status, name in _KINDS.items()},
+        "index_sum": roots.index_sum,
+        "complete": roots.complete,
+        "undecided": len(roots.undecided),
+        "nodes": roots.stats.nodes,
+        "seconds": roots.stats.seconds,
+    }
+
+
+def kinds(roots: RootSet) -> Counter[ContactStatus]:
+    """For every status the number of isolated roots at which some node has it."""
+    return Counter(status for root in roots for status in set(root.statuses))

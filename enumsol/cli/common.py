@@ -1,0 +1,159 @@
+"""What the commands share: the problem and alpha they are given, options, exit statuses, worker processes."""
+
+from __future__ import annotations
+
+import enum
+import multiprocessing
+import signal
+from contextlib import contextmanager
+from fractions import Fraction
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from enumsol import gallery
+from enumsol.errors import InvalidArgumentError
+from enumsol.io import read_problem
+from enumsol.problem import finite_alpha
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from concurrent.futures import Executor
+
+    from enumsol.problem import Alpha, ContactProblem
+
+_GALLERY = "gallery:"
+
+ProblemArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="PROBLEM",
+        help="A file (.npz, .h5), a directory of MatrixMarket files, or gallery:NAME.",
+        show_default=False,
+    ),
+]
+
+
+Arithmetic = Literal["verified", "fast", "exact"]
+FromOption = Annotated[
+    str,
+    typer.Option("--from", metavar="NUMBER", help="First alpha: a number or a fraction.", show_default=False),
+]
+ToOption = Annotated[
+    str,
+    typer.Option("--to", metavar="NUMBER", help="Last alpha: a number or a fraction.", show_default=False),
+]
+#: Options that are grouped in the help of every command.
+LIMITS, OUTPUT, PLOT = "Limits", "Output", "Plot"
+JsonOption = Annotated[
+    str | None,
+    typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is stdout.", rich_help_panel=OUTPUT),
+]
+PlotOption = Annotated[
+    str | None,
+    typer.Option("--plot", metavar="FILE", help="Draw a figure: .png, .pdf, .svg.", rich_help_panel=PLOT),
+]
+GraphFileOption = Annotated[
+    str | None,
+    typer.Option("--graph", metavar="FILE", help="A graph that enumsol graph --save wrote.", show_default=False),
+]
+Quantity = Literal["lambda_n", "lambda_t", "u_n", "u_t"]
+QuantityOption = Annotated[Quantity, typer.Option(help="What is drawn against alpha.", rich_help_panel=PLOT)]
+
+
+class ExitStatus(enum.IntEnum):
+    """What the command line tells its caller."""
+
+    DONE = 0
+    BAD_INPUT = 2
+    INCOMPLETE = 3
+    INTERRUPTED = 130
+    BROKEN_PIPE = 141
+
+
+def load_problem(name: str) -> ContactProblem:
+    """The problem in a file, or the one of the gallery for ``gallery:NAME``.
+
+    Raises
+    ------
+    InvalidProblemError, InvalidArgumentError
+        It cannot be read, or the gallery has none of that name.
+    """
+    if name.startswith(_GALLERY):
+        return gallery.get(name.removeprefix(_GALLERY)).build()
+    return read_problem(name)
+
+
+def parse_alpha(text: str) -> Alpha:
+    """A float, or an exact Fraction for text such as 8/3.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is neither, or not finite.
+    """
+    try:
+        value = Fraction(text) if "/" in text else float(text)
+    except (ValueError, ZeroDivisionError):
+        raise InvalidArgumentError(
+            f"alpha is {text!r}; expected a number such as 2.5 or a fraction such as 8/3"
+        ) from None
+    finite_alpha(value)
+    return value
+
+
+def parse_interval(first: str, last: str) -> tuple[Alpha, Alpha]:
+    """Both ends of an interval of alpha.
+
+    Raises
+    ------
+    InvalidArgumentError
+        One is not a number, or the first is not below the last.
+    """
+    low, high = parse_alpha(first), parse_alpha(last)
+    if not low < high:
+        raise InvalidArgumentError(f"--from is {first} and --to is {last}; expected the first below the second")
+    return low, high
+
+
+def node_row(problem: ContactProblem, label: str | None) -> int:
+    """Row number of a contact node that is named by its label; the first one for None.
+
+    Raises
+    ------
+    InvalidArgumentError
+        There is no such node.
+    """
+    if label is None:
+        return 0
+    labels = [str(node) for node in problem.node_ids]
+    if label not in labels:
+        some = ", ".join(labels[:8]) + (", ..." if len(labels) > 8 else "")
+        raise InvalidArgumentError(f"there is no contact node {label}; expected one of {some}")
+    return labels.index(label)
+
+
+@contextmanager
+def workers(jobs: int) -> Iterator[Executor | None]:
+    """An executor of that many processes, stopped at once on the way out; None for one."""
+    if jobs == 1:
+        yield None
+        return
+    from concurrent.futures import ProcessPoolExecutor
+
+    before = set(multiprocessing.active_children())
+    # spawned, not forked: a progress bar runs in a thread of its own
+    context = multiprocessing.get_context("spawn")
+    executor = ProcessPoolExecutor(jobs, mp_context=context)
+    # a terminal sends Ctrl-C to the workers too: processes born while it is ignored go on ignoring it
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        for _ in range(jobs):
+            executor.submit(int)
+        signal.signal(signal.SIGINT, handler)
+        yield executor
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        executor.shutdown(wait=False, cancel_futures=True)
+        for worker in set(multiprocessing.active_children()) - before:
+            worker.terminate()

@@ -1,0 +1,342 @@
+"""``enumsol follow``: branches of solutions by continuation (Algorithm 5.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from enumsol.cli.common import (
+    OUTPUT,
+    PLOT,
+    Arithmetic,
+    ExitStatus,
+    FromOption,
+    JsonOption,
+    PlotOption,
+    ProblemArgument,
+    QuantityOption,
+    ToOption,
+    load_problem,
+    node_row,
+    parse_alpha,
+    parse_interval,
+)
+from enumsol.cli.graph import read_graph
+from enumsol.cli.output import as_json, check_outputs, check_plot, write_figure, write_text
+from enumsol.cli.progress import Display, SearchDisplay
+from enumsol.enumeration import enumerate_roots
+from enumsol.errors import Interrupted, InvalidArgumentError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+    from enumsol.branches import BranchGraph
+    from enumsol.continuation import ContinuationOptions, Path
+    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.results import Root
+
+_STEPS = "Steps"
+#: Ends of a path at which nothing is left to follow.
+_ARRIVED = ("interval left", "closed")
+
+
+def follow(
+    problem: ProblemArgument,
+    first: FromOption,
+    last: ToOption,
+    start: Annotated[
+        str,
+        typer.Option(metavar="NUMBER", help="Alpha at which the starts are enumerated.", show_default=False),
+    ],
+    root: Annotated[
+        int | None,
+        typer.Option(
+            min=0, metavar="K", help="Start from root K of enumsol roots; default: from all.", show_default=False
+        ),
+    ] = None,
+    direction: Annotated[
+        str,
+        typer.Option(metavar="+1|-1|both", help="+1: positively oriented; alpha then grows where the index is +1."),
+    ] = "both",
+    tangent: Annotated[
+        int | None,
+        typer.Option(
+            min=0, metavar="K", help="Of several tangents at a degenerate root, the K-th.", show_default=False
+        ),
+    ] = None,
+    arithmetic: Annotated[Arithmetic, typer.Option(help="Of the enumeration of the starts.")] = "verified",
+    h_max: Annotated[
+        float, typer.Option("--h-max", metavar="LENGTH", help="Longest step.", rich_help_panel=_STEPS)
+    ] = 1.0,
+    h_min: Annotated[
+        float, typer.Option("--h-min", metavar="LENGTH", help="Shortest step.", rich_help_panel=_STEPS)
+    ] = 1e-5,
+    h_init: Annotated[
+        float | None,
+        typer.Option("--h-init", metavar="LENGTH", help="First step; default: 0.05, or h-max.", rich_help_panel=_STEPS),
+    ] = None,
+    eps: Annotated[
+        float, typer.Option(metavar="NORM", help="Convergence of the corrections.", rich_help_panel=_STEPS)
+    ] = 1e-6,
+    max_steps: Annotated[
+        int, typer.Option(min=1, metavar="N", help="Stop a path after N steps.", rich_help_panel=_STEPS)
+    ] = 5000,
+    check_steps: Annotated[
+        bool,
+        typer.Option(
+            help="Refuse steps that may have left the branch; without, the algorithm as printed.",
+            rich_help_panel=_STEPS,
+        ),
+    ] = True,
+    json_file: JsonOption = None,
+    csv_file: Annotated[
+        str | None,
+        typer.Option(
+            "--csv",
+            metavar="FILE",
+            help="Write one row a point, for enumsol audit; - is stdout.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    plot_file: PlotOption = None,
+    graph_file: Annotated[
+        str | None,
+        typer.Option(
+            "--graph",
+            metavar="FILE",
+            help="Draw over this graph of enumsol graph --save.",
+            rich_help_panel=PLOT,
+            show_default=False,
+        ),
+    ] = None,
+    quantity: QuantityOption = "lambda_n",
+    node: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LABEL",
+            help="Contact node to draw; default: the first.",
+            rich_help_panel=PLOT,
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Follow branches of solutions of PROBLEM from its roots at one alpha.
+
+    A root on a branch that was followed before is not followed again. Branches that have no root at that alpha are not
+    found: compare with enumsol graph, or enumsol audit.
+
+    Exit status: 0 when every path left the interval or closed; 3 when one ended otherwise or could not start; 2 on bad
+    input; 130 on Ctrl-C, after printing the paths so far.
+    """
+    check_outputs(json=json_file, csv=csv_file)
+    check_plot(plot_file)
+    if graph_file is not None and plot_file is None:
+        raise InvalidArgumentError("--graph is given without --plot; expected both")
+    if tangent is not None and (root is None or direction == "both"):
+        raise InvalidArgumentError("--tangent is given without --root or --direction; expected one root and direction")
+    options = _options(h_max, h_min, h_init, eps, max_steps, check_steps)
+    interval, alpha, signs = parse_interval(first, last), parse_alpha(start), _directions(direction)
+    body = load_problem(problem)
+    row = node_row(body, node)
+    over = None if graph_file is None else read_graph(graph_file, body)
+    tour = _Tour(body, (float(interval[0]), float(interval[1])), options, tangent)
+    interrupted = False
+    try:
+        tour.run(_starts(body, interval, alpha, arithmetic, root), signs, alone=root is not None)
+    except KeyboardInterrupt:
+        # wherever it came: the paths so far are kept
+        interrupted = True
+    if "-" not in (json_file, csv_file):
+        typer.echo(tour.as_text() + (" (interrupted)" if interrupted else ""))
+    if json_file is not None:
+        write_text(json_file, as_json({"problem": problem, "start": alpha, "interval": interval, **tour.content()}))
+    if csv_file is not None:
+        write_text(csv_file, tour.frame().to_csv(index=False))
+    if plot_file is not None and tour.paths:
+        write_figure(plot_file, _draw(tour.paths, over, row, quantity))
+    if interrupted:
+        raise typer.Exit(ExitStatus.INTERRUPTED)
+    raise typer.Exit(ExitStatus.DONE if tour.arrived else ExitStatus.INCOMPLETE)
+
+
+def _options(
+    h_max: float, h_min: float, h_init: float | None, eps: float, max_steps: int, check_steps: bool
+) -> ContinuationOptions:
+    from enumsol.continuation import ContinuationOptions
+
+    first = min(0.05, h_max) if h_init is None else h_init
+    return ContinuationOptions(
+        h_max=h_max,
+        h_min=h_min,
+        h_init=first,
+        eps=eps,
+        eps_prime=eps,
+        max_steps=max_steps,
+        check_steps=check_steps,
+    )
+
+
+def _directions(text: str) -> tuple[int, ...]:
+    known = {"+1": (1,), "1": (1,), "-1": (-1,), "both": (1, -1)}
+    if text not in known:
+        raise InvalidArgumentError(f"--direction is {text}; expected +1, -1 or both")
+    return known[text]
+
+
+def _starts(
+    problem: ContactProblem, interval: tuple[Alpha, Alpha], alpha: Alpha, arithmetic: Arithmetic, root: int | None
+) -> list[tuple[int, Root]]:
+    if not interval[0] <= alpha <= interval[1]:
+        low, high = (float(end) for end in interval)
+        raise InvalidArgumentError(f"--start is {float(alpha):g}; expected an alpha between {low:g} and {high:g}")
+    with SearchDisplay() as display:
+        found = enumerate_roots(problem, alpha, arithmetic, progress=display)
+    count = len(found)
+    if not count:
+        raise InvalidArgumentError(
+            f"there is no isolated root at alpha = {float(alpha):g} ({found.completeness()}); expected another --start"
+        )
+    if root is None:
+        return list(enumerate(found))
+    if root >= count:
+        raise InvalidArgumentError(
+            f"--root is {root}; expected a number below {count}, the number of roots at alpha = {float(alpha):g}"
+        )
+    return [(root, found[root])]
+
+
+@dataclass
+class _Tour:
+    """Paths from one root after the other."""
+
+    problem: ContactProblem
+    interval: tuple[float, float]
+    options: ContinuationOptions
+    tangent: int | None
+    paths: list[Path] = field(default_factory=list)
+    labels: list[tuple[int, int]] = field(default_factory=list)
+    failures: list[tuple[int, int, str]] = field(default_factory=list)
+    passed: dict[int, int] = field(default_factory=dict)
+
+    def run(self, starts: Sequence[tuple[int, Root]], signs: tuple[int, ...], *, alone: bool) -> None:
+        """Follow each start; Interrupted leaves what there is."""
+        with Display("following") as display:
+            for done, (number, root) in enumerate(starts):
+                earlier = next((k for k, path in enumerate(self.paths) if _passes(path, root)), None)
+                if earlier is not None:
+                    self.passed[number] = earlier
+                    continue
+                for sign in signs:
+                    if self._follow(number, root, sign, alone=alone):
+                        break
+                points = sum(len(path) for path in self.paths)
+                display.show((done + 1) / len(starts), f"{len(self.paths)} paths, {points:,} points")
+
+    def _follow(self, number: int, root: Root, sign: int, *, alone: bool) -> bool:
+        """One path; whether it closed."""
+        from enumsol.continuation import AmbiguousStart
+        from enumsol.continuation import follow as follow_path
+
+        try:
+            path = follow_path(self.problem, root, sign, self.interval, self.options, tangent=self.tangent)
+        except AmbiguousStart as error:
+            # the one root that was asked for: bad input; one among many: noted
+            if alone:
+                raise
+            self.failures.append((number, sign, str(error)))
+            return False
+        except Interrupted as interruption:
+            self._keep(number, sign, interruption.partial)
+            raise
+        self._keep(number, sign, path)
+        return path.closed
+
+    def _keep(self, number: int, sign: int, path: Path | Any) -> None:
+        self.paths.append(path)
+        self.labels.append((number, sign))
+
+    @property
+    def arrived(self) -> bool:
+        """Whether every path left the interval or closed."""
+        return not self.failures and all(path.status in _ARRIVED for path in self.paths)
+
+    def as_text(self) -> str:
+        """The printed paths."""
+        lines = []
+        for k, ((number, sign), path) in enumerate(zip(self.labels, self.paths, strict=True)):
+            lines += [f"path {k}, from root {number} in direction {sign:+d}: {path!r}", ""]
+        lines += [f"root {number} lies on path {k}" for number, k in self.passed.items()]
+        lines += [f"root {number} in direction {sign:+d}: {reason}" for number, sign, reason in self.failures]
+        ended = sum(path.status in _ARRIVED for path in self.paths)
+        lines.append(
+            f"{len(self.paths)} path{'s' * (len(self.paths) != 1)}, {ended} of them left the interval or closed"
+        )
+        return "\n".join(lines)
+
+    def frame(self) -> pd.DataFrame:
+        """Points of all paths, with the columns path, root and direction."""
+        import pandas as pd
+
+        frames = []
+        for k, ((number, sign), path) in enumerate(zip(self.labels, self.paths, strict=True)):
+            one = path.to_frame()
+            for at, (name, value) in enumerate((("path", k), ("root", number), ("direction", sign))):
+                one.insert(at, name, value)
+            frames.append(one)
+        return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=["path", "alpha"])
+
+    def content(self) -> dict[str, Any]:
+        """Everything, for JSON."""
+        return {
+            "paths": [
+                {"root": number, "direction": sign, **_content(path)}
+                for (number, sign), path in zip(self.labels, self.paths, strict=True)
+            ],
+            "passed": [{"root": number, "path": k} for number, k in self.passed.items()],
+            "failures": [{"root": number, "direction": sign, "reason": why} for number, sign, why in self.failures],
+        }
+
+
+def _passes(path: Path, root: Root) -> bool:
+    """Whether the path runs through a regular root: its selection has no other solution at that alpha."""
+    if not root.regular:
+        return False
+    alpha = float(root.alpha)
+    names = [point.statuses for point in path]
+    return any(
+        names[k] == root.statuses and (path.alpha[k] - alpha) * (path.alpha[k + 1] - alpha) <= 0
+        for k in range(len(path) - 1)
+    )
+
+
+def _content(path: Path) -> dict[str, Any]:
+    return {
+        "status": path.status,
+        "message": path.message,
+        "closed": path.closed,
+        "stats": vars(path.stats),
+        "folds": [item.alpha for item in path.folds],
+        "transitions": [
+            {
+                "alpha": item.alpha,
+                "point": item.point,
+                "before": [status.value for status in item.before],
+                "after": [status.value for status in item.after],
+                "fold": item in path.folds,
+                "local_branch": None if item.local_test is None else item.local_test.exists,
+            }
+            for item in path.transitions
+        ],
+        "points": path.to_frame().to_dict("list"),
+    }
+
+
+def _draw(paths: Sequence[Path], over: BranchGraph | None, node: int, quantity: str) -> Any:
+    axes = paths[0].plot(over, node=node, quantity=quantity)
+    for path in paths[1:]:
+        path.plot(ax=axes, node=node, quantity=quantity)
+    return axes.figure

@@ -1,0 +1,65 @@
+"""``enumsol gallery``: the named problems, and files made of them."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from enumsol import gallery
+from enumsol.io import write_problem
+
+app = typer.Typer(help="Named problems to try things on.", no_args_is_help=False)
+
+
+@app.callback(invoke_without_command=True)
+def _gallery(context: typer.Context) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+@app.command("list")
+def list_() -> None:
+    """List the problems, each with an alpha worth a look and the number of its roots there."""
+    rows = [
+        (entry.name, f"{entry.alpha:g}", "family" if entry.roots is None else str(entry.roots), entry.summary)
+        for entry in gallery.GALLERY.values()
+    ]
+    if not sys.stdout.isatty():
+        # for other programs: one line a problem, however long
+        widths = [max(len(row[k]) for row in rows) for k in range(3)]
+        for name, alpha, roots, summary in rows:
+            typer.echo(f"{name:<{widths[0]}}  {alpha:>{widths[1]}}  {roots:>{widths[2]}}  {summary}")
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("NAME", no_wrap=True)
+    table.add_column("alpha", justify="right", no_wrap=True)
+    table.add_column("roots", justify="right", no_wrap=True)
+    table.add_column("what it shows")
+    for row in rows:
+        table.add_row(*row)
+    console = Console(highlight=False)
+    console.print(table, markup=False)
+    console.print("\nTry one: enumsol roots gallery:NAME --alpha ALPHA", style="dim", markup=False)
+
+
+@app.command()
+def write(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="As in enumsol gallery list.", show_default=False)],
+    file: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE",
+            help="Where to: .npz, .h5 (fclib), or a directory for MatrixMarket files.",
+            show_default=False,
+        ),
+    ],
+) -> None:
+    """Write the problem NAME to FILE, in a form that read_problem and the other commands take."""
+    entry = gallery.get(name.removeprefix("gallery:"))
+    write_problem(entry.build(), file)
+    typer.echo(f"wrote {entry.name} to {file}; try: enumsol roots {file} --alpha {entry.alpha:g}")

@@ -1,0 +1,131 @@
+"""Results on stdout and in files: texts, JSON, figures."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from fractions import Fraction
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+
+from enumsol.errors import InvalidArgumentError, MissingDependencyError
+
+
+def check_writable(path: str | None, option: str) -> None:
+    """Refuse a place that cannot be written before a long search rather than after it.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is a directory, or its directory does not exist or may not be written to.
+    """
+    if path is None or path == "-":
+        return
+    place = Path(path)
+    if place.is_dir():
+        raise InvalidArgumentError(
+            f"{option} is {path}, a directory; expected the name of a file, or - for the terminal"
+        )
+    if not place.parent.is_dir() or not os.access(place if place.exists() else place.parent, os.W_OK):
+        raise InvalidArgumentError(
+            f"{option} is {path}, which cannot be written; expected a file in a writable directory"
+        )
+
+
+def write_text(path: str, text: str) -> None:
+    """Write a result to a file, or to stdout for ``-``.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file cannot be written.
+    """
+    if path == "-":
+        typer.echo(text, nl=not text.endswith("\n"))
+        return
+    try:
+        Path(path).write_text(text if text.endswith("\n") else text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InvalidArgumentError(
+            f"{path} cannot be written ({error.strerror}); expected a file in a writable directory"
+        ) from error
+
+
+def check_outputs(**paths: str | None) -> None:
+    """Refuse results that cannot be written, or two results on stdout; named as their options are.
+
+    Raises
+    ------
+    InvalidArgumentError
+        As `check_writable`, or two of them are ``-``.
+    """
+    on_stdout = [f"--{name}" for name, path in paths.items() if path == "-"]
+    if len(on_stdout) > 1:
+        raise InvalidArgumentError(f"{' and '.join(on_stdout)} are both -; expected one of them to be a file")
+    for name, path in paths.items():
+        check_writable(path, f"--{name}")
+
+
+def check_plot(path: str | None) -> None:
+    """Refuse a figure that cannot be drawn before the search rather than after it.
+
+    Raises
+    ------
+    MissingDependencyError
+        matplotlib is not installed.
+    InvalidArgumentError
+        The file cannot be written, or its name has an ending for which there is no format.
+    """
+    if path is None:
+        return
+    if find_spec("matplotlib") is None:
+        raise MissingDependencyError(
+            '--plot needs matplotlib, which is not installed; install it with: pip install "enumsol[plots]"'
+        )
+    if path == "-":
+        raise InvalidArgumentError("--plot is -, but a figure is a binary file; expected the name of a file")
+    check_writable(path, "--plot")
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    known = FigureCanvasBase.get_supported_filetypes()
+    ending = Path(path).suffix.removeprefix(".").lower()
+    if ending not in known:
+        raise InvalidArgumentError(f"--plot is {path}; expected a file name that ends in .png, .pdf or .svg")
+
+
+def write_figure(path: str, figure: Any) -> None:
+    """Write a matplotlib figure.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file cannot be written.
+    """
+    try:
+        figure.savefig(path, dpi=150)
+    except OSError as error:
+        raise InvalidArgumentError(
+            f"{path} cannot be written ({error.strerror}); expected a file in a writable directory"
+        ) from error
+
+
+def as_json(content: Any) -> str:
+    """JSON text of dictionaries, sequences, arrays and numbers; what is not finite is null."""
+    return json.dumps(_plain(content), indent=1)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, (np.generic, Fraction)):
+        return _plain(value.item() if isinstance(value, np.generic) else float(value))
+    return None if isinstance(value, float) and not math.isfinite(value) else value

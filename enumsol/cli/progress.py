@@ -1,0 +1,90 @@
+"""Progress on stderr."""
+
+from __future__ import annotations
+
+import sys
+import time
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Any, Self
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import TracebackType
+
+    from rich.progress import Progress, TaskID
+
+    from enumsol.enumeration import SearchProgress
+
+#: Work shorter than this shows no progress [seconds].
+_PROGRESS_DELAY = 1.0
+
+
+class Display(AbstractContextManager[Any]):
+    """A progress bar on stderr, shown on a terminal when the work lasts.
+
+    Parameters
+    ----------
+    title : str
+        What is going on.
+    """
+
+    def __init__(self, title: str) -> None:
+        self._title = title
+        self._started = time.perf_counter()
+        self._progress: Progress | None = None
+        self._task: TaskID | None = None
+        self._shown = sys.stderr.isatty()
+
+    def __enter__(self) -> Self:
+        """Nothing is shown yet."""
+        return self
+
+    def show(self, share: float, note: str) -> None:
+        """Show how much is done, and a note behind it."""
+        seconds = time.perf_counter() - self._started
+        if not self._shown or (self._progress is None and seconds < _PROGRESS_DELAY):
+            return
+        if self._progress is None or self._task is None:
+            self._progress, self._task = _progress_bar(self._title)
+        self._progress.update(self._task, completed=share, counts=f"{note}  {seconds:.0f} s")
+        self._progress.start()
+
+    def count(self, unit: str) -> Callable[[int, int], None]:
+        """A callback that is told how many of all are done."""
+        return lambda done, of: self.show(done / max(of, 1), f"{done:,} of {of:,} {unit}")
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Take the bar away."""
+        if self._progress is not None:
+            self._progress.stop()
+
+
+class SearchDisplay(Display):
+    """Progress of a search: the callback of enumerate_roots."""
+
+    def __init__(self) -> None:
+        super().__init__("searching")
+
+    def __call__(self, state: SearchProgress) -> None:
+        """Show where the search is."""
+        self.show(state.covered, f"nodes {state.nodes:,}  roots {state.solutions:,}")
+
+
+def _progress_bar(title: str) -> tuple[Progress, TaskID]:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    progress = Progress(
+        TextColumn(title),
+        BarColumn(bar_width=24),
+        TextColumn("{task.percentage:.2f}%  {task.fields[counts]}"),
+        console=Console(stderr=True),
+        transient=True,
+        refresh_per_second=4,
+    )
+    return progress, progress.add_task("", total=1.0, counts="")

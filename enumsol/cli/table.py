@@ -1,0 +1,166 @@
+"""``enumsol table``: the number of solutions at many alphas."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from enumsol.cli.common import (
+    LIMITS,
+    OUTPUT,
+    Arithmetic,
+    ExitStatus,
+    JsonOption,
+    ProblemArgument,
+    load_problem,
+    parse_alpha,
+    parse_interval,
+    workers,
+)
+from enumsol.cli.output import as_json, check_outputs, write_text
+from enumsol.cli.progress import Display
+from enumsol.errors import Interrupted, InvalidArgumentError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from enumsol.problem import Alpha, ContactProblem
+
+#: Names of the columns on the terminal.
+_NAMES = {
+    "with_open": "open",
+    "with_stick": "stick",
+    "with_slip_plus": "slip+",
+    "with_slip_minus": "slip-",
+    "index_sum": "index sum",
+}
+#: Longer tables are printed as runs of equal counts.
+_ROWS = 40
+
+
+def table(
+    problem: ProblemArgument,
+    first: Annotated[
+        str | None, typer.Option("--from", metavar="NUMBER", help="First alpha.", show_default=False)
+    ] = None,
+    last: Annotated[str | None, typer.Option("--to", metavar="NUMBER", help="Last alpha.", show_default=False)] = None,
+    samples: Annotated[int, typer.Option(min=2, metavar="N", help="Evenly spaced alphas, both ends included.")] = 21,
+    alphas: Annotated[
+        str | None,
+        typer.Option(metavar="LIST", help="Instead of these: alphas, such as 1,2.5,8/3.", show_default=False),
+    ] = None,
+    arithmetic: Annotated[Arithmetic, typer.Option(help="Of each enumeration, as in enumsol roots.")] = "verified",
+    max_nodes: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help="Most nodes of the tree at one alpha.", rich_help_panel=LIMITS),
+    ] = None,
+    time_limit: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="Longest search, per alpha.", rich_help_panel=LIMITS)
+    ] = None,
+    jobs: Annotated[
+        int, typer.Option(min=1, metavar="N", help="Processes: alphas searched at a time.", rich_help_panel=LIMITS)
+    ] = 1,
+    json_file: JsonOption = None,
+    csv_file: Annotated[
+        str | None,
+        typer.Option("--csv", metavar="FILE", help="Write one row an alpha; - is stdout.", rich_help_panel=OUTPUT),
+    ] = None,
+) -> None:
+    """Count the solutions of PROBLEM at many alphas, by kind of contact.
+
+    What happens between the alphas is not seen; enumsol graph sees it.
+
+    Exit status: 0 when complete at every alpha (in fast arithmetic, which proves nothing: when every search ran to its
+    end with nothing undecided); 3 when something stayed undecided or the indices do not add up to +1 somewhere; 2 on
+    bad input; 130 on Ctrl-C, after printing what was done so far.
+    """
+    check_outputs(json=json_file, csv=csv_file)
+    values, body = _alphas(first, last, samples, alphas), load_problem(problem)
+    options: dict[str, Any] = {"max_nodes": max_nodes, "time_limit": time_limit}
+    interrupted = False
+    frame: Any
+    try:
+        frame = _search(body, values, arithmetic, jobs, {k: v for k, v in options.items() if v is not None})
+    except Interrupted as interruption:
+        interrupted, frame = True, interruption.partial
+    if "-" not in (json_file, csv_file):
+        typer.echo(_as_text(frame, len(values)))
+    if json_file is not None:
+        rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
+        write_text(json_file, as_json({"problem": problem, "arithmetic": arithmetic, "rows": rows}))
+    if csv_file is not None:
+        write_text(csv_file, frame.to_csv(index=False))
+    if interrupted:
+        raise typer.Exit(ExitStatus.INTERRUPTED)
+    raise typer.Exit(ExitStatus.INCOMPLETE if len(_open(frame)) else ExitStatus.DONE)
+
+
+def _alphas(first: str | None, last: str | None, samples: int, listed: str | None) -> list[Alpha]:
+    if listed is not None:
+        if first is not None or last is not None:
+            raise InvalidArgumentError("--alphas and --from or --to are both given; expected one or the other")
+        return [parse_alpha(text.strip()) for text in listed.split(",")]
+    if first is None or last is None:
+        raise InvalidArgumentError("expected --from and --to, or --alphas")
+    low, high = parse_interval(first, last)
+    if isinstance(low, Fraction) or isinstance(high, Fraction):
+        start, width = Fraction(low), Fraction(high) - Fraction(low)
+        return [start + width * k / (samples - 1) for k in range(samples)]
+    return [float(alpha) for alpha in np.linspace(low, high, samples)]
+
+
+def _search(
+    problem: ContactProblem, alphas: list[Alpha], arithmetic: Arithmetic, jobs: int, options: dict[str, Any]
+) -> pd.DataFrame:
+    from enumsol.branches import multiplicity_table
+
+    with workers(jobs) as executor, Display("enumerating") as display:
+        return multiplicity_table(
+            problem, alphas, arithmetic=arithmetic, executor=executor, progress=display.count("alphas"), **options
+        )
+
+
+def _open(frame: pd.DataFrame) -> pd.DataFrame:
+    """Rows at which something is undecided or known to be missing."""
+    known = frame["index_sum"].notna()
+    return frame[frame["undecided"].gt(0) | (known & frame["index_sum"].ne(1))]
+
+
+def _as_text(frame: pd.DataFrame, asked: int) -> str:
+    shown = frame.drop(columns=["nodes", "seconds"]).rename(columns=_NAMES)
+    if not shown["undecided"].any():
+        shown = shown.drop(columns="undecided")
+    known = shown["index sum"].notna()
+    shown["index sum"] = shown["index sum"].map("{:+}".format).where(known, "?")
+    shown["complete"] = ["yes" if value else "no" for value in shown["complete"]]
+    if len(shown) > _ROWS:
+        shown = _runs(shown)
+    for name in ("alpha", "to alpha"):
+        if name in shown:
+            shown[name] = [f"{value:.8g}" for value in shown[name]]
+    lines = [shown.to_string(index=False)] if len(shown) else []
+    return "\n".join([*lines, "", _closing_line(frame, asked)])
+
+
+def _runs(frame: pd.DataFrame) -> pd.DataFrame:
+    """Neighbouring rows with equal counts as one."""
+    counts = frame.drop(columns="alpha")
+    run = counts.ne(counts.shift()).any(axis=1).cumsum()
+    first, last = frame.groupby(run).first(), frame["alpha"].groupby(run).last()
+    first.insert(1, "to alpha", last)
+    return first
+
+
+def _closing_line(frame: pd.DataFrame, asked: int) -> str:
+    if len(frame) < asked:
+        return f"complete: no (interrupted after {len(frame)} of {asked} alphas)"
+    left = _open(frame)
+    if len(left):
+        some = ", ".join(f"{alpha:g}" for alpha in left["alpha"][:5]) + (", ..." if len(left) > 5 else "")
+        return f"complete: no (at {len(left)} of {asked} alphas: {some})"
+    if frame["complete"].all():
+        return f"complete: yes (proven at all {asked} alphas; says nothing about those in between)"
+    return "complete: not proven (0 undecided)"

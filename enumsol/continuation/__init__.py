@@ -1,0 +1,37 @@
+"""Piecewise smooth Newton and Moore-Penrose continuation (Algorithm 5.1), the local branch test and audits."""
+
+from enumsol.continuation.audit import AuditReport, Jump, MissedArc, audit
+from enumsol.continuation.errors import AmbiguousStart, NewtonIteration, NotConverged
+from enumsol.continuation.follow import follow, start_tangents
+from enumsol.continuation.follow_all import FollowAllResult, follow_all, follow_arc
+from enumsol.continuation.local_test import LocalBranchTest, local_branch_test
+from enumsol.continuation.newton import newton
+from enumsol.continuation.options import ContinuationOptions
+from enumsol.continuation.parameter_path import SmoothPath
+from enumsol.continuation.path import Path, PathPoint, PathStats, Transition
+from enumsol.continuation.tangents import Tangent
+
+__all__ = [
+    "AmbiguousStart",
+    "AuditReport",
+    "ContinuationOptions",
+    "FollowAllResult",
+    "Jump",
+    "LocalBranchTest",
+    "MissedArc",
+    "NewtonIteration",
+    "NotConverged",
+    "Path",
+    "PathPoint",
+    "PathStats",
+    "SmoothPath",
+    "Tangent",
+    "Transition",
+    "audit",
+    "follow",
+    "follow_all",
+    "follow_arc",
+    "local_branch_test",
+    "newton",
+    "start_tangents",
+]

@@ -1,0 +1,121 @@
+"""Corrections: the Moore-Penrose corrector of Algorithm 5.1 and smooth Newton corrections inside one selection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from enumsol.continuation.equation import Codes, CondensedEquation, Vector
+    from enumsol.continuation.options import ContinuationOptions
+
+#: Smooth Newton iterations inside a selection; quadratic convergence needs about five.
+MAX_SMOOTH_ITERATIONS = 20
+#: Corrections longer than this diverge: solutions have forces of size one at most, and steps are not much longer.
+MAX_CORRECTION = 1e6
+#: Smooth corrections that no longer get shorter have reached rounding, provided that they are at most this long.
+STAGNATION = 1e-8
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Result of the corrections of one step.
+
+    Attributes
+    ----------
+    x : (2p + 1,) array
+    count : int
+        Number of corrections.
+    converged : bool
+    residual : float
+        Norm of H at x.
+    tangent : (2p + 1,) array
+        Unit tangent of the last selection, turned from the prediction's by less than a right angle a correction.
+    """
+
+    x: Vector
+    count: int
+    converged: bool
+    residual: float
+    tangent: Vector
+
+
+def moore_penrose(equation: CondensedEquation, x: Vector, tangent: Vector, options: ContinuationOptions) -> Correction:
+    """Steps 3-6 of Algorithm 5.1 from the prediction x: Newton's method across selections with a rotating tangent."""
+    size = 2 * equation.p
+    T: Vector = tangent
+    residual = np.inf
+    for count in range(1, options.k_max + 2):
+        J = equation.jacobian(equation.test_functions(x) > 0, x)
+        bordered = np.vstack([J, equation.metric @ T])
+        right = np.zeros((size + 1, 2))
+        right[:size, 0] = J @ T
+        right[:size, 1] = equation.residual(x)
+        if not (np.all(np.isfinite(bordered)) and np.all(np.isfinite(right))):
+            break
+        try:
+            steps: Vector = np.asarray(np.linalg.solve(bordered, right), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            break  # a selection whose gradient does not fit the tangent: a shorter step is tried
+        if not np.max(np.abs(steps)) <= MAX_CORRECTION:
+            break
+        turned: Vector = np.asarray(T - steps[:, 0], dtype=np.float64)
+        length = equation.norm(turned)
+        x = x - steps[:, 1]
+        if length == 0:
+            break
+        T = turned / length
+        residual = float(np.linalg.norm(equation.residual(x)))
+        if residual < options.eps and equation.norm(steps[:, 1]) < options.eps_prime:
+            return Correction(x, count, True, residual, T)
+    return Correction(x, count, False, residual, T)
+
+
+def smooth_newton(
+    equation: CondensedEquation, codes: Codes, x: Vector, row: Vector | tuple[int, int], value: float, tolerance: float
+) -> Vector | None:
+    """Point of a selection's solution curve at which one more condition holds, by Newton's method from x.
+
+    Parameters
+    ----------
+    codes : statuses that name the selection
+    row : (2p + 1,) array, or (node, k)
+        The condition: ``row @ x = value``, or a slack of `CondensedEquation.slacks` that shall be ``value``.
+    tolerance : float
+        Length of the last correction.
+
+    Returns
+    -------
+    (2p + 1,) array, or None when it does not converge
+    """
+    rows = equation.selection(codes)
+    last = np.inf
+    for _ in range(MAX_SMOOTH_ITERATIONS):
+        if isinstance(row, tuple):
+            gradient = equation.slack_gradient(codes, x, row)
+            defect = equation.slacks(codes, x)[row] - value
+        else:
+            gradient, defect = row, row @ x - value
+        matrix = np.vstack([equation.jacobian(rows, x), gradient])
+        right = np.append(equation.selection_residual(rows, x), defect)
+        if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(right))):
+            return None
+        step = _solve(matrix, right)
+        if not np.max(np.abs(step)) <= MAX_CORRECTION:
+            return None
+        x = x - step
+        length = equation.norm(step)
+        if length <= tolerance or 0.5 * last < length <= STAGNATION:
+            return x
+        last = length
+    return None
+
+
+def _solve(matrix: Vector, right: Vector) -> Vector:
+    """Newton step; of least length where the matrix is singular (a vertical segment ends in a bifurcation point)."""
+    try:
+        return np.asarray(np.linalg.solve(matrix, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0])

@@ -1,0 +1,221 @@
+"""Every branch of a graph followed from its starting points, and single arcs followed from where they meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.continuation.audit import DETOUR, POINT_TOLERANCE, AuditReport, audit_on
+from enumsol.continuation.errors import AmbiguousStart
+from enumsol.continuation.follow import follow, start_tangents
+from enumsol.continuation.path import Path, PathStats
+from enumsol.continuation.places import GraphMap
+from enumsol.errors import InvalidArgumentError, TooLargeError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from enumsol.continuation.options import ContinuationOptions
+    from enumsol.continuation.places import GraphLike
+    from enumsol.problem import ContactProblem
+
+#: Where on a missed arc it is started anew, as fractions of its interval; its ends are transition points.
+_SEEDS = (0.5, 0.25, 0.75)
+
+
+@dataclass(frozen=True)
+class FollowAllResult:
+    """All branches followed.
+
+    Attributes
+    ----------
+    paths : tuple of Path
+    report : AuditReport
+        Of all paths together.
+    failures : tuple of (alpha, str)
+        Starts from which no path could be followed, with the reason, and paths that stalled.
+    reseeded : int
+        Paths that were started on arcs which those from the starting points had missed.
+    graph : BranchGraph
+    """
+
+    paths: tuple[Path, ...]
+    report: AuditReport
+    failures: tuple[tuple[float, str], ...]
+    reseeded: int
+    graph: Any
+
+    @property
+    def complete(self) -> bool:
+        """Every arc was visited, every point lies on the graph, and there is no jump."""
+        return self.report.ok and self.report.complete
+
+    @property
+    def stats(self) -> PathStats:
+        """Steps and corrections of all paths."""
+        return sum((path.stats for path in self.paths), PathStats())
+
+    def __repr__(self) -> str:
+        stats = self.stats
+        lines = [
+            f"{len(self.paths)} paths ({self.reseeded} reseeded), {stats.accepted} steps, "
+            f"{stats.corrections} corrections",
+            *(f"  failed at alpha = {alpha:.8g}: {reason}" for alpha, reason in self.failures),
+            repr(self.report),
+        ]
+        return "\n".join(lines)
+
+
+def follow_all(
+    problem: ContactProblem,
+    interval: tuple[float, float],
+    options: ContinuationOptions | None = None,
+    *,
+    graph: GraphLike | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> FollowAllResult:
+    """Every branch in the interval followed in both directions, and the audit of all paths.
+
+    Paths start from ``graph.starting_points()``; starts on arcs that were already passed are left out. Arcs missed by
+    these, which may happen beyond bifurcations, are started anew.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    interval : (float, float)
+    options : ContinuationOptions or None
+    graph : BranchGraph or None
+        Of this problem over this interval; made by ``branch_graph`` when None.
+    progress : callable or None
+        Called with the number of arcs visited and of all arcs after every path.
+
+    Returns
+    -------
+    FollowAllResult
+
+    Raises
+    ------
+    InvalidArgumentError
+        The graph belongs to another problem.
+    """
+    if graph is None:
+        from enumsol.branches import branch_graph  # python-flint and networkx, slow to import
+
+        graph = branch_graph(problem, interval)
+    if graph.problem is not problem and graph.problem.p != problem.p:
+        raise InvalidArgumentError(f"graph has {graph.problem.p} contact nodes; expected the problem's {problem.p}")
+    crew = _Crew(problem, interval, options, graph, progress)
+    for start in graph.starting_points():
+        crew.start(start)
+    seeded = len(crew.paths)
+    for seed in crew.missed_seeds():
+        crew.start(seed)
+    report = audit_on(crew.chart, crew.paths, DETOUR)
+    return FollowAllResult(tuple(crew.paths), report, tuple(crew.failures), len(crew.paths) - seeded, graph)
+
+
+class _Crew:
+    """Paths so far, and the arcs that they passed."""
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        interval: tuple[float, float],
+        options: ContinuationOptions | None,
+        graph: GraphLike,
+        progress: Callable[[int, int], object] | None,
+    ) -> None:
+        self.problem, self.interval, self.options = problem, interval, options
+        self.graph, self.progress = graph, progress
+        self.chart = GraphMap(graph, POINT_TOLERANCE)
+        self.paths: list[Path] = []
+        self.failures: list[tuple[float, str]] = []
+        self.visited: set[int] = set()
+
+    def start(self, start: Any) -> None:
+        """Follow a start in both directions unless its arc was passed before."""
+        place = self.chart.place(self.chart.point(float(start.alpha), start.lambda_n, start.lambda_t))
+        if place.kind == "arc" and place.distance <= POINT_TOLERANCE and place.number in self.visited:
+            return
+        for direction in (1, -1):
+            try:
+                path = follow(self.problem, start, direction, self.interval, self.options)
+            except (AmbiguousStart, TooLargeError) as error:
+                self.failures.append((float(start.alpha), str(error)))
+                continue
+            self.paths.append(path)
+            if path.status in ("stalled", "dead end", "step limit"):
+                self.failures.append((float(path.alpha[-1]), path.message))
+            self.visited |= audit_on(self.chart, path, DETOUR).visited
+            if self.progress is not None:
+                self.progress(len(self.visited), len(self.graph.arcs))
+            if path.closed:
+                break
+
+    def missed_seeds(self) -> Iterator[Any]:
+        """Roots on arcs that were not visited so far."""
+        for arc in self.graph.arcs:
+            if arc.dimension or not arc.lo < arc.hi:
+                continue
+            for share in _SEEDS:
+                if arc.number in self.visited:
+                    break
+                yield _seed(arc, arc.lo + share * (arc.hi - arc.lo))
+
+
+@dataclass(frozen=True)
+class _Seed:
+    alpha: float
+    lambda_n: Any
+    lambda_t: Any
+
+
+def _seed(arc: Any, alpha: float) -> _Seed:
+    return _Seed(alpha, *arc.values(alpha))
+
+
+def follow_arc(
+    problem: ContactProblem,
+    graph: GraphLike,
+    vertex: int,
+    arc: int,
+    interval: tuple[float, float] | None = None,
+    options: ContinuationOptions | None = None,
+) -> Path:
+    """A path that leaves a vertex of the graph on one of the arcs that meet there (branch switching).
+
+    The path starts at the vertex itself where its tangents tell the arcs apart by first derivatives, and in the middle
+    of the arc where they do not, or where the vertex is a family.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    graph : BranchGraph
+    vertex, arc : int
+        Numbers of the vertex and of an arc that ends there.
+    interval : (float, float) or None
+        None: the graph's.
+    options : ContinuationOptions or None
+
+    Raises
+    ------
+    InvalidArgumentError
+        The arc does not end at the vertex, or is a sheet.
+    """
+    chosen = next((item for item in graph.arcs if item.number == arc), None)
+    point = next((item for item in graph.vertices if item.number == vertex), None)
+    if chosen is None or point is None or vertex not in (chosen.tail, chosen.head) or chosen.dimension:
+        raise InvalidArgumentError(f"arc {arc} is not an arc of single roots that ends at vertex {vertex} of the graph")
+    span = interval if interval is not None else (float(graph.interval[0]), float(graph.interval[1]))
+    sign = 1 if vertex == chosen.tail else -1
+    if point.family is None:
+        tangents = start_tangents(problem, point, span, options)
+        fitting = [k for k, t in enumerate(tangents) if t.statuses == chosen.statuses and np.sign(t.dalpha) == sign]
+        if len(fitting) == 1:
+            return follow(problem, point, 1, span, options, tangent=fitting[0])
+    middle = _seed(chosen, 0.5 * (chosen.lo + chosen.hi))
+    tangents = start_tangents(problem, middle, span, options)
+    k = max(range(len(tangents)), key=lambda k: sign * tangents[k].dalpha)
+    return follow(problem, middle, 1, span, options, tangent=k)

@@ -1,0 +1,385 @@
+"""The loop of Algorithm 5.1: predictions, corrections, step control, checks of steps, and stop conditions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
+from enumsol.continuation.equation import STATUS_TOLERANCE
+from enumsol.continuation.kinks import (
+    FORWARD_TOLERANCE,
+    CurvePoint,
+    Kink,
+    confirm,
+    continuations,
+    next_kink,
+    passed_kink,
+    same_curve,
+)
+from enumsol.continuation.recorder import Recorder
+from enumsol.continuation.tangents import curve_tangent, orientation
+from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from enumsol.continuation.equation import Codes, CondensedEquation, Vector
+    from enumsol.continuation.options import ContinuationOptions
+    from enumsol.continuation.parameter_path import SmoothPath
+    from enumsol.continuation.path import Path
+    from enumsol.continuation.tangents import Tangent
+
+#: Conditions may be negative by this much at a point that is converged to rounding.
+ROUNDING = 1e-12
+#: Two points closer than this are the same point of the solution set: located points agree to about 1e-10.
+SAME_POINT = 1e-7
+#: Without checks a transition point may lie behind: by this times h_min or eps, for steps are refused beyond it.
+UNCHECKED_REACH = 100.0
+#: Selection changes in a row without moving after which the path is stuck at a point where many selections meet.
+MAX_CHANGES_IN_PLACE = 32
+
+
+@dataclass(frozen=True)
+class _Step:
+    """An accepted step: its end, the transition points passed on the way, and how it was found."""
+
+    end: CurvePoint
+    kinks: tuple[Kink, ...]
+    length: float
+    corrections: int
+
+
+@dataclass(frozen=True)
+class _Stop:
+    status: str
+    message: str
+
+
+class Follower:
+    """One continuation.
+
+    Parameters
+    ----------
+    equation : CondensedEquation
+    first : CurvePoint
+        The start and the direction in which to leave it.
+    sign : {+1, -1}
+        Orientation kept along the path.
+    interval : (float, float)
+        Range of unscaled alpha.
+    options : ContinuationOptions
+    smooth_path : SmoothPath or None
+        Carried into the Path.
+    visited : sequence of Path
+    """
+
+    def __init__(
+        self,
+        equation: CondensedEquation,
+        first: CurvePoint,
+        sign: int,
+        interval: tuple[float, float],
+        options: ContinuationOptions,
+        smooth_path: SmoothPath | None,
+        visited: Sequence[Path],
+    ) -> None:
+        self.equation, self.options, self.interval = equation, options, interval
+        self.current, self.sign = first, sign
+        self.h = options.h_init
+        self._smooth_path = smooth_path
+        self._origin = first
+        self._in_place = 0
+        self._friction_ends = False
+        low, high = interval
+        margin = options.overshoot
+        self._low, self._high = (low - margin) / equation.alpha_scale, (high + margin) / equation.alpha_scale
+        self._landmarks = list(_landmarks(equation, visited))
+        self.record = Recorder(equation)
+        self.record.add(first, "start")
+
+    def run(self) -> Path:
+        """Follow until a stop condition is met."""
+        try:
+            stop = None
+            while stop is None:
+                stop = self._advance()
+        except KeyboardInterrupt as interruption:
+            message = f"interrupted at alpha = {self._alpha():g}; path.resume() goes on"
+            partial = self._path(_Stop("interrupted", message))
+            raise Interrupted(f"follow was {message}", partial) from interruption
+        return self._path(stop)
+
+    def _path(self, stop: _Stop) -> Path:
+        return self.record.path(
+            stop.status,
+            stop.message,
+            orientation=self.sign,
+            interval=self.interval,
+            options=self.options,
+            next_step=self.h,
+            smooth_path=self._smooth_path,
+        )
+
+    def _alpha(self) -> float:
+        return self.equation.alpha(self.current.x)
+
+    # -- one step of Algorithm 5.1 -----------------------------------------------------------------------------------
+
+    def _advance(self) -> _Stop | None:
+        if self.record.stats.accepted >= self.options.max_steps:
+            return _Stop(
+                "step limit",
+                f"the limit of {self.options.max_steps} steps was reached at alpha = {self._alpha():g}; "
+                "path.resume() goes on",
+            )
+        step = self._step()
+        if step is None:
+            return self._change_selection()
+        self._in_place = 0
+        return self._take(step)
+
+    def _step(self) -> _Step | None:
+        """Steps 2-7 and 9: an accepted step, or None when even the shortest one fails."""
+        options, h, shortened = self.options, self.h, False
+        while True:
+            self._friction_ends = False
+            prediction = self.current.x + h * self.current.tangent
+            correction = moore_penrose(self.equation, prediction, self.current.tangent, options)
+            self.record.count(corrections=correction.count)
+            if correction.converged:
+                found = self._judge(correction, h)
+                if found is not None:
+                    self.record.count(accepted=1)
+                    longer = correction.count - 1 < options.k_thr and not shortened
+                    self.h = min(options.h_inc * h, options.h_max) if longer else h
+                    return found
+                self.record.count(refused=1)
+            else:
+                self.record.count(not_converged=1)
+            if h <= options.h_min:
+                return None
+            h, shortened = max(options.h_dec * h, options.h_min), True
+
+    def _judge(self, correction: Correction, h: float) -> _Step | None:
+        """The step that ends at the corrected point, or None when it does not continue the path."""
+        self._friction_ends = bool(np.any(self.equation.at(correction.x).F < 0)) and self._inside(correction.x)
+        if self._friction_ends:
+            return None
+        if not self.options.check_steps:
+            return self._unchecked(correction, h)
+        end = self._end_point(correction)
+        if end is None:
+            return None
+        if end.codes == self.current.codes:
+            if not same_curve(self.equation, self.current, end, sharp=h <= self.options.h_min):
+                return None
+            return _Step(end, (), h, correction.count)
+        kink = confirm(self.equation, self.current, end, self.sign, self.options.transition_tolerance)
+        return None if kink is None else _Step(end, (kink,), h, correction.count)
+
+    def _end_point(self, correction: Correction) -> CurvePoint | None:
+        """The solution beside a corrected point, converged to rounding; None when it is not admissible.
+
+        H is small near the tip of a fold, where no solution is: only the conditions of a converged point tell.
+        """
+        equation = self.equation
+        codes = equation.codes(correction.x, self.current.codes, max(STATUS_TOLERANCE, 10 * correction.residual))
+        tangent = curve_tangent(equation, codes, correction.x, self.sign)
+        if tangent is None:
+            return None
+        row = equation.metric @ tangent
+        tolerance = self.options.transition_tolerance
+        x = smooth_newton(equation, codes, correction.x, row, float(row @ correction.x), tolerance)
+        if x is None or np.min(equation.slacks(codes, x)) < -ROUNDING:
+            return None
+        tangent = curve_tangent(equation, codes, x, self.sign)
+        return None if tangent is None else CurvePoint(x, codes, tangent)
+
+    def _unchecked(self, correction: Correction, h: float) -> _Step | None:
+        """The step as Algorithm 5.1 takes it: any converged correction, with the tangent of its last correction."""
+        tolerance = max(STATUS_TOLERANCE, 10 * correction.residual)
+        codes = self.equation.codes(correction.x, self.current.codes, tolerance)
+        tangent = curve_tangent(self.equation, codes, correction.x, self.sign)
+        if tangent is None:
+            return None
+        end = CurvePoint(correction.x, codes, tangent)
+        kinks: tuple[Kink, ...] = ()
+        if end.codes != self.current.codes:
+            kink = confirm(self.equation, self.current, end, self.sign, self.options.transition_tolerance)
+            kinks = () if kink is None else (kink,)
+        if self.equation.dot(end.tangent, correction.tangent) < 0:
+            end = CurvePoint(end.x, end.codes, -end.tangent)
+            self.sign = orientation(self.equation, end.codes, end.x, end.tangent)
+        return _Step(end, kinks, h, correction.count)
+
+    def _change_selection(self) -> _Stop | None:
+        """Step 8: go to the next transition point of the current curve and leave it on another selection."""
+        equation, options = self.equation, self.options
+        if self._friction_ends:
+            return _Stop(
+                "friction", f"a friction coefficient becomes negative beyond alpha = {self._alpha():g}; expected F >= 0"
+            )
+        arrival = next_kink(equation, self.current, self.sign, options.transition_tolerance)
+        if arrival is None and not options.check_steps:
+            reach = UNCHECKED_REACH * max(options.h_min, options.eps)
+            arrival = passed_kink(equation, self.current, self.sign, options.transition_tolerance, reach)
+        if arrival is None:
+            return self._stalled("no transition point was found ahead")
+        moved = equation.norm(arrival.x - self.current.x) > SAME_POINT
+        self._in_place = 0 if moved else self._in_place + 1
+        if self._in_place > MAX_CHANGES_IN_PLACE:
+            return self._stalled("the selection changes again and again at one point")
+        try:
+            keep, others = continuations(equation, arrival, self.sign)
+        except TooLargeError as error:
+            return self._stalled(str(error))
+        if not keep:
+            return self._dead_end(arrival, len(others))
+        index = self._index(keep)
+        chosen = keep[index]
+        alternatives = (*(t for k, t in enumerate(keep) if k != index), *others)
+        self.record.count(selection_changes=1)
+        kink = Kink(arrival, CurvePoint(arrival.x, chosen.codes, chosen.vector), alternatives)
+        self.h = options.h_init
+        return self._enter(self.current, kink)
+
+    def _index(self, tangents: Sequence[Tangent]) -> int:
+        if self.options.choose is None or len(tangents) == 1:
+            return 0
+        index = self.options.choose(tangents)
+        if not 0 <= index < len(tangents):
+            raise InvalidArgumentError(f"options.choose gave {index!r}; expected an index below {len(tangents)}")
+        return index
+
+    # -- accepting points, and stop conditions -----------------------------------------------------------------------
+
+    def _take(self, step: _Step) -> _Stop | None:
+        origin = self.current
+        for kink in step.kinks:
+            stop = self._enter(origin, kink)
+            if stop is not None:
+                return stop
+            origin = kink.after
+        stop = self._piece(origin, step.end)
+        if stop is not None:
+            return stop
+        self.record.add(step.end, "step", step.length, step.corrections)
+        self.current = step.end
+        return None
+
+    def _enter(self, start: CurvePoint, kink: Kink) -> _Stop | None:
+        """Go from ``start`` on its curve to a transition point and through it."""
+        stop = self._piece(start, kink.before)
+        if stop is not None:
+            return stop
+        arrived = self._known(kink)
+        self.record.add_kink(kink)
+        self.current = kink.after
+        self._landmarks.append((kink.after.x, kink.after.codes, False))
+        return arrived
+
+    def _piece(self, start: CurvePoint, end: CurvePoint) -> _Stop | None:
+        """Stop conditions met between two points of one curve; the path is ended there."""
+        return self._border(start, end) or self._return(start, end)
+
+    def _inside(self, x: Vector) -> bool:
+        return bool(self._low <= x[-1] <= self._high)
+
+    def _border(self, start: CurvePoint, end: CurvePoint) -> _Stop | None:
+        if self._inside(end.x):
+            return None
+        value = self._low if end.x[-1] < self._low else self._high
+        row = np.zeros(len(end.x))
+        row[-1] = 1.0
+        # the statuses of the end: without checks they may differ from those of the start
+        x = smooth_newton(self.equation, end.codes, end.x, row, value, self.options.transition_tolerance)
+        if x is not None:
+            x[-1] = value
+            self._end(CurvePoint(x, end.codes, end.tangent))
+        low, high = self.interval
+        return _Stop(
+            "interval left",
+            f"alpha left the interval ({low:g}, {high:g}) at {self.equation.alpha_scale * value:g}; "
+            "path.resume(interval=...) goes on",
+        )
+
+    def _return(self, start: CurvePoint, end: CurvePoint) -> _Stop | None:
+        if self._passes(start, end, self._origin.x, self._origin.codes):
+            self._end(self._origin)
+            return self._closed()
+        for x, codes, foreign in self._landmarks:
+            if foreign and self._passes(start, end, x, codes):
+                tangent = curve_tangent(self.equation, codes, x, self.sign)
+                self._end(CurvePoint(x, codes, start.tangent if tangent is None else tangent))
+                return self._visited(x)
+        return None
+
+    def _passes(self, start: CurvePoint, end: CurvePoint, x: Vector, codes: Codes) -> bool:
+        """Whether the piece from start to end of one curve goes through a known point of the same selection."""
+        equation = self.equation
+        if codes != start.codes or equation.dot(x - start.x, start.tangent) <= FORWARD_TOLERANCE:
+            return False
+        if equation.dot(end.x - x, end.tangent) < -FORWARD_TOLERANCE:
+            return False
+        tangent = curve_tangent(equation, codes, x, self.sign)
+        if tangent is None:
+            return False
+        middle = CurvePoint(x, codes, tangent)
+        return same_curve(equation, start, middle, sharp=True) and same_curve(equation, middle, end, sharp=True)
+
+    def _known(self, kink: Kink) -> _Stop | None:
+        """A transition point that is the start, or was passed before in the same or the opposite direction."""
+        equation, x = self.equation, kink.before.x
+        if equation.norm(x - self._origin.x) <= SAME_POINT and kink.after.codes == self._origin.codes:
+            moved = len(self.record.points) > 1
+            if moved and equation.dot(kink.after.tangent, self._origin.tangent) > 0:
+                return self._closed()
+        for known, codes, foreign in self._landmarks:
+            same = codes == kink.after.codes or (foreign and codes == kink.before.codes)
+            if same and equation.norm(x - known) <= SAME_POINT:
+                return self._visited(x)
+        return None
+
+    def _end(self, point: CurvePoint) -> None:
+        if self.equation.norm(point.x - self.record.points[-1].x) > FORWARD_TOLERANCE:
+            self.record.add(point, "end")
+        self.current = point
+
+    def _closed(self) -> _Stop:
+        return _Stop("closed", f"the path returned to its start at alpha = {self._alpha():g}: a closed branch")
+
+    def _visited(self, x: Vector) -> _Stop:
+        return _Stop("visited", f"the path arrived at a point already visited, at alpha = {self.equation.alpha(x):g}")
+
+    def _stalled(self, reason: str) -> _Stop:
+        return _Stop(
+            "stalled",
+            f"no step of length {self.options.h_min:g} or more was accepted at alpha = {self._alpha():g} ({reason}); "
+            "a smaller h_min or h_init may pass, and branch_graph shows which arcs meet there",
+        )
+
+    def _dead_end(self, arrival: CurvePoint, others: int) -> _Stop:
+        self._end(arrival)
+        return _Stop(
+            "dead end",
+            f"no continuation keeps the orientation at alpha = {self._alpha():g}, where {others} other directions "
+            "leave; start anew there with follow(tangent=k)",
+        )
+
+
+def _landmarks(equation: CondensedEquation, visited: Sequence[Path]) -> Iterator[tuple[Vector, Codes, bool]]:
+    """Starts, transition points and ends of other paths, with the statuses on both sides."""
+    for path in visited:
+        for k, kind in enumerate(path.kinds):
+            if kind == "step":
+                continue
+            x = equation.point(float(path.alpha[k]), np.concatenate([path.lambda_n[k], path.lambda_t[k]]))
+            if not math.isfinite(float(np.sum(x))):
+                continue
+            codes = {tuple(int(c) for c in path.codes[k]), tuple(int(c) for c in path.codes[max(k - 1, 0)])}
+            for one in codes:
+                yield x, one, True

@@ -1,0 +1,189 @@
+"""Piecewise smooth Newton method for H at fixed alpha."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.continuation.equation import CondensedEquation
+from enumsol.continuation.errors import NewtonIteration, NotConverged
+from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
+from enumsol.errors import InvalidArgumentError
+from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.results import Root
+from enumsol.selections import FRICTIONLESS, STATUSES, STICK
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from enumsol.continuation.equation import Vector
+    from enumsol.continuation.parameter_path import ParameterPath
+    from enumsol.problem import Alpha
+
+#: Norm of H, relative to the load, at which an iterate is a root: well above rounding for any conditioning seen.
+RESIDUAL_TOLERANCE = 1e-10
+#: Shortest fraction of a Newton step that the line search tries.
+MIN_FRACTION = 2.0**-12
+#: Decrease of the residual that the line search asks for (Armijo).
+SUFFICIENT_DECREASE = 1e-4
+
+
+def newton(
+    problem: ContactProblem,
+    alpha: Alpha,
+    start: Root | ArrayLike | None = None,
+    *,
+    r: float | None = None,
+    smooth_path: SmoothPath | None = None,
+    max_iterations: int = 100,
+) -> Root:
+    """One root at alpha, by the piecewise smooth Newton method from any start.
+
+    Every iteration solves the selection of H that is active at the iterate. Full steps are taken until a selection
+    comes back; from then on a line search on the norm of H. Which root is found depends on the start; a start near a
+    regular root leads to it in one step. Each iteration costs one dense solve of size 2p.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    alpha : float or Fraction
+    start : Root, (2p,) or (p, 2) array_like, or None
+        Contact forces: those of a root, lambda_n followed by lambda_t, or a row (lambda_n, lambda_t) per node [force].
+        None: zero.
+    r : float or None
+        Parameter of H [force / length]; None for each node's own stiffness.
+    smooth_path : SmoothPath or None
+        Friction and load at alpha come from here.
+    max_iterations : int
+
+    Returns
+    -------
+    Root
+        Not regular when the point found belongs to a continuum of solutions (index None then).
+
+    Raises
+    ------
+    NotConverged
+        With the history of the iterations, and advice.
+    InvalidArgumentError
+        An argument cannot be used as given.
+    """
+    if not isinstance(problem, ContactProblem):
+        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
+    value = finite_alpha(alpha)
+    if r is not None and not 0 < r < np.inf:
+        raise InvalidArgumentError(f"r is {r}; expected a positive finite number")
+    frozen = problem if smooth_path is None else smooth_path.problem_at(problem, value)
+    frozen.friction_at(value)
+    path: ParameterPath = AffinePath(problem) if smooth_path is None else CallablePath(problem, smooth_path, value)
+    equation = CondensedEquation(path, start=value, r=r)
+    x = equation.point(value, _start_forces(start, problem.p))
+    x = _iterate(equation, x, value, max_iterations)
+    return build_root(frozen, alpha if smooth_path is None else value, equation, x)
+
+
+def _start_forces(start: Root | ArrayLike | None, p: int) -> NDArray[np.float64]:
+    if start is None:
+        return np.zeros(2 * p)
+    if isinstance(start, Root):
+        forces = np.concatenate([start.lambda_n, start.lambda_t])
+    else:
+        forces = np.asarray(start, dtype=np.float64)
+        if forces.shape == (p, 2):
+            forces = forces.T.ravel()
+    if forces.shape != (2 * p,) or not np.all(np.isfinite(forces)):
+        raise InvalidArgumentError(
+            f"start has shape {forces.shape}; expected a Root or finite contact forces of shape ({2 * p},) or ({p}, 2)"
+        )
+    return forces
+
+
+def _iterate(equation: CondensedEquation, x: Vector, alpha: float, max_iterations: int) -> Vector:
+    history: list[NewtonIteration] = []
+    seen: set[bytes] = set()
+    rows = equation.test_functions(x) > 0
+    damped = False
+    for _ in range(max_iterations):
+        residual = float(np.linalg.norm(equation.residual(x)))
+        now = equation.test_functions(x) > 0
+        changes = int(np.sum(np.any(now != rows, axis=1)))
+        rows = now
+        if residual <= RESIDUAL_TOLERANCE:
+            return x
+        damped = damped or rows.tobytes() in seen
+        seen.add(rows.tobytes())
+        step = _newton_step(equation, rows, x)
+        fraction = _fraction(equation, x, step, residual) if damped else 1.0
+        history.append(NewtonIteration(residual, fraction, changes))
+        if fraction < MIN_FRACTION:
+            raise NotConverged(alpha, history, "no step along Newton's direction lowers the residual")
+        x = x.copy()
+        x[:-1] -= fraction * step
+    raise NotConverged(alpha, history, f"the limit of {max_iterations} iterations was reached")
+
+
+def _newton_step(equation: CondensedEquation, rows: NDArray[np.bool_], x: Vector) -> Vector:
+    """Newton step in the active selection; the shortest least-squares one where it is singular."""
+    J = equation.jacobian(rows, x)[:, :-1]
+    residual = equation.residual(x)
+    try:
+        step = np.linalg.solve(J, residual)
+    except np.linalg.LinAlgError:
+        step = np.full(len(residual), np.nan)
+    if not np.all(np.isfinite(step)):
+        step = np.linalg.lstsq(J, residual, rcond=None)[0]
+    return np.asarray(step)
+
+
+def _fraction(equation: CondensedEquation, x: Vector, step: Vector, residual: float) -> float:
+    """Largest 2^-k that lowers the residual sufficiently."""
+    fraction = 1.0
+    while fraction >= MIN_FRACTION:
+        trial = x.copy()
+        trial[:-1] -= fraction * step
+        if np.linalg.norm(equation.residual(trial)) <= (1 - SUFFICIENT_DECREASE * fraction) * residual:
+            return fraction
+        fraction *= 0.5
+    return 0.0
+
+
+def build_root(problem: ContactProblem, alpha: Alpha, equation: CondensedEquation, x: Vector) -> Root:
+    """The Root at a point x of the condensed equation, with its index, margin and derivative."""
+    # the enumeration is not needed to follow paths, and slow to import
+    from enumsol.enumeration.assembly import RootBuilder
+    from enumsol.enumeration.components import connected_components
+    from enumsol.enumeration.float_selections import FloatSelections
+
+    floats = FloatSelections(problem.condensed.at(alpha).scaled)
+    solution = floats.solve(equation.codes(x))
+    if solution is not None and solution.dimension == 0:
+        component = connected_components([solution], floats)[0]
+        if component.dimension == 0:
+            return RootBuilder(problem, alpha, floats, floats, {}).root(component)
+    return _family_point(problem, alpha, equation, x)
+
+
+def _family_point(problem: ContactProblem, alpha: Alpha, equation: CondensedEquation, x: Vector) -> Root:
+    """A point of a continuum of solutions, as a root that is not regular."""
+    p = equation.p
+    forces, w = equation.forces(x), equation.displacements(x)
+    codes = equation.codes(x)
+    active = equation.active(x)
+    return Root(
+        alpha=alpha,
+        statuses=equation.statuses(codes, w[p:]),
+        active=tuple(
+            frozenset(STATUSES[STICK if code == FRICTIONLESS else code] for code in holds) for holds in active
+        ),
+        lambda_n=forces[:p],
+        lambda_t=forces[p:],
+        u_n=w[:p],
+        u_t=w[p:],
+        index=None,
+        regular=False,
+        margin=0.0,
+        enclosure=None,
+        _condensed=problem.condensed,
+        _tangent=None,
+    )

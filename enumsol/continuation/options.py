@@ -1,0 +1,103 @@
+"""Settings of Algorithm 5.1."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+from enumsol.errors import InvalidArgumentError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from enumsol.continuation.tangents import Tangent
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContinuationOptions:
+    """Settings of `follow`; the defaults are those of the paper's Section 6.
+
+    Lengths and residuals are without units. Contact forces are measured in the energy norm relative to the load,
+    sqrt(lambda' S lambda) / sqrt(g' S^-1 g), which is at most one at every solution, and alpha in units of
+    ``alpha_scale``; the arclength is the square root of the sum of both squares. A path therefore does not depend on
+    the units of force and length, and not on those of alpha when ``alpha_scale`` is None and the interval is finite.
+
+    Attributes
+    ----------
+    eps, eps_prime : float
+        Convergence of the corrections: norm of H, and length of the last correction.
+    h_min, h_max, h_init : float
+        Least, largest and initial step length.
+    h_inc, h_dec : float
+        Factors that lengthen and shorten a step.
+    k_max, k_thr : int
+        Most corrections in a step; a step with fewer than ``k_thr`` may be followed by a longer one.
+    r : float or None
+        The parameter of H [force / length]. None: per node 1 / sqrt(S_nn S_tt), the node's own stiffness. Solutions do
+        not depend on it.
+    max_steps : int
+        Accepted steps after which to stop.
+    alpha_scale : float or None
+        Change of alpha that counts as one. None: a twentieth of the interval, so that on the paper's 0 .. 20 it is one
+        as there; 1 for an interval that is not finite.
+    transition_tolerance : float
+        Accuracy to which transition points are located, at most 1e-8: the checks of steps rely on it.
+    check_steps : bool
+        Accept a step only when its end is the continuation of its start: in the same selection, or behind one located
+        change of status. False is Algorithm 5.1 as printed, which may jump between branches when steps are long.
+    overshoot : float
+        How far outside the interval the path is followed in the hope that it returns, in the units of alpha.
+    choose : callable or None
+        Called with the admissible tangents where more than one continues the path (Remark 5.1); returns an index. None:
+        the one that turns least.
+    """
+
+    eps: float = 1e-6
+    eps_prime: float = 1e-6
+    h_min: float = 1e-5
+    h_max: float = 1.0
+    h_init: float = 0.05
+    h_inc: float = 1.3
+    h_dec: float = 0.5
+    k_max: int = 10
+    k_thr: int = 4
+    r: float | None = None
+    max_steps: int = 5000
+    alpha_scale: float | None = None
+    transition_tolerance: float = 1e-10
+    check_steps: bool = True
+    overshoot: float = 0.0
+    choose: Callable[[Sequence[Tangent]], int] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("eps", "eps_prime", "h_min", "transition_tolerance"):
+            self._require(name, getattr(self, name) > 0, "a positive number")
+        self._require("transition_tolerance", self.transition_tolerance <= 1e-8, "at most 1e-8")
+        self._require("h_init", self.h_min <= self.h_init <= self.h_max, "h_min <= h_init <= h_max")
+        self._require("h_max", math.isfinite(self.h_max), "a finite number")
+        self._require("h_inc", 1 < self.h_inc < math.inf, "a number > 1")
+        self._require("h_dec", 0 < self.h_dec < 1, "a number between 0 and 1")
+        self._require("k_thr", isinstance(self.k_thr, int) and 0 < self.k_thr <= self.k_max, "0 < k_thr <= k_max")
+        self._require("k_max", isinstance(self.k_max, int), "an integer")
+        self._require("max_steps", isinstance(self.max_steps, int) and self.max_steps > 0, "a positive integer")
+        self._require("overshoot", 0 <= self.overshoot < math.inf, "a finite number >= 0")
+        for name in ("r", "alpha_scale"):
+            value = getattr(self, name)
+            self._require(name, value is None or 0 < value < math.inf, "a positive finite number or None")
+
+    def _require(self, name: str, holds: bool, expected: str) -> None:
+        if not holds:
+            raise InvalidArgumentError(f"options.{name} is {getattr(self, name)!r}; expected {expected}")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The settings that can be saved: all but ``choose``."""
+        values = asdict(self)
+        del values["choose"]
+        return values
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> ContinuationOptions:
+        """Settings from a saved dictionary; names of other versions are ignored."""
+        known = {item.name for item in fields(cls)}
+        return cls(**{name: value for name, value in values.items() if name in known})

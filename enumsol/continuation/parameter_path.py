@@ -1,0 +1,194 @@
+"""Paths of friction and load over alpha, affine ones and the user's own callables, condensed to the contact nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.condensed import RHS_BLOCK
+from enumsol.errors import InvalidArgumentError
+from enumsol.problem import ContactProblem
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: A user's derivative may differ from a central difference by this fraction of its size: wrong formulas differ by more.
+DERIVATIVE_TOLERANCE = 1e-4
+#: Step of that central difference relative to alpha: near the cube root of the rounding unit, its best value.
+DIFFERENCE_STEP = 1e-5
+
+PathFunction = Callable[[float], Any]
+
+
+@dataclass(frozen=True)
+class SmoothPath:
+    """Friction and load as callables of alpha, in place of the affine paths of a problem.
+
+    Give friction, load or both, each with its derivative; what is not given stays as the problem has it.
+
+    Attributes
+    ----------
+    F, dF : callable or None
+        Friction coefficients and their derivative at alpha: a number or a (p,) array [-].
+    f, df : callable or None
+        Load and its derivative at alpha, (n,) arrays [force].
+
+    Raises
+    ------
+    InvalidArgumentError
+        A function comes without its derivative, or none is given.
+    """
+
+    F: PathFunction | None = None
+    dF: PathFunction | None = None  # noqa: N815 (the name is part of the public interface)
+    f: PathFunction | None = None
+    df: PathFunction | None = None
+
+    def __post_init__(self) -> None:
+        if (self.F is None) != (self.dF is None) or (self.f is None) != (self.df is None):
+            raise InvalidArgumentError(
+                "SmoothPath has a function without its derivative; expected F with dF, f with df"
+            )
+        if self.F is None and self.f is None:
+            raise InvalidArgumentError("SmoothPath has neither F nor f; expected at least one of them")
+
+    def problem_at(self, problem: ContactProblem, alpha: float) -> ContactProblem:
+        """The problem with friction and load frozen at alpha, to enumerate roots on the path."""
+        F = problem.friction_at(alpha) if self.F is None else _evaluate(self.F, alpha, "F", problem.p, broadcast=True)
+        f = problem.load_at(alpha) if self.f is None else _evaluate(self.f, alpha, "f", problem.n)
+        return ContactProblem(
+            problem.A,
+            problem.Bn,
+            problem.Bt,
+            f,
+            gap=problem.gap,
+            friction=(F, 0.0),
+            slip_offset=problem.slip_offset,
+            node_ids=problem.node_ids,
+            coordinates=problem.coordinates,
+        )
+
+
+@dataclass(frozen=True)
+class PathValues:
+    """Condensed load g, friction F and their derivatives at one alpha: arrays (2p,), (p,), (2p,), (p,)."""
+
+    g: NDArray[np.float64]
+    F: NDArray[np.float64]
+    dg: NDArray[np.float64]
+    dF: NDArray[np.float64]  # noqa: N815 (as above)
+
+
+class ParameterPath(Protocol):
+    """What the continuation needs to know about alpha."""
+
+    problem: ContactProblem
+
+    def at(self, alpha: float) -> PathValues:
+        """Values at any alpha, also where friction would be negative (iterates only)."""
+
+    @property
+    def frictionless(self) -> NDArray[np.bool_]:
+        """Nodes whose friction is zero for every alpha, shape (p,)."""
+
+
+class AffinePath:
+    """The problem's own F0 + alpha F1 and f + alpha load_slope."""
+
+    def __init__(self, problem: ContactProblem) -> None:
+        self.problem = problem
+        self._condensed = problem.condensed
+
+    def at(self, alpha: float) -> PathValues:
+        """Values at alpha."""
+        c = self._condensed
+        return PathValues(c.g0 + alpha * c.g1, c.F0 + alpha * c.F1, c.g1, c.F1)
+
+    @property
+    def frictionless(self) -> NDArray[np.bool_]:
+        """Nodes with F0 = F1 = 0."""
+        return np.asarray((self._condensed.F0 == 0) & (self._condensed.F1 == 0))
+
+
+class CallablePath:
+    """A SmoothPath condensed to the contact nodes; a load given by callables costs 2 p n multiplications an alpha."""
+
+    def __init__(self, problem: ContactProblem, smooth: SmoothPath, alpha: float) -> None:
+        self.problem = problem
+        self._smooth = smooth
+        self._affine = AffinePath(problem)
+        self._start = alpha
+        self._check_derivatives(alpha)
+
+    @cached_property
+    def _influence(self) -> NDArray[np.float64]:
+        """B A^{-1}, shape (2p, n): dense, but only its few rows."""
+        problem = self.problem
+        B = sp.csr_array(sp.vstack([problem.Bn, problem.Bt], format="csr"))
+        rows = np.empty(B.shape)
+        for start in range(0, B.shape[0], RHS_BLOCK):
+            block = B[start : start + RHS_BLOCK].T.toarray()
+            rows[start : start + RHS_BLOCK] = problem.factorization.solve(block).T
+        return rows
+
+    def at(self, alpha: float) -> PathValues:
+        """Values at alpha."""
+        values = self._affine.at(alpha)
+        g, F, dg, dF = values.g, values.F, values.dg, values.dF
+        problem, smooth = self.problem, self._smooth
+        if smooth.F is not None and smooth.dF is not None:
+            F = _evaluate(smooth.F, alpha, "F", problem.p, broadcast=True)
+            dF = _evaluate(smooth.dF, alpha, "dF", problem.p, broadcast=True)
+        if smooth.f is not None and smooth.df is not None:
+            offset = np.concatenate([problem.gap, problem.slip_offset])
+            g = self._influence @ _evaluate(smooth.f, alpha, "f", problem.n) - offset
+            dg = self._influence @ _evaluate(smooth.df, alpha, "df", problem.n)
+        return PathValues(g, F, dg, dF)
+
+    @cached_property
+    def frictionless(self) -> NDArray[np.bool_]:
+        """Nodes with F = 0 and dF = 0 at the start; taken to stay so."""
+        if self._smooth.F is None:
+            return self._affine.frictionless
+        values = self.at(self._start)
+        return np.asarray((values.F == 0) & (values.dF == 0))
+
+    def _check_derivatives(self, alpha: float) -> None:
+        """Compare the derivatives with central differences at the start: a wrong one stalls the corrections later."""
+        smooth, step = self._smooth, DIFFERENCE_STEP * max(abs(alpha), 1.0)
+        for name, function, derivative, size, scalar in (
+            ("F", smooth.F, smooth.dF, self.problem.p, True),
+            ("f", smooth.f, smooth.df, self.problem.n, False),
+        ):
+            if function is None or derivative is None:
+                continue
+            given = _evaluate(derivative, alpha, f"d{name}", size, broadcast=scalar)
+            ahead = _evaluate(function, alpha + step, name, size, broadcast=scalar)
+            behind = _evaluate(function, alpha - step, name, size, broadcast=scalar)
+            if not np.all(np.isfinite(ahead) & np.isfinite(behind)):
+                continue  # the start lies on the border of the functions' domain
+            scale = max(np.max(np.abs(given)), np.max(np.abs(ahead)) / max(abs(alpha), 1.0))
+            error = np.max(np.abs(given - (ahead - behind) / (2 * step)))
+            if error > DERIVATIVE_TOLERANCE * scale:
+                raise InvalidArgumentError(
+                    f"SmoothPath.d{name} at alpha = {alpha:g} differs by {error:.2g} from a central difference of "
+                    f"{name}; expected the derivative of {name} with respect to alpha"
+                )
+
+
+def _evaluate(
+    function: PathFunction, alpha: float, name: str, size: int, *, broadcast: bool = False
+) -> NDArray[np.float64]:
+    value = np.asarray(function(alpha), dtype=np.float64)
+    if value.ndim == 0 and broadcast:
+        value = np.full(size, float(value))
+    if value.shape != (size,):
+        raise InvalidArgumentError(
+            f"SmoothPath.{name} gives shape {value.shape} at alpha = {alpha:g}; expected ({size},)"
+        )
+    return value

@@ -1,0 +1,186 @@
+"""Tangents of solution curves: orientation, and all that are admissible at a point (Definition 5.1, Remark 5.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from math import prod, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.continuation.equation import STATUS_TOLERANCE
+from enumsol.errors import TooLargeError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from enumsol.continuation.equation import Codes, CondensedEquation, Vector
+    from enumsol.selections import ContactStatus
+
+#: Selections examined at one point (Remark 5.1); six nodes in a corner of three statuses have 729.
+MAX_SELECTIONS = 4096
+#: A singular value of a selection's gradient below this fraction of the largest counts as zero.
+RANK_TOLERANCE = 1e-10
+#: The rate of a vanishing condition along an admissible tangent may be negative by rounding, as much as this.
+RATE_TOLERANCE = 1e-8
+#: Two tangents closer than this are one.
+SAME_TANGENT = 1e-6
+#: How far along a tangent its orientation is read where the gradient loses rank; squares of it are above rounding.
+ORIENTATION_STEP = 1e-4
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """A direction in which a solution curve leaves a point.
+
+    Attributes
+    ----------
+    statuses : tuple of p ContactStatus
+        Statuses on the curve.
+    dalpha : float
+        Derivative of alpha with respect to the arclength; 0 on a vertical segment.
+    dlambda : (p, 2) array
+        Derivatives of (lambda_n, lambda_t) [force].
+    orientation : int
+        +1 positively oriented (Definition 5.1), -1 negatively, 0 undecided.
+    codes, vector :
+        The same in the variables of the continuation.
+    """
+
+    statuses: tuple[ContactStatus, ...]
+    dalpha: float
+    dlambda: NDArray[np.float64]
+    orientation: int
+    codes: Codes
+    vector: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        names = ", ".join(status.value for status in self.statuses[:8])
+        names += ", ..." if len(self.statuses) > 8 else ""
+        return f"Tangent(dalpha={self.dalpha:+.3g}, orientation={self.orientation:+d}, [{names}])"
+
+
+def orientation(equation: CondensedEquation, codes: Codes, x: Vector, tangent: Vector) -> int:
+    """Sign of det [grad H; tangent'] in a selection: +1, -1, or 0 where the matrix is singular."""
+    J = equation.jacobian(equation.selection(codes), x)
+    bordered = np.vstack([J, equation.metric @ tangent])
+    return int(np.linalg.slogdet(bordered)[0])
+
+
+def curve_tangent(equation: CondensedEquation, codes: Codes, x: Vector, sign: int) -> Vector | None:
+    """Unit tangent of a selection's solution curve with the given orientation; None where it is not unique."""
+    J = equation.jacobian(equation.selection(codes), x)
+    if not np.all(np.isfinite(J)):
+        return None
+    Q, R = np.linalg.qr(J.T, mode="complete")
+    pivots = np.abs(np.diagonal(R))
+    if np.min(pivots) <= RANK_TOLERANCE * np.max(pivots):
+        return None
+    vector = Q[:, -1] / equation.norm(Q[:, -1])
+    bordered = np.vstack([J, equation.metric @ vector])
+    return np.asarray(vector if np.linalg.slogdet(bordered)[0] == sign else -vector)
+
+
+def admissible_tangents(
+    equation: CondensedEquation, x: Vector, tolerance: float = STATUS_TOLERANCE
+) -> tuple[Tangent, ...]:
+    """All directions in which a solution curve leaves x, in the order of their selections.
+
+    At a regular root these are two. Directions are judged by first derivatives. A direction that several selections
+    share (a grazing curve) is listed once, with the first of them.
+
+    Raises
+    ------
+    TooLargeError
+        More than MAX_SELECTIONS selections hold at x.
+    """
+    active = equation.active(x, tolerance)
+    count = prod(len(holds) for holds in active)
+    if count > MAX_SELECTIONS:
+        raise TooLargeError(
+            f"{count} selections hold at alpha = {equation.alpha(x):g}; tangents are listed for at most "
+            f"{MAX_SELECTIONS}"
+        )
+    found: list[Tangent] = []
+    for codes in product(*(sorted(holds) for holds in active)):
+        for vector in _directions(equation, codes, x):
+            for candidate in (vector, -vector):
+                if _leaves_into(equation, codes, x, candidate, tolerance) and not any(
+                    equation.norm(candidate - other.vector) <= SAME_TANGENT for other in found
+                ):
+                    found.append(describe(equation, codes, x, candidate))
+    return tuple(found)
+
+
+def describe(equation: CondensedEquation, codes: Codes, x: Vector, vector: Vector) -> Tangent:
+    """The tangent in the user's units, with its orientation."""
+    p = equation.p
+    sign = orientation(equation, codes, x, vector)
+    J = equation.jacobian(equation.selection(codes), x)
+    if _kernel(J).shape[1] > 1:
+        # a bifurcation point of the selection itself: read the orientation a little ahead
+        sign = orientation(equation, codes, x + ORIENTATION_STEP * vector, vector)
+    change = vector[:-1] * equation.force
+    slip = equation.w(x + ORIENTATION_STEP * vector)[p:]
+    return Tangent(
+        equation.statuses(codes, slip),
+        float(vector[-1] * equation.alpha_scale),
+        np.column_stack([change[:p], change[p:]]),
+        sign,
+        codes,
+        vector,
+    )
+
+
+def _leaves_into(equation: CondensedEquation, codes: Codes, x: Vector, vector: Vector, tolerance: float) -> bool:
+    """Whether the conditions of the selection that vanish at x do not become negative along the vector."""
+    at_zero = equation.slacks(codes, x) <= tolerance
+    rates = equation.slack_rates(codes, x, vector)
+    return bool(np.all(rates[at_zero] >= -RATE_TOLERANCE))
+
+
+def _kernel(J: Vector) -> Vector:
+    _, sigma, Vt = np.linalg.svd(J)
+    rank = int(np.sum(sigma > RANK_TOLERANCE * sigma[0]))
+    return np.asarray(Vt[rank:].T)
+
+
+def _directions(equation: CondensedEquation, codes: Codes, x: Vector) -> Iterator[Vector]:
+    """Unit vectors, up to sign, along which the selection's solution set leaves x (none when it is a surface)."""
+    rows = equation.selection(codes)
+    J = equation.jacobian(rows, x)
+    kernel = _kernel(J)
+    if kernel.shape[1] == 1:
+        yield kernel[:, 0] / equation.norm(kernel[:, 0])
+    elif kernel.shape[1] == 2:
+        left = np.linalg.svd(J)[0][:, -1]
+        form = _second_derivative(equation, rows, x, left, kernel)
+        for weights in _isotropic_lines(form):
+            vector = kernel @ weights
+            yield vector / equation.norm(vector)
+
+
+def _second_derivative(
+    equation: CondensedEquation, rows: NDArray[np.bool_], x: Vector, left: Vector, kernel: Vector
+) -> Vector:
+    """The bifurcation form left' D2H(x)[a, b] on a two-dimensional kernel, by central differences of the gradient."""
+    form = np.empty((2, 2))
+    for k in range(2):
+        step = ORIENTATION_STEP * kernel[:, k]
+        change = equation.jacobian(rows, x + step) - equation.jacobian(rows, x - step)
+        form[k] = left @ change @ kernel / (2 * ORIENTATION_STEP)
+    return np.asarray(0.5 * (form + form.T))
+
+
+def _isotropic_lines(form: Vector) -> Iterator[Vector]:
+    """Unit vectors t with t' form t = 0, up to sign; none for a definite form or a zero one."""
+    values, vectors = np.linalg.eigh(form)
+    if np.max(np.abs(values)) <= RATE_TOLERANCE or values[0] * values[1] > 0:
+        return
+    weights = np.sqrt(np.abs(values[::-1])) / sqrt(float(np.sum(np.abs(values))))
+    yield np.asarray(vectors @ weights)
+    if np.min(np.abs(weights)) > SAME_TANGENT:
+        yield np.asarray(vectors @ (weights * np.array([1.0, -1.0])))

@@ -1,0 +1,38 @@
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+OPTIMAL: int
+BOUND_EXCEEDED: int
+STALLED: int
+
+class QPData:
+    n: int
+    k: int
+    m: int
+    def __init__(
+        self,
+        S: NDArray[np.float64],
+        c: NDArray[np.float64],
+        W: NDArray[np.float64],
+        w0: NDArray[np.float64],
+        row_start: NDArray[np.intp],
+        row_index: NDArray[np.intp],
+        row_value: NDArray[np.float64],
+        row_rhs: NDArray[np.float64],
+    ) -> None: ...
+
+class QPState:
+    iterations: int
+    bound: float
+    def __init__(self, data: QPData) -> None: ...
+    def copy(self) -> QPState: ...
+    def switch(self, rows: Sequence[int], modes: Sequence[int]) -> None: ...
+    def mode_of(self, row: int) -> int: ...
+    @property
+    def x_array(self) -> NDArray[np.float64]: ...
+    @property
+    def w_array(self) -> NDArray[np.float64]: ...
+    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]: ...
+    def solve(self, target: float, tolerance: float, limit: int) -> int: ...

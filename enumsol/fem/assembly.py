@@ -1,0 +1,348 @@
+"""A plane-strain body of P1 triangles on a rigid foundation: stiffness by scikit-fem, loads, and the ContactProblem.
+
+Degrees of freedom before constraints are ``2 node + component``. A problem is put together from plain arrays::
+
+    loads = edge_forces(points, top_edges, (0.3, -1.0))
+    problem = contact_problem(
+        points, triangles, (1.0, 1.0), held=left, contact=bottom, normals=(0.0, -1.0), forces=loads
+    )
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem._arguments import lame_coefficients, vector_2d
+from enumsol.problem import ContactProblem
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+
+def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]) -> sp.csc_array:
+    """Stiffness of the unconstrained body in plane strain, (2N, 2N), assembled by scikit-fem.
+
+    Parameters
+    ----------
+    points : (N, 2) array_like
+        Positions of the nodes [length].
+    triangles : (M, 3) array_like of int
+        Nodes of each triangle, in any orientation.
+    lame : (float, float)
+        Lame coefficients l, m [force / length^2].
+
+    Returns
+    -------
+    csc_array of shape (2N, 2N)
+        Its kernel holds the rigid motions [force / length, per unit thickness].
+
+    Raises
+    ------
+    InvalidArgumentError
+        The mesh is not one (shapes, node numbers, a triangle without area) or the coefficients are not admissible.
+    """
+    # scikit-fem takes a while to import and is needed for meshes only
+    from skfem import Basis, ElementTriP1, ElementVector, MeshTri
+    from skfem.models.elasticity import linear_elasticity
+
+    lam, mu = lame_coefficients(lame)
+    nodes, cells = _points(points), _elements(triangles, "triangles", 3, points)
+    _check_areas(nodes, cells)
+    used = np.unique(cells)
+    if len(used) != len(nodes):
+        lone = int(np.setdiff1d(np.arange(len(nodes)), used)[0])
+        raise InvalidArgumentError(f"triangles leave node {lone} out; expected every node in some triangle")
+    # sorting is ours, so that scikit-fem has no reason to renumber or to log
+    mesh = MeshTri(np.ascontiguousarray(nodes.T), np.ascontiguousarray(np.sort(cells, axis=1).T))
+    basis = Basis(mesh, ElementVector(ElementTriP1()), intorder=0)
+    matrix = sp.coo_array(linear_elasticity(lam, mu).assemble(basis))
+    # scikit-fem's number of each (node, component), turned into 2 node + component
+    ours = np.empty(2 * len(nodes), dtype=np.int64)
+    ours[basis.nodal_dofs.T.ravel()] = np.arange(2 * len(nodes))
+    row, column = ours[matrix.coords[0]], ours[matrix.coords[1]]
+    A = sp.csc_array((matrix.data, (row, column)), shape=matrix.shape)
+    return sp.csc_array(0.5 * (A + A.T))
+
+
+def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> NDArray[np.float64]:
+    """Stiffness (6, 6) of one P1 triangle in closed form, without quadrature: simple data give exact entries.
+
+    Parameters
+    ----------
+    corners : (3, 2) array_like
+        Positions of the corners, in any orientation [length].
+    lame : (float, float)
+        Lame coefficients l, m [force / length^2].
+
+    Raises
+    ------
+    InvalidArgumentError
+        The triangle has no area, or an argument is not of the stated form.
+    """
+    lam, mu = lame_coefficients(lame)
+    nodes, cells = _points(corners), np.array([[0, 1, 2]])
+    if nodes.shape != (3, 2):
+        raise InvalidArgumentError(f"corners has shape {nodes.shape}; expected (3, 2)")
+    _check_areas(nodes, cells)
+    opposite = np.roll(nodes, -2, axis=0) - np.roll(nodes, -1, axis=0)
+    # gradients of the shape functions times twice the area, up to a sign that all share
+    g = np.stack([-opposite[:, 1], opposite[:, 0]], axis=1)
+    K = lam * np.einsum("ai,bj->aibj", g, g) + mu * np.einsum("aj,bi->aibj", g, g)
+    K += mu * np.einsum("ab,ij->aibj", g @ g.T, np.eye(2))
+    return np.asarray(K.reshape(6, 6) / (2.0 * abs(float(_double_areas(nodes, cells)[0]))))
+
+
+def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> NDArray[np.float64]:
+    """Nodal forces of tractions constant on each edge, (N, 2) [force, per unit thickness].
+
+    Parameters
+    ----------
+    points : (N, 2) array_like
+        Positions of the nodes [length].
+    edges : (k, 2) array_like of int
+        The two nodes of each loaded edge.
+    traction : (2,) or (k, 2) array_like
+        Force per length of edge in x and y, one for all or one for each edge [force / length].
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument has the wrong shape, or a node number is out of range.
+    """
+    nodes, ends = _points(points), _elements(edges, "edges", 2, points)
+    density = _rows(traction, "traction", len(ends))
+    lengths = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
+    forces = np.zeros_like(nodes)
+    for end in range(2):
+        np.add.at(forces, ends[:, end], 0.5 * lengths[:, None] * density)
+    return forces
+
+
+def body_forces(points: ArrayLike, triangles: ArrayLike, density: ArrayLike) -> NDArray[np.float64]:
+    """Nodal forces of a body force constant on each triangle, (N, 2) [force, per unit thickness].
+
+    Parameters
+    ----------
+    points : (N, 2) array_like
+        Positions of the nodes [length].
+    triangles : (M, 3) array_like of int
+        Nodes of each triangle.
+    density : (2,) or (M, 2) array_like
+        Force per area in x and y, one for all or one for each triangle [force / length^2].
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument has the wrong shape, or a node number is out of range.
+    """
+    nodes, cells = _points(points), _elements(triangles, "triangles", 3, points)
+    values = _rows(density, "density", len(cells))
+    third = np.abs(_double_areas(nodes, cells)) / 6.0
+    forces = np.zeros_like(nodes)
+    for corner in range(3):
+        np.add.at(forces, cells[:, corner], third[:, None] * values)
+    return forces
+
+
+def contact_problem(
+    points: ArrayLike,
+    triangles: ArrayLike,
+    lame: tuple[float, float],
+    *,
+    contact: ArrayLike,
+    normals: ArrayLike,
+    tangents: ArrayLike | None = None,
+    held: ArrayLike = (),
+    springs: ArrayLike | None = None,
+    forces: ArrayLike | None = None,
+    forces_slope: ArrayLike | None = None,
+    gap: ArrayLike = 0.0,
+    friction: float | tuple[ArrayLike, ArrayLike] = (0.0, 1.0),
+    slip_offset: ArrayLike = 0.0,
+    node_ids: Sequence[Any] | None = None,
+) -> ContactProblem:
+    """Contact problem of a plane-strain P1 body; the held degrees of freedom are eliminated.
+
+    Parameters
+    ----------
+    points, triangles, lame
+        Mesh and Lame coefficients, see `stiffness`.
+    contact : (p,) array_like of int
+        The contact nodes, in the order of the rows of Bn and Bt. None of them may be held.
+    normals : (2,) or (p, 2) array_like
+        Directions out of the body at the contact nodes, one for all or one each; scaled to length one.
+    tangents : (2,) or (p, 2) array_like or None
+        Tangential directions, perpendicular to the normals; default (-n_y, n_x), a quarter turn counterclockwise.
+    held : array_like of int, or (N, 2) array of bool
+        Nodes held fixed in both components, or a mask of the held components.
+    springs : (2,) or (N, 2) array_like or None
+        Stiffness of springs from every node to the ground in x and y, at least 0 [force / length]. An elastic
+        support where nothing is held.
+    forces, forces_slope : (N, 2) array_like or None
+        Nodal forces and their derivative with respect to alpha (sums of `edge_forces` and `body_forces`).
+    gap, friction, slip_offset
+        As in `ContactProblem`.
+    node_ids : sequence or None
+        Labels of the contact nodes; default their node numbers.
+
+    Returns
+    -------
+    ContactProblem
+        With ``coordinates`` the positions of the contact nodes.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument has the wrong shape or names a node that does not exist or is held.
+    InvalidProblemError
+        The body is free to move as a rigid body, or the data of ContactProblem are not admissible.
+    """
+    nodes = _points(points)
+    free = np.flatnonzero(~_held_mask(held, len(nodes)).ravel())
+    touching = _node_numbers(contact, "contact", len(nodes))
+    A = stiffness(nodes, triangles, lame)
+    if springs is not None:
+        A = sp.csc_array(A + sp.diags_array(_springs(springs, len(nodes)).ravel()))
+    normal = _unit(_rows(normals, "normals", len(touching)), "normals")
+    tangent = _tangents(tangents, normal)
+    return ContactProblem(
+        sp.csc_array(A[free][:, free]),
+        _contact_rows(touching, normal, free, len(nodes)),
+        _contact_rows(touching, tangent, free, len(nodes)),
+        _nodal(forces, "forces", len(nodes))[free],
+        gap=gap,
+        friction=friction,
+        load_slope=None if forces_slope is None else _nodal(forces_slope, "forces_slope", len(nodes))[free],
+        slip_offset=slip_offset,
+        node_ids=[int(node) for node in touching] if node_ids is None else node_ids,
+        coordinates=nodes[touching],
+    )
+
+
+def _contact_rows(
+    contact: NDArray[np.int64], direction: NDArray[np.float64], free: NDArray[np.int64], count: int
+) -> sp.csr_array:
+    p = len(contact)
+    column = np.full(2 * count, -1, dtype=np.int64)
+    column[free] = np.arange(len(free))
+    where = column[np.stack([2 * contact, 2 * contact + 1], axis=1)]
+    if np.any(where < 0):
+        node = int(contact[np.argmax(np.any(where < 0, axis=1))])
+        raise InvalidArgumentError(f"contact names node {node}, which is held; expected free nodes only")
+    rows = np.repeat(np.arange(p), 2)
+    return sp.csr_array((direction.ravel(), (rows, where.ravel())), shape=(p, len(free)))
+
+
+def _tangents(tangents: ArrayLike | None, normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    if tangents is None:
+        return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    tangent = _unit(_rows(tangents, "tangents", len(normal)), "tangents")
+    skew = np.abs(np.sum(tangent * normal, axis=1))
+    if np.any(skew > 1e-12):  # both have length one: this is the cosine between them, up to rounding
+        k = int(np.argmax(skew))
+        raise InvalidArgumentError(f"tangents row {k} is not perpendicular to normals row {k}; expected right angles")
+    return tangent
+
+
+def _real_array(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidArgumentError(
+            f"{name} is not an array of real numbers (found {type(value).__name__}); expected float64 values"
+        ) from None
+
+
+def _points(points: ArrayLike) -> NDArray[np.float64]:
+    nodes = _real_array(points, "points")
+    if nodes.ndim != 2 or nodes.shape[1] != 2 or not np.all(np.isfinite(nodes)):
+        raise InvalidArgumentError(f"points has shape {nodes.shape}; expected (N, 2) with finite coordinates")
+    return nodes
+
+
+def _elements(value: ArrayLike, name: str, corners: int, points: ArrayLike) -> NDArray[np.int64]:
+    array = np.asarray(value)
+    if array.ndim != 2 or array.shape[1] != corners or len(array) == 0:
+        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected (k, {corners}) node numbers, k >= 1")
+    return _node_numbers(array.ravel(), name, len(np.asarray(points)), distinct=False).reshape(array.shape)
+
+
+def _node_numbers(value: ArrayLike, name: str, count: int, *, distinct: bool = True) -> NDArray[np.int64]:
+    array = np.asarray(value)
+    if array.ndim != 1 or array.size == 0 or not np.issubdtype(array.dtype, np.integer):
+        raise InvalidArgumentError(
+            f"{name} has shape {array.shape} and type {array.dtype}; expected at least one node number (integers)"
+        )
+    if np.min(array) < 0 or np.max(array) >= count:
+        raise InvalidArgumentError(
+            f"{name} has node numbers from {np.min(array)} to {np.max(array)}; expected them in 0 .. {count - 1}"
+        )
+    if distinct and len(np.unique(array)) != len(array):
+        raise InvalidArgumentError(f"{name} names a node twice; expected distinct nodes")
+    return array.astype(np.int64)
+
+
+def _held_mask(held: ArrayLike, count: int) -> NDArray[np.bool_]:
+    array = np.asarray(held)
+    mask = np.zeros((count, 2), dtype=bool)
+    if array.size == 0:
+        return mask
+    if array.dtype == bool:
+        if array.shape != (count, 2):
+            raise InvalidArgumentError(f"held has shape {array.shape}; expected ({count}, 2) for a mask of components")
+        return array
+    mask[_node_numbers(array, "held", count, distinct=False)] = True
+    return mask
+
+
+def _rows(value: ArrayLike, name: str, count: int) -> NDArray[np.float64]:
+    array = _real_array(value, name)
+    if array.ndim == 1:
+        return np.tile(vector_2d(value, name), (count, 1))
+    if array.shape != (count, 2) or not np.all(np.isfinite(array)):
+        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected (2,) or ({count}, 2), finite")
+    return array
+
+
+def _unit(vectors: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    lengths = np.linalg.norm(vectors, axis=1)
+    if np.any(lengths == 0):
+        raise InvalidArgumentError(f"{name} row {int(np.argmin(lengths))} is zero; expected directions")
+    return np.asarray(vectors / lengths[:, None])
+
+
+def _springs(springs: ArrayLike, count: int) -> NDArray[np.float64]:
+    values = _rows(springs, "springs", count)
+    if np.min(values) < 0:
+        raise InvalidArgumentError(f"springs has the value {np.min(values):g}; expected stiffnesses >= 0")
+    return values
+
+
+def _nodal(forces: ArrayLike | None, name: str, count: int) -> NDArray[np.float64]:
+    if forces is None:
+        return np.zeros(2 * count)
+    array = _real_array(forces, name)
+    if array.shape != (count, 2):
+        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected ({count}, 2), a force for every node")
+    return array.ravel()
+
+
+def _double_areas(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.float64]:
+    first, second = nodes[cells[:, 1]] - nodes[cells[:, 0]], nodes[cells[:, 2]] - nodes[cells[:, 0]]
+    return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+
+
+def _check_areas(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
+    areas = np.abs(_double_areas(nodes, cells))
+    corners = nodes[cells]
+    sides = np.max(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2), axis=1)
+    flat = areas <= 1e-14 * sides**2  # relative to the longest side: no area beyond rounding
+    if np.any(flat):
+        k = int(np.argmax(flat))
+        raise InvalidArgumentError(f"triangles row {k} has no area; expected proper triangles")

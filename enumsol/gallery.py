@@ -1,0 +1,411 @@
+"""Named contact problems for documentation, tests and benchmarks: small closed forms, blocks, wedges and chains.
+
+Every function returns a `ContactProblem`. `GALLERY` lists ready-made ones with a parameter value at which each is worth
+a look and, where it is known, the number of its roots there; `get` finds one by name.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from dataclasses import dataclass, field
+from functools import partial
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol import fem
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem._arguments import (
+    finite_number,
+    lame_coefficients,
+    nonnegative_number,
+    positive_integer,
+    positive_number,
+    vector_2d,
+)
+from enumsol.problem import ContactProblem
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+    Friction = float | tuple[ArrayLike, ArrayLike]
+
+Pair = tuple[float, float]
+
+
+def one_node_triangle(f: Pair = (1.5, -4.0), lame: Pair = (1.0, 1.0)) -> ContactProblem:
+    """One triangle with one contact node: the smallest problem with three roots, and all of it in closed form.
+
+    A P1 triangle with legs of equal length; the corner (0, 0) at the right angle touches the floor, the corners (1, 0)
+    and (0, 1) are fixed, friction is F(alpha) = alpha (the paper's Examples 6.1-6.3). In (normal, tangential)
+    coordinates A = 1/2 [[l + 3m, -(l + m)], [-(l + m), l + 3m]]. With f = (f_n, f_t) and
+    s = (l + 3m) f_n + (l + m) f_t it shows
+
+    - one branch when s > 0, or when f_n <= 0 and s <= 0;
+    - two separate branches when s < 0 and f_n > 0: for f = (1.5, -4), l = m = 1, the node is open for every alpha, and
+      from alpha = 8/3 on it may also stick (lambda_n = 1.5) or slip (lambda_n = 1 / (alpha - 2));
+    - two branches that meet in a continuum of roots at alpha = (l + 3m) / (l + m) when s = 0 and f_n > 0.
+
+    Parameters
+    ----------
+    f : (float, float)
+        Load of the contact node in normal (into the floor) and tangential direction [force].
+    lame : (float, float)
+        Lame coefficients l, m [force / length^2].
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not two admissible numbers.
+    """
+    return ContactProblem(
+        _one_node_stiffness(lame), [[1.0, 0.0]], [[0.0, 1.0]], vector_2d(f, "f"), coordinates=[[0.0, 0.0]]
+    )
+
+
+def two_node_square(
+    f1: Pair = (1.0, -3.0),
+    f2: Pair = (1.0, -1.0),
+    lame: Pair = (1.0, 1.0),
+    friction: Friction = (0.0, 1.0),
+    load_slope: tuple[Pair, Pair] | None = None,
+) -> ContactProblem:
+    """Two contact nodes on one square: up to five roots, several branches, and loading paths (n = 4, p = 2).
+
+    The geometry is our own, not that of the paper's Examples 6.4-6.7, whose coordinates were never published; their
+    loads can be applied to it, their printed figures are not to be expected. The unit square is clamped along its top
+    and stands in a corner: node 0 at (0, 0) touches the floor (normal (0, -1), tangent (1, 0)), node 1 at (1, 0) the
+    wall on the right (normal (1, 0), tangent (0, 1)). Two P1 triangles share the diagonal from (1, 0) to (0, 1). The
+    degrees of freedom are (u_n, u_t) of node 0, then of node 1; for l = m = 1 the entries of A are exact in binary.
+
+    With l = m = 1 it shows
+
+    - f1 = (1, -3), f2 = (1, -1) (Example 6.4): 1 root for alpha < 3, 5 for 3 < alpha < 3.828, then 3;
+    - f1 = (1, -4), f2 = (1.5, -3.5): 5 well separated roots at alpha = 5;
+    - f1 = (0.4, 0.2), f2 = (1.8, -0.1), friction = 4, load_slope = ((0.1, -1.1), (0.2, -0.8)), the loading path of
+      Example 6.7: 3 roots for alpha between 1.2 and 2.6, else one. The other reading of its signs,
+      load_slope = ((0.1, 1.1), (0.2, 0.8)), has 3 roots between -1.2 and -0.75.
+
+    Parameters
+    ----------
+    f1, f2 : (float, float)
+        Loads of node 0 and node 1 in their own (normal, tangential) directions at alpha = 0 [force].
+    lame : (float, float)
+        Lame coefficients l, m [force / length^2].
+    friction : float or tuple (F0, F1)
+        As in `ContactProblem`; default F(alpha) = alpha.
+    load_slope : ((float, float), (float, float)) or None
+        Derivatives of f1 and f2 with respect to alpha.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+    """
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    K = np.zeros((8, 8))
+    for triangle in ((0, 1, 2), (1, 3, 2)):
+        dofs = [2 * node + component for node in triangle for component in range(2)]
+        K[np.ix_(dofs, dofs)] += fem.triangle_stiffness(corners[list(triangle)], lame)
+    # rows: u_n = -u_y and u_t = u_x at node 0, u_n = u_x and u_t = u_y at node 1 (nodes 2 and 3 are clamped)
+    turn = np.array([[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    slope = None
+    if load_slope is not None:
+        if not isinstance(load_slope, (tuple, list)) or len(load_slope) != 2:
+            raise InvalidArgumentError(f"load_slope is {load_slope!r}; expected two pairs, the slopes of f1 and f2")
+        slope = np.concatenate([vector_2d(pair, f"load_slope[{k}]") for k, pair in enumerate(load_slope)])
+    return ContactProblem(
+        turn @ K[:4, :4] @ turn.T,
+        np.eye(4)[[0, 2]],
+        np.eye(4)[[1, 3]],
+        np.concatenate([vector_2d(f1, "f1"), vector_2d(f2, "f2")]),
+        friction=friction,
+        load_slope=slope,
+        coordinates=corners[:2],
+    )
+
+
+def clamped_block(
+    nx: int,
+    ny: int,
+    length: float = 1.0,
+    height: float = 1.0,
+    lame: Pair = (1.0, 1.0),
+    *,
+    traction: Pair = (0.3, -1.0),
+    friction: Friction = (0.0, 1.0),
+    gap: float = 0.0,
+    contact: int | None = None,
+) -> ContactProblem:
+    """Elastic block clamped at its left side and pressed onto the floor: one root, and the benchmark of the search.
+
+    The rectangle (0, length) x (0, height) is meshed by nx by ny cells of two P1 triangles. All nodes along the bottom
+    touch the floor (normal (0, -1), tangent (1, 0)) except the clamped corner: p = nx, in the order of x. The top
+    carries a uniform traction. With tractions (0.3, -1), (1, -0.3) or (0, -1) and length 1 or 2 it has one root for
+    friction from 1 to 10; tractions that drag it towards the clamp, such as (-0.3, -1), make the search longer.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Cells along x and y, at least 1.
+    length, height : float
+        Sides of the rectangle [length].
+    lame : (float, float)
+        Lame coefficients l, m [force / length^2].
+    traction : (float, float)
+        Force per length of the top in x and y [force / length].
+    friction : float or tuple (F0, F1)
+        As in `ContactProblem`; default F(alpha) = alpha.
+    gap : float
+        Initial gap below all contact nodes [length]; negative is a press fit.
+    contact : int or None
+        Number of contact nodes, a divisor of nx: only every (nx / contact)-th node of the bottom then meets the floor,
+        as on a row of ridges, and p stays small on a fine mesh. Default nx.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+    """
+    mesh = fem.rectangle(nx, ny, length, height)
+    cells = len(mesh.bottom) - 1
+    count = cells if contact is None else positive_integer(contact, "contact")
+    if cells % count:
+        raise InvalidArgumentError(f"contact is {count}; expected a divisor of nx = {cells}")
+    return fem.contact_problem(
+        mesh.points,
+        mesh.triangles,
+        lame,
+        contact=mesh.bottom[cells // count :: cells // count],
+        normals=(0.0, -1.0),
+        held=mesh.left,
+        forces=fem.edge_forces(mesh.points, fem.edges_along(mesh.top), vector_2d(traction, "traction")),
+        gap=finite_number(gap, "gap"),
+        friction=friction,
+    )
+
+
+def wedge(
+    nx: int,
+    ny: int,
+    pull: Pair = (0.0, 5e-4),
+    press: float = 5e-4,
+    springs: Pair = (0.04, 0.02),
+    *,
+    width: float = 1.0,
+    height: float = 1.0,
+    half_angle: float = 20.0,
+    lame: Pair = (1.0, 1.0),
+    friction: Friction = (0.0, 1.0),
+) -> ContactProblem:
+    """Elastic wedge pressed into a rigid notch and pulled out of it: it may stay jammed or come out (3 or 5 roots).
+
+    The trapezoid of bottom width ``width`` and height ``height`` widens upward by ``half_angle`` on both sides, and so
+    does the notch. It is meshed by nx by ny cells of two P1 triangles. All nodes of the two inclined sides below the
+    mouth of the notch are contact nodes, first the left side and then the right, each from the bottom up: p = 2 ny. The
+    normals point into the walls, both tangents out of the notch, so slip+ is sliding out. The wedge is larger than the
+    notch by ``press`` (gap = -press at every contact node), weak springs hold its top, and ``pull`` drags at it.
+
+    A wedge that was pressed in can be in equilibrium jammed (its own compression gives friction the grip to hold
+    against the pull) or popped out (free, held by the springs alone). Between them is a third root, sliding out on both
+    sides, of index -1. An oblique pull adds one that hangs tilted, stuck to a wall near the mouth with the tip sliding
+    on the other wall, and one more of index -1. Scaling pull and press together scales the roots and nothing else. With
+    nx = 4 and the other defaults there are
+
+    - pull = (0, 5e-4), alpha = 1: 3 roots at p = 8, 14, 20 and 32;
+    - pull = (4e-4, 1e-3), alpha = 2, 2.1, .. 3: 5 roots at p = 8, 14 and 20.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Cells across and along the height, at least 1; for even nx the mesh is symmetric about the axis.
+    pull : (float, float)
+        Force per length of the top in x and y; positive y is out of the notch [force / length].
+    press : float
+        Interference with both walls, along the normals [length].
+    springs : (float, float)
+        Total stiffness of the springs between the top and the ground in x and y, > 0 [force / length].
+    width, height : float
+        Width of the bottom and height of the wedge [length].
+    half_angle : float
+        Inclination of the sides to the axis, between 0 and 80 [degrees].
+    lame : (float, float)
+        Lame coefficients l, m [force / length^2].
+    friction : float or tuple (F0, F1)
+        As in `ContactProblem`; default F(alpha) = alpha.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+    """
+    angle = math.radians(positive_number(half_angle, "half_angle"))
+    if angle > math.radians(80.0):
+        raise InvalidArgumentError(f"half_angle is {half_angle!r}; expected degrees between 0 and 80")
+    width, height = positive_number(width, "width"), positive_number(height, "height")
+    mesh = fem.trapezoid(nx, ny, width, width + 2.0 * height * math.tan(angle), height)
+    # the top row stands in the mouth of the notch, out of contact, and carries springs and pull
+    left, right = mesh.left[:-1], mesh.right[:-1]
+    c, s = math.cos(angle), math.sin(angle)
+    return fem.contact_problem(
+        mesh.points,
+        mesh.triangles,
+        lame,
+        contact=np.concatenate([left, right]),
+        normals=np.repeat([[-c, -s], [c, -s]], len(left), axis=0),
+        tangents=np.repeat([[-s, c], [s, c]], len(left), axis=0),
+        springs=_top_springs(mesh, springs),
+        forces=fem.edge_forces(mesh.points, fem.edges_along(mesh.top), vector_2d(pull, "pull")),
+        gap=-finite_number(press, "press"),
+        friction=friction,
+    )
+
+
+def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.0, 1.0)) -> ContactProblem:
+    """One-node triangles in a row, weakly coupled: 3^p roots, to measure what an enumeration costs per root.
+
+    Each of the p triangles is `one_node_triangle`; springs of stiffness ``coupling`` join the free nodes of neighbours
+    in both directions. Friction is F(alpha) = alpha. Without coupling the nodes choose independently, and with the
+    default load every node has three roots for alpha > 8/3: 3^p together. At alpha = 5 this is still so with
+    coupling = 0.05 (counted up to p = 8; for p up to 5 couplings to 0.2 too).
+
+    Parameters
+    ----------
+    p : int
+        Number of triangles, at least 1.
+    coupling : float
+        Stiffness of each connecting spring, at least 0 [force / length].
+    f : (float, float)
+        Load of every contact node in normal and tangential direction [force].
+    lame : (float, float)
+        Lame coefficients l, m [force / length^2].
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+    """
+    count = positive_integer(p, "p")
+    spring = nonnegative_number(coupling, "coupling")
+    # the graph Laplacian of the row: a spring pulls on both of its ends
+    link = np.arange(count - 1)
+    sign = np.ones(count - 1)
+    ends = sp.csr_array(
+        (np.concatenate([sign, -sign]), (np.tile(link, 2), np.concatenate([link, link + 1]))), shape=(count - 1, count)
+    )
+    join = sp.kron(ends.T @ ends, sp.eye_array(2))
+    A = sp.kron(sp.eye_array(count), _one_node_stiffness(lame)) + spring * join
+    dofs = sp.csr_array(sp.eye_array(2 * count))
+    # triangles with legs of length one, half a leg apart
+    coordinates = np.stack([1.5 * np.arange(count), np.zeros(count)], axis=1)
+    load = np.tile(vector_2d(f, "f"), count)
+    return ContactProblem(sp.csc_array(A), dofs[0::2], dofs[1::2], load, coordinates=coordinates)
+
+
+@dataclass(frozen=True)
+class GalleryEntry:
+    """A named problem of the gallery.
+
+    Attributes
+    ----------
+    name : str
+        Its name, as in ``gallery:NAME``.
+    summary : str
+        What it shows, in a line.
+    alpha : float
+        A parameter value at which it is worth a look.
+    roots : int or None
+        Number of its roots at that alpha; None where they are not all isolated or the number is not known.
+    build : callable
+        Makes the problem.
+    """
+
+    name: str
+    summary: str
+    alpha: float
+    roots: int | None
+    build: Callable[[], ContactProblem] = field(repr=False)
+
+
+def get(name: str) -> GalleryEntry:
+    """Return the entry of `GALLERY` with this name.
+
+    Raises
+    ------
+    InvalidArgumentError
+        There is none; the message lists the names most like it, or all.
+    """
+    if name in GALLERY:
+        return GALLERY[name]
+    close = difflib.get_close_matches(str(name), GALLERY, n=5, cutoff=0.5)
+    known = f"did you mean {', '.join(close)}?" if close else f"expected one of {', '.join(GALLERY)}"
+    raise InvalidArgumentError(f"the gallery has no problem named {name!r}; {known}")
+
+
+def _small() -> Iterator[GalleryEntry]:
+    def one(name: str, summary: str, alpha: float, roots: int | None, f: Pair) -> GalleryEntry:
+        return GalleryEntry(f"one-node-{name}", summary, alpha, roots, partial(one_node_triangle, f))
+
+    def two(name: str, summary: str, alpha: float, roots: int, loads: tuple[Pair, Pair]) -> GalleryEntry:
+        build = partial(two_node_square, *loads)
+        return GalleryEntry(f"two-node-{name}", f"own geometry, {summary}", alpha, roots, build)
+
+    def path(name: str, sign: float, alpha: float) -> GalleryEntry:
+        slope = ((0.1, sign * 1.1), (0.2, sign * 0.8))
+        build = partial(two_node_square, (0.4, 0.2), (1.8, -0.1), friction=4.0, load_slope=slope)
+        summary = f"own geometry, loading path of Example 6.7, tangential slopes {sign * 1.1:+g} and {sign * 0.8:+g}"
+        return GalleryEntry(f"two-node-6.7-{name}", summary, alpha, 3, build)
+
+    yield one("6.1", "two branches: open for every alpha, and a fold at alpha = 8/3", 5.0, 3, (1.5, -4.0))
+    yield one("6.2", "one branch", 5.0, 1, (1.5, 7.0))
+    yield one("6.3", "two branches that meet in a continuum of roots at alpha = 2", 2.0, None, (1.0, -2.0))
+    yield one("6.3-perturbed", "a small change of the load destroys that bifurcation", 5.0, 3, (0.98, -2.0))
+    yield two("6.4", "loads of Example 6.4: five roots between alpha = 3 and 3.8", 3.5, 5, ((1.0, -3.0), (1.0, -1.0)))
+    yield two("6.5", "loads of Example 6.5: three roots from alpha = 3.5 on", 5.0, 3, ((0.4, -1.4), (1.5, -1.3)))
+    yield two("6.6", "loads of Example 6.6: one root", 5.0, 1, ((2.0, -3.0), (1.0, -1.0)))
+    yield path("minus", -1.0, 1.6)
+    yield path("plus", 1.0, -1.0)
+    yield two("5", "own loads: five well separated roots", 5.0, 5, ((1.0, -4.0), (1.5, -3.5)))
+
+
+def _large() -> Iterator[GalleryEntry]:
+    for p in (8, 16, 32, 64, 100):
+        build = partial(clamped_block, p, p // 2)
+        yield GalleryEntry(f"clamped-block-{p}", f"block on {p} contact nodes: one root", 3.0, 1, build)
+    for p in (8, 14, 20, 32):
+        build = partial(wedge, 4, p // 2)
+        yield GalleryEntry(f"wedge-{p}-3", "wedge pulled straight: jammed, free or sliding out", 1.0, 3, build)
+    # at each of these alpha the five roots keep well clear of changes of status
+    for p, alpha in ((8, 3.0), (14, 2.2), (20, 2.25), (32, 2.2)):
+        build = partial(wedge, 4, p // 2, (4e-4, 1e-3))
+        yield GalleryEntry(f"wedge-{p}-5", "wedge pulled obliquely: it may hang tilted too", alpha, 5, build)
+    for p in (2, 4, 6, 8):
+        yield GalleryEntry(f"chain-{p}", f"{p} separate one-node triangles: 3^{p} roots", 5.0, 3**p, partial(chain, p))
+    for p in (2, 4, 6, 8):
+        build = partial(chain, p, 0.05)
+        yield GalleryEntry(f"chain-{p}-coupled", f"{p} one-node triangles joined by weak springs", 5.0, 3**p, build)
+
+
+#: All named problems, by name.
+GALLERY: Mapping[str, GalleryEntry] = MappingProxyType({entry.name: entry for entry in (*_small(), *_large())})
+
+
+def _one_node_stiffness(lame: Pair) -> NDArray[np.float64]:
+    lam, mu = lame_coefficients(lame)
+    return 0.5 * np.array([[lam + 3 * mu, -(lam + mu)], [-(lam + mu), lam + 3 * mu]])
+
+
+def _top_springs(mesh: fem.Mesh, springs: Pair) -> NDArray[np.float64]:
+    total = vector_2d(springs, "springs")
+    if np.min(total) <= 0:
+        raise InvalidArgumentError(f"springs is {springs!r}; expected two stiffnesses > 0, or the wedge is not held")
+    share = np.full(len(mesh.top), 1.0 / (len(mesh.top) - 1))
+    share[[0, -1]] *= 0.5
+    values = np.zeros_like(mesh.points)
+    values[mesh.top] = share[:, None] * total
+    return values

@@ -1,0 +1,134 @@
+"""Contact problems in files: NumPy archives, MatrixMarket directories and fclib HDF5 files.
+
+All three hold the arrays of `ContactProblem` by name. `read_problem` and `write_problem` choose the format by the path.
+
+``.npz``
+    A NumPy archive. ``A``, ``Bn``, ``Bt`` as dense matrices or in sparse parts, and the vector ``f``::
+
+        np.savez("block.npz", A=A, Bn=Bn, Bt=Bt, f=f, gap=gap, friction0=0.3)
+
+    The sparse parts of a matrix are those of `scipy.sparse`: for A (csc or csr) ``A_data``, ``A_indices``,
+    ``A_indptr``, ``A_shape`` and ``A_format`` ("csc" or "csr"), and likewise for Bn and Bt.
+    Optional are
+
+    - ``friction``: one number, a constant coefficient; or ``friction0`` and ``friction1``: F = friction0 + alpha
+      friction1, each a number or a (p,) array, 0 when left out. With none of them F = alpha, as in `ContactProblem`.
+    - ``gap``, ``load_slope``, ``slip_offset``, ``coordinates``: as in `ContactProblem`.
+    - ``node_ids``: (p,) integers, floats or strings.
+    - ``enumsol_format``: version of this layout, now 1; taken as 1 when left out.
+
+    Names that begin with an underscore are ignored; any other name is refused, since it may be a misspelt one.
+directory
+    One MatrixMarket file a name: ``A.mtx``, ``Bn.mtx``, ``Bt.mtx``, ``f.mtx`` and optionally ``gap.mtx``,
+    ``friction0.mtx`` and so on, with the names above. Vectors are matrices with one column (or one row), one entry
+    stands for all nodes. Labels are in ``node_ids.json``, a list. Files of other kinds are ignored.
+``.h5``, ``.hdf5``
+    The format of the Frictional Contact Library (`enumsol.io.fclib`); needs h5py.
+
+NumPy archives and MatrixMarket directories give every number back bit by bit. Pickled objects are never loaded.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.io import fclib, matrix_market, npz
+from enumsol.problem import ContactProblem
+
+__all__ = ["read_problem", "write_problem"]
+
+_FORMATS = "a .npz file, a directory of MatrixMarket files, or an fclib file (.h5, .hdf5)"
+
+
+def read_problem(path: str | os.PathLike[str]) -> ContactProblem:
+    """Contact problem from a file or directory; `enumsol.io` describes the formats.
+
+    Parameters
+    ----------
+    path : str or path-like
+        A .npz file, a directory of MatrixMarket files, or an fclib file (.h5, .hdf5).
+
+    Raises
+    ------
+    InvalidProblemError
+        The file does not exist, is no problem file, is damaged, lacks an array or holds one that is not known (the
+        closest name is given), or its data are no contact problem. The message begins with the path.
+    MissingDependencyError
+        An fclib file, and h5py is not installed.
+    """
+    place = _path(path)
+    try:
+        return _read(place)
+    except InvalidProblemError as error:
+        raise InvalidProblemError(f"{place}: {error}") from error
+    except OSError as error:
+        reason = error.strerror or error
+        raise InvalidProblemError(f"{place}: it cannot be read ({reason}); expected a readable place") from error
+
+
+def write_problem(problem: ContactProblem, path: str | os.PathLike[str]) -> None:
+    """Write a contact problem to a file or directory; `enumsol.io` describes the formats.
+
+    An existing file is replaced. In an existing directory the MatrixMarket files of an earlier problem are replaced.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    path : str or path-like
+        Ends in .npz, .h5 or .hdf5, or is a directory (made if its name has no suffix).
+
+    Raises
+    ------
+    InvalidArgumentError
+        The path cannot be written or its suffix is not known.
+    InvalidProblemError
+        The format cannot hold the problem: mixed node labels; friction or load that depend on alpha (fclib).
+    MissingDependencyError
+        An fclib file, and h5py is not installed.
+    """
+    if not isinstance(problem, ContactProblem):
+        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
+    place = _path(path)
+    try:
+        _write(problem, place)
+    except InvalidProblemError as error:
+        raise InvalidProblemError(f"{place}: {error}") from error
+    except OSError as error:
+        reason = error.strerror or error
+        raise InvalidArgumentError(f"{place}: it cannot be written ({reason}); expected a writable place") from error
+
+
+def _read(place: Path) -> ContactProblem:
+    if place.is_dir():
+        return matrix_market.read(place)
+    if not place.exists():
+        raise InvalidProblemError(f"there is no such file or directory; expected {_FORMATS}")
+    if place.suffix == ".npz":
+        return npz.read(place)
+    if place.suffix in fclib.SUFFIXES:
+        return fclib.read(place)
+    if place.suffix == ".mtx":
+        raise InvalidProblemError(
+            "one MatrixMarket file is no problem; expected a directory with A.mtx, Bn.mtx and so on"
+        )
+    found = f"its name ends in {place.suffix!r}" if place.suffix else "its name has no suffix"
+    raise InvalidProblemError(f"{found}; expected {_FORMATS}")
+
+
+def _write(problem: ContactProblem, place: Path) -> None:
+    if place.is_dir() or not place.suffix:
+        matrix_market.write(problem, place)
+    elif place.suffix == ".npz":
+        npz.write(problem, place)
+    elif place.suffix in fclib.SUFFIXES:
+        fclib.write(problem, place)
+    else:
+        raise InvalidArgumentError(f"{place}: its name ends in {place.suffix!r}; expected {_FORMATS}")
+
+
+def _path(path: object) -> Path:
+    if not isinstance(path, (str, os.PathLike)):
+        raise InvalidArgumentError(f"path is a {type(path).__name__}; expected the name of a file or directory")
+    return Path(path)

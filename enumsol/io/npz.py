@@ -1,0 +1,130 @@
+"""Problems in NumPy archives (.npz); the layout is described in `enumsol.io`."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.errors import InvalidProblemError
+from enumsol.io.arrays import FORMAT_VERSION, MATRICES, check_names, problem_from_arrays, refusing, vectors_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from enumsol.problem import ContactProblem
+
+_VERSION = "enumsol_format"
+_PARTS = ("data", "indices", "indptr", "shape", "format")
+#: What numpy and zipfile raise on files that are damaged or are something else.
+_DAMAGE = (
+    ValueError,
+    EOFError,
+    OSError,
+    NotImplementedError,
+    RuntimeError,
+    SyntaxError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+
+
+def read(path: Path) -> ContactProblem:
+    """The problem in a .npz file."""
+    arrays = _load(path)
+    version = arrays.pop(_VERSION, np.array(FORMAT_VERSION))
+    if version.ndim or version.dtype.kind not in "iu" or not 1 <= int(version) <= FORMAT_VERSION:
+        raise InvalidProblemError(
+            f"{_VERSION} is {version}; expected a whole number up to {FORMAT_VERSION} (is it from a newer enumsol?)"
+        )
+    named: dict[str, Any] = dict(arrays)
+    for name in MATRICES:
+        parts = {part: named.pop(f"{name}_{part}") for part in _PARTS if f"{name}_{part}" in named}
+        if parts and name in named:
+            raise InvalidProblemError(f"{name} is given as a matrix and in sparse parts; expected one of both")
+        if parts:
+            named[name] = _matrix(name, parts)
+    check_names(named)
+    if "node_ids" in named:
+        named["node_ids"] = _labels(named["node_ids"])
+    return problem_from_arrays(named)
+
+
+def write(problem: ContactProblem, path: Path) -> None:
+    """Write a problem with its matrices in sparse parts."""
+    arrays: dict[str, NDArray[Any]] = {_VERSION: np.array(FORMAT_VERSION)}
+    for name in MATRICES:
+        matrix = getattr(problem, name)
+        arrays |= {f"{name}_{part}": np.asarray(getattr(matrix, part)) for part in _PARTS}
+    arrays |= vectors_of(problem)
+    labels = np.array(problem.node_ids)
+    if labels.dtype.kind not in "iufU" or _labels(labels) != list(problem.node_ids):
+        raise InvalidProblemError(
+            "node_ids cannot be kept in a .npz file; expected labels that are all integers, all floats or all strings"
+        )
+    arrays["node_ids"] = labels
+    with path.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **arrays)
+
+
+def _load(path: Path) -> dict[str, NDArray[Any]]:
+    damaged = refusing(_DAMAGE, "it is not a readable .npz archive", "a complete one, by numpy.savez or write_problem")
+    with path.open("rb") as file, damaged:
+        if file.read(2) != b"PK":
+            raise InvalidProblemError("it is no .npz archive in spite of its name; expected what numpy.savez writes")
+        file.seek(0)
+        archive = np.load(file, allow_pickle=False)
+        with archive:
+            return {name: _member(archive, name) for name in archive.files if not name.startswith("_")}
+
+
+def _member(archive: Any, name: str) -> NDArray[Any]:
+    try:
+        array = archive[name]
+    except ValueError as error:
+        if "allow_pickle" not in str(error):
+            raise
+        raise InvalidProblemError(
+            f"{name} is a pickled Python object, which is never loaded; expected an array of numbers, or for a sparse "
+            f"matrix its parts {', '.join(f'{name}_{part}' for part in _PARTS)}"
+        ) from error
+    if not isinstance(array, np.ndarray):
+        raise InvalidProblemError(f"its member {name} is no NumPy array; expected arrays only")
+    return array
+
+
+def _matrix(name: str, parts: dict[str, NDArray[Any]]) -> sp.csc_array | sp.csr_array:
+    missing = [f"{name}_{part}" for part in _PARTS if part not in parts]
+    if missing:
+        raise InvalidProblemError(
+            f"{', '.join(missing)} is missing of the sparse parts of {name}; "
+            f"expected {', '.join(f'{name}_{part}' for part in _PARTS)}"
+        )
+    kind, shape = str(parts["format"]), parts["shape"]
+    if kind not in ("csc", "csr"):
+        raise InvalidProblemError(f'{name}_format is {kind!r}; expected "csc" or "csr"')
+    if shape.shape != (2,) or shape.dtype.kind not in "iu":
+        raise InvalidProblemError(f"{name}_shape is {shape.tolist()}; expected two whole numbers")
+    for part in ("indices", "indptr"):
+        if parts[part].ndim != 1 or parts[part].dtype.kind not in "iu":
+            raise InvalidProblemError(f"{name}_{part} is no list of whole numbers; expected those of scipy.sparse")
+    if parts["data"].ndim != 1 or parts["data"].dtype.kind not in "iufb":
+        raise InvalidProblemError(f"{name}_data is no list of real numbers; expected those of scipy.sparse")
+    build = sp.csc_array if kind == "csc" else sp.csr_array
+    with refusing((ValueError,), f"the sparse parts of {name} do not fit together", f"those of one {kind} matrix"):
+        matrix = build((parts["data"], parts["indices"], parts["indptr"]), shape=(int(shape[0]), int(shape[1])))
+        matrix.check_format(full_check=True)
+    return matrix
+
+
+def _labels(array: NDArray[Any]) -> list[Any]:
+    if array.ndim != 1 or array.dtype.kind not in "iufU":
+        raise InvalidProblemError(
+            f"node_ids has shape {array.shape} and type {array.dtype}; expected (p,) integers, floats or strings"
+        )
+    return list(array.tolist())

@@ -1,0 +1,72 @@
+"""roots_at(alpha) of a graph equals enumerate_roots at that alpha, on generic, degenerate and larger problems."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from branches.problems import assert_balanced, assert_same_roots, generic_problem, integer_problem
+
+from enumsol import enumerate_roots, gallery
+from enumsol.branches import branch_graph
+
+KINDS = ("friction", "load", "both")
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_generic_problems_at_random_alphas(seed):
+    rng = np.random.default_rng(seed)
+    problem = generic_problem(rng, int(rng.integers(1, 5)), KINDS[seed % 3])
+    graph = branch_graph(problem, (0.0, 6.0))
+    assert_balanced(graph)
+    for alpha in rng.uniform(0.0, 6.0, size=12).tolist():
+        roots = enumerate_roots(problem, alpha, "fast")
+        assert_same_roots(graph.roots_at(alpha), roots)
+        assert graph.multiplicity_at(alpha) == len(roots)
+
+
+@pytest.mark.parametrize("seed", range(9))
+def test_exact_arithmetic_proves_generic_graphs_complete(seed):
+    rng = np.random.default_rng(100 + seed)
+    problem = generic_problem(rng, int(rng.integers(1, 4)), KINDS[seed % 3])
+    graph = branch_graph(problem, (0.0, 6.0), "exact")
+    assert graph.complete
+    assert_balanced(graph)
+    alpha = Fraction(rng.uniform(0.0, 6.0)).limit_denominator(1000)
+    assert_same_roots(graph.roots_at(alpha), enumerate_roots(problem, alpha, "exact"))
+
+
+@pytest.mark.parametrize("block", range(6))
+def test_degenerate_problems_at_their_critical_alphas_too(block):
+    for seed in range(20 * block, 20 * block + 20):
+        rng = np.random.default_rng(seed)
+        kind = KINDS[seed % 3]
+        problem = integer_problem(rng, int(rng.integers(1, 4)), kind)
+        interval = (-3, 3) if kind == "load" else (0, 4)
+        graph = branch_graph(problem, interval, "exact")
+        assert graph.complete, (seed, graph.reasons)
+        assert_balanced(graph)
+        alphas = [Fraction(x).limit_denominator(997) for x in rng.uniform(*interval, size=2)]
+        alphas += [v.enclosure[0] for v in graph.vertices if v.enclosure[0] == v.enclosure[1]]
+        for alpha in alphas[:8]:
+            roots = enumerate_roots(problem, alpha, "exact")
+            assert_same_roots(graph.roots_at(alpha), roots)
+            assert graph.multiplicity_at(alpha) == len(roots) + len(roots.families)
+
+
+@pytest.mark.parametrize("name", ["two-node-6.4", "two-node-6.5", "two-node-6.6", "two-node-5", "chain-4-coupled"])
+def test_gallery_problems(name, rng):
+    problem = gallery.get(name).build()
+    graph = branch_graph(problem, (0.0, 8.0))
+    assert_balanced(graph)
+    for alpha in rng.uniform(0.0, 8.0, size=10).tolist():
+        assert_same_roots(graph.roots_at(alpha), enumerate_roots(problem, alpha, "fast"))
+
+
+def test_the_wedge_over_its_whole_path(rng):
+    problem = gallery.get("wedge-14-5").build()
+    graph = branch_graph(problem, (0.0, 5.0))
+    assert_balanced(graph)
+    assert graph.stats.nodes < 40_000
+    assert max(graph.steps[2]) == 5
+    for alpha in rng.uniform(0.0, 5.0, size=12).tolist():
+        assert_same_roots(graph.roots_at(alpha), enumerate_roots(problem, alpha, "fast"))

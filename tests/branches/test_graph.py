@@ -1,0 +1,186 @@
+"""Questions to a graph: branches, jumps, uniqueness, starting points, tables, files, figures."""
+
+import json
+from fractions import Fraction
+
+import networkx as nx
+import numpy as np
+import pytest
+from branches.problems import assert_balanced, assert_same_roots, one_node
+
+from enumsol import ContactProblem, enumerate_roots, gallery
+from enumsol.branches import BranchGraph, branch_graph
+from enumsol.errors import InvalidArgumentError
+
+
+@pytest.fixture(scope="module")
+def square():
+    return branch_graph(gallery.get("two-node-6.4").build(), (0.0, 8.0), "exact")
+
+
+def test_the_two_node_square_goes_back_and_forth(square):
+    assert square.complete
+    assert len(square.branches) == 2
+    (turning,) = [branch for branch in square.branches if branch.folds]
+    assert [v.alpha for v in turning.folds] == pytest.approx([3.0, 1 + 2 * np.sqrt(2.0), 3.0], abs=1e-14)
+    assert [square.multiplicity_at(a) for a in (1.0, 3.5, 5.0)] == [1, 5, 3]
+
+
+def test_jumps_are_the_folds_that_no_arc_leaves_to_the_right(square):
+    assert [v.alpha for v in square.jumps] == [pytest.approx(1 + 2 * np.sqrt(2.0))]
+
+
+def test_a_closed_branch_of_any_length():
+    # F = 1.5 alpha, f_n = 4 - alpha, f_t = -c: stick and slip- exist where 1.5 alpha (4 - alpha) > c
+    for c in (5.5, 5.9999, 1.5 * (4 - 2.5e-13)):
+        problem = one_node((4.0, -c), friction=(0.0, 1.5), load_slope=[-1.0, 0.0])
+        half = float((4 - Fraction(c) / Fraction(3, 2)) ** 1) ** 0.5
+        for arithmetic in ("fast", "exact"):
+            graph = branch_graph(problem, (0.0, 4.0), arithmetic)
+            assert_balanced(graph)
+            (closed,) = [branch for branch in graph.branches if branch.closed]
+            assert len(closed.arcs) == len(closed.vertices) == 2
+            lo, hi = (v.exact.enclosure()[0] for v in sorted(closed.folds, key=lambda v: v.alpha))
+            assert float(hi - lo) == pytest.approx(2 * half, rel=1e-9)
+            assert graph.multiplicity_at(2.0) == 3
+
+
+def test_a_branch_on_an_alpha_interval_of_length_1e_6_is_missed_by_samples():
+    c = 1.5 * (4 - 2.5e-13)
+    problem = one_node((4.0, -c), friction=(0.0, 1.5), load_slope=[-1.0, 0.0])
+    graph = branch_graph(problem, (0.0, 4.0))
+    (closed,) = [branch for branch in graph.branches if branch.closed]
+    lo, hi = closed.interval
+    assert 0.99e-6 < hi - lo < 1.01e-6
+    samples = np.linspace(0.0, 4.0, 1000).tolist()
+    assert not any(lo <= alpha <= hi for alpha in samples)
+    assert all(len(enumerate_roots(problem, alpha, "fast")) == 1 for alpha in samples[450:550])
+
+
+def test_pinned_closed_branch_of_the_two_node_square():
+    problem = gallery.two_node_square(
+        (3.7, -5.0), (1.1, 3.4), friction=(0.9, 1.7), load_slope=((-0.8, -0.1), (-1.0, 0.6))
+    )
+    graph = branch_graph(problem, (0.0, 5.0), "exact")
+    assert graph.complete
+    assert_balanced(graph)
+    (closed,) = [branch for branch in graph.branches if branch.closed]
+    assert len(closed.arcs) == 4
+    assert closed.interval == pytest.approx((0.398590498429, 2.170936637865), abs=1e-10)
+
+
+def test_pinned_bifurcation_that_a_perturbation_of_the_load_destroys():
+    graph = branch_graph(gallery.chain(2, 0.4, (0.5, -3.0)), (0.0, 10.0), "exact")
+    (corner,) = graph.bifurcations
+    assert corner.alpha == 6.0
+    assert sum(arc.tail == corner.number for arc in graph.arcs) == 4
+    chain = gallery.chain(2, 0.4, (0.5, -3.0))
+    moved = ContactProblem(chain.A, chain.Bn, chain.Bt, chain.f + np.array([0.0, 0.0, 0.001, 0.0]))
+    graph = branch_graph(moved, (0.0, 10.0), "exact")
+    assert graph.complete
+    assert not graph.bifurcations
+    assert len(graph.folds) == 2
+
+
+def test_the_networkx_graph_holds_vertices_and_arcs(square):
+    graph = square.graph
+    assert isinstance(graph, nx.MultiGraph)
+    assert graph.number_of_edges() == len(square.arcs)
+    for _, _, number, data in graph.edges(keys=True, data=True):
+        assert data["arc"] is square.arcs[number]
+        lo, hi = data["alpha"]
+        lambda_n, lambda_t = data["values"](0.5 * (lo + hi))
+        assert lambda_n.shape == lambda_t.shape == (2,)
+    for number, data in graph.nodes(data=True):
+        assert data["alpha"] == square.vertices[number].alpha
+
+
+def test_arcs_continue_in_their_vertices(square):
+    for arc in square.arcs:
+        for alpha, vertex in ((arc.lo, square.vertices[arc.tail]), (arc.hi, square.vertices[arc.head])):
+            np.testing.assert_allclose(arc.values(alpha)[0], vertex.lambda_n, atol=1e-12)
+            np.testing.assert_allclose(arc.values(alpha)[1], vertex.lambda_t, atol=1e-12)
+            np.testing.assert_allclose(arc.displacements(alpha)[0], vertex.u_n, atol=1e-12)
+            np.testing.assert_allclose(arc.displacements(alpha)[1], vertex.u_t, atol=1e-12)
+        with pytest.raises(InvalidArgumentError, match="expected a value on the arc"):
+            arc.values(arc.hi + 1.0)
+
+
+def test_starting_points_are_regular_roots_on_every_branch(square):
+    points = square.starting_points()
+    assert len(points) == len(square.branches)
+    for branch, root in zip(square.branches, points, strict=True):
+        assert root.regular
+        assert any(root.statuses == arc.statuses and arc.lo < root.alpha < arc.hi for arc in branch.arcs)
+
+
+def test_alphas_outside_the_interval_are_refused(square):
+    with pytest.raises(InvalidArgumentError, match="interval"):
+        square.roots_at(8.5)
+    with pytest.raises(InvalidArgumentError, match="interval"):
+        square.multiplicity_at(-0.1)
+
+
+def test_frames_and_summary(square):
+    frame = square.to_frame()
+    assert len(frame) == len(square.arcs)
+    assert set(frame["branch"]) == {branch.number for branch in square.branches}
+    vertices = square.vertices_frame()
+    assert len(vertices) == 2 * len(square.vertices)
+    assert json.loads(json.dumps(square.summary()))["folds"] == [v.alpha for v in square.folds]
+    assert "complete: yes (proven)" in repr(square)
+
+
+@pytest.mark.parametrize("name", ["one-node-6.3", "two-node-6.4", "two-node-6.7-plus"])
+@pytest.mark.parametrize("arithmetic", ["fast", "exact"])
+def test_a_saved_graph_is_read_back_to_the_last_bit(name, arithmetic, tmp_path):
+    interval = (-3.0, 3.0) if "6.7" in name else (0.0, 8.0)
+    graph = branch_graph(gallery.get(name).build(), interval, arithmetic)
+    file = tmp_path / "graph.json"
+    graph.save(file)
+    back = BranchGraph.load(file)
+    assert repr(back) == repr(graph)
+    assert back.reasons == graph.reasons
+    assert back.to_frame().equals(graph.to_frame())
+    assert back.vertices_frame().equals(graph.vertices_frame())
+    for v, w in zip(graph.vertices, back.vertices, strict=True):
+        assert v.exact.compare(w.exact) == 0
+    for alpha in (1.3, 2.0, 2.9):
+        assert_same_roots(back.roots_at(alpha), graph.roots_at(alpha))
+    graph.write_graphml(tmp_path / "graph.graphml")
+    assert nx.read_graphml(tmp_path / "graph.graphml").number_of_nodes() == len(graph.vertices)
+
+
+def test_files_that_are_no_graphs_are_refused(tmp_path):
+    file = tmp_path / "graph.json"
+    with pytest.raises(InvalidArgumentError, match="cannot be read"):
+        BranchGraph.load(file)
+    for text, message in (
+        ("{", "JSON"),
+        ("[]", "format"),
+        ('{"format": "enumsol-branch-graph", "version": 1}', "damaged"),
+    ):
+        file.write_text(text)
+        with pytest.raises(InvalidArgumentError, match=message):
+            BranchGraph.load(file)
+
+
+@pytest.mark.parametrize("quantity", ["lambda_n", "lambda_t", "u_n", "u_t"])
+def test_figures(square, quantity, tmp_path):
+    file = tmp_path / "graph.png"
+    figure = square.plot(quantity, file=file)
+    assert len(figure.axes) == 3
+    assert file.stat().st_size > 10_000
+    assert len(square.plot(quantity, [1], multiplicity=False).axes) == 1
+    styles = {line.get_linestyle() for line in figure.axes[0].lines}
+    assert {"-", "--"} <= styles
+
+
+def test_figures_of_families_and_sheets(tmp_path):
+    branch_graph(one_node((1.0, -2.0)), (0.0, 5.0)).plot("u_t", file=tmp_path / "family.png")
+    sheet = branch_graph(one_node((0.0, 0.0), friction=2.0, load_slope=[1.0, -2.0]), (-1.0, 1.0))
+    sheet.plot(file=tmp_path / "sheet.png")
+    with pytest.raises(InvalidArgumentError, match="quantity"):
+        sheet.plot("pressure")
+    with pytest.raises(InvalidArgumentError, match="nodes"):
+        sheet.plot(nodes=["x"])

@@ -1,0 +1,117 @@
+"""multiplicity_table and link_samples."""
+
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+
+import numpy as np
+import pandas as pd
+import pytest
+from branches.problems import generic_problem
+
+from enumsol import gallery
+from enumsol.branches import branch_graph, link_samples, multiplicity_table
+from enumsol.errors import Interrupted, InvalidArgumentError
+
+ALPHAS = [0.5, 2.0, 3.5, 5.0, 7.5]
+
+
+@pytest.fixture(scope="module")
+def square():
+    return gallery.get("two-node-6.4").build()
+
+
+def without_time(table):
+    return table.drop(columns="seconds")
+
+
+def test_the_table_counts_roots_families_and_kinds(square):
+    table = multiplicity_table(square, ALPHAS)
+    assert table["alpha"].tolist() == ALPHAS
+    assert table["roots"].tolist() == [1, 1, 5, 3, 3]
+    assert (table["index_sum"] == 1).all()
+    assert table["complete"].all()
+    assert not multiplicity_table(square, ALPHAS, arithmetic="fast")["complete"].any()
+    assert multiplicity_table(square, [3.5], arithmetic="exact")["complete"].all()
+    assert table["with_stick"].tolist() == [0, 0, 2, 1, 1]
+    family = multiplicity_table(gallery.get("one-node-6.3").build(), [2.0])
+    assert family[["roots", "families"]].to_numpy().tolist() == [[0, 1]]
+
+
+def test_the_table_agrees_with_the_graph(rng):
+    problem = generic_problem(rng, 3, "load")
+    graph = branch_graph(problem, (0.0, 6.0))
+    alphas = rng.uniform(0.0, 6.0, size=20).tolist()
+    assert multiplicity_table(problem, alphas)["roots"].tolist() == [graph.multiplicity_at(a) for a in alphas]
+
+
+@pytest.mark.parametrize("pool", [ThreadPoolExecutor, ProcessPoolExecutor])
+def test_a_parallel_run_gives_the_same_table(square, pool):
+    seen = []
+    with pool(2) as executor:
+        table = multiplicity_table(square, ALPHAS, executor=executor, progress=lambda *state: seen.append(state))
+    pd.testing.assert_frame_equal(without_time(table), without_time(multiplicity_table(square, ALPHAS)))
+    assert seen[-1] == (5, 5)
+
+
+def test_two_dask_workers_give_the_same_table(square):
+    import distributed
+
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        table = multiplicity_table(square, ALPHAS, executor=client.get_executor())
+    pd.testing.assert_frame_equal(without_time(table), without_time(multiplicity_table(square, ALPHAS)))
+
+
+def test_an_interruption_keeps_what_was_done(square):
+    def stop(done, total):
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match="3 of 5") as caught:
+        multiplicity_table(square, ALPHAS, progress=stop)
+    assert caught.value.partial["alpha"].tolist() == ALPHAS[:3]
+    with ThreadPoolExecutor(1) as executor, pytest.raises(Interrupted) as caught:
+        multiplicity_table(square, ALPHAS, executor=executor, progress=stop)
+    assert len(caught.value.partial) == 3
+
+
+def test_bad_alphas_are_refused_before_any_work(square):
+    with pytest.raises(InvalidArgumentError, match="alpha"):
+        multiplicity_table(square, [1.0, np.nan])
+    with pytest.raises(InvalidArgumentError, match="friction"):
+        multiplicity_table(square, [1.0, -1.0])
+    assert len(multiplicity_table(square, [])) == 0
+    with pytest.raises(InvalidArgumentError, match="empty"):
+        link_samples(square, [])
+
+
+def test_linked_samples_follow_the_branches(square):
+    graph = branch_graph(square, (0.0, 8.0))
+    linked = link_samples(square, np.linspace(0.05, 7.95, 80))
+    assert all(data["heuristic"] for _, _, data in linked.graph.edges(data=True))
+    missed = linked.missed(graph)
+    assert missed.arcs == missed.branches == missed.components == ()
+    # no link joins roots of different exact branches
+    place = {}
+    for (sample, root), data in linked.graph.nodes(data=True):
+        arcs = [a for a in graph.arcs_at(linked.root_sets[sample].alpha) if a.statuses == data["statuses"]]
+        place[sample, root] = graph.branch_of[arcs[0].number]
+    assert all(place[a] == place[b] for a, b in linked.graph.edges)
+    assert "80 samples" in repr(linked)
+
+
+def test_links_follow_a_transition_by_a_vanishing_test_function():
+    problem = gallery.get("one-node-6.2").build()
+    linked = link_samples(problem, [4.0, 4.5, 4.9, 5.5])
+    assert [data["rule"] for *_, data in linked.graph.edges(data=True)] == ["selection", "flip", "selection"]
+    assert len(linked.branches) == 1
+
+
+def test_what_samples_miss_is_named(square):
+    graph = branch_graph(square, (0.0, 8.0))
+    missed = link_samples(square, [1.0, 2.0]).missed(graph)
+    assert len(missed.arcs) == 4
+    assert missed.branches == missed.components == (1,)
+    family = branch_graph(gallery.get("one-node-6.3").build(), (0.0, 5.0))
+    assert link_samples(family.problem, [1.0, 3.0]).missed(family).families == 1

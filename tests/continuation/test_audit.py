@@ -1,0 +1,207 @@
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+import pytest
+
+import enumsol
+from enumsol import gallery
+from enumsol.continuation import ContinuationOptions, audit, follow, follow_all, follow_arc, newton
+
+enumerate_roots = partial(enumsol.enumerate_roots, arithmetic="fast")
+
+OPEN, STICK, MINUS = (enumsol.ContactStatus(name) for name in ("open", "stick", "slip-"))
+
+
+@dataclass
+class Arc:
+    number: int
+    statuses: tuple
+    lo: float
+    hi: float
+    tail: int
+    head: int
+    force: object
+    dimension: int = 0
+
+    def values(self, alpha):
+        n, t = self.force(alpha)
+        return np.array([n]), np.array([t])
+
+
+@dataclass
+class Vertex:
+    number: int
+    alpha: float
+    lambda_n: np.ndarray
+    lambda_t: np.ndarray
+    family: object = None
+
+
+@dataclass
+class Branch:
+    number: int
+    arcs: tuple
+
+
+@dataclass
+class Graph:
+    """Example 6.1 in closed form, sharing nothing with the package but the problem."""
+
+    problem: object
+    interval: tuple = (0.0, 20.0)
+    arcs: tuple = field(init=False)
+    vertices: tuple = field(init=False)
+    branches: tuple = field(init=False)
+
+    def __post_init__(self):
+        fold = 8 / 3
+        forces = [lambda a: (0.0, 0.0), lambda a: (1.5, -4.0), lambda a: (1 / (a - 2), -a / (a - 2))]
+        ends = [(0, forces[0]), (20, forces[0]), (fold, forces[1]), (20, forces[1]), (20, forces[2])]
+        self.vertices = tuple(
+            Vertex(k, float(a), *(np.array([value]) for value in force(a))) for k, (a, force) in enumerate(ends)
+        )
+        self.arcs = (
+            Arc(0, (OPEN,), 0.0, 20.0, 0, 1, forces[0]),
+            Arc(1, (STICK,), fold, 20.0, 2, 3, forces[1]),
+            Arc(2, (MINUS,), fold, 20.0, 2, 4, forces[2]),
+        )
+        self.branches = (Branch(0, self.arcs[:1]), Branch(1, self.arcs[1:]))
+
+    def starting_points(self):
+        roots = enumerate_roots(self.problem, 5.0)
+        return [next(r for r in roots if r.statuses[0] is s) for s in (OPEN, MINUS)]
+
+
+@pytest.fixture
+def graph():
+    return Graph(gallery.one_node_triangle())
+
+
+@pytest.fixture
+def path(graph):
+    return follow(graph.problem, newton(graph.problem, 5.0, [1.5, -4.0]), -1, (0, 20))
+
+
+def test_points_lie_on_the_closed_form(graph, path):
+    report = audit(path, graph)
+    assert report.ok
+    assert report.max_distance < 1e-12
+    assert report.visited == {1, 2}
+
+
+def test_missed_branch_is_named(graph, path):
+    report = audit(path, graph)
+    assert not report.complete
+    (missed,) = report.missed
+    assert (missed.arc, missed.branch, missed.interval) == (0, 0, (0.0, 20.0))
+    assert "arc 0 of branch 0" in repr(report)
+
+
+def test_planted_jump_is_found_and_located(graph, path, tmp_path):
+    frame = path.to_frame()
+    late = frame.index[frame["alpha"].gt(10) & frame["status_0"].eq("slip-")]
+    frame.loc[late, ["lambda_n_0", "lambda_t_0"]] = 0.0
+    frame.to_csv(tmp_path / "points.csv", index=False)
+    report = audit(tmp_path / "points.csv", graph)
+    assert not report.ok
+    assert not report.off
+    (jump,) = report.jumps
+    assert jump.branches == (1, 0)
+    assert jump.point == late[0] - 1
+    assert jump.alpha[0] < 10 < jump.alpha[1]
+    assert jump.way == np.inf
+    assert report.to_frame()["jump"].sum() == 1
+
+
+def test_jump_of_the_printed_algorithm_is_found(graph, path):
+    """With long steps and without checks, corrections beyond the fold converge to the open branch."""
+    options = ContinuationOptions(check_steps=False, h_max=0.5)
+    jumped = follow(graph.problem, path[0], -1, (0, 20), options)
+    report = audit(jumped, graph)
+    (jump,) = report.jumps
+    assert jump.branches == (1, 0)
+    assert jump.alpha[1] < 8 / 3 < jump.alpha[0]
+    assert audit(follow(graph.problem, path[0], -1, (0, 20), ContinuationOptions(h_max=0.5)), graph).ok
+
+
+def test_planted_wrong_point_is_off(graph, path):
+    frame = path.to_frame()
+    frame.loc[3, "lambda_n_0"] += 1e-3
+    report = audit(frame, graph)
+    assert report.off == (3,)
+    assert report.distances[3] > 1e-4
+
+
+def test_every_half_of_the_path_misses_an_arc(graph, path):
+    half = path.to_frame().iloc[: path.folds[0].point]
+    assert {item.arc for item in audit(half, graph).missed} == {0, 2}
+
+
+def test_follow_all_with_the_closed_form(graph):
+    result = follow_all(graph.problem, (0, 20), graph=graph)
+    assert result.complete
+    assert result.reseeded == 0
+    assert not result.failures
+    assert result.stats.accepted > 0
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [(3, "path is a int"), ("missing.csv", "CSV"), ("frame", "no column 'lambda_t_0'")],
+)
+def test_bad_arguments(graph, path, source, message):
+    given = path.to_frame().drop(columns="lambda_t_0") if source == "frame" else source
+    with pytest.raises(enumsol.InvalidArgumentError, match=message):
+        audit(given, graph)
+
+
+class TestBranchGraph:
+    """Against the exact branch graphs."""
+
+    @pytest.fixture
+    def branch_graph(self):
+        return pytest.importorskip("enumsol.branches.build").branch_graph
+
+    @pytest.mark.parametrize("loading", [False, True])
+    @pytest.mark.parametrize("seed", range(15))
+    def test_follow_all_visits_every_arc(self, branch_graph, seed, loading, random_problems):
+        problem = random_problems(seed, loading)
+        interval = (-5.0, 5.0) if loading else (0.0, 20.0)
+        result = follow_all(problem, interval, graph=branch_graph(problem, interval))
+        assert result.complete
+        assert result.report.max_distance < 1e-8
+
+    @pytest.mark.parametrize(
+        "name", ["one-node-6.1", "one-node-6.2", "two-node-6.4", "two-node-6.5", "chain-2-coupled"]
+    )
+    def test_gallery(self, branch_graph, name):
+        problem = gallery.get(name).build()
+        result = follow_all(problem, (0.0, 8.0), graph=branch_graph(problem, (0.0, 8.0)))
+        assert result.complete
+        assert not result.failures
+
+    def test_every_arc_at_the_vertical_segment_can_be_taken(self, branch_graph):
+        problem = gallery.get("one-node-6.3").build()
+        graph = branch_graph(problem, (0.0, 20.0))
+        (family,) = [v for v in graph.vertices if v.family is not None]
+        meeting = [arc for arc in graph.arcs if family.number in (arc.tail, arc.head)]
+        assert len(meeting) == 3
+        for arc in meeting:
+            path = follow_arc(problem, graph, family.number, arc.number)
+            assert path[0].statuses == arc.statuses
+            assert path.alpha[-1] == (20 if arc.tail == family.number else 0)
+        result = follow_all(problem, (0.0, 20.0), graph=graph)
+        assert result.complete
+
+    def test_every_arc_at_a_bifurcation_can_be_taken(self, branch_graph):
+        problem = gallery.get("chain-2").build()
+        graph = branch_graph(problem, (0.0, 6.0))
+        (vertex,) = graph.bifurcations
+        for arc in graph.arcs:
+            if vertex.number in (arc.tail, arc.head):
+                path = follow_arc(problem, graph, vertex.number, arc.number)
+                assert path[1].statuses == arc.statuses
+                assert path.alpha[0] == pytest.approx(8 / 3)
+        with pytest.raises(enumsol.InvalidArgumentError, match="not an arc"):
+            follow_arc(problem, graph, vertex.number, 10_000)

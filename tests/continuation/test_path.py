@@ -1,0 +1,114 @@
+import numpy as np
+import pytest
+
+import enumsol
+from enumsol import gallery
+from enumsol.continuation import ContinuationOptions, Path, follow, newton
+
+
+@pytest.fixture
+def problem():
+    return gallery.one_node_triangle()
+
+
+@pytest.fixture
+def path(problem):
+    return follow(problem, newton(problem, 5.0, [1.5, -4.0]), -1, (0, 20))
+
+
+def test_is_a_sequence_of_points(path):
+    assert len(path.points) == len(path) == len(path.alpha)
+    assert path[0].kind == "start"
+    assert path[-1].alpha == 20
+    assert [point.alpha for point in path[:2]] == list(path.alpha[:2])
+    assert np.all(np.diff(path.arclength) > 0)
+    assert path.kinds.count("step") in (path.stats.accepted, path.stats.accepted - 1)
+
+
+def test_frame_has_the_columns_that_audits_read(path):
+    frame = path.to_frame()
+    assert len(frame) == len(path)
+    assert {"alpha", "kind", "lambda_n_0", "lambda_t_0", "status_0"} <= set(frame.columns)
+
+
+def test_save_and_load(path, tmp_path):
+    path.save(tmp_path / "path.npz")
+    again = Path.load(tmp_path / "path.npz")
+    assert repr(again) == repr(path)
+    assert np.array_equal(again.lambda_n, path.lambda_n)
+    assert again.transitions[0].local_test == path.transitions[0].local_test
+    assert again.options == path.options
+
+
+def test_load_refuses_other_files(tmp_path):
+    np.savez(tmp_path / "other.npz", a=1)
+    with pytest.raises(enumsol.InvalidArgumentError, match="does not hold a path"):
+        Path.load(tmp_path / "other.npz")
+
+
+def test_resume_after_the_step_limit_is_the_same_path(problem, path, tmp_path):
+    options = ContinuationOptions(max_steps=7)
+    part = follow(problem, path[0], -1, (0, 20), options)
+    assert part.status == "step limit"
+    part.save(tmp_path / "part.npz")
+    loaded = Path.load(tmp_path / "part.npz")
+    with pytest.raises(enumsol.InvalidArgumentError, match="problem is missing"):
+        loaded.resume()
+    whole = loaded.resume(problem, options=ContinuationOptions())
+    assert whole.status == "interval left"
+    assert whole.alpha == pytest.approx(path.alpha, abs=1e-9)
+    assert whole.transitions[0].point == path.transitions[0].point
+    assert whole.stats.accepted == path.stats.accepted
+
+
+def test_resume_in_a_wider_interval(problem):
+    first = follow(problem, newton(problem, 5.0, [1.5, -4.0]), 1, (0, 6))
+    more = first.resume(interval=(0, 9))
+    assert more.alpha[-1] == 9
+    assert 6 in more.alpha
+
+
+def test_prints_why_it_ended(path):
+    text = repr(path)
+    assert "stick -> slip-, fold, no local branch" in text
+    assert "alpha left the interval (0, 20) at 20" in text
+
+
+def test_plot(path):
+    ax = path.plot()
+    assert {line.get_label() for line in ax.lines} == {"steps", "folds", "start"}
+    assert len(path.plot(ax=ax).lines) == 6
+    with pytest.raises(enumsol.InvalidArgumentError, match="quantity"):
+        path.plot(quantity="stress")
+    with pytest.raises(enumsol.InvalidArgumentError, match="node"):
+        path.plot(node=3)
+
+
+def test_plot_over_a_graph(problem, path, tmp_path):
+    from enumsol import branches
+
+    ax = path.plot(branches.branch_graph(problem, (0.0, 20.0)))
+    ax.figure.savefig(tmp_path / "figure.png")
+    assert "steps" in {line.get_label() for line in ax.lines}
+    with pytest.raises(enumsol.InvalidArgumentError, match="both given"):
+        path.plot(branches.branch_graph(problem, (0.0, 20.0)), ax=ax)
+
+
+def test_interruption_keeps_the_path(problem, path, monkeypatch):
+    from enumsol.continuation import follower
+
+    real, calls = follower.moore_penrose, []
+
+    def interrupted(*arguments):
+        calls.append(1)
+        if len(calls) > 5:
+            raise KeyboardInterrupt
+        return real(*arguments)
+
+    monkeypatch.setattr(follower, "moore_penrose", interrupted)
+    with pytest.raises(enumsol.Interrupted, match="resume") as caught:
+        follow(problem, path[0], -1, (0, 20))
+    partial = caught.value.partial
+    assert len(partial) == 6
+    monkeypatch.undo()
+    assert partial.resume().alpha == pytest.approx(path.alpha, abs=1e-9)

@@ -1,0 +1,195 @@
+"""Searches cut short, watched, interrupted, and run by executors."""
+
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+
+import pytest
+from compare import differences, forces, statuses
+
+import enumsol
+from enumsol import gallery
+
+
+@pytest.fixture(scope="module")
+def wedge():
+    entry = gallery.get("wedge-8-5")
+    return entry.build(), entry.alpha
+
+
+def test_stop_after(wedge):
+    whole = enumsol.enumerate_roots(*wedge, "fast")
+    assert len(whole) == 5
+    nodes = []
+    for count in (1, 2, 3):
+        part = enumsol.enumerate_roots(*wedge, "fast", stop_after=count)
+        assert len(part) == count
+        assert statuses(part) < statuses(whole)
+        assert part.undecided
+        assert not part.complete
+        assert repr(part).splitlines()[-1].startswith("complete: no (stopped after enough roots")
+        nodes.append(part.stats.nodes)
+    assert nodes == sorted(nodes)
+    assert nodes[-1] < whole.stats.nodes
+    more = enumsol.enumerate_roots(*wedge, "fast", stop_after=6)
+    assert more.stopped is None
+    assert not differences(more, whole)
+
+
+def test_stop_after_counts_roots_and_not_selections():
+    # the unloaded neighbours make 4^2 selections of every root
+    problem = gallery.chain(3, 0.0)
+    loads = problem.f.copy()
+    loads[2:] = 0.0
+    problem = enumsol.ContactProblem(problem.A, problem.Bn, problem.Bt, loads)
+    for method in ("tree", "exhaustive"):
+        assert len(enumsol.enumerate_roots(problem, 5.0, "fast", method)) == 3
+        part = enumsol.enumerate_roots(problem, 5.0, "fast", method, stop_after=2)
+        assert len(part) == 2
+
+
+def test_max_nodes(wedge):
+    roots = enumsol.enumerate_roots(*wedge, "fast", max_nodes=40)
+    assert roots.stats.nodes == 40
+    assert "max_nodes = 40" in roots.stopped
+    assert not roots.complete
+    # what was not examined is listed, in the user's terms
+    assert roots.undecided
+    known = {None, "contact", *enumsol.ContactStatus}
+    assert all(len(item.statuses) == wedge[0].p and set(item.statuses) <= known for item in roots.undecided)
+
+
+def covers(codes, names):
+    """Whether a partial assignment contains a selection."""
+    return all(
+        code is None or getattr(code, "value", code) == name or (code == "contact" and name != "open")
+        for code, name in zip(codes, names, strict=True)
+    )
+
+
+@pytest.mark.parametrize("limit", [1, 7, 40, 100])
+def test_every_root_is_found_or_lies_in_an_undecided_part(wedge, limit):
+    roots = enumsol.enumerate_roots(*wedge, "fast", max_nodes=limit)
+    for names in statuses(enumsol.enumerate_roots(*wedge, "fast")):
+        inside = sum(covers(item.statuses, names) for item in roots.undecided)
+        assert inside + (names in statuses(roots)) == 1
+
+
+def test_time_limit(wedge):
+    roots = enumsol.enumerate_roots(*wedge, "fast", time_limit=1e-9)
+    assert roots.stats.nodes < 100
+    assert "time limit" in roots.stopped
+    assert not roots.complete
+
+
+@pytest.mark.parametrize("option", [{"stop_after": 0}, {"max_nodes": 0}, {"max_nodes": 2.5}, {"time_limit": 0.0},
+                                    {"time_limit": float("nan")}, {"tolerance": -1.0}, {"tolerance": 1.0},
+                                    {"engine": "simplex"}, {"method": "guess"}, {"arithmetic": "double"}])  # fmt: skip
+def test_options_out_of_range(option):
+    with pytest.raises(enumsol.InvalidArgumentError, match=f"^{next(iter(option))} is .*; expected"):
+        enumsol.enumerate_roots(gallery.one_node_triangle(), 1.0, **option)
+
+
+@pytest.mark.parametrize("alpha", [float("nan"), float("inf"), "much", None, 1j])
+def test_alpha_out_of_range(alpha):
+    with pytest.raises(enumsol.InvalidArgumentError, match="alpha is"):
+        enumsol.enumerate_roots(gallery.one_node_triangle(), alpha, "fast")
+
+
+def test_negative_friction_is_refused_at_its_alpha():
+    with pytest.raises(enumsol.InvalidArgumentError, match="friction at alpha = -1 is -1 at contact node 0"):
+        enumsol.enumerate_roots(gallery.one_node_triangle(), -1.0, "fast")
+
+
+@pytest.mark.parametrize("method", ["tree", "exhaustive"])
+def test_progress(method):
+    seen = []
+    problem = gallery.chain(6, 0.0)
+    enumsol.enumerate_roots(problem, 5.0, "fast", method, progress=seen.append)
+    assert len(seen) >= 2
+    assert [s.nodes for s in seen] == sorted(s.nodes for s in seen)
+    assert [s.covered for s in seen] == sorted(s.covered for s in seen)
+    assert 0 <= seen[0].covered < seen[-1].covered <= 1 + 1e-12
+    assert 0 < seen[-1].solutions <= 729
+    assert seen[-1].seconds > 0
+
+
+class Stop:
+    """Raises KeyboardInterrupt once a share of the search is done."""
+
+    def __init__(self, share):
+        self.share = share
+
+    def __call__(self, progress):
+        if progress.covered > self.share:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("method", ["tree", "exhaustive"])
+def test_interruption_keeps_what_was_found(method):
+    problem = gallery.chain(6, 0.0)
+    with pytest.raises(enumsol.Interrupted) as caught:
+        enumsol.enumerate_roots(problem, 5.0, "fast", method, progress=Stop(0.3))
+    partial = caught.value.partial
+    whole = enumsol.enumerate_roots(problem, 5.0, "fast")
+    assert 0 < len(partial) < len(whole)
+    assert statuses(partial) < statuses(whole)
+    assert not partial.complete
+    assert repr(partial).splitlines()[-1].startswith("complete: no (interrupted")
+    assert isinstance(caught.value, KeyboardInterrupt)
+
+
+def test_interruption_of_a_parallel_search_keeps_what_was_found():
+    problem = gallery.chain(5, 0.0)
+    with ThreadPoolExecutor(2) as executor, pytest.raises(enumsol.Interrupted) as caught:
+        enumsol.enumerate_roots(problem, 5.0, "fast", executor=executor, progress=Stop(0.5))
+    assert 0 < len(caught.value.partial) < 243
+
+
+@pytest.mark.parametrize("name", ["wedge-14-5", "two-node-5", "one-node-6.3", "chain-4-coupled"])
+def test_threads(name):
+    entry = gallery.get(name)
+    problem = entry.build()
+    serial = enumsol.enumerate_roots(problem, entry.alpha, "fast")
+    with ThreadPoolExecutor(2) as executor:
+        parallel = enumsol.enumerate_roots(problem, entry.alpha, "fast", executor=executor)
+    assert not differences(parallel, serial, rtol=1e-12)
+    # a subtree starts cold, and ties at its minimiser may break another way
+    assert parallel.stats.nodes == pytest.approx(serial.stats.nodes, rel=0.1)
+    assert parallel.stopped is None
+
+
+def test_processes():
+    # spawn: nothing is inherited, everything travels by pickle
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(2, mp_context=context) as executor:
+        for name in ("wedge-8-5", "one-node-6.3"):
+            entry = gallery.get(name)
+            problem = entry.build()
+            serial = enumsol.enumerate_roots(problem, entry.alpha, "fast")
+            parallel = enumsol.enumerate_roots(problem, entry.alpha, "fast", executor=executor)
+            assert not differences(parallel, serial, rtol=1e-12)
+            assert [forces(r).tolist() for r in parallel] == [forces(r).tolist() for r in serial]
+
+
+def test_parallel_search_of_an_unloaded_body():
+    with ThreadPoolExecutor(2) as executor:
+        roots = enumsol.enumerate_roots(gallery.chain(8, 0.1, f=(0.0, 0.0)), 1.0, "fast", executor=executor)
+    assert (len(roots), roots.index_sum) == (1, 1)
+
+
+def test_parallel_search_with_limits(wedge):
+    with ThreadPoolExecutor(2) as executor:
+        two = enumsol.enumerate_roots(*wedge, "fast", executor=executor, stop_after=2)
+        assert len(two) >= 2
+        assert two.stopped is not None or len(two) == 5
+        late = enumsol.enumerate_roots(*wedge, "fast", executor=executor, time_limit=1e-9)
+    assert not late.complete
+    assert late.stopped is not None
+
+
+def test_the_exhaustive_method_stops_at_max_nodes_without_a_root():
+    problem = gallery.clamped_block(6, 3)
+    roots = enumsol.enumerate_roots(problem, 1.0, "exact", "exhaustive", max_nodes=10)
+    assert roots.stats.selections == 10
+    assert "max_nodes = 10" in roots.stopped
+    assert not roots.complete

@@ -1,0 +1,202 @@
+"""RootSet and Root as the user sees them."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from compare import forces
+from generators import dense_compliance, from_condensed, planted_load
+
+import enumsol
+from enumsol import ContactProblem, ContactStatus, PiecewiseSmoothEquation, gallery
+
+CASES = [
+    ("one-node-6.1", None),
+    ("two-node-5", None),
+    ("two-node-6.7-minus", None),
+    ("two-node-6.7-plus", None),
+    ("wedge-8-3", None),
+    ("wedge-8-5", None),
+    ("clamped-block-16", None),
+    ("clamped-block-16", 0.0),
+]
+
+
+def load(name, alpha):
+    entry = gallery.get(name)
+    return entry.build(), entry.alpha if alpha is None else alpha
+
+
+@pytest.mark.parametrize(("name", "alpha"), CASES)
+def test_roots_solve_the_problem(name, alpha):
+    problem, alpha = load(name, alpha)
+    size = np.max(np.abs(problem.load_at(alpha))) + np.max(np.abs(problem.A.data)) * np.max(np.abs(problem.gap))
+    for root in enumsol.enumerate_roots(problem, alpha, "fast"):
+        u = root.u
+        contact = problem.Bn.T @ root.lambda_n + problem.Bt.T @ root.lambda_t
+        balance = problem.A @ u + contact - problem.load_at(alpha)
+        assert np.max(np.abs(balance)) < 1e-10 * size
+        scale = np.max(np.abs(u)) + size / np.max(np.abs(problem.A.data))
+        np.testing.assert_allclose(problem.Bn @ u - problem.gap, root.u_n, atol=1e-9 * scale)
+        np.testing.assert_allclose(problem.Bt @ u - problem.slip_offset, root.u_t, atol=1e-9 * scale)
+        assert np.all(root.lambda_n >= 0)
+        assert np.all(root.u_n <= 0)
+        for r in (0.1, 1.0, 10.0):
+            equation = PiecewiseSmoothEquation(problem, r)
+            x = np.concatenate([u, forces(root)])
+            assert np.max(np.abs(equation.residual(x, alpha))) < 1e-9 * size
+            if root.regular:
+                # open nodes: theta2 and theta3 carry the sign of u_t
+                tested = equation.test_functions(x, alpha)
+                clear = np.abs(tested) > 1e-9 * size
+                assert np.array_equal(root.signs[clear], np.sign(tested[clear]))
+                assert np.all(clear[:, 0])
+
+
+def test_signs_name_the_selection():
+    roots = enumsol.enumerate_roots(gallery.one_node_triangle(), 5.0, "fast")
+    assert [root.signs.tolist() for root in roots] == [[[-1, -1, -1]], [[1, -1, -1]], [[1, -1, 1]]]
+    for root in roots:
+        assert root.active == (frozenset({root.statuses[0]}),)
+    # at the fold stick meets slip-: theta3 vanishes
+    fold = enumsol.enumerate_roots(gallery.one_node_triangle(), Fraction(8, 3), "exact")[1]
+    assert fold.signs.tolist() == [[1, -1, 0]]
+    assert fold.active == (frozenset({ContactStatus.STICK, ContactStatus.SLIP_MINUS}),)
+    assert fold.statuses == (ContactStatus.STICK,)
+
+
+def paths():
+    """Problems with roots that move with alpha: friction path, loading path, both; with slipping nodes."""
+    yield gallery.one_node_triangle(), 5.0
+    yield gallery.get("two-node-5").build(), 5.0
+    yield gallery.get("two-node-6.7-minus").build(), 1.6
+    yield gallery.get("wedge-8-5").build(), 3.0
+    yield gallery.clamped_block(8, 4), 0.7
+    yield gallery.clamped_block(8, 4), 0.0
+    rng = np.random.default_rng(8)
+    loads = ((dense_compliance(rng, 3), np.exp(rng.uniform(0, 3, size=3))) for _ in range(20))
+    planted = [(S, g, F) for S, F in loads if (g := planted_load(rng, S, F)) is not None]
+    for S, g, F in planted[:5]:
+        base = from_condensed(S, g, F)
+        slope = 0.1 * base.A @ rng.normal(size=6)
+        yield ContactProblem(base.A, base.Bn, base.Bt, base.f, friction=(F, 0.1 * F), load_slope=slope), 0.0
+
+
+@pytest.mark.parametrize(("problem", "alpha"), list(paths()))
+def test_derivative_against_finite_differences(problem, alpha):
+    h = 1e-6
+    sides = {}
+    for sign in (1, -1) if alpha > 0 or problem.load_slope is not None else (1,):
+        for root in enumsol.enumerate_roots(problem, alpha + sign * h, "fast"):
+            sides.setdefault(root.statuses, {})[sign] = forces(root)
+    moving = 0
+    for root in enumsol.enumerate_roots(problem, alpha, "fast"):
+        assert root.regular
+        near = sides[root.statuses]
+        difference = (near[1] - near.get(-1, forces(root))) / (h * len(near))
+        given = root.dlambda_dalpha.T.ravel()
+        size = np.max(np.abs(difference)) + np.max(np.abs(forces(root)))
+        np.testing.assert_allclose(given, difference, rtol=1e-4, atol=(1e-5 if len(near) == 1 else 1e-6) * size)
+        moving += np.max(np.abs(given)) > 1e-6 * size
+    assert moving > 0
+
+
+def test_derivative_in_closed_form():
+    alpha = 5.0
+    roots = enumsol.enumerate_roots(gallery.one_node_triangle(), alpha, "fast")
+    slip = -1 / (alpha - 2) ** 2
+    expected = {"open": [0, 0], "stick": [0, 0], "slip-": [slip, -1 / (alpha - 2) - alpha * slip]}
+    for root in roots:
+        np.testing.assert_allclose(root.dlambda_dalpha[0], expected[root.statuses[0].value], rtol=1e-12, atol=1e-15)
+
+
+def test_margin_shrinks_towards_the_change_of_status():
+    # stick ends at alpha = 8/3, slip- too; open never
+    margins = [
+        [root.margin for root in enumsol.enumerate_roots(gallery.one_node_triangle(), alpha, "fast")]
+        for alpha in (2.667, 2.7, 3.0, 4.0)
+    ]
+    sticks, slips = [m[2] for m in margins], [m[1] for m in margins]
+    assert 0 < sticks[0] < sticks[1] < sticks[2] < sticks[3]
+    assert 0 < slips[0] < slips[1] < slips[2]
+    assert len({m[0] for m in margins}) == 1
+
+
+def test_condition_grows_towards_a_singular_selection():
+    # the determinant of slip- vanishes at alpha = 2
+    problem = gallery.one_node_triangle((1.0, -1.9))
+    conditions = []
+    for alpha in (3.0, 2.5, 2.1):
+        by_status = {root.statuses[0].value: root for root in enumsol.enumerate_roots(problem, alpha, "fast")}
+        conditions.append(by_status["stick"].condition)
+    assert all(np.isfinite(c) and c >= 1 for c in conditions)
+
+
+def test_sequence():
+    roots = enumsol.enumerate_roots(gallery.get("two-node-5").build(), 5.0, "fast")
+    assert len(roots) == 5
+    assert roots[0] is next(iter(roots))
+    assert roots[-1] is roots[4]
+    assert roots[1:3] == (roots[1], roots[2])
+    assert next(reversed(roots)) is roots[4]
+    with pytest.raises(IndexError):
+        roots[5]
+
+
+@pytest.mark.parametrize("arithmetic", ["fast", "exact"])
+def test_order_is_deterministic(arithmetic):
+    problem = gallery.get("two-node-5").build()
+    flipped = ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f)
+    for method in ("tree", "exhaustive"):
+        roots = enumsol.enumerate_roots(flipped, 5.0, arithmetic, method)
+        names = [[s.value for s in root.statuses] for root in roots]
+        assert names == sorted(names)
+
+
+def test_frame():
+    problem = gallery.get("two-node-5").build()
+    problem = ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f, node_ids=["floor", "wall"])
+    roots = enumsol.enumerate_roots(problem, 5.0, "fast")
+    frame = roots.to_frame()
+    assert list(frame.columns) == [
+        "alpha", "root", "node", "status", "lambda_n", "lambda_t", "u_n", "u_t", "index", "regular",
+    ]  # fmt: skip
+    assert len(frame) == 10
+    assert frame["node"].tolist() == ["floor", "wall"] * 5
+    for k, part in frame.groupby("root"):
+        root = roots[k]
+        assert part["status"].tolist() == [s.value for s in root.statuses]
+        for name in ("lambda_n", "lambda_t", "u_n", "u_t"):
+            assert np.array_equal(part[name], getattr(root, name))
+        assert part["index"].tolist() == [root.index] * 2
+    assert frame["alpha"].eq(5.0).all()
+    assert frame["regular"].all()
+
+
+def test_frame_without_roots():
+    roots = enumsol.enumerate_roots(gallery.one_node_triangle((1.0, -2.0)), 2.0, "exact")
+    assert len(roots.to_frame()) == 0
+
+
+def test_repr():
+    roots = enumsol.enumerate_roots(gallery.one_node_triangle(), 5.0, "fast")
+    lines = repr(roots).splitlines()
+    assert lines[0] == "RootSet at alpha = 5: 3 roots (fast, tree)"
+    assert lines[1].split() == ["index", "regular", "margin", "max", "lambda_n", "contact"]
+    assert [line.split()[1] for line in lines[2:5]] == ["+1", "-1", "+1"]
+    assert lines[-2] == "index sum: +1"
+    assert lines[-1] == "complete: not proven (0 undecided)"
+    exact = enumsol.enumerate_roots(gallery.one_node_triangle(), 5.0, "exact")
+    assert repr(exact).splitlines()[-1] == "complete: yes (proven)"
+    many = repr(enumsol.enumerate_roots(gallery.chain(4), 5.0, "fast"))
+    assert "... 61 more" in many
+    assert len(many.splitlines()) < 30
+
+
+def test_exact_values_are_rounded_once():
+    # every lambda is a float nearest to a rational: compare with the closed form in rationals
+    for alpha in (Fraction(7, 2), Fraction(10, 3), Fraction(22, 7)):
+        roots = enumsol.enumerate_roots(gallery.one_node_triangle(), alpha, "exact")
+        assert roots[1].lambda_n[0] == float(1 / (alpha - 2))
+        assert roots[1].lambda_t[0] == float(-alpha / (alpha - 2))
+        assert roots.alpha == alpha

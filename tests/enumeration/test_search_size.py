@@ -1,0 +1,59 @@
+"""How many nodes the tree needs: the count is deterministic and part of the promise (issue 2)."""
+
+import pytest
+
+import enumsol
+from enumsol import gallery
+
+
+@pytest.mark.parametrize("length", [1.0, 2.0])
+@pytest.mark.parametrize("traction", [(0.3, -1.0), (0.0, -1.0)])
+@pytest.mark.parametrize("p", [8, 14, 20, 32])
+def test_at_most_eight_nodes_per_contact_node(p, traction, length):
+    problem = gallery.clamped_block(p, p // 2, length, traction=traction)
+    for F in (1.0, 1.5, 2.0, 3.0, 5.0, 10.0):
+        roots = enumsol.enumerate_roots(problem, F, "fast")
+        assert (len(roots), roots.index_sum, roots.families) == (1, 1, ())
+        assert roots.stats.nodes <= 8 * p, (F, roots.stats)
+        assert roots.stats.fallback_qps == 0
+
+
+@pytest.mark.parametrize("p", [8, 14, 20, 32])
+def test_loads_towards_the_right_stay_within_a_known_bound(p):
+    # (1, -0.3) lifts part of the block off: a known gap, up to 9 p where there is one root (studies/search_size.py)
+    for length in (1.0, 2.0):
+        problem = gallery.clamped_block(p, p // 2, length, traction=(1.0, -0.3))
+        for F in (1.0, 3.0, 10.0):
+            roots = enumsol.enumerate_roots(problem, F, "fast")
+            assert roots.index_sum == 1
+            assert roots.stats.nodes <= 9 * p * len(roots)
+
+
+@pytest.mark.parametrize("p", [8, 14, 20, 32])
+def test_wedges(p):
+    for name in (f"wedge-{p}-3", f"wedge-{p}-5"):
+        entry = gallery.get(name)
+        roots = enumsol.enumerate_roots(entry.build(), entry.alpha, "fast")
+        assert (len(roots), roots.index_sum) == (entry.roots, 1)
+        assert all(root.regular for root in roots)
+
+
+def test_the_cost_of_exhaustion_is_refused_with_an_estimate():
+    with pytest.raises(enumsol.TooLargeError, match=r"1\.8.*e\+19 selections .*hours.*method=\"tree\""):
+        enumsol.enumerate_roots(gallery.clamped_block(32, 8), 1.0, "fast", "exhaustive")
+    with pytest.raises(enumsol.TooLargeError, match="selections"):
+        enumsol.enumerate_roots(gallery.clamped_block(8, 2), 1.0, "exact", "exhaustive")
+
+
+def test_exact_arithmetic_refuses_large_bodies():
+    with pytest.raises(enumsol.TooLargeError, match="n = "):
+        enumsol.enumerate_roots(gallery.clamped_block(32, 8), 1.0, "exact")
+
+
+def test_statistics_add_up():
+    roots = enumsol.enumerate_roots(gallery.clamped_block(14, 4), 2.0, "fast")
+    stats = roots.stats
+    assert stats.qps == stats.nodes
+    assert 0 < stats.pruned < stats.nodes
+    assert len(roots) <= stats.selections <= stats.nodes - stats.pruned
+    assert stats.seconds > 0

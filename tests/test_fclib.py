@@ -1,0 +1,218 @@
+import builtins
+
+import h5py
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from enumsol import (
+    ContactProblem,
+    InvalidProblemError,
+    MissingDependencyError,
+    enumerate_roots,
+    gallery,
+    read_problem,
+    write_problem,
+)
+
+
+def constant_square(alpha):
+    return gallery.two_node_square((1.0, -4.0), (1.5, -3.5), friction=alpha)
+
+
+def put_matrix(group, name, matrix, kind="csc"):
+    """As fclib.h writes it: p and i are pointers and indices, or the triplets' columns and rows (CSparse)."""
+    parts = group.create_group(name)
+    matrix = {"csc": sp.csc_array, "csr": sp.csr_array, "triplet": sp.coo_array}[kind](matrix)
+    if kind == "triplet":
+        p, i, nz = matrix.col, matrix.row, matrix.nnz
+    else:
+        p, i, nz = matrix.indptr, matrix.indices, -1 if kind == "csc" else -2
+    for key, value in (("nzmax", matrix.nnz), ("m", matrix.shape[0]), ("n", matrix.shape[1]), ("nz", nz)):
+        parts[key] = np.array([value], dtype=np.int32)
+    parts["p"], parts["i"], parts["x"] = p.astype(np.int32), i.astype(np.int32), matrix.data
+
+
+def put_local(path, W, q, mu, kind="csc", spacedim=2):
+    with h5py.File(path, "w") as file:
+        group = file.create_group("fclib_local")
+        group["spacedim"] = np.array([spacedim], dtype=np.int32)
+        put_matrix(group, "W", W, kind)
+        vectors = group.create_group("vectors")
+        vectors["q"], vectors["mu"] = q, mu
+
+
+def put_global(path, M, H, f, w, mu, kind="csc"):
+    with h5py.File(path, "w") as file:
+        group = file.create_group("fclib_global")
+        group["spacedim"] = np.array([2], dtype=np.int32)
+        put_matrix(group, "M", M)
+        put_matrix(group, "H", H, kind)
+        vectors = group.create_group("vectors")
+        vectors["f"], vectors["w"], vectors["mu"] = f, w, mu
+
+
+def fclib_residual(W, q, mu, u, r):
+    """How far (u, r) is from u = W r + q, 0 <= u_N perp r_N >= 0 and Coulomb's law as fclib states them."""
+    gap, press, slide, drag = u[0::2], r[0::2], u[1::2], r[1::2]
+    return max(
+        np.max(np.abs(W @ r + q - u)),
+        np.max(-np.minimum(gap, 0)),
+        np.max(-np.minimum(press, 0)),
+        np.max(np.abs(gap * press)),
+        np.max(np.maximum(np.abs(drag) - mu * press, 0)),
+        # maximal dissipation: drag = -mu press sign(slide) where it slides
+        np.max(np.abs(slide * drag + mu * press * np.abs(slide))),
+    )
+
+
+@pytest.mark.parametrize("kind", ["csc", "csr", "triplet"])
+def test_local_problems(tmp_path, kind):
+    # r_N >= 0 and u_N >= 0 in fclib, friction against u_T: every root, put back, solves the file's own equations
+    source = constant_square(5.0)
+    S, g = source.condensed.S, source.condensed.g0
+    order = [0, 2, 1, 3]  # normal and tangential, contact by contact
+    W, q, mu = S[np.ix_(order, order)], -g[order], np.full(2, 5.0)
+    put_local(tmp_path / "p.hdf5", W, q, mu, kind)
+    problem = read_problem(tmp_path / "p.hdf5")
+    assert problem.p == 2
+    assert np.allclose(problem.condensed.S, S, rtol=1e-14)
+    assert np.allclose(problem.condensed.g0, g, rtol=1e-14)
+    roots, expected = enumerate_roots(problem, 0.0), enumerate_roots(source, 0.0)
+    assert len(roots) == 5
+    for root, other in zip(roots, expected, strict=True):
+        assert root.statuses == other.statuses
+        assert np.allclose(root.lambda_n, other.lambda_n, rtol=1e-12, atol=1e-14)
+        u = -np.column_stack([root.u_n, root.u_t]).ravel()
+        r = np.column_stack([root.lambda_n, root.lambda_t]).ravel()
+        assert fclib_residual(W, q, mu, u, r) < 1e-13
+
+
+def test_global_problems_round_trip_exactly(tmp_path):
+    rng = np.random.default_rng(0)
+    X = rng.normal(size=(9, 9))
+    problem = ContactProblem(
+        X @ X.T + np.eye(9),
+        rng.normal(size=(3, 9)),
+        sp.random_array((3, 9), density=0.5, rng=rng),
+        rng.normal(size=9),
+        gap=rng.normal(size=3),
+        slip_offset=rng.normal(size=3),
+        friction=(rng.random(3), 0.0),
+    )
+    write_problem(problem, tmp_path / "p.h5")
+    copy = read_problem(tmp_path / "p.h5")
+    for name in ("A", "Bn", "Bt"):
+        assert np.array_equal(getattr(copy, name).toarray(), getattr(problem, name).toarray())
+    for name in ("f", "gap", "slip_offset", "friction"):
+        assert np.array_equal(getattr(copy, name), getattr(problem, name))
+    write_problem(problem, tmp_path / "p.h5")  # replaces itself
+
+
+@pytest.mark.parametrize("kind", ["csc", "csr", "triplet"])
+def test_global_problems_of_others(tmp_path, kind):
+    # u = H'v + w >= 0 opens: a spring pushed down by 3, 0.5 above the floor
+    H = np.zeros((6, 2))
+    H[4, 0] = H[5, 1] = 1.0
+    put_global(tmp_path / "p.h5", 4.0 * np.eye(6), H, [0, 0, 0, 0, -3.0, 0.5], [0.5, 0.0], [0.1], kind)
+    (root,) = enumerate_roots(read_problem(tmp_path / "p.h5"), 0.0)
+    assert root.lambda_n[0] == pytest.approx(1.0)
+    assert root.u[4] == pytest.approx(-0.5)
+    assert root.u[5] == pytest.approx((0.5 - 0.1) / 4)  # it slips towards positive v, friction holds it back
+
+
+def test_triplets_that_could_be_read_both_ways_are_refused(tmp_path):
+    H = np.zeros((6, 2))
+    H[0, 0], H[1, 1], H[1, 0] = 1.0, 1.0, 0.5
+    put_global(tmp_path / "p.h5", np.eye(6), H, np.ones(6), np.zeros(2), [0.1], "triplet")
+    with pytest.raises(
+        InvalidProblemError, match="H is stored as triplets whose rows and columns cannot be told apart"
+    ):
+        read_problem(tmp_path / "p.h5")
+
+
+def refused(path, pattern):
+    with pytest.raises(InvalidProblemError, match=pattern) as caught:
+        read_problem(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    assert "expected" in message
+
+
+def test_what_is_refused(tmp_path):
+    path = tmp_path / "p.h5"
+    W, q, mu = np.eye(4), np.ones(4), np.ones(2)
+    put_local(path, np.eye(6), np.ones(6), mu, spacedim=3)
+    refused(path, "it is a problem in 3 dimensions; expected spacedim = 2")
+    put_local(path, W, np.ones(3), mu)
+    refused(path, r"/fclib_local/vectors/q has shape \(3,\); expected \(4,\)")
+    put_local(path, np.eye(5), np.ones(5), mu)
+    refused(path, r"W has shape \(5, 5\); expected a square matrix with two rows a contact")
+    put_local(path, np.diag([1.0, 1.0, 1.0, 0.0]), q, mu)
+    refused(path, "its W, read as A, Bn and Bt, cannot be used: Bt row 1 is zero")
+    # redundant contacts, as on a rigid body
+    put_local(path, np.ones((4, 4)) + np.diag([1.0, 1.0, 0.0, 0.0]), q, mu)
+    refused(path, "its W, read as A, Bn and Bt, cannot be used: .* linearly dependent rows")
+    put_local(path, W, q, np.array([1.0, -1.0]))
+    refused(path, "friction is -1 at contact node 1")
+    put_local(path, W, q, mu)
+    with h5py.File(path, "a") as file:
+        file["fclib_local"].create_group("V")
+    refused(path, r"equality constraints \(V, R, s\)")
+    put_global(path, np.eye(4), -np.eye(4), q, q, mu)
+    with h5py.File(path, "a") as file:
+        file["fclib_global"].create_group("G")
+    refused(path, r"equality constraints \(G, b\)")
+    put_global(path, np.eye(4), -np.eye(4)[:, :3], q, q, mu)
+    refused(path, r"H has shape \(4, 3\); expected 4 rows and two columns a contact")
+
+
+def test_broken_structures(tmp_path):
+    path = tmp_path / "p.h5"
+
+    def change(edit):
+        put_local(path, np.eye(4), np.ones(4), np.ones(2))
+        with h5py.File(path, "a") as file:
+            edit(file["fclib_local"])
+
+    change(lambda group: group.pop("W"))
+    refused(path, r"/fclib_local/W is missing \(found .*vectors\)")
+    change(lambda group: group["W"].pop("i"))
+    refused(path, "/fclib_local/W/i is missing")
+    change(lambda group: group["W"]["i"].write_direct(np.full(4, 9, dtype=np.int32)))
+    refused(path, "W is no sparse matrix")
+    change(lambda group: group["W"]["nz"].write_direct(np.array([-7], dtype=np.int32)))
+    refused(path, "W/nz is -7; expected -1")
+    change(lambda group: group["vectors"].pop("mu"))
+    refused(path, "/fclib_local/vectors/mu is missing")
+    with h5py.File(path, "w") as file:
+        file["other"] = 1
+    refused(path, "it holds other; expected a group named fclib_global or fclib_local")
+    with h5py.File(path, "w"):
+        pass
+    refused(path, "it holds nothing; expected a group named")
+
+
+def test_paths_over_alpha_cannot_be_written(tmp_path):
+    for problem in (gallery.one_node_triangle(), gallery.get("two-node-6.7-minus").build()):
+        with pytest.raises(InvalidProblemError, match="friction or load depends on alpha, which fclib cannot hold"):
+            write_problem(problem, tmp_path / "p.h5")
+    assert not (tmp_path / "p.h5").exists()
+
+
+def test_without_h5py_the_extra_is_named(tmp_path, monkeypatch):
+    path = tmp_path / "p.h5"
+    write_problem(constant_square(1.0), path)
+    found = builtins.__import__
+
+    def without(name, *args, **kwargs):
+        if name == "h5py":
+            raise ModuleNotFoundError(name)
+        return found(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(MissingDependencyError, match=r'need the package h5py.*pip install "enumsol\[fclib\]"'):
+        read_problem(path)
+    with pytest.raises(MissingDependencyError, match="h5py"):
+        write_problem(constant_square(1.0), path)

@@ -1,0 +1,236 @@
+"""Gallery problems: closed forms, geometry, root counts by brute force where p is small, the registry."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from enumsol import ContactProblem, gallery
+from enumsol.errors import InvalidArgumentError
+
+OPEN, STICK, SLIP_PLUS, SLIP_MINUS = range(4)
+
+
+def brute_force(problem: ContactProblem, alpha: float) -> list[tuple[tuple[int, ...], np.ndarray, float]]:
+    """(statuses, forces, least slack of a condition) of every selection whose conditions hold."""
+    system = problem.condensed.at(alpha)
+    S, g, F, p = system.S, system.g, system.F, system.p
+    found = []
+    for statuses in itertools.product(range(4), repeat=p):
+        M, b = np.zeros((2 * p, 2 * p)), np.zeros(2 * p)
+        for i, status in enumerate(statuses):
+            if status == OPEN:
+                M[i, i] = M[p + i, p + i] = 1.0
+                continue
+            M[i], b[i] = S[i], g[i]
+            if status == STICK:
+                M[p + i], b[p + i] = S[p + i], g[p + i]
+            else:
+                M[p + i, p + i], M[p + i, i] = 1.0, -F[i] if status == SLIP_PLUS else F[i]
+        if abs(np.linalg.det(M)) < 1e-12:
+            continue
+        forces = np.linalg.solve(M, b)
+        w = np.reshape(g - S @ forces, (2, p))
+        slack = min(_slack(status, forces[[i, p + i]], w[:, i], F[i]) for i, status in enumerate(statuses))
+        if slack >= 0:
+            found.append((statuses, forces, slack))
+    return found
+
+
+def _slack(status: int, force: np.ndarray, w: np.ndarray, F: float) -> float:
+    if status == OPEN:
+        return -w[0]
+    return min(force[0], {STICK: F * force[0] - abs(force[1]), SLIP_PLUS: w[1], SLIP_MINUS: -w[1]}[status])
+
+
+def test_one_node_closed_form_does_not_depend_on_assembly():
+    problem = gallery.one_node_triangle((1.5, -4.0), (2.0, 3.0))
+    assert np.array_equal(problem.A.toarray(), [[5.5, -2.5], [-2.5, 5.5]])
+    assert np.array_equal(problem.f, [1.5, -4.0])
+
+
+@pytest.mark.parametrize(("alpha", "count"), [(1.0, 1), (2.5, 1), (2.7, 3), (5.0, 3), (40.0, 3)])
+def test_one_node_roots(alpha, count):
+    roots = brute_force(gallery.one_node_triangle(), alpha)
+    assert len(roots) == count
+    if count == 3:
+        normal = {statuses[0]: forces[0] for statuses, forces, _ in roots}
+        assert normal == {OPEN: 0.0, STICK: pytest.approx(1.5), SLIP_MINUS: pytest.approx(1 / (alpha - 2))}
+
+
+def test_one_node_criterion():
+    rng = np.random.default_rng(0)
+    seen = set()
+    for _ in range(200):
+        lame = tuple(rng.uniform(0.1, 3.0, 2))
+        f = rng.normal(size=2) * (1.0, 3.0)
+        s = (lame[0] + 3 * lame[1]) * f[0] + (lame[0] + lame[1]) * f[1]
+        two_branches = s < 0 < f[0]
+        counts = {len(brute_force(gallery.one_node_triangle(tuple(f), lame), alpha)) for alpha in (0.1, 1.0, 5.0, 1e3)}
+        assert counts <= ({1, 3} if two_branches else {1})
+        seen.add(two_branches)
+    assert seen == {True, False}
+
+
+def test_two_node_square_agrees_with_scikit_fem():
+    from enumsol import fem
+
+    lame = (1.3, 0.7)
+    square = gallery.two_node_square(lame=lame)
+    assembled = fem.contact_problem(
+        [[0, 0], [1, 0], [0, 1], [1, 1]],
+        [[0, 1, 2], [1, 3, 2]],
+        lame,
+        contact=[0, 1],
+        normals=[[0, -1], [1, 0]],
+        held=[2, 3],
+        forces=[[-3, -1], [1, -1], [0, 0], [0, 0]],
+    )
+    assert np.allclose(square.condensed.S, assembled.condensed.S, rtol=1e-13, atol=1e-13)
+    assert np.allclose(square.condensed.g0, assembled.condensed.g0, rtol=1e-13, atol=1e-13)
+    assert np.array_equal(square.coordinates, assembled.coordinates)
+
+
+def test_two_node_square_is_exact_for_simple_coefficients():
+    A = gallery.two_node_square().A.toarray()
+    assert np.array_equal(2 * A, np.round(2 * A))
+
+
+@pytest.mark.parametrize(("alpha", "count"), [(1.0, 1), (2.9, 1), (3.1, 5), (3.8, 5), (3.9, 3), (20.0, 3)])
+def test_two_node_square_with_the_loads_of_example_6_4(alpha, count):
+    assert len(brute_force(gallery.two_node_square(), alpha)) == count
+
+
+@pytest.mark.parametrize(
+    ("sign", "alpha", "count"), [(-1, 1.0, 1), (-1, 1.6, 3), (-1, 2.8, 1), (1, -1.5, 1), (1, -1.0, 3), (1, 1.6, 1)]
+)
+def test_two_node_square_on_the_loading_path_of_example_6_7(sign, alpha, count):
+    slope = ((0.1, sign * 1.1), (0.2, sign * 0.8))
+    problem = gallery.two_node_square((0.4, 0.2), (1.8, -0.1), friction=4.0, load_slope=slope)
+    expected = [0.1 * alpha + 0.4, sign * 1.1 * alpha + 0.2, 0.2 * alpha + 1.8, sign * 0.8 * alpha - 0.1]
+    assert np.allclose(problem.load_at(alpha), expected, rtol=1e-14)
+    assert len(brute_force(problem, alpha)) == count
+
+
+@pytest.mark.parametrize("length", [1.0, 2.0])
+@pytest.mark.parametrize("traction", [(0.3, -1.0), (1.0, -0.3), (0.0, -1.0)])
+def test_clamped_block_has_one_root(length, traction):
+    problem = gallery.clamped_block(4, 3, length, traction=traction)
+    for alpha in (1.0, 2.0, 5.0, 10.0):
+        assert len(brute_force(problem, alpha)) == 1
+
+
+def test_clamped_block_geometry_and_load():
+    problem = gallery.clamped_block(4, 3, length=2.0, height=0.5, traction=(0.3, -1.0), gap=0.1, friction=0.4)
+    assert (problem.p, problem.n) == (4, 2 * 4 * 4)
+    assert np.allclose(problem.coordinates, [[0.5, 0], [1, 0], [1.5, 0], [2, 0]])
+    assert np.all(problem.gap == 0.1)
+    # a unit displacement up moves every contact node away from the floor, one to the right slips forward
+    assert np.array_equal(problem.Bn @ np.tile([0.0, 1.0], 16), -np.ones(4))
+    assert np.array_equal(problem.Bt @ np.tile([1.0, 0.0], 16), np.ones(4))
+    # of the top's total load, half an edge goes to the clamped corner
+    assert np.allclose(problem.f.reshape(-1, 2).sum(axis=0), np.array([0.3, -1.0]) * 2.0 * (1 - 1 / 8))
+
+
+def test_clamped_block_with_fewer_contact_nodes():
+    fine = gallery.clamped_block(12, 3, contact=4)
+    assert np.allclose(fine.coordinates[:, 0], [0.25, 0.5, 0.75, 1.0])
+    assert fine.n == gallery.clamped_block(12, 3).n
+
+
+@pytest.mark.parametrize("ny", [1, 4, 7])
+def test_wedge_geometry(ny):
+    angle = math.radians(20.0)
+    problem = gallery.wedge(4, ny)
+    left, right = np.split(problem.coordinates, 2)
+    assert problem.p == 2 * ny
+    assert np.allclose(right[:, 0], 0.5 + right[:, 1] * math.tan(angle))
+    assert np.allclose(left, right * [-1, 1])
+    assert np.all(np.diff(right[:, 1]) > 0) if ny > 1 else right[0, 1] == 0
+    # pulling the body straight out: both sides leave their walls and slide out
+    up = np.tile([0.0, 1.0], problem.n // 2)
+    assert np.allclose(problem.Bn @ up, -math.sin(angle))
+    assert np.allclose(problem.Bt @ up, math.cos(angle))
+    assert np.all(problem.gap < 0)
+
+
+def test_wedge_is_symmetric():
+    S = gallery.wedge(4, 3).condensed.S
+    mirror = np.concatenate([np.arange(3, 6), np.arange(3), np.arange(9, 12), np.arange(6, 9)])
+    assert np.allclose(S, S[np.ix_(mirror, mirror)], rtol=1e-10)
+
+
+def test_small_wedge_jams_slides_or_is_free():
+    roots = brute_force(gallery.wedge(4, 2), 1.0)
+    assert {statuses for statuses, _, _ in roots} == {(OPEN,) * 4, (STICK,) * 4, (SLIP_PLUS,) * 4}
+
+
+def test_wedge_roots_scale_with_pull_and_press():
+    first = brute_force(gallery.wedge(4, 2), 1.0)
+    second = brute_force(gallery.wedge(4, 2, pull=(0.0, 5.0), press=5.0), 1.0)
+    for (statuses, forces, _), (same, large, _) in zip(first, second, strict=True):
+        assert statuses == same
+        assert np.allclose(1e4 * forces, large, rtol=1e-9, atol=0)
+
+
+@pytest.mark.parametrize("coupling", [0.0, 0.05])
+@pytest.mark.parametrize("p", [1, 2, 3, 4])
+def test_chain_has_three_roots_a_node(p, coupling):
+    roots = brute_force(gallery.chain(p, coupling), 5.0)
+    assert len(roots) == 3**p
+    assert min(slack for _, _, slack in roots) > 0.05
+
+
+def test_chain_couples_neighbours_only():
+    A = gallery.chain(4, 0.5).A.toarray() - gallery.chain(4).A.toarray()
+    assert np.array_equal(A[::2, ::2], 0.5 * np.array([[1, -1, 0, 0], [-1, 2, -1, 0], [0, -1, 2, -1], [0, 0, -1, 1]]))
+    assert np.array_equal(A[1::2, 1::2], A[::2, ::2])
+    assert not np.any(A[::2, 1::2])
+
+
+@pytest.mark.parametrize("name", gallery.GALLERY)
+def test_registry_builds(name):
+    entry = gallery.get(name)
+    problem = entry.build()
+    assert entry.name == name
+    assert entry.summary
+    assert problem.coordinates.shape == (problem.p, 2)
+    assert np.all(problem.friction_at(entry.alpha) > 0)
+    if problem.p <= 4 and entry.roots is not None:
+        roots = brute_force(problem, entry.alpha)
+        assert len(roots) == entry.roots
+        assert min(slack for _, _, slack in roots) > 1e-3
+
+
+def test_unknown_name_is_answered_with_close_ones():
+    with pytest.raises(InvalidArgumentError, match=r"'wedge-14'; did you mean .*wedge-14-3"):
+        gallery.get("wedge-14")
+    with pytest.raises(InvalidArgumentError, match=r"'zzz'; expected one of one-node-6\.1, .*chain-8"):
+        gallery.get("zzz")
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: gallery.one_node_triangle(f=(1.0,)), r"f is \(1\.0,\); expected two finite numbers"),
+        (lambda: gallery.one_node_triangle(lame=(1.0, 0.0)), r"lame is \(1\.0, 0\.0\); expected Lame coefficients"),
+        (lambda: gallery.two_node_square(f2="ab"), "f2 is 'ab'; expected two finite numbers"),
+        (lambda: gallery.two_node_square(load_slope=(1.0, 2.0, 3.0)), "load_slope is .* expected two pairs"),
+        (lambda: gallery.two_node_square(load_slope=(1.0, 2.0)), r"load_slope\[0\] is 1\.0; expected two"),
+        (lambda: gallery.clamped_block(0, 2), "nx is 0; expected an integer of at least 1"),
+        (lambda: gallery.clamped_block(2, 2.5), r"ny is 2\.5; expected an integer"),
+        (lambda: gallery.clamped_block(2, 2, length=-1.0), r"length is -1\.0; expected a finite number > 0"),
+        (lambda: gallery.clamped_block(2, 2, traction=(0.0, math.nan)), "traction is .* expected two finite numbers"),
+        (lambda: gallery.clamped_block(2, 2, gap="wide"), "gap is 'wide'; expected a finite number"),
+        (lambda: gallery.clamped_block(6, 2, contact=4), "contact is 4; expected a divisor of nx = 6"),
+        (lambda: gallery.wedge(2, 2, half_angle=85.0), r"half_angle is 85\.0; expected degrees between 0 and 80"),
+        (lambda: gallery.wedge(2, 2, springs=(0.0, 1.0)), r"springs is \(0\.0, 1\.0\); expected two stiffnesses > 0"),
+        (lambda: gallery.wedge(2, 2, press=math.inf), "press is inf; expected a finite number"),
+        (lambda: gallery.chain(0), "p is 0; expected an integer of at least 1"),
+        (lambda: gallery.chain(2, coupling=-0.1), r"coupling is -0\.1; expected a finite number >= 0"),
+    ],
+)
+def test_bad_arguments_are_named(build, message):
+    with pytest.raises(InvalidArgumentError, match=message):
+        build()

@@ -1,0 +1,205 @@
+import pickle
+import re
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from enumsol import ContactProblem, InvalidArgumentError, InvalidProblemError, enumerate_roots, gallery
+
+A = np.array([[2.0, -0.5, 0.0, 0.0], [-0.5, 2.0, -0.5, 0.0], [0.0, -0.5, 2.0, -0.5], [0.0, 0.0, -0.5, 2.0]])
+BN, BT = np.eye(4)[[0, 2]], np.eye(4)[[1, 3]]
+F = np.array([1.0, -2.0, 0.5, 1.0])
+
+
+def problem(**changes):
+    data = {"A": A, "Bn": BN, "Bt": BT, "f": F} | changes
+    return ContactProblem(**data)
+
+
+def with_entry(array, index, value):
+    changed = np.array(array, dtype=float)
+    changed[index] = value
+    return changed
+
+
+def bar(n):
+    """A free bar of n springs in a row: singular, its rigid motion is (1, .., 1)."""
+    main = np.full(n, 2.0)
+    main[[0, -1]] = 1.0
+    return sp.diags_array([-np.ones(n - 1), main, -np.ones(n - 1)], offsets=(-1, 0, 1))
+
+
+BAD = {
+    "A not square": ({"A": A[:3]}, r"A has shape \(3, 4\); expected a square matrix"),
+    "A of one dimension": ({"A": A[0]}, r"A has 1 dimension\(s\), shape \(4,\); expected a matrix"),
+    "A empty": ({"A": np.zeros((0, 0))}, r"A has shape \(0, 0\)"),
+    "A of text": ({"A": [["a", "b"], ["c", "d"]]}, "A is not an array of real numbers"),
+    "A ragged": ({"A": [[1.0, 2.0], [3.0]]}, "A is not an array of real numbers"),
+    "A complex": ({"A": A + 0j}, "A is not an array of real numbers"),
+    "A complex sparse": ({"A": sp.csr_array(A + 0j)}, "A has complex entries; expected real numbers"),
+    "A unsymmetric": ({"A": with_entry(A, (0, 1), -0.4)}, r"A is not symmetric: max\|A - A'\| = 0.1 .*; expected"),
+    "A negative diagonal": (
+        {"A": with_entry(A, (3, 3), -2.0)},
+        "A is not positive definite: its diagonal entry 3 is -2",
+    ),
+    "A indefinite": ({"A": A - 1.7 * np.eye(4)}, "A is not positive definite"),
+    "A zero": ({"A": np.zeros((4, 4))}, "A is not positive definite: its diagonal entry 0 is 0"),
+    "A rigid": ({"A": bar(4)}, "the body is free to move as a rigid body"),
+    "A NaN": ({"A": with_entry(A, (1, 1), np.nan)}, r"A has the value nan at index \(1, 1\); expected finite"),
+    "A inf": ({"A": sp.csc_array(with_entry(A, (2, 3), np.inf))}, r"A has the value inf at index \(2, 3\)"),
+    "Bn columns": ({"Bn": BN[:, :3]}, r"Bn has shape \(2, 3\); expected \(p, n\) = \(2, 4\)"),
+    "Bt rows": ({"Bt": BT[:1]}, r"Bt has shape \(1, 4\); expected \(p, n\) = \(2, 4\)"),
+    "Bn NaN": ({"Bn": with_entry(BN, (0, 3), np.nan)}, r"Bn has the value nan at index \(0, 3\)"),
+    "Bt inf": ({"Bt": sp.csr_array(with_entry(BT, (1, 2), -np.inf))}, r"Bt has the value -inf at index \(1, 2\)"),
+    "p = 0": ({"Bn": np.zeros((0, 4)), "Bt": np.zeros((0, 4))}, r"Bn has no rows \(p = 0 contact nodes\)"),
+    "zero row": ({"Bt": with_entry(BT, (1, 3), 0.0)}, "Bt row 1 is zero; expected linearly independent rows"),
+    "equal rows": ({"Bt": BN}, r"\[Bn; Bt\] has linearly dependent rows \(.*Bn row 0.*\); expected full rank 2p = 4"),
+    "p > n / 2": ({"Bn": np.eye(4), "Bt": np.ones((4, 4)) - np.eye(4)}, "linearly dependent rows"),
+    "f shape": ({"f": F[:3]}, r"f has shape \(3,\); expected \(4,\)"),
+    "f scalar": ({"f": 1.0}, r"f has shape \(\); expected \(4,\)"),
+    "f NaN": ({"f": with_entry(F, 1, np.nan)}, r"f has the value nan at index \(1,\)"),
+    "gap shape": ({"gap": [0.0, 0.0, 0.0]}, r"gap has shape \(3,\); expected \(2,\) or a single number"),
+    "gap inf": ({"gap": np.inf}, "gap has the value inf"),
+    "slip offset": ({"slip_offset": [[0.0, 1.0]]}, r"slip_offset has shape \(1, 2\); expected \(2,\)"),
+    "load slope": ({"load_slope": [1.0]}, r"load_slope has shape \(1,\); expected \(4,\)"),
+    "load slope NaN": ({"load_slope": with_entry(F, 0, np.nan)}, "load_slope has the value nan"),
+    "friction list": ({"friction": [0.1, 0.2]}, r"friction is a bare list, which is ambiguous; expected a number, or"),
+    "friction array": ({"friction": np.array([0.1, 0.2])}, "friction is a bare ndarray, which is ambiguous"),
+    "friction triple": ({"friction": (0.1, 0.2, 0.3)}, "friction is a tuple of 3 entries; expected a number"),
+    "friction None": ({"friction": None}, "friction is a bare NoneType"),
+    "friction shape": ({"friction": ([0.1, 0.2, 0.3], 0.0)}, r"friction F0 has shape \(3,\); expected \(2,\)"),
+    "friction NaN": ({"friction": (0.0, np.nan)}, "friction F1 has the value nan"),
+    "friction negative": ({"friction": -0.3}, "friction is -0.3 at contact node 0; expected F >= 0"),
+    "node ids few": ({"node_ids": [7]}, "node_ids has 1 entries, 1 distinct; expected 2 distinct labels"),
+    "node ids equal": ({"node_ids": ["a", "a"]}, "node_ids has 2 entries, 1 distinct"),
+    "node ids number": ({"node_ids": 7}, "node_ids is 7; expected a sequence of 2 distinct labels"),
+    "node ids lists": ({"node_ids": [[1], [2]]}, "node_ids .* expected a sequence of 2 distinct labels"),
+    "coordinates": ({"coordinates": [0.0, 1.0]}, r"coordinates has shape \(2,\); expected \(p, 2\) = \(2, 2\)"),
+    "coordinates NaN": (
+        {"coordinates": [[0.0, np.nan], [1.0, 0.0]]},
+        r"coordinates has the value nan at index \(0, 1\)",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_data_get_one_sentence(case):
+    changes, pattern = BAD[case]
+    with pytest.raises(InvalidProblemError, match=pattern) as caught:
+        problem(**changes)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert not message.endswith(".")
+    assert "expected" in message
+
+
+def test_a_body_held_in_one_direction_only_is_named_as_free():
+    # a plane block without any support: three rigid motions
+    block = gallery.clamped_block(3, 2)
+    free = np.kron(bar(3).toarray(), np.eye(2))
+    with pytest.raises(InvalidProblemError, match="free to move as a rigid body"):
+        ContactProblem(free, np.eye(6)[:1], np.eye(6)[1:2], np.ones(6))
+    assert block.p == 3
+
+
+@pytest.mark.parametrize("alpha", [np.nan, np.inf, -np.inf, "five", None, 10**400, 1j])
+def test_alpha_must_be_finite(alpha):
+    with pytest.raises(InvalidArgumentError, match=r"alpha is .*; expected a finite real number"):
+        enumerate_roots(problem(), alpha)
+
+
+def test_negative_friction_at_alpha_names_the_node():
+    p = problem(friction=([1.0, 2.0], [0.5, -1.0]), node_ids=["left", "right"])
+    assert np.array_equal(p.friction_at(2.0), [2.0, 0.0])
+    with pytest.raises(
+        InvalidArgumentError, match=re.escape("friction at alpha = 3 is -1 at contact node right; expected F >= 0")
+    ):
+        enumerate_roots(p, 3)
+
+
+def test_paths_over_alpha():
+    p = problem(friction=(0.25, [1.0, 0.5]), load_slope=2 * F)
+    assert np.array_equal(p.friction_at(Fraction(3, 2)), [1.75, 1.0])
+    assert np.array_equal(p.load_at(0.5), 2 * F)
+    assert np.array_equal(problem(friction=0.3).friction_at(-100.0), [0.3, 0.3])
+    assert np.array_equal(problem().friction_at(2), [2.0, 2.0])
+
+
+def test_fields_and_defaults():
+    p = problem(gap=0.25, slip_offset=[0.0, 1.0])
+    assert (p.n, p.p) == (4, 2)
+    assert np.array_equal(p.A.toarray(), A)
+    assert np.array_equal(p.Bn.toarray(), BN)
+    assert np.array_equal(p.gap, [0.25, 0.25])
+    assert np.array_equal(p.slip_offset, [0.0, 1.0])
+    assert np.array_equal(p.friction, [[0.0, 0.0], [1.0, 1.0]])
+    assert p.node_ids == (0, 1)
+    assert p.load_slope is None
+    assert p.coordinates is None
+    assert "2 contact nodes" in repr(p)
+    assert "degrees of freedom  4" in repr(p)
+    assert problem(gap=-0.1).gap[0] == -0.1  # a press fit
+    assert not np.any(np.signbit(problem(f=-0.0 * F, gap=-0.0).f))
+    assert problem(gap=-0.0).fingerprint == problem(gap=0.0).fingerprint
+
+
+def test_sparse_and_dense_data_make_the_same_problem():
+    rng = np.random.default_rng(1)
+    duplicates = sp.coo_array(([1.5, 0.5, 2.0, 2.0, 2.0], ([0, 0, 1, 2, 3], [0, 0, 1, 2, 3])), shape=(4, 4))
+    assert np.array_equal(problem(A=duplicates).A.toarray(), 2 * np.eye(4))
+    X = rng.normal(size=(4, 4))
+    S = X @ X.T + np.eye(4)
+    for kind in (sp.csr_array, sp.csc_array, sp.coo_array, sp.csr_matrix, sp.lil_array):
+        assert np.array_equal(problem(A=kind(S)).A.toarray(), problem(A=S).A.toarray())
+
+
+def test_the_problem_is_immutable_and_independent_of_its_sources():
+    f, gap, stiffness = F.copy(), np.zeros(2), sp.csc_array(A)
+    p = problem(A=stiffness, f=f, gap=gap)
+    f[0], gap[0] = 99.0, 99.0
+    stiffness.data[:] = 99.0
+    assert p.f[0] == 1.0
+    assert p.gap[0] == 0.0
+    assert p.A[0, 0] == 2.0
+    with pytest.raises(AttributeError, match="ContactProblem is immutable: f cannot be set; build a new problem"):
+        p.f = F
+    arrays = (p.f, p.gap, p.slip_offset, *p.friction)
+    sparse = (p.A.data, p.A.indices, p.A.indptr, p.Bn.data, p.Bn.indices, p.Bn.indptr, p.Bt.data)
+    for array in (*arrays, *sparse, p.condensed.S, p.condensed.g0):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+
+
+@pytest.mark.parametrize("scale", [1e-200, 1e-9, 1.0, 1e9, 1e200])
+def test_a_small_asymmetry_is_averaged_away(scale):
+    skewed = scale * with_entry(A, (0, 1), -0.5 * (1 + 1e-12))
+    p = problem(A=skewed)
+    assert np.array_equal(p.A.toarray(), 0.5 * (skewed + skewed.T))
+    assert np.array_equal(p.A.toarray(), p.A.toarray().T)
+    with pytest.raises(InvalidProblemError, match="A is not symmetric"):
+        problem(A=scale * with_entry(A, (0, 1), -0.5 * (1 + 1e-11)))
+
+
+def test_rows_that_are_nearly_dependent_but_independent_are_accepted():
+    rows = np.eye(4)[:2] + 1e-9 * np.eye(4)[2:]
+    assert ContactProblem(A, np.eye(4)[:2], rows, F).p == 2
+
+
+def test_pickling_keeps_the_problem():
+    p = problem(gap=0.1, friction=(0.2, [1.0, 2.0]), load_slope=F, node_ids=["a", "b"], coordinates=[[0, 0], [1, 0]])
+    before = enumerate_roots(p, 1.5)
+    copy = pickle.loads(pickle.dumps(p))
+    assert copy.node_ids == p.node_ids
+    for name in ("f", "gap", "load_slope", "slip_offset", "coordinates"):
+        assert np.array_equal(getattr(copy, name), getattr(p, name))
+    assert np.array_equal(copy.friction, p.friction)
+    assert np.array_equal(copy.A.toarray(), p.A.toarray())
+    after = enumerate_roots(copy, 1.5)
+    assert [root.statuses for root in after] == [root.statuses for root in before]
+    assert np.array_equal([root.u for root in after], [root.u for root in before])
+    with pytest.raises(AttributeError, match="immutable"):
+        copy.f = F
+    with pytest.raises(ValueError, match="read-only"):
+        copy.f[0] = 1.0
