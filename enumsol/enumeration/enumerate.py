@@ -12,7 +12,7 @@ import numpy as np
 from enumsol.certification.proof import Proof, ProofWriter
 from enumsol.enumeration.assembly import RootBuilder
 from enumsol.enumeration.components import Component, connected_components
-from enumsol.enumeration.exhaustive import exhaustive_exact, exhaustive_float
+from enumsol.enumeration.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
 from enumsol.enumeration.float_selections import SIGN_TOLERANCE, FloatSelections
 from enumsol.enumeration.local_degree import perturbed_degree
 from enumsol.enumeration.parallel import run_parallel
@@ -196,7 +196,8 @@ class _Enumeration:
             if solution is not None:
                 outcome.solutions.append(solution)
             now = time.perf_counter()
-            if self.progress is not None and (now - reported > _REPORT_SECONDS or outcome.selections == total):
+            due = now - reported > _REPORT_SECONDS or (solution is None and outcome.selections % BLOCK == 0)
+            if self.progress is not None and (due or outcome.selections == total):
                 reported = now
                 share = outcome.selections / total
                 state = SearchProgress(outcome.selections, share, len(outcome.solutions), now - self.started)

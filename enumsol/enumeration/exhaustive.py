@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 #: Most selections that the exhaustive method examines, in floats and in rationals.
 FLOAT_LIMIT = 4**11
 EXACT_LIMIT = 4**7
-_BLOCK = 2048
+#: Selections solved together in floats, and between two reports of progress.
+BLOCK = 2048
 #: Selections whose float solution breaks a condition by more than this are dropped without a second look.
 _SCREEN = 1e-6
 #: Reciprocal condition below which the screen does not trust a float solution.
@@ -63,7 +64,7 @@ def exhaustive_float(system: ScaledSystem, solver: SelectionSolver) -> Iterator[
     codes = all_codes(solver.F_positive)
     done = 0
     while done < total:
-        block = np.array([next(codes) for _ in range(min(_BLOCK, total - done))], dtype=np.int8)
+        block = np.array([next(codes) for _ in range(min(BLOCK, total - done))], dtype=np.int8)
         for row in block[_candidates(system, block)]:
             solution = solver.solve(tuple(int(c) for c in row))
             if solution is not None:

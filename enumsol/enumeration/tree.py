@@ -236,9 +236,9 @@ class TreeSearch:
             outcome.stopped = f"stopped after max_nodes = {limits.max_nodes} nodes, {waiting} subtrees not examined"
         elif limits.enough is not None and limits.enough(outcome.solutions):
             outcome.stopped = f"stopped after enough roots, {waiting} subtrees not examined"
+        elif limits.deadline is not None and time.perf_counter() > limits.deadline:
+            outcome.stopped = f"stopped by the time limit, {waiting} subtrees not examined"
         elif outcome.nodes % _REPORT_EVERY == 0:
-            if limits.deadline is not None and time.perf_counter() > limits.deadline:
-                outcome.stopped = f"stopped by the time limit, {waiting} subtrees not examined"
             self.report(self._covered)
         return outcome.stopped is not None
 
