@@ -157,7 +157,7 @@ def _check(
 
 
 def _check_friction(problem: ContactProblem, a: Fraction, b: Fraction) -> None:
-    """Refuse negative friction inside the interval; F is affine, so that both ends tell."""
+    """Refuse negative and huge friction inside the interval; F is affine, so that both ends tell."""
     for node, F0, F1 in zip(problem.node_ids, *(part.tolist() for part in problem.friction), strict=True):
         for end in (a, b):
             value = Fraction(F0) + end * Fraction(F1)
@@ -167,3 +167,5 @@ def _check_friction(problem: ContactProblem, a: Fraction, b: Fraction) -> None:
                     f"friction at contact node {node} is negative in the interval: {float(value):g} at "
                     f"alpha = {float(end):g} (it is zero at alpha = {float(zero):.17g}); expected F >= 0"
                 )
+    for end in (a, b):
+        problem.friction_at(end)

@@ -20,6 +20,7 @@ import numpy as np
 
 from enumsol.condensed import CondensedSystem, ScaledSystem
 from enumsol.enumeration.relaxation import (
+    BRANCHING_CANDIDATES,
     CONTACT,
     EQUALITY,
     FEASIBILITY_TOLERANCE,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensed import CondensedProblem
     from enumsol.enumeration.relaxation import Relaxation
+    from enumsol.enumeration.solutions import Codes
 
 #: Part of the energy's unit (g' S^-1 g lies in [1, 4) at its larger end) that makes the form in (lambda, tau) definite.
 RIDGE = 1e-3
@@ -158,6 +160,7 @@ class IntervalEngine:
         self.size = 2 * p
         self._module = _active_set
         self.limit = 200 + 20 * p
+        self.rule = _active_set.BranchingRule(system.F, *_slip_rows(system), BRANCHING_CANDIDATES)
         start, index, value = _all_rows(system)
         if not system.loaded:
             self.offset = 0.0
@@ -200,6 +203,17 @@ def _all_rows(system: IntervalSystem) -> tuple[NDArray[np.intp], NDArray[np.intp
     return start, np.concatenate([index, extra, extra]), np.concatenate([value, plus, minus])
 
 
+def _slip_rows(system: IntervalSystem) -> tuple[NDArray[np.intp], NDArray[np.int8]]:
+    """Row and mode, (2, p) each, that put lambda_t on the slip bound in slip+ and slip-."""
+    constant = system.F_lo == system.F
+    p = system.p
+    equal = np.array([_R.CONE_PLUS, _R.CONE_MINUS])[:, None]
+    least = np.array([_I.SLIP_AT_LEAST_PLUS, _I.SLIP_AT_LEAST_MINUS])[:, None]
+    rows = np.where(constant, equal, least) * p + np.arange(p)
+    modes = np.broadcast_to(np.where(constant, EQUALITY, INEQUALITY), (2, p))
+    return rows, modes.astype(np.int8)
+
+
 class _IntervalRelaxation:
     """A solved relaxation; ``bound`` is the energy bound itself, the secant's constant subtracted."""
 
@@ -229,6 +243,11 @@ class _IntervalRelaxation:
         rows, values = self._state.multipliers()  # type: ignore[attr-defined]
         keep = rows < len(RowKind) * (self._engine.size // 2) + len(IntervalRowKind) * (self._engine.size // 2)
         return rows[keep], values[keep]
+
+    def choose(self, codes: Codes) -> int:
+        """The contact node that the partial assignment is to be branched on, -1 when all are decided."""
+        target = PRUNE_MARGIN + self._engine.offset
+        return self._state.choose(np.array(codes, dtype=np.int8), self._engine.rule, target)  # type: ignore[attr-defined, no-any-return]
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""

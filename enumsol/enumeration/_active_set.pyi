@@ -23,6 +23,17 @@ class QPData:
         row_rhs: NDArray[np.float64],
     ) -> None: ...
 
+class BranchingRule:
+    p: int
+    candidates: int
+    def __init__(
+        self,
+        F: NDArray[np.float64],
+        slip_rows: NDArray[np.intp],
+        slip_modes: NDArray[np.int8],
+        candidates: int,
+    ) -> None: ...
+
 class QPState:
     iterations: int
     bound: float
@@ -35,4 +46,6 @@ class QPState:
     @property
     def w_array(self) -> NDArray[np.float64]: ...
     def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]: ...
+    def gain(self, row: int, mode: int) -> float: ...
+    def choose(self, codes: NDArray[np.int8], rule: BranchingRule, target: float) -> int: ...
     def solve(self, target: float, tolerance: float, limit: int) -> int: ...

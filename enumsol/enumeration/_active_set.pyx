@@ -9,38 +9,33 @@ multipliers that prove a lower bound. The method keeps J = L^{-T} Q and R with L
 N the normals of the active rows, all rows scaled to unit length in the norm of (2 S)^{-1}.
 """
 
-from libc.math cimport fabs, hypot, isfinite, sqrt
+cimport cython
+from libc.math cimport HUGE_VAL, fabs, fmax, fmin, hypot, isfinite, sqrt
 from libc.stdlib cimport free, malloc
 from libc.string cimport memcpy, memset
 
 import numpy as np
 
+from enumsol.enumeration.relaxation import CONTACT, FEASIBILITY_TOLERANCE, UNDECIDED
+
 OPTIMAL = 0
 BOUND_EXCEEDED = 1
 STALLED = 2
 
+cdef enum:
+    POOL = 64  # blocks of memory kept for new states: fresh pages from the system cost more than the copy into them
+
+cdef double LEAST = 1e-3      # part of the gap below which a child's gain makes no difference
 cdef double DEPENDENT = 1e-10  # part of a unit normal outside the span of the active ones, below which it lies in it
 
 
-cdef inline double dot(const double *a, const double *b, Py_ssize_t n) noexcept nogil:
-    cdef double s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0
-    cdef Py_ssize_t i = 0
-    while i + 4 <= n:
-        s0 += a[i] * b[i]
-        s1 += a[i + 1] * b[i + 1]
-        s2 += a[i + 2] * b[i + 2]
-        s3 += a[i + 3] * b[i + 3]
-        i += 4
-    while i < n:
-        s0 += a[i] * b[i]
-        i += 1
-    return (s0 + s1) + (s2 + s3)
-
-
-cdef inline void axpy(double t, const double *a, double *y, Py_ssize_t n) noexcept nogil:
-    cdef Py_ssize_t i
-    for i in range(n):
-        y[i] += t * a[i]
+cdef extern from "_kernels.h" nogil:
+    double dot "enumsol_dot"(const double *a, const double *b, Py_ssize_t n)
+    void matvec "enumsol_matvec"(const double *M, Py_ssize_t rows, Py_ssize_t n, const double *v, double *out)
+    void add_rows "enumsol_add_rows"(const double *M, Py_ssize_t rows, Py_ssize_t n, const double *c, double *out)
+    void add_outer "enumsol_add_outer"(
+        double t, const double *c, const double *z, Py_ssize_t rows, Py_ssize_t n, double *M)
+    void rotate "enumsol_rotate"(double c, double s, double *a, double *b, Py_ssize_t n)
 
 
 cdef class QPData:
@@ -65,6 +60,8 @@ cdef class QPData:
     cdef Py_ssize_t[::1] start, index
     cdef double[::1] value, rhs, norm
     cdef double f0
+    cdef double *spare[POOL]    # memory of states that are no longer used
+    cdef int spares
 
     def __init__(self, S, c, W, w0, row_start, row_index, row_value, row_rhs):
         self.n = len(c)
@@ -99,6 +96,11 @@ cdef class QPData:
             rhs[r] /= norm[r]
         self.value, self.rhs, self.norm = value, rhs, norm
 
+    def __dealloc__(self):
+        while self.spares > 0:
+            self.spares -= 1
+            free(self.spare[self.spares])
+
     cdef inline double row_at(self, Py_ssize_t r, const double *x, const double *w) noexcept nogil:
         cdef double s = -self.rhs[r]
         cdef Py_ssize_t j, i
@@ -122,19 +124,56 @@ cdef class QPData:
     cdef void add_normal(self, Py_ssize_t r, double t, double *out) noexcept nogil:
         """out += t * n_r."""
         cdef Py_ssize_t j, i
+        cdef double s
         for j in range(self.start[r], self.start[r + 1]):
             i = self.index[j]
             if i < self.n:
                 out[i] += t * self.value[j]
             else:
-                axpy(t * self.value[j], &self.W[i - self.n, 0], out, self.n)
+                s = t * self.value[j]
+                add_rows(&self.W[i - self.n, 0], 1, self.n, &s, out)
 
 
+cdef class BranchingRule:
+    """Which contact node a partial assignment is branched on.
+
+    Candidates are the nodes with the largest violation of complementarity at the minimiser. For each child of each of
+    them one step of the dual method, without carrying it out, bounds the child's energy from below. The candidate
+    whose children close most of the gap is taken, the first one at once of which all children but one are excluded.
+
+    Parameters
+    ----------
+    F : (p,) array
+        Friction coefficients.
+    slip_rows, slip_modes : (2, p) int arrays
+        The row, and its mode, that puts lambda_t on the slip bound in slip+ and in slip-. Other rows are numbered
+        kind * p + node as in enumsol.enumeration.relaxation.RowKind.
+    candidates : int
+        How many nodes are looked at.
+    """
+
+    cdef readonly Py_ssize_t p, candidates
+    cdef double[::1] F, violation
+    cdef Py_ssize_t[:, ::1] slip_row
+    cdef signed char[:, ::1] slip_mode
+    cdef Py_ssize_t[::1] order
+
+    def __init__(self, F, slip_rows, slip_modes, candidates):
+        self.p = len(F)
+        self.candidates = candidates
+        self.F = np.ascontiguousarray(F, dtype=np.float64)
+        self.slip_row = np.ascontiguousarray(slip_rows, dtype=np.intp)
+        self.slip_mode = np.ascontiguousarray(slip_modes, dtype=np.int8)
+        self.violation = np.zeros(candidates)
+        self.order = np.zeros(candidates, dtype=np.intp)
+
+
+@cython.no_gc_clear
 cdef class QPState:
     """One quadratic program of the tree: which rows are on, which are active, and the iterate."""
 
     cdef QPData data
-    cdef double *block          # J (n x n), R (n x n), x, u, d, z, r, normal (n each), w (k)
+    cdef double *block          # x, u (n each), w (k), J (n x n), R (n x n), then scratch: d, z, r, normal (n each)
     cdef double *J
     cdef double *R
     cdef double *x
@@ -148,7 +187,7 @@ cdef class QPState:
     cdef int *position          # row -> place in active, or -1 (m)
     cdef signed char *mode      # row -> 0 off, 1 inequality, 2 equality (m)
     cdef signed char *sign      # row -> orientation of an active equality (m)
-    cdef Py_ssize_t q, size
+    cdef Py_ssize_t q
     cdef int pending            # row with a multiplier that is not active yet, or -1
     cdef double pending_u
     cdef double f
@@ -158,21 +197,24 @@ cdef class QPState:
     def __cinit__(self, QPData data):
         cdef Py_ssize_t n = data.n
         self.data = data
-        self.size = 2 * n * n + 6 * n + data.k
-        self.block = <double *> malloc(self.size * sizeof(double))
+        if data.spares > 0:
+            data.spares -= 1
+            self.block = data.spare[data.spares]
+        else:
+            self.block = <double *> malloc((2 * n * n + 6 * n + data.k) * sizeof(double))
         self.active = <int *> malloc((n + data.m) * sizeof(int))
         self.mode = <signed char *> malloc(2 * data.m + 1)
         if self.block == NULL or self.active == NULL or self.mode == NULL:
             raise MemoryError
-        self.J = self.block
-        self.R = self.J + n * n
-        self.x = self.R + n * n
+        self.x = self.block
         self.u = self.x + n
-        self.d = self.u + n
+        self.w = self.u + n
+        self.J = self.w + data.k
+        self.R = self.J + n * n
+        self.d = self.R + n * n
         self.z = self.d + n
         self.r = self.z + n
         self.normal = self.r + n
-        self.w = self.normal + n
         self.position = self.active + n
         self.sign = self.mode + data.m
 
@@ -186,7 +228,11 @@ cdef class QPState:
         self.bound = self.f
 
     def __dealloc__(self):
-        free(self.block)
+        if self.block != NULL and self.data.spares < POOL:
+            self.data.spare[self.data.spares] = self.block
+            self.data.spares += 1
+        else:
+            free(self.block)
         free(self.active)
         free(self.mode)
 
@@ -194,7 +240,6 @@ cdef class QPState:
         """Unconstrained minimum, nothing active."""
         cdef Py_ssize_t i, n = self.data.n
         memcpy(self.J, &self.data.J0[0, 0], n * n * sizeof(double))
-        memset(self.R, 0, n * n * sizeof(double))
         memset(self.u, 0, n * sizeof(double))
         memcpy(self.x, &self.data.x0[0], n * sizeof(double))
         for i in range(self.q):
@@ -206,13 +251,18 @@ cdef class QPState:
 
     cdef void _update_w(self) noexcept nogil:
         cdef Py_ssize_t i
+        matvec(&self.data.W[0, 0], self.data.k, self.data.n, self.x, self.w)
         for i in range(self.data.k):
-            self.w[i] = self.data.w0[i] + dot(&self.data.W[i, 0], self.x, self.data.n)
+            self.w[i] += self.data.w0[i]
 
     def copy(self):
         """An independent state with the same rows and iterate."""
+        cdef Py_ssize_t i, n = self.data.n
         cdef QPState other = QPState.__new__(QPState, self.data)
-        memcpy(other.block, self.block, self.size * sizeof(double))
+        # of R only the triangle of the active rows means something
+        memcpy(other.block, self.block, (2 * n + self.data.k + n * n) * sizeof(double))
+        for i in range(self.q):
+            memcpy(other.R + i * n + i, self.R + i * n + i, (self.q - i) * sizeof(double))
         memcpy(other.active, self.active, (self.data.n + self.data.m) * sizeof(int))
         memcpy(other.mode, self.mode, 2 * self.data.m)
         other.q, other.pending, other.f = self.q, self.pending, self.f
@@ -261,7 +311,7 @@ cdef class QPState:
     cdef double _dual_bound(self) noexcept nogil:
         """Lower bound proven by the current multipliers, computed from them and the data alone."""
         cdef Py_ssize_t j, i, n = self.data.n
-        cdef double total = 0.0, t, s
+        cdef double total = 0.0, t
         cdef int row
         for i in range(n):
             self.normal[i] = self.data.c[i]
@@ -279,30 +329,140 @@ cdef class QPState:
             t *= self.sign[row]
             self.data.add_normal(row, t, self.normal)
             total += t * self.data.offset(row)
-        s = 0.0
-        for i in range(n):
-            t = dot(&self.data.J0[i, 0], self.normal, n)
-            s += t * t
-        return total - 0.5 * s
+        matvec(&self.data.J0[0, 0], n, n, self.normal, self.z)
+        return total - 0.5 * dot(self.z, self.z, n)
 
-    cdef double _direction(self, int row, double sgn) noexcept nogil:
-        """d = J'n, z = J2 d2, r = R^{-1} d1 for the row's normal; returns |d2|^2."""
-        cdef Py_ssize_t i, j, n = self.data.n, q = self.q
-        cdef double s, d2 = 0.0
-        memset(self.normal, 0, n * sizeof(double))
-        self.data.add_normal(row, sgn, self.normal)
-        for i in range(n):
-            self.d[i] = dot(self.J + i * n, self.normal, n)
-        memset(self.z, 0, n * sizeof(double))
-        for i in range(q, n):
-            d2 += self.d[i] * self.d[i]
-            axpy(self.d[i], self.J + i * n, self.z, n)
+    cdef void _project(self, int row, double sgn) noexcept nogil:
+        """d = J'n for the row's normal n, turned by sgn."""
+        cdef Py_ssize_t i, j, at, n = self.data.n
+        cdef double t
+        cdef bint sparse = True
+        for j in range(self.data.start[row], self.data.start[row + 1]):
+            sparse = sparse and self.data.index[j] < n
+        if not sparse:
+            memset(self.normal, 0, n * sizeof(double))
+            self.data.add_normal(row, sgn, self.normal)
+            matvec(self.J, n, n, self.normal, self.d)
+            return
+        memset(self.d, 0, n * sizeof(double))
+        for j in range(self.data.start[row], self.data.start[row + 1]):
+            at, t = self.data.index[j], sgn * self.data.value[j]
+            for i in range(n):
+                self.d[i] += t * self.J[i * n + at]
+
+    cdef Py_ssize_t _ratios(self, double *step) noexcept nogil:
+        """r = R^{-1} d1; the active inequality whose multiplier vanishes first along r, or -1, and at which step."""
+        cdef Py_ssize_t i, l = -1, n = self.data.n, q = self.q
+        cdef double t
+        step[0] = -1.0
         for i in range(q - 1, -1, -1):
-            s = self.d[i]
-            for j in range(i + 1, q):
-                s -= self.R[i * n + j] * self.r[j]
-            self.r[i] = s / self.R[i * n + i]
-        return d2
+            self.r[i] = (self.d[i] - dot(self.R + i * n + i + 1, self.r + i + 1, q - i - 1)) / self.R[i * n + i]
+        for i in range(q):
+            if self.mode[self.active[i]] == 1 and self.r[i] > 0.0:
+                t = self.u[i] / self.r[i]
+                if t < 0.0:
+                    t = 0.0
+                if l < 0 or t < step[0]:
+                    step[0] = t
+                    l = i
+        return l
+
+    def gain(self, int row, int mode):
+        """By how much one dual step on a row, imposed in that mode, raises the bound; inf: nothing is feasible."""
+        return self._gain(row, mode)
+
+    cdef double _gain(self, int row, int mode) noexcept nogil:
+        cdef Py_ssize_t n = self.data.n
+        cdef double t, t1, d2, s = self.data.row_at(row, self.x, self.w)
+        cdef double sgn = -1.0 if (mode == 2 and s > 0.0) else 1.0
+        s = -sgn * s
+        if s <= SATISFIED or self.position[row] >= 0:
+            return 0.0
+        self._project(row, sgn)
+        d2 = dot(self.d + self.q, self.d + self.q, n - self.q)
+        self._ratios(&t1)
+        if d2 <= DEPENDENT * DEPENDENT:
+            return t1 * s if t1 >= 0.0 else HUGE_VAL
+        t = s / d2
+        if 0.0 <= t1 < t:
+            t = t1
+        return t * (s - 0.5 * t * d2)
+
+    cdef double _promise(self, Py_ssize_t i, signed char code, BranchingRule rule, double gap) noexcept nogil:
+        """How far branching on a contact node closes the gap, by one dual step a child; HUGE_VAL: all but one child."""
+        cdef Py_ssize_t p = rule.p
+        cdef double a, b, c, slip
+        if code == UNDECIDED_:
+            # open: no force; in contact: no gap
+            a = fmax(self._gain(<int> i, 2), self._gain(<int> (p + i), 2) if rule.F[i] > 0.0 else 0.0)
+            b = self._gain(<int> (4 * p + i), 2)
+            a = fmin(a / gap, 1.0)
+            b = fmin(b / gap, 1.0)
+            if a >= 1.0 or b >= 1.0:
+                return HUGE_VAL
+            return (a + LEAST) * (b + LEAST)
+        # stick: no slip; slip: the slip bound is reached, and the slip has its sign
+        slip = fmin(self._gain(<int> (5 * p + i), 2) / gap, 1.0)
+        a = fmin(self._gain(<int> rule.slip_row[0, i], rule.slip_mode[0, i]) / gap, 1.0)
+        b = fmin(self._gain(<int> rule.slip_row[1, i], rule.slip_mode[1, i]) / gap, 1.0)
+        if self.w[p + i] < 0.0:
+            a = fmax(a, slip)
+        else:
+            b = fmax(b, slip)
+        if (slip >= 1.0) + (a >= 1.0) + (b >= 1.0) >= 2:
+            return HUGE_VAL
+        c = fmax(slip, fmax(a, b))
+        slip, a = fmin(slip, fmin(a, b)), slip + a + b - c
+        return (slip + LEAST) * (a - slip + LEAST) * sqrt(c + LEAST)
+
+    def choose(self, signed char[::1] codes, BranchingRule rule, double target):
+        """The contact node to branch on, -1 when every node is decided (see BranchingRule).
+
+        Parameters
+        ----------
+        codes : (p,) int8 array
+            The partial assignment whose minimiser this state holds.
+        rule : BranchingRule
+        target : float
+            The bound at which a partial assignment is pruned.
+        """
+        cdef Py_ssize_t best
+        with nogil:
+            best = self._choose(codes, rule, target)
+        return best
+
+    cdef Py_ssize_t _choose(self, signed char[::1] codes, BranchingRule rule, double target) noexcept nogil:
+        cdef Py_ssize_t i, j, k, count = 0, best = -1, p = rule.p
+        cdef double slip, value, most = -1.0, gap = fmax(target - self.bound, 1e-300)
+        for i in range(p):
+            if codes[i] < CONTACT_:
+                continue
+            slip = rule.F[i] * self.x[i] * fabs(self.w[p + i]) - self.x[p + i] * self.w[p + i]
+            if codes[i] == UNDECIDED_:
+                # an undecided node's slip counts double: deciding it now saves the slack that it leaves in the energy
+                slip += slip - self.x[i] * self.w[i]
+            # insertion among the largest violations
+            j = count if count < rule.candidates else count - 1
+            if count == rule.candidates and not slip > rule.violation[j]:
+                continue
+            while j > 0 and rule.violation[j - 1] < slip:
+                rule.violation[j], rule.order[j] = rule.violation[j - 1], rule.order[j - 1]
+                j -= 1
+            rule.violation[j], rule.order[j] = slip, i
+            if count < rule.candidates:
+                count += 1
+        if count == 1 or (count > 0 and rule.candidates == 1):
+            return rule.order[0]
+        for k in range(count):
+            i = rule.order[k]
+            value = self._promise(i, codes[i], rule, gap)
+            if value == HUGE_VAL:
+                return i
+            value *= fmax(rule.violation[k], 1e-12)
+            if value > most:
+                most = value
+                best = i
+        return best
 
     cdef void _append(self, int row, double u) noexcept nogil:
         """Make a row active, d being J'n of its normal: a Householder reflection of the columns from q on."""
@@ -322,10 +482,8 @@ cdef class QPState:
             beta = -1.0 / (norm * v0)
             v[q] = v0
             memset(self.z, 0, n * sizeof(double))
-            for i in range(q, n):
-                axpy(v[i], self.J + i * n, self.z, n)
-            for i in range(q, n):
-                axpy(-beta * v[i], self.z, self.J + i * n, n)
+            add_rows(self.J + q * n, n - q, n, v + q, self.z)
+            add_outer(-beta, v + q, self.z, n - q, n, self.J + q * n)
         elif v0 != 0.0:
             for i in range(n):
                 self.J[q * n + i] = -self.J[q * n + i]
@@ -337,9 +495,7 @@ cdef class QPState:
     cdef void _drop(self, Py_ssize_t l) noexcept nogil:
         """Take the active row at place l out; Givens rotations restore the triangle."""
         cdef Py_ssize_t i, j, n = self.data.n, q = self.q
-        cdef double a, b, h, c, s, t
-        cdef double *Ja
-        cdef double *Jb
+        cdef double a, b, h, c, s
         self.position[self.active[l]] = -1
         for j in range(l + 1, q):
             self.active[j - 1] = self.active[j]
@@ -361,16 +517,8 @@ cdef class QPState:
             s = b / h
             self.R[j * n + j] = h
             self.R[(j + 1) * n + j] = 0.0
-            for i in range(j + 1, q - 1):
-                t = self.R[j * n + i]
-                self.R[j * n + i] = c * t + s * self.R[(j + 1) * n + i]
-                self.R[(j + 1) * n + i] = -s * t + c * self.R[(j + 1) * n + i]
-            Ja = self.J + j * n
-            Jb = self.J + (j + 1) * n
-            for i in range(n):
-                t = Ja[i]
-                Ja[i] = c * t + s * Jb[i]
-                Jb[i] = -s * t + c * Jb[i]
+            rotate(c, s, self.R + j * n + j + 1, self.R + (j + 1) * n + j + 1, q - 2 - j)
+            rotate(c, s, self.J + j * n, self.J + (j + 1) * n, n)
 
     cdef double _polish(self) noexcept nogil:
         """Project x back on the active rows (rounding drift); returns the largest residual found before."""
@@ -386,7 +534,8 @@ cdef class QPState:
             self.d[i] = s / self.R[i * n + i]
         if worst > 0.0:
             for i in range(self.q):
-                axpy(-self.d[i], self.J + i * n, self.x, n)
+                self.d[i] = -self.d[i]
+            add_rows(self.J, self.q, n, self.d, self.x)
             self._update_w()
         return worst
 
@@ -451,17 +600,9 @@ cdef class QPState:
                 self.iterations += 1
                 if self.iterations > limit:
                     return STALLED_
-                d2 = self._direction(row, sgn)
-                t1 = -1.0
-                l = -1
-                for i in range(self.q):
-                    if self.mode[self.active[i]] == 1 and self.r[i] > 0.0:
-                        t = self.u[i] / self.r[i]
-                        if t < 0.0:
-                            t = 0.0
-                        if l < 0 or t < t1:
-                            t1 = t
-                            l = i
+                self._project(row, sgn)
+                d2 = dot(self.d + self.q, self.d + self.q, n - self.q)
+                l = self._ratios(&t1)
                 if d2 > DEPENDENT * DEPENDENT:
                     t2 = -s / d2
                     if l >= 0 and t1 < t2:
@@ -469,7 +610,10 @@ cdef class QPState:
                     else:
                         t = t2
                         full = True
-                    axpy(t, self.z, self.x, n)
+                    # x += t J2 d2
+                    for i in range(self.q, n):
+                        self.r[i] = t * self.d[i]
+                    add_rows(self.J + self.q * n, n - self.q, n, self.r + self.q, self.x)
                     self.f += t * d2 * (0.5 * t + self.pending_u)
                 elif l < 0:
                     # infeasible: along the ray the bound grows at the rate -s
@@ -508,3 +652,6 @@ cdef class QPState:
 cdef int OPTIMAL_ = 0
 cdef int EXCEEDED_ = 1
 cdef int STALLED_ = 2
+cdef signed char CONTACT_ = CONTACT
+cdef signed char UNDECIDED_ = UNDECIDED
+cdef double SATISFIED = FEASIBILITY_TOLERANCE

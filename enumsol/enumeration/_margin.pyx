@@ -1,11 +1,14 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, initializedcheck=False
 """The exclusion inequality of enumsol.certification.kernel in compiled loops, for the search.
 
-Formula and error bounds are those of ``kernel.exclusion_margin``, which the checker uses; tests compare the two. Plain
-loops in double arithmetic: the a-priori bounds hold for any order of summation and for fused multiply-adds.
+Formula and error bounds are those of ``kernel.exclusion_margin``, which the checker uses; tests compare the two. Sums in
+double arithmetic: the a-priori bounds hold for any order of summation and for fused multiply-adds.
 """
 
 from libc.math cimport fabs, isfinite, sqrt
+
+cdef extern from "_kernels.h" nogil:
+    void matvec "enumsol_matvec"(const double *M, Py_ssize_t rows, Py_ssize_t n, const double *v, double *out)
 
 import numpy as np
 
@@ -82,28 +85,18 @@ cdef class Margins:
         return self._bound(k)
 
     cdef double _bound(self, double k) noexcept:
-        cdef Py_ssize_t i, j, n = 2 * self.p
+        cdef Py_ssize_t i, n = 2 * self.p
         cdef double[::1] y = self.work[0], c = self.work[1], c_rad = self.work[2], q = self.work[3]
         cdef double[::1] x = self.work[4], Sx = self.work[5], Sy = self.work[6], q_rad = self.work[7]
-        cdef double s, t, first = 0, cross = 0, y_form = 0, x_form = 0, first_error = 0, cross_error = 0
+        cdef double first = 0, cross = 0, y_form = 0, x_form = 0, first_error = 0, cross_error = 0
         cdef double yy = 0, xx = 0, rr = 0, dd = 0, qq = 0, rest, tail, total, error, margin
         for i in range(n):
             c_rad[i] *= self.safe
             q[i] = self.g[i] + c[i]
             q_rad[i] = (self.g_rad[i] + c_rad[i] + 2 * self.unit * fabs(q[i])) * self.safe
-        for i in range(n):
-            s = 0
-            for j in range(n):
-                s += self.inverse[i, j] * q[j]
-            x[i] = s
-        for i in range(n):
-            s = 0
-            t = 0
-            for j in range(n):
-                s += self.S[i, j] * x[j]
-                t += self.S[i, j] * y[j]
-            Sx[i] = s
-            Sy[i] = t
+        matvec(&self.inverse[0, 0], n, n, &q[0], &x[0])
+        matvec(&self.S[0, 0], n, n, &x[0], &Sx[0])
+        matvec(&self.S[0, 0], n, n, &y[0], &Sy[0])
         for i in range(n):
             first += y[i] * (self.g[i] - c[i])
             first_error += fabs(y[i]) * (k * (fabs(self.g[i]) + fabs(c[i])) + self.g_rad[i] + c_rad[i])

@@ -8,12 +8,13 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import solve_triangular
 
-from enumsol.enumeration.relaxation import EQUALITY, PRUNE_MARGIN, Relaxation, row_terms
+from enumsol.enumeration.relaxation import EQUALITY, PRUNE_MARGIN, Relaxation, largest_violation, row_terms
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensed import ScaledSystem
+    from enumsol.enumeration.solutions import Codes
 
 
 class InteriorPointEngine:
@@ -99,6 +100,10 @@ class _InteriorPointRelaxation:
         """Rows and their multipliers, which prove ``bound``."""
         keep = self._values != 0
         return self._rows[keep], self._values[keep]
+
+    def choose(self, codes: Codes) -> int:
+        """The undecided node at which complementarity is violated most, -1 when all are decided."""
+        return largest_violation(codes, self._engine.system.F, self.forces, self.displacements)
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on, solved from scratch."""

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensed import ScaledSystem
     from enumsol.enumeration._active_set import QPState
+    from enumsol.enumeration.solutions import Codes
 
 #: Codes of nodes whose status is not final yet; final codes are those of enumsol.selections.
 CONTACT, UNDECIDED = 5, 6
@@ -21,6 +22,8 @@ CONTACT, UNDECIDED = 5, 6
 FEASIBILITY_TOLERANCE = 1e-11
 #: A leaf is pruned when its energy bound exceeds this; g' S^{-1} g lies in [1, 4), so it is relative to the data.
 PRUNE_MARGIN = 1e-9
+#: Nodes whose children are bounded before one of them is branched on (measured in studies/branching.py).
+BRANCHING_CANDIDATES = 24
 
 
 class RowKind(enum.IntEnum):
@@ -109,8 +112,23 @@ class Relaxation(Protocol):
     def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Rows and their multipliers, which prove ``bound``."""
 
+    def choose(self, codes: Codes) -> int:
+        """The contact node that the partial assignment is to be branched on, -1 when all are decided."""
+
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""
+
+
+def largest_violation(codes: Codes, F: NDArray[np.float64], forces: NDArray[np.float64], w: NDArray[np.float64]) -> int:
+    """The undecided node at which complementarity is violated most, -1 when all are decided."""
+    array, p = np.array(codes), len(F)
+    open_nodes = np.flatnonzero(array >= CONTACT)
+    if not len(open_nodes):
+        return -1
+    slip = F * forces[:p] * np.abs(w[p:]) - forces[p:] * w[p:]
+    # an undecided node's slip counts double: deciding it now saves the slack that it leaves in the energy
+    score = np.where(array == UNDECIDED, slip - forces[:p] * w[:p], 0.0) + slip
+    return int(open_nodes[np.argmax(score[open_nodes])])
 
 
 class Engine(Protocol):
@@ -135,6 +153,10 @@ class ActiveSetEngine:
         rhs = np.zeros(len(start) - 1)
         self._data = _active_set.QPData(system.S, system.g, -system.S, system.g, start, index, value, rhs)
         self._module = _active_set
+        cones = np.array([RowKind.CONE_PLUS, RowKind.CONE_MINUS])[:, None] * p + np.arange(p)
+        self.rule = _active_set.BranchingRule(
+            system.F, cones, np.full((2, p), EQUALITY, dtype=np.int8), BRANCHING_CANDIDATES
+        )
         self.limit = 200 + 20 * p
 
     def root(self, rows: list[int], modes: list[int]) -> Relaxation:
@@ -164,6 +186,9 @@ class _ActiveSetRelaxation:
 
     def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         return self._state.multipliers()
+
+    def choose(self, codes: Codes) -> int:
+        return self._state.choose(np.array(codes, dtype=np.int8), self._engine.rule, PRUNE_MARGIN)
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         state = self._state if last else self._state.copy()

@@ -276,36 +276,30 @@ class TreeSearch:
 
     # -- branching -------------------------------------------------------------------------------------------------
 
-    def _choose(self, codes: Codes, relaxation: Relaxation | None) -> int:
-        """The undecided node with the largest complementarity violation at the minimiser; -1 when all are decided."""
-        array = np.array(codes)
-        open_nodes = np.flatnonzero(array >= CONTACT)
-        if not len(open_nodes):
-            return -1
+    @staticmethod
+    def _choose(codes: Codes, relaxation: Relaxation | None) -> int:
+        """The contact node to branch on; -1 when all are decided."""
         if relaxation is None or relaxation.pruned:
-            return int(open_nodes[0])
-        p, F = self.system.p, self.system.F
-        force, w = relaxation.forces, relaxation.displacements
-        slip = F * force[:p] * np.abs(w[p:]) - force[p:] * w[p:]
-        # an undecided node's slip counts double: deciding it now saves the slack that it leaves in the energy
-        score = np.where(array == UNDECIDED, slip - force[:p] * w[:p], 0.0) + slip
-        return int(open_nodes[np.argmax(score[open_nodes])])
+            return next((i for i, code in enumerate(codes) if code >= CONTACT), -1)
+        return relaxation.choose(codes)
 
     def _children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
         """Codes of the children, the one nearest to the minimiser first."""
         allowed = self._allowed[node]
         contact = [c for c in (STICK, SLIP_PLUS, SLIP_MINUS) if c in allowed]
         p = self.system.p
+        if relaxation is not None:
+            force, w = relaxation.forces, relaxation.displacements
         if codes[node] == UNDECIDED:
             touching = FRICTIONLESS if not self._friction[node] else (contact[0] if len(contact) == 1 else CONTACT)
             children = [OPEN] if OPEN in allowed else []
             if (FRICTIONLESS in allowed) if touching == FRICTIONLESS else contact:
                 children.append(touching)
-            if relaxation is not None and relaxation.forces[node] > -relaxation.displacements[node]:
+            if relaxation is not None and force[node] > -w[node]:
                 children.reverse()
             return children
         if relaxation is not None:
-            force, w_t = relaxation.forces, relaxation.displacements[p + node]
+            w_t = w[p + node]
             slack = self.system.F[node] * force[node] - abs(force[p + node])
             order = {
                 STICK: 0.0 if slack > abs(w_t) else 2.0,

@@ -210,3 +210,58 @@ def test_no_partial_assignment_above_a_root_is_pruned():
                     assert node.bound < 1e-10
             np.testing.assert_allclose(node.forces, root.forces, rtol=1e-6, atol=1e-9)
     assert several > 10
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_one_dual_step_bounds_the_child(seed):
+    rng = np.random.default_rng(seed + 50)
+    compared = raised = 0
+    for _ in range(30):
+        p = int(rng.integers(1, 9))
+        system = random_system(rng, p)
+        for codes, node in descend(rng, system, ActiveSetEngine(system)):
+            if node.pruned:
+                continue
+            for i in range(p):
+                if codes[i] not in (UNDECIDED, CONTACT):
+                    continue
+                for code in (OPEN, STICK, SLIP_PLUS, SLIP_MINUS) if system.F[i] > 0 else (OPEN, FRICTIONLESS):
+                    if codes[i] == CONTACT and code == OPEN:
+                        continue
+                    rows, modes = rows_of((*codes[:i], code, *codes[i + 1 :]), system.F, [i])
+                    gain = max(node._state.gain(row, mode) for row, mode in zip(rows, modes, strict=True))
+                    child = node.child(rows, modes, last=False)
+                    compared += 1
+                    raised += gain > 1e-6
+                    # a search that prunes stops as soon as its bound suffices
+                    assert child.pruned or child.bound >= node.bound + gain - 1e-8
+                    assert child.pruned or gain < np.inf
+    assert compared > 100
+    assert raised > 30
+
+
+def test_branching_takes_an_undecided_node_and_prefers_one_that_is_forced():
+    # three blocks apart from each other: node 1 is pressed down hard, nodes 0 and 2 are balanced
+    S, F = np.eye(6), np.array([0.5, 0.5, 0.5])
+    system = CondensedSystem(S, np.array([0.2, 5.0, 0.2, 0.6, 0.0, 0.6]), F).scaled
+    codes = (UNDECIDED,) * 3
+    node = ActiveSetEngine(system).root(*rows_of(codes, F))
+    assert not node.pruned
+    assert node.child(*rows_of((UNDECIDED, OPEN, UNDECIDED), F, [1]), last=False).pruned
+    assert node.choose(codes) == 1
+    for decided in range(3):
+        codes = tuple(UNDECIDED if i == decided else STICK for i in range(3))
+        assert ActiveSetEngine(system).root(*rows_of(codes, F)).choose(codes) == decided
+    assert node.choose((STICK, OPEN, SLIP_PLUS)) == -1
+
+
+def test_memory_of_dropped_states_is_used_again():
+    rng = np.random.default_rng(60)
+    system = random_system(rng, 7)
+    root = ActiveSetEngine(system).root(*rows_of((UNDECIDED,) * 7, system.F))
+    kept = [root.child([], [], last=False) for _ in range(100)]
+    x = kept[50].forces
+    del kept[:50], kept[1:]
+    others = [root.child(*rows_of((CONTACT,) * 7, system.F), last=False) for _ in range(100)]
+    assert np.array_equal(kept[0].forces, x)
+    assert all(np.array_equal(other.forces, others[0].forces) for other in others)
