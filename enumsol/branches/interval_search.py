@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from enumsol.condensed import CondensedProblem
     from enumsol.enumeration.relaxation import Relaxation
     from enumsol.enumeration.solutions import Codes
-    from enumsol.enumeration.tree import Branch, Judge
+    from enumsol.enumeration.tree import Judge
 
 #: Nodes of a piece's tree, per contact node, that are spent before the tree at its middle is looked at.
 NODES_PER_CONTACT = 20
@@ -157,22 +157,13 @@ class IntervalTreeSearch(TreeSearch):
         super().__init__(system.scaled, judge, engine=IntervalEngine(system), limits=limits)
         self._constant = [bool(v) for v in system.F_lo == system.F]
 
-    def _rows(self, codes: Codes, nodes: Sequence[int]) -> tuple[list[int], list[int]]:
-        rows, modes, p = [], [], self.system.p
-        for i in nodes:
-            for kind, mode in interval_rows(codes[i], friction=self._friction[i], constant=self._constant[i]):
-                rows.append(kind * p + i)
-                modes.append(mode)
-        return rows, modes
+    def node_rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
+        """(kind, mode) of the rows that a contact node imposes in a status over the interval."""
+        return interval_rows(code, friction=self._friction[node], constant=self._constant[node])
 
-    def _relax(self, branch: Branch) -> Relaxation | None:
-        outcome, codes = self.outcome, branch.codes
-        outcome.qps += 1
-        if branch.parent is not None:
-            relaxation = branch.parent.child(*self._rows(codes, (branch.changed,)), last=branch.last)
-        else:
-            relaxation = self.engine.root(*self._rows(codes, range(len(codes))))
-        return None if relaxation.stalled else relaxation
+    def _fall_back(self, codes: Codes) -> None:
+        """No other engine knows intervals: the partial assignment is branched on."""
+        del codes
 
 
 class IntervalSearch:

@@ -49,6 +49,7 @@ _DIGEST = 32
 _CHUNK = 1 << 16
 # measured on multipliers: level 6 saves 4 % of the size and takes several times as long
 _LEVEL = 1
+_ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 #: Characters of one record; longer ones are no proof.
 _LONGEST = 1 << 26
 _HEX_FRACTION = re.compile(r"(-?[0-9a-f]+)/([0-9a-f]+)", re.ASCII)
@@ -136,7 +137,7 @@ class ProofWriter:
 
     def write(self, record: Any) -> None:
         """Append one record."""
-        self._pending.append(json.dumps(record, separators=(",", ":"), allow_nan=False))
+        self._pending.append(_ENCODER.encode(record))
         if len(self._pending) >= 256:
             self._flush()
 

@@ -112,7 +112,7 @@ class SearchOutcome:
     fallback_qps: int = 0
 
 
-@dataclass
+@dataclass(slots=True)
 class Branch:
     """A node of the tree that waits to be examined: its parent's relaxation and what it adds."""
 
@@ -170,6 +170,7 @@ class TreeSearch:
         self._friction = [bool(f > 0) for f in system.F]
         every = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS))
         self._allowed = list(allowed) if allowed is not None else [every] * system.p
+        self._known_rows: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
         self._covered = 0.0
         self._start = time.perf_counter()
 
@@ -250,28 +251,38 @@ class TreeSearch:
 
     # -- relaxations -----------------------------------------------------------------------------------------------
 
-    def _rows(self, codes: Codes, nodes: Sequence[int]) -> tuple[list[int], list[int]]:
-        rows, modes, p = [], [], self.system.p
-        for i in nodes:
-            for kind, mode in status_rows(codes[i], friction=self._friction[i]):
-                rows.append(kind * p + i)
-                modes.append(mode)
-        return rows, modes
+    def node_rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
+        """(kind, mode) of the rows that a contact node imposes in a status."""
+        return status_rows(code, friction=self._friction[node])
+
+    def _rows_of(self, node: int, code: int) -> tuple[list[int], list[int]]:
+        rows = self._known_rows.get((node, code))
+        if rows is None:
+            pairs = self.node_rows(node, code)
+            rows = [kind * self.system.p + node for kind, _ in pairs], [mode for _, mode in pairs]
+            self._known_rows[node, code] = rows
+        return rows
+
+    def _all_rows(self, codes: Codes) -> tuple[list[int], list[int]]:
+        parts = [self._rows_of(i, code) for i, code in enumerate(codes)]
+        return [row for rows, _ in parts for row in rows], [mode for _, modes in parts for mode in modes]
 
     def _relax(self, branch: Branch) -> Relaxation | None:
-        """The solved relaxation; None when neither engine has an answer."""
-        outcome, codes = self.outcome, branch.codes
-        outcome.qps += 1
+        """The solved relaxation; None when no engine has an answer."""
+        codes = branch.codes
+        self.outcome.qps += 1
         if branch.parent is not None:
-            relaxation = branch.parent.child(*self._rows(codes, (branch.changed,)), last=branch.last)
+            relaxation = branch.parent.child(*self._rows_of(branch.changed, codes[branch.changed]), last=branch.last)
         else:
-            relaxation = self.engine.root(*self._rows(codes, range(len(codes))))
-        if not relaxation.stalled:
-            return relaxation
-        outcome.fallback_qps += 1
+            relaxation = self.engine.root(*self._all_rows(codes))
+        return self._fall_back(codes) if relaxation.stalled else relaxation
+
+    def _fall_back(self, codes: Codes) -> Relaxation | None:
+        """The relaxation by the slower engine; None when that gives no answer either."""
+        self.outcome.fallback_qps += 1
         if self._fallback is None:
             self._fallback = InteriorPointEngine(self.system)
-        relaxation = self._fallback.root(*self._rows(codes, range(len(codes))))
+        relaxation = self._fallback.root(*self._all_rows(codes))
         return None if relaxation.stalled else relaxation
 
     # -- branching -------------------------------------------------------------------------------------------------
