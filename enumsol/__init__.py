@@ -5,25 +5,11 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from enumsol import gallery
-from enumsol.certification.checker import VerificationReport, verify
-from enumsol.certification.proof import Proof, ProofFormatError
-from enumsol.enumeration import SearchProgress, enumerate_roots
-from enumsol.errors import (
-    EnumsolError,
-    Interrupted,
-    InvalidArgumentError,
-    InvalidProblemError,
-    MissingDependencyError,
-    TooLargeError,
-)
-from enumsol.io import read_problem, write_problem
-from enumsol.problem import ContactProblem
-from enumsol.results import Enclosure, Polytope, Root, RootFamily, RootSet, SearchStats, Undecided
-from enumsol.selections import ContactStatus, PiecewiseSmoothEquation, sign_array
-
 if TYPE_CHECKING:
+    from enumsol import gallery
     from enumsol.branches import BranchGraph, branch_graph, link_samples, multiplicity_table
+    from enumsol.certification.checker import VerificationReport, verify
+    from enumsol.certification.proof import Proof, ProofFormatError
     from enumsol.continuation import (
         ContinuationOptions,
         NotConverged,
@@ -35,23 +21,69 @@ if TYPE_CHECKING:
         local_branch_test,
         newton,
     )
+    from enumsol.enumeration import SearchProgress, enumerate_roots
+    from enumsol.errors import (
+        EnumsolError,
+        Interrupted,
+        InvalidArgumentError,
+        InvalidProblemError,
+        MissingDependencyError,
+        TooLargeError,
+    )
+    from enumsol.io import read_problem, write_problem
+    from enumsol.problem import ContactProblem
+    from enumsol.results import Enclosure, Polytope, Root, RootFamily, RootSet, SearchStats, Undecided
+    from enumsol.selections import ContactStatus, PiecewiseSmoothEquation, sign_array
 
-#: Names that are imported when first used: they bring in networkx and rational arithmetic.
-_LATER = {
-    "BranchGraph": "enumsol.branches",
-    "branch_graph": "enumsol.branches",
-    "link_samples": "enumsol.branches",
-    "multiplicity_table": "enumsol.branches",
-    "ContinuationOptions": "enumsol.continuation",
-    "NotConverged": "enumsol.continuation",
-    "Path": "enumsol.continuation",
-    "SmoothPath": "enumsol.continuation",
-    "audit": "enumsol.continuation",
-    "follow": "enumsol.continuation",
-    "follow_all": "enumsol.continuation",
-    "local_branch_test": "enumsol.continuation",
-    "newton": "enumsol.continuation",
+#: Where the public names are at home. A module is loaded when a name of it is first used, so that a program loads what
+#: it works with and no more: sparse matrices come with a problem, networkx and rational arithmetic with a branch graph.
+_HOMES = {
+    "enumsol.branches": ("BranchGraph", "branch_graph", "link_samples", "multiplicity_table"),
+    "enumsol.certification.checker": ("VerificationReport", "verify"),
+    "enumsol.certification.proof": ("Proof", "ProofFormatError"),
+    "enumsol.continuation": (
+        "ContinuationOptions",
+        "NotConverged",
+        "Path",
+        "SmoothPath",
+        "audit",
+        "follow",
+        "follow_all",
+        "local_branch_test",
+        "newton",
+    ),
+    "enumsol.enumeration": ("SearchProgress", "enumerate_roots"),
+    "enumsol.errors": (
+        "EnumsolError",
+        "Interrupted",
+        "InvalidArgumentError",
+        "InvalidProblemError",
+        "MissingDependencyError",
+        "TooLargeError",
+    ),
+    "enumsol.io": ("read_problem", "write_problem"),
+    "enumsol.problem": ("ContactProblem",),
+    "enumsol.results": ("Enclosure", "Polytope", "Root", "RootFamily", "RootSet", "SearchStats", "Undecided"),
+    "enumsol.selections": ("ContactStatus", "PiecewiseSmoothEquation", "sign_array"),
 }
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+#: Modules that are reached as attributes without an import of their own.
+_MODULES = frozenset(
+    (
+        "branches",
+        "certification",
+        "condensed",
+        "continuation",
+        "enumeration",
+        "errors",
+        "fem",
+        "gallery",
+        "io",
+        "problem",
+        "results",
+        "selections",
+    )
+)
 
 __all__ = [
     "BranchGraph",
@@ -97,9 +129,13 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    if name not in _LATER:
+    if name in _MODULES:
+        return import_module(f"{__name__}.{name}")
+    if name not in _HOME_OF:
         raise AttributeError(f"module 'enumsol' has no attribute {name!r}")
-    return getattr(import_module(_LATER[name]), name)
+    value = getattr(import_module(_HOME_OF[name]), name)
+    globals()[name] = value  # found without this detour from now on
+    return value
 
 
 def __dir__() -> list[str]:

@@ -1,10 +1,26 @@
 """Branches of solutions over alpha: arcs glued to a graph, multiplicity tables, linked samples (theory, section 7)."""
 
-from enumsol.branches.build import branch_graph
-from enumsol.branches.graph import BranchGraph, GraphStats
-from enumsol.branches.parts import Arc, Branch, Component, Vertex
-from enumsol.branches.samples import Missed, SampledGraph, link_samples
-from enumsol.branches.table import multiplicity_table
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from enumsol.branches.build import branch_graph
+    from enumsol.branches.graph import BranchGraph, GraphStats
+    from enumsol.branches.parts import Arc, Branch, Component, Vertex
+    from enumsol.branches.samples import Missed, SampledGraph, link_samples
+    from enumsol.branches.table import multiplicity_table
+
+#: Modules of the public names, loaded when first used: a table needs neither networkx nor rational arithmetic.
+_HOMES = {
+    "build": ("branch_graph",),
+    "graph": ("BranchGraph", "GraphStats"),
+    "parts": ("Arc", "Branch", "Component", "Vertex"),
+    "samples": ("Missed", "SampledGraph", "link_samples"),
+    "table": ("multiplicity_table",),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Arc",
@@ -19,3 +35,9 @@ __all__ = [
     "link_samples",
     "multiplicity_table",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'enumsol.branches' has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME_OF[name]}"), name)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.metadata
 import os
 import sys
 import warnings
@@ -41,11 +40,13 @@ app.add_typer(gallery.app, name="gallery")
 
 def _version(value: bool) -> None:
     if value:
+        from importlib.metadata import PackageNotFoundError, version  # for nothing else
+
         try:
-            version = importlib.metadata.version("enumsol")
-        except importlib.metadata.PackageNotFoundError:
-            version = "(not installed, run from its source)"
-        typer.echo(f"enumsol {version}")
+            found = version("enumsol")
+        except PackageNotFoundError:
+            found = "(not installed, run from its source)"
+        typer.echo(f"enumsol {found}")
         raise typer.Exit
 
 

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import enum
-import multiprocessing
-import signal
 from contextlib import contextmanager
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from enumsol import gallery
 from enumsol.errors import InvalidArgumentError
-from enumsol.io import read_problem
-from enumsol.problem import finite_alpha
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -80,7 +75,11 @@ def load_problem(name: str) -> ContactProblem:
         It cannot be read, or the gallery has none of that name.
     """
     if name.startswith(_GALLERY):
+        from enumsol import gallery  # numpy and scipy: not for --help
+
         return gallery.get(name.removeprefix(_GALLERY)).build()
+    from enumsol.io import read_problem  # as above
+
     return read_problem(name)
 
 
@@ -92,6 +91,8 @@ def parse_alpha(text: str) -> Alpha:
     InvalidArgumentError
         It is neither, or not finite.
     """
+    from enumsol.problem import finite_alpha  # as above
+
     try:
         value = Fraction(text) if "/" in text else float(text)
     except (ValueError, ZeroDivisionError):
@@ -139,6 +140,9 @@ def workers(jobs: int) -> Iterator[Executor | None]:
     if jobs == 1:
         yield None
         return
+    # only for several processes
+    import multiprocessing
+    import signal
     from concurrent.futures import ProcessPoolExecutor
 
     before = set(multiprocessing.active_children())

@@ -26,7 +26,6 @@ from enumsol.cli.common import (
 from enumsol.cli.graph import read_graph
 from enumsol.cli.output import as_json, check_outputs, check_plot, write_figure, write_text
 from enumsol.cli.progress import Display, SearchDisplay
-from enumsol.enumeration import enumerate_roots
 from enumsol.errors import Interrupted, InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -193,6 +192,8 @@ def _starts(
     if not interval[0] <= alpha <= interval[1]:
         low, high = (float(end) for end in interval)
         raise InvalidArgumentError(f"--start is {float(alpha):g}; expected an alpha between {low:g} and {high:g}")
+    from enumsol.enumeration import enumerate_roots  # numpy and scipy: not for --help
+
     with SearchDisplay() as display:
         found = enumerate_roots(problem, alpha, arithmetic, progress=display)
     count = len(found)

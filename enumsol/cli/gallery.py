@@ -7,9 +7,6 @@ from typing import Annotated
 
 import typer
 
-from enumsol import gallery
-from enumsol.io import write_problem
-
 app = typer.Typer(help="Named problems to try things on.", no_args_is_help=False)
 
 
@@ -22,6 +19,8 @@ def _gallery(context: typer.Context) -> None:
 @app.command("list")
 def list_() -> None:
     """List the problems, each with an alpha worth a look and the number of its roots there."""
+    from enumsol import gallery  # numpy and scipy: not for --help
+
     rows = [
         (entry.name, f"{entry.alpha:g}", "family" if entry.roots is None else str(entry.roots), entry.summary)
         for entry in gallery.GALLERY.values()
@@ -60,6 +59,9 @@ def write(
     ],
 ) -> None:
     """Write the problem NAME to FILE, in a form that read_problem and the other commands take."""
+    from enumsol import gallery  # as above
+    from enumsol.io import write_problem
+
     entry = gallery.get(name.removeprefix("gallery:"))
     write_problem(entry.build(), file)
     typer.echo(f"wrote {entry.name} to {file}; try: enumsol roots {file} --alpha {entry.alpha:g}")

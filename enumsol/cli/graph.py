@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from enumsol.cli.common import (
@@ -166,6 +165,8 @@ def read_graph(file: str, problem: ContactProblem) -> BranchGraph:
 def _same_problem(a: ContactProblem, b: ContactProblem) -> bool:
     if (a.n, a.p) != (b.n, b.p) or any((getattr(a, name) != getattr(b, name)).nnz for name in ("A", "Bn", "Bt")):
         return False
+    import numpy as np  # not for --help
+
     pairs = [(getattr(a, name), getattr(b, name)) for name in ("f", "gap", "slip_offset")]
     slopes = [np.zeros(a.n) if item.load_slope is None else item.load_slope for item in (a, b)]
     return all(np.array_equal(x, y) for x, y in [*pairs, *zip(a.friction, b.friction, strict=True), tuple(slopes)])

@@ -10,7 +10,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import typer
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
@@ -122,10 +121,10 @@ def as_json(content: Any) -> str:
 def _plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
-    if isinstance(value, (np.generic, Fraction)):
-        return _plain(value.item() if isinstance(value, np.generic) else float(value))
+    if isinstance(value, Fraction):
+        return _plain(float(value))
+    if hasattr(value, "tolist"):  # arrays and numbers of numpy, which is not imported for --help
+        return _plain(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value

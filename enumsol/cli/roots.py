@@ -20,7 +20,6 @@ from enumsol.cli.common import (
 )
 from enumsol.cli.output import check_outputs, check_writable, write_text
 from enumsol.cli.progress import SearchDisplay
-from enumsol.enumeration import enumerate_roots
 from enumsol.errors import Interrupted, InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -110,6 +109,8 @@ def _search(
     jobs: int,
     proof_file: str | None,
 ) -> RootSet:
+    from enumsol.enumeration import enumerate_roots  # numpy and scipy: not for --help
+
     with workers(jobs) as executor, SearchDisplay() as display:
         return enumerate_roots(
             problem,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from enumsol.cli.common import (
@@ -109,6 +108,8 @@ def _alphas(first: str | None, last: str | None, samples: int, listed: str | Non
     if isinstance(low, Fraction) or isinstance(high, Fraction):
         start, width = Fraction(low), Fraction(high) - Fraction(low)
         return [start + width * k / (samples - 1) for k in range(samples)]
+    import numpy as np  # not for --help
+
     return [float(alpha) for alpha in np.linspace(low, high, samples)]
 
 

@@ -7,8 +7,6 @@ from typing import Annotated
 
 import typer
 
-from enumsol.certification.checker import verify as check
-from enumsol.certification.proof import Proof
 from enumsol.cli.common import ExitStatus, ProblemArgument, load_problem
 
 
@@ -29,6 +27,10 @@ def verify(
     Exit status: 0 when the proof holds and nothing is undecided; 3 when it holds and leaves selections undecided;
     2 when it does not hold or cannot be read.
     """
+    # numpy and scipy: not for --help
+    from enumsol.certification.checker import verify as check
+    from enumsol.certification.proof import Proof
+
     report = check(load_problem(problem), Proof.load(proof), _show_progress if sys.stderr.isatty() else None)
     if sys.stderr.isatty():
         typer.echo("\r\033[K", nl=False, err=True)

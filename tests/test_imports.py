@@ -1,0 +1,126 @@
+"""What a scene makes the program load and keep: libraries and memory follow from what is asked, and no more."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import enumsol
+from enumsol.condensed import Factorization
+
+#: Libraries that only some problems, results or commands need.
+RARE = {"flint", "networkx", "pandas", "matplotlib", "cvxpy", "skfem", "typer", "rich", "scipy.optimize", "h5py"}
+GENERIC = "import enumsol; problem = enumsol.gallery.{problem}; roots = enumsol.enumerate_roots(problem, {alpha}); "
+
+
+def modules_after(code):
+    """Modules in a new process after the code."""
+    ending = "; import sys, json; print(json.dumps(sorted(sys.modules)), file=sys.__stdout__)"
+    done = subprocess.run([sys.executable, "-c", code + ending], check=True, capture_output=True, text=True)
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+def test_importing_loads_no_library():
+    assert not modules_after("import enumsol") & (RARE | {"numpy", "scipy"})
+
+
+def test_a_problem_loads_sparse_matrices_and_nothing_rare():
+    modules = modules_after("import enumsol; enumsol.ContactProblem")
+    assert "scipy.sparse" in modules
+    assert not modules & RARE
+    assert "scipy.sparse.linalg" not in modules
+
+
+@pytest.mark.parametrize(
+    ("problem", "alpha", "roots"),
+    [
+        ("one_node_triangle()", 5.0, 3),
+        ("two_node_square()", 3.5, 5),
+        ("chain(3)", 5.0, 27),
+        ("wedge(4, 7, (4e-4, 1e-3))", 2.2, 5),
+    ],
+)
+def test_no_rational_arithmetic_where_intervals_decide(problem, alpha, roots):
+    """Proving and checking the proof: flint stays out. (scikit-fem makes the mesh of the wedge.)"""
+    code = GENERIC.format(problem=problem, alpha=alpha)
+    code += f"assert roots.complete and len(roots) == {roots}; assert enumsol.verify(problem, roots.proof).complete"
+    modules = modules_after(code)
+    assert "enumsol.enumeration.verified" in modules
+    assert not modules & (RARE - {"skfem"} if "wedge" in problem else RARE)
+
+
+def test_rational_arithmetic_where_a_sign_is_zero():
+    assert "flint" in modules_after("import enumsol; enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), 8/3)")
+
+
+def test_a_search_does_not_load_the_checker():
+    modules = modules_after(GENERIC.format(problem="one_node_triangle()", alpha=5.0) + "pass")
+    assert not modules & {"enumsol.certification.checker", "enumsol.io", "enumsol.branches", "enumsol.continuation"}
+
+
+def test_a_branch_graph_loads_algebra_and_graphs_only():
+    code = "import enumsol; graph = enumsol.branch_graph(enumsol.gallery.two_node_square(), (0.0, 10.0)); "
+    modules = modules_after(code + "assert graph.complete")
+    assert modules >= {"flint", "networkx"}
+    assert not modules & (RARE - {"flint", "networkx"})
+
+
+def test_continuation_loads_no_graph():
+    code = "import enumsol; problem = enumsol.gallery.one_node_triangle(); "
+    code += "enumsol.follow(problem, enumsol.newton(problem, 1.0), interval=(0.0, 4.0))"
+    assert not modules_after(code) & RARE
+
+
+def test_help_loads_neither_numpy_nor_scipy():
+    code = "import io, contextlib, enumsol.cli as cli\nwith contextlib.redirect_stdout(io.StringIO()): cli.main({0})\n0"
+    for arguments in (["--help"], ["roots", "--help"], ["--version"]):
+        assert not modules_after(code.format(arguments)) & {"numpy", "scipy", "flint", "networkx"}
+    assert not modules_after(code.format(["gallery", "list"])) & (RARE - {"typer", "rich"} | {"scipy.sparse.linalg"})
+
+
+def test_every_public_name_is_found():
+    for name in enumsol.__all__:
+        assert getattr(enumsol, name).__name__
+    assert dir(enumsol) == enumsol.__all__
+    homes = [name for names in enumsol._HOMES.values() for name in names]
+    assert sorted([*homes, "gallery"]) == sorted(enumsol.__all__)
+
+
+@pytest.mark.parametrize("name", sorted(enumsol._MODULES))
+def test_modules_are_attributes_after_a_plain_import(name):
+    assert f"enumsol.{name}" in modules_after(f"import enumsol; enumsol.{name}")
+
+
+def test_an_unknown_name_is_refused():
+    with pytest.raises(AttributeError, match="module 'enumsol' has no attribute 'enumerate_root'"):
+        enumsol.enumerate_root  # noqa: B018  # looking it up is the test
+
+
+def test_a_name_is_looked_up_once():
+    assert enumsol.enumerate_roots is enumsol.__dict__["enumerate_roots"]
+
+
+def test_the_factorization_keeps_no_copy_of_its_factors():
+    problem = enumsol.gallery.clamped_block(8, 4)
+    factorization = problem.factorization
+    assert factorization._lu.nnz > problem.A.nnz
+    assert factorization._lu.L.nnz == factorization._lu.U.nnz == 0
+    # and works as before, however often it is checked
+    factorization.check_positive_definite()
+    x = factorization.solve(problem.f)
+    assert np.allclose(problem.A @ x, problem.f)
+    assert np.array_equal(x, Factorization(problem.A).solve(problem.f))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the peak is read from /proc")
+def test_nothing_of_size_n_by_n_is_dense():
+    code = (
+        "import enumsol, re, pathlib; problem = enumsol.gallery.clamped_block(100, 99, contact=10); "
+        "assert problem.n == 20_000; assert enumsol.enumerate_roots(problem, 1.0).complete; "
+        r"status = pathlib.Path('/proc/self/status').read_text(); peak = re.search(r'VmHWM:\s+(\d+) kB', status)[1]; "
+        "print(int(peak) * 1024)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert int(done.stdout) < 0.15 * 8 * 20_000**2
