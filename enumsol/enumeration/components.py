@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.enumeration.solutions import VertexLimitError
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
     from typing import Any
@@ -100,6 +102,7 @@ def _grow(
     tried: dict[Codes, SelectionSolution | None] = dict(known)
     groups: list[tuple[list[SelectionSolution], bool]] = []
     placed: set[Codes] = set()
+    refused: set[Codes] = set()
     for seed in degenerate:
         if seed.codes in placed:
             continue
@@ -116,7 +119,13 @@ def _grow(
                     if codes in placed:
                         continue
                     if codes not in tried:
-                        tried[codes] = solver.solve(codes)
+                        try:
+                            tried[codes] = solver.solve(codes)
+                        except VertexLimitError:
+                            # the search lists this selection as open
+                            tried[codes] = None
+                            refused.add(codes)
+                    whole = whole and codes not in refused
                     other = tried[codes]
                     if other is not None and _touch(solution, other, solver):
                         placed.add(codes)

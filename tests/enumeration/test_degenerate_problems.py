@@ -10,6 +10,10 @@ from oracles import exact_condense, exact_solutions, perturbed_indices
 
 import enumsol
 from enumsol import ContactProblem, gallery
+from enumsol.enumeration.components import connected_components
+from enumsol.enumeration.float_selections import FloatSelections
+from enumsol.enumeration.solutions import VertexLimitError
+from enumsol.selections import OPEN, SLIP_PLUS, STICK
 
 
 def check(problem, rng, methods=METHODS):
@@ -152,3 +156,21 @@ def test_friction_that_only_rounds_to_zero(method):
     (root,) = enumsol.enumerate_roots(problem, Fraction(3, 10), "exact", method)
     assert root.statuses[0].value == "slip+"
     assert root.lambda_t[0] > 0
+
+
+def test_a_neighbour_with_too_many_vertices_leaves_the_root_without_an_index():
+    # node 0 grazes without load: all four statuses hold there
+    problem = ContactProblem(np.eye(4), np.eye(4)[::2], np.eye(4)[1::2], [0.0, 0.0, 1.0, 0.2], friction=1.0)
+    system = problem.condensed.at(0.0).scaled
+
+    class Limited(FloatSelections):
+        def solve(self, codes):
+            if codes == (SLIP_PLUS, STICK):
+                raise VertexLimitError("a family of roots has too many candidate vertices")
+            return super().solve(codes)
+
+    seed = FloatSelections(system).solve((OPEN, STICK))
+    (whole,) = connected_components([seed], FloatSelections(system))
+    assert (len(whole.solutions), whole.index, whole.whole) == (4, 1, True)
+    (cut,) = connected_components([seed], Limited(system))
+    assert (len(cut.solutions), cut.index, cut.whole) == (3, None, False)
