@@ -218,6 +218,8 @@ class SearchStats:
         Wall time.
     escalations : Escalations or None
         In verified arithmetic: how many decisions needed which arithmetic.
+    presolved : int
+        Contact nodes proven open or in contact before the search began to branch on alternatives.
     """
 
     nodes: int = 0
@@ -227,6 +229,7 @@ class SearchStats:
     fallback_qps: int = 0
     seconds: float = 0.0
     escalations: Escalations | None = None
+    presolved: int = 0
 
 
 class RootSet(Sequence[Root]):

@@ -249,6 +249,11 @@ class _IntervalRelaxation:
         target = PRUNE_MARGIN + self._engine.offset
         return self._state.choose(np.array(codes, dtype=np.int8), self._engine.rule, target)  # type: ignore[attr-defined, no-any-return]
 
+    def forced(self, codes: Codes) -> tuple[int, ...]:
+        """Undecided contact nodes of which one child at most is not excluded by a bound that is at hand."""
+        target = PRUNE_MARGIN + self._engine.offset
+        return self._state.forced(np.array(codes, dtype=np.int8), self._engine.rule, target)  # type: ignore[attr-defined, no-any-return]
+
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""
         state = self._state if last else self._state.copy()  # type: ignore[attr-defined]

@@ -415,6 +415,16 @@ cdef class QPState:
         slip, a = fmin(slip, fmin(a, b)), slip + a + b - c
         return (slip + LEAST) * (a - slip + LEAST) * sqrt(c + LEAST)
 
+    def forced(self, signed char[::1] codes, BranchingRule rule, double target):
+        """Undecided contact nodes of which one dual step excludes all children but one (see choose)."""
+        cdef Py_ssize_t i
+        cdef double gap = fmax(target - self.bound, 1e-300)
+        found = []
+        for i in range(rule.p):
+            if codes[i] == UNDECIDED_ and self._promise(i, codes[i], rule, gap) == HUGE_VAL:
+                found.append(i)
+        return tuple(found)
+
     def choose(self, signed char[::1] codes, BranchingRule rule, double target):
         """The contact node to branch on, -1 when every node is decided (see BranchingRule).
 

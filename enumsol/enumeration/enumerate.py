@@ -251,6 +251,7 @@ class _Enumeration:
                 *counts,
                 time.perf_counter() - self.started,
                 self.judge.escalations if isinstance(self.judge, VerifiedJudge) else None,
+                outcome.presolved,
             ),
             node_ids=bench.problem.node_ids,
             certified_data=bench.data,

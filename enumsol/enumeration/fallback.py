@@ -105,6 +105,11 @@ class _InteriorPointRelaxation:
         """The undecided node at which complementarity is violated most, -1 when all are decided."""
         return largest_violation(codes, self._engine.system.F, self.forces, self.displacements)
 
+    def forced(self, codes: Codes) -> tuple[int, ...]:
+        """None: this method has no bound at hand for a child but by solving it."""
+        del codes
+        return ()
+
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on, solved from scratch."""
         del last

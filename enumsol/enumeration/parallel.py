@@ -68,7 +68,9 @@ def run_parallel(
             if level >= LEVELS:
                 plan.submit(branch)
             else:
-                stack.extend((child, level + 1) for child in reversed(list(search.examine(branch))))
+                children = reversed(list(search.examine(branch)))
+                # presolve goes down without spreading out
+                stack.extend((child, level + (child.forced is None)) for child in children)
         total, done, enough = len(plan.futures), 0, False
         for item in plan.items:
             if not isinstance(item, _Handed):

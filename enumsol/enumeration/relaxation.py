@@ -115,6 +115,9 @@ class Relaxation(Protocol):
     def choose(self, codes: Codes) -> int:
         """The contact node that the partial assignment is to be branched on, -1 when all are decided."""
 
+    def forced(self, codes: Codes) -> tuple[int, ...]:
+        """Undecided contact nodes of which one child at most is not excluded by a bound that is at hand."""
+
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""
 
@@ -189,6 +192,9 @@ class _ActiveSetRelaxation:
 
     def choose(self, codes: Codes) -> int:
         return self._state.choose(np.array(codes, dtype=np.int8), self._engine.rule, PRUNE_MARGIN)
+
+    def forced(self, codes: Codes) -> tuple[int, ...]:
+        return self._state.forced(np.array(codes, dtype=np.int8), self._engine.rule, PRUNE_MARGIN)
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         state = self._state if last else self._state.copy()

@@ -4,6 +4,9 @@ Every node of the tree is a partial assignment of statuses. Its relaxation is so
 is pruned when the judge accepts the multipliers as a proof that it holds no solution, branched on otherwise, and handed
 to the judge as a complete selection when every contact node is decided. The leaves cover all selections by
 construction: an engine that fails is replaced by the fallback, and where that fails too the node is branched on.
+
+Presolve comes first: contact nodes that one dual step proves open or in contact are branched on before all others, so
+that everything below knows them.
 """
 
 from __future__ import annotations
@@ -110,6 +113,7 @@ class SearchOutcome:
     selections: int = 0
     qps: int = 0
     fallback_qps: int = 0
+    presolved: int = 0
 
 
 @dataclass(slots=True)
@@ -121,6 +125,8 @@ class Branch:
     changed: int  # the contact node decided last, or -1
     last: bool  # the last of its siblings: may take over the parent's state
     weight: float
+    #: Presolve: nodes with one child that is not excluded, to be branched on first; None once there were no more.
+    forced: tuple[int, ...] | None = None
 
 
 def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
@@ -178,7 +184,7 @@ class TreeSearch:
 
     def first(self) -> Branch:
         """The root of the tree: nothing decided."""
-        return Branch(None, (UNDECIDED,) * self.system.p, -1, last=False, weight=1.0)
+        return Branch(None, (UNDECIDED,) * self.system.p, -1, last=False, weight=1.0, forced=())
 
     def run(self, roots: Sequence[Codes] | None = None) -> SearchOutcome:
         """Examine the subtrees of the given partial assignments (default: the whole tree)."""
@@ -207,18 +213,19 @@ class TreeSearch:
             outcome.pruned += 1
             self._covered += branch.weight
             return
-        node = self._choose(codes, relaxation)
+        node, forced = self._choose(branch, relaxation)
         if node < 0:
             self._settle(codes)
             self._covered += branch.weight
             return
         children = self._children(codes, node, relaxation)
+        outcome.presolved += forced is not None
         self.judge.branching(node, children)
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
         for k, code in enumerate(children):
             child = (*codes[:node], code, *codes[node + 1 :])
             last = k + 1 == len(children)
-            yield Branch(usable, child, node, last, branch.weight / len(children))
+            yield Branch(usable, child, node, last, branch.weight / len(children), forced)
 
     def _settle(self, codes: Codes) -> None:
         """Have the judge decide a complete selection."""
@@ -288,11 +295,15 @@ class TreeSearch:
     # -- branching -------------------------------------------------------------------------------------------------
 
     @staticmethod
-    def _choose(codes: Codes, relaxation: Relaxation | None) -> int:
-        """The contact node to branch on; -1 when all are decided."""
+    def _choose(branch: Branch, relaxation: Relaxation | None) -> tuple[int, tuple[int, ...] | None]:
+        """The contact node to branch on, -1 when all are decided; and the forced ones that the children begin with."""
         if relaxation is None or relaxation.pruned:
-            return next((i for i, code in enumerate(codes) if code >= CONTACT), -1)
-        return relaxation.choose(codes)
+            return next((i for i, code in enumerate(branch.codes) if code >= CONTACT), -1), branch.forced
+        if branch.forced is not None:
+            forced = branch.forced or relaxation.forced(branch.codes)
+            if forced:
+                return forced[0], forced[1:]
+        return relaxation.choose(branch.codes), None
 
     def _children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
         """Codes of the children, the one nearest to the minimiser first."""

@@ -1,5 +1,7 @@
 """How many nodes the tree needs: the count is deterministic and part of the promise (issue 2)."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import pytest
 
 import enumsol
@@ -64,3 +66,28 @@ def test_statistics_add_up():
     assert 0 < stats.pruned < stats.nodes
     assert len(roots) <= stats.selections <= stats.nodes - stats.pruned
     assert stats.seconds > 0
+
+
+@pytest.mark.parametrize("arithmetic", ["fast", "verified"])
+def test_presolve_proves_nodes_open(arithmetic):
+    # a load to the right lifts the left part of the block off
+    problem = gallery.clamped_block(32, 16, 2.0, traction=(1.0, -0.3))
+    roots = enumsol.enumerate_roots(problem, 10.0, arithmetic)
+    (root,) = roots
+    assert 10 <= roots.stats.presolved <= sum(status.value == "open" for status in root.statuses)
+    if arithmetic == "verified":
+        report = enumsol.verify(problem, roots.proof)
+        assert report.complete
+    with ThreadPoolExecutor(2) as executor:
+        spread = enumsol.enumerate_roots(problem, 10.0, arithmetic, executor=executor)
+    assert spread.stats.presolved == roots.stats.presolved
+    assert [root.statuses for root in spread] == [root.statuses]
+    assert spread.complete == roots.complete
+
+
+def test_presolve_leaves_the_search_alone_where_nothing_is_forced():
+    entry = gallery.get("wedge-14-5")
+    assert enumsol.enumerate_roots(entry.build(), entry.alpha, "fast").stats.presolved == 0
+    assert (
+        enumsol.enumerate_roots(entry.build(), entry.alpha, "fast", engine="clarabel", max_nodes=5).stats.presolved == 0
+    )
