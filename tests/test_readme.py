@@ -1,0 +1,56 @@
+"""What README shows runs as it stands, and what its comments say comes out."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+import enumsol
+from enumsol import gallery
+from enumsol.cli import main
+
+README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+COMMANDS = [shlex.split(line)[1:] for line in re.findall(r"^    (?:\.venv/bin/)?(enumsol .*)$", README, re.MULTILINE)]
+
+
+@pytest.fixture
+def elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_enumeration(elsewhere):
+    problem = gallery.get("wedge-14-5").build()
+    A, Bn, Bt = (matrix.toarray() for matrix in (problem.A, problem.Bn, problem.Bt))
+    seen = {"A": A, "Bn": Bn, "Bt": Bt, "f": problem.f}
+    exec(BLOCKS[0], seen)
+    assert seen["roots"].complete
+    assert len(seen["roots"]) % 2 == 1
+    assert (elsewhere / "roots.proof").stat().st_size > 1000
+
+
+def test_branches_and_continuation(elsewhere):
+    assert len(BLOCKS) == 2
+    seen = {}
+    exec(BLOCKS[1], seen)
+    graph, path = seen["graph"], seen["path"]
+    assert graph.complete
+    assert graph.multiplicity_at(3.5) == 5
+    assert graph.uniqueness_limit == 3
+    assert "of them 3 folds" in str(path)
+    assert not seen["report"].complete
+    assert seen["everything"].complete
+    assert list(seen["table"]["roots"]) == [1, 1, 1]
+    assert enumsol.verify(seen["problem"], graph.proof).complete
+    assert (elsewhere / "branches.png").stat().st_size > 1000
+
+
+def test_commands(elsewhere, capsys):
+    # in README's order: later ones read what earlier ones wrote
+    assert len(COMMANDS) >= 6
+    for command in COMMANDS:
+        assert main(command) == 0, (command, capsys.readouterr())
+        assert capsys.readouterr().out.strip()
+    assert {path.name for path in elsewhere.iterdir()} >= {"wedge.proof", "branches.png", "graph.json", "POINTS.csv"}
