@@ -1,6 +1,6 @@
 """The trusted kernel: exclusion inequalities and verified selection solves on an EnclosedSystem (theory, section 6).
 
-Everything that makes the word "complete" true for a regular problem passes through the two functions of this module,
+Everything that makes the word "complete" true for a regular problem passes through the three functions of this module,
 in the search and in the checker alike. Codes and row kinds are plain integers with the meaning documented in
 ``enumsol.certification.format``.
 """
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dtrtri
 
-from enumsol.certification.enclosure import ROOT_TINY, SAFE, TINY, UNIT, gamma, upper_sum
+from enumsol.certification.enclosure import ROOT_TINY, SAFE, TINY, UNIT, gamma, upper_norm, upper_sum
 from enumsol.certification.format import (
     FORBIDDEN,
     FRICTIONLESS,
@@ -106,7 +106,10 @@ def energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array) -> A
     q = g + c
     q_abs, y_abs = np.abs(q), np.abs(y)
     q_rad = (system.g_rad + c_rad + 2 * UNIT * q_abs) * SAFE
-    x = q @ system.inverse
+    # Any x is a choice; a good one needs S x near q, which a computed inverse gives from the left, not its transpose.
+    # The step of refinement makes a checker's bound better than that of the search, which does without.
+    x = q @ system.inverse.T
+    x += (q - x @ S) @ system.inverse.T
     Sx, Sy = x @ S, y @ S
     first, cross = _dots(y, g - c), _dots(x, q)
     y_form, x_form = _dots(y, Sy), _dots(x, Sx)
@@ -166,26 +169,89 @@ def solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSel
         return _solve_selection(system, codes)
 
 
+def contradicts(system: EnclosedSystem, codes: Sequence[int]) -> bool:
+    """Whether the equations M z = b of a complete selection are proven to hold for no forces that a root can have.
+
+    At a root lambda' S lambda <= g' lambda, so that ||z|| <= ||lambda|| <= ||g|| / mu with mu the smallest eigenvalue
+    of S. Any vector y with |y'b| > ||M'y|| ||g|| / mu excludes that; the one tried is close to the left null vectors of
+    a singular or nearly singular M. Where the equations miss a continuum of solutions by d, the margin is of order d,
+    that of the energy only of order d^2.
+    """
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore", under="ignore"):
+        parts = _Equations.of(system, np.asarray(codes, dtype=np.intp))
+        b, b_rad = system.g[parts.rows], system.g_rad[parts.rows]
+        if not len(b) or not np.all(np.isfinite(parts.M)):
+            return False
+        try:
+            U, sizes, _ = np.linalg.svd(parts.M)
+        except np.linalg.LinAlgError:
+            return False
+        sizes = np.maximum(sizes / np.max(np.abs(system.S)), UNIT)
+        y = U @ ((b @ U) / sizes**2)
+        # its length is of no account
+        y /= np.max(np.abs(y))
+        y_abs, k = np.abs(y), gamma(len(b) + 2)
+        least = abs(float(y @ b)) - float(y_abs @ (b_rad + k * np.abs(b))) * (1 + 2 * k) * SAFE - TINY
+        product = np.abs(y @ parts.M) + y_abs @ (parts.M_rad + k * np.abs(parts.M)) * (1 + 2 * k) * SAFE
+        reach = upper_norm(np.abs(system.g) + system.g_rad) / system.smallest_eigenvalue * SAFE
+        return bool(least > upper_norm(product) * reach * SAFE + ROOT_TINY)
+
+
+@dataclass(frozen=True)
+class _Equations:
+    """M z = g[rows] of a complete selection: z holds lambda_n of the closed nodes, then lambda_t of the sticking ones.
+
+    Attributes
+    ----------
+    closed, across, held : int arrays
+        Places of lambda_n of the closed nodes, of their lambda_t, and of lambda_t of the sticking nodes.
+    slipping, uncertain : arrays
+        lambda_t / lambda_n of the closed nodes as a ball.
+    M, M_rad : square arrays
+    """
+
+    closed: NDArray[np.intp]
+    across: NDArray[np.intp]
+    held: NDArray[np.intp]
+    slipping: Array
+    uncertain: Array
+    M: Array
+    M_rad: Array
+
+    @property
+    def rows(self) -> NDArray[np.intp]:
+        return np.concatenate([self.closed, self.held])
+
+    @classmethod
+    def of(cls, system: EnclosedSystem, status: NDArray[np.intp]) -> _Equations:
+        p = system.p
+        closed, held = np.flatnonzero(status != OPEN), p + np.flatnonzero(status == STICK)
+        across = p + closed
+        slip = np.where(status == SLIP_PLUS, 1.0, 0.0) - np.where(status == SLIP_MINUS, 1.0, 0.0)
+        # lambda = E z: columns e_i + slip F e_(p+i), then e_(p+i) of the sticking nodes
+        slipping = (slip * system.F)[closed]
+        uncertain = (np.abs(slip) * system.F_rad)[closed]
+        turning = np.abs(slipping)
+        rows = np.concatenate([closed, held])
+        S_rows, rad_rows = system.S[rows], system.S_rad[rows]
+        normal, tangential = S_rows[:, closed], S_rows[:, across]
+        M = np.hstack([normal + tangential * slipping, S_rows[:, held]])
+        left = rad_rows[:, closed] + rad_rows[:, across] * (turning + uncertain)
+        left += np.abs(tangential) * (2 * uncertain + 4 * UNIT * turning) + 4 * UNIT * np.abs(normal)
+        M_rad = np.hstack([left, rad_rows[:, held]]) * SAFE + TINY
+        return cls(closed, across, held, slipping, uncertain, M, M_rad)
+
+
 def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSelection | None:
-    p, S, F = system.p, system.S, system.F
+    p, S = system.p, system.S
     status = np.asarray(codes, dtype=np.intp)
-    closed, stuck = np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
-    across, held = p + closed, p + stuck
-    slip = np.where(status == SLIP_PLUS, 1.0, 0.0) - np.where(status == SLIP_MINUS, 1.0, 0.0)
-    rows = np.concatenate([closed, held])
+    parts = _Equations.of(system, status)
+    rows, closed, across, held = parts.rows, parts.closed, parts.across, parts.held
+    slipping, uncertain, M, M_rad = parts.slipping, parts.uncertain, parts.M, parts.M_rad
+    turning = np.abs(slipping)
     if not len(rows):
         zero = np.zeros(2 * p)
         return _conditions(system, status, zero, zero, system.g, system.g_rad, 1)
-    # lambda = E y: columns e_i + slip F e_(p+i), then e_(p+i) of the sticking nodes
-    slipping = (slip * F)[closed]
-    uncertain = (np.abs(slip) * system.F_rad)[closed]
-    turning = np.abs(slipping)
-    S_rows, rad_rows = S[rows], system.S_rad[rows]
-    normal, tangential = S_rows[:, closed], S_rows[:, across]
-    M = np.hstack([normal + tangential * slipping, S_rows[:, held]])
-    left = rad_rows[:, closed] + rad_rows[:, across] * (turning + uncertain)
-    left += np.abs(tangential) * (2 * uncertain + 4 * UNIT * turning) + 4 * UNIT * np.abs(normal)
-    M_rad = np.hstack([left, rad_rows[:, held]]) * SAFE + TINY
     # scale the columns by powers of two, so that the contraction is asked of comparable unknowns
     scale = np.ldexp(1.0, -np.frexp(np.max(np.abs(M), axis=0) + TINY)[1])
     # what underflows in the scaling is less than TINY

@@ -12,7 +12,8 @@ Tree
     ``["b", node, [codes]]``: contact node ``node`` is branched on; the children follow, in this order.
     ``["x", rows, multipliers]``: no solution; the dual inequality is positive. Base64 of little-endian 32-bit unsigned
     row numbers and 64-bit floats. ``["X", ...]``: the same, to be checked in rational arithmetic.
-    ``["n"]``: no solution; the selection is regular and its only candidate breaks a condition strictly.
+    ``["n"]``: no solution; the selection is regular and its only candidate breaks a condition strictly, or its
+    equations contradict the bound on all solutions.
     ``["r", [mid], [rad], index]``: exactly one root, regular; 2p balls of lambda in the problem's units.
     ``["N"]``: no solution, in rational arithmetic.
     ``["D", [[point], ...], dimension]``: in rational arithmetic, the selection's roots are the hull of these points,

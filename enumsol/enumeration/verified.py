@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.certification.format import FREE, NONNEGATIVE, row_signs
-from enumsol.certification.kernel import VerifiedSelection, exclusion_margin, solve_selection
+from enumsol.certification.kernel import VerifiedSelection, contradicts, exclusion_margin, solve_selection
 from enumsol.certification.proof import fraction_text, packed
 from enumsol.enumeration.solutions import SelectionSolution
 from enumsol.enumeration.tree import Open
@@ -130,13 +130,15 @@ class VerifiedJudge:
     def selection(self, codes: Codes) -> SelectionSolution | Open | None:
         """All roots in a complete selection."""
         ball = None if self._enclosed is None else solve_selection(self._enclosed, codes)
-        if ball is not None and ball.is_excluded:
-            self.escalations.balls += 1
-            self._leaf("n")
-            return None
         if ball is not None and ball.is_root:
             self.escalations.balls += 1
             return self._regular(codes, ball)
+        if (ball is not None and ball.is_excluded) or (
+            self._enclosed is not None and contradicts(self._enclosed, codes)
+        ):
+            self.escalations.balls += 1
+            self._leaf("n")
+            return None
         judge = self._exact()
         if judge is None:
             return self._undecided(codes, *_reason(codes, ball, self._node_ids))

@@ -5,11 +5,12 @@ from itertools import product
 
 import numpy as np
 import pytest
+from generators import integer_problem
 from oracles import exact_condense, exact_solutions
 from proof_tools import det_sign
 
 from enumsol import ContactProblem, enumerate_roots, verify
-from enumsol.certification.kernel import solve_selection
+from enumsol.certification.kernel import contradicts, solve_selection
 
 # (seed, load) found by a random search over 6,000 matrices
 HUNTED = ((345, 1), (557, 0), (801, 1), (975, 0), (1016, 0), (1016, 2), (1052, 1), (2546, 1))
@@ -88,3 +89,58 @@ def test_exact_count_by_an_oracle_in_fractions(seed, load):
     roots = enumerate_roots(problem, 0.0)
     assert len(roots) == sum(c.dimension == 0 for c in components)
     assert len(roots.families) == sum(c.dimension > 0 for c in components)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_selection_that_holds_a_root_is_never_contradicted(seed):
+    rng = np.random.default_rng([seed, 88])
+    singular = holding = refuted = 0
+    for _ in range(60):
+        p = int(rng.integers(1, 4))
+        problem = integer_problem(rng, p)
+        S, g, F = exact_condense(problem, 0.0)
+        if not any(g):
+            continue
+        one = np.ones(2 * p)
+        system = problem.enclosure.at(0.0, one, one)
+        held = {codes for c in exact_solutions(problem, 0.0) for codes, *_ in c.parts}
+        for codes in product(*(range(4) if f > 0 else (0, 4) for f in F)):
+            verdict = contradicts(system, codes)
+            holding += codes in held
+            refuted += verdict
+            singular += det_sign(S, F, codes) == 0
+            assert not (verdict and codes in held)
+    assert min(singular, holding, refuted) >= 10
+
+
+def beside_a_continuum(more):
+    """Slip- is singular; at alpha = 1 it holds a continuum, at a distance d from it its equations miss by d."""
+    n = 2 + more
+    A = np.eye(n)
+    A[:2, :2] = [[2.0, -1.0], [-1.0, 2.0]]
+    rows, f, slope = np.eye(n), np.zeros(n), np.zeros(n)
+    f[:2], slope[1] = (1.0, -3.0), 1.0
+    return ContactProblem(A, rows[:1], rows[1:2], f, friction=2.0, load_slope=slope)
+
+
+@pytest.mark.parametrize("exponent", [3, 6, 7, 8, 10, 12, 13])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_equations_that_contradict_each_other_need_no_rationals(exponent, side):
+    # 253 degrees of freedom: no rational arithmetic to fall back on
+    alpha = 1 + side * Fraction(1, 10**exponent)
+    roots = enumerate_roots(beside_a_continuum(251), alpha)
+    assert roots.complete
+    assert [root.statuses for root in roots] == [
+        root.statuses for root in enumerate_roots(beside_a_continuum(0), alpha, "exact")
+    ]
+    assert roots.stats.escalations.rationals == 0
+    assert verify(beside_a_continuum(251), roots.proof).complete
+
+
+def test_on_the_continuum_nothing_is_contradicted():
+    problem = beside_a_continuum(251)
+    system = problem.enclosure.at(1.0, np.ones(2), np.ones(2))
+    assert not contradicts(system, (3,))
+    roots = enumerate_roots(problem, 1)
+    assert not roots.complete
+    assert [item.statuses[0].value for item in roots.undecided if item.statuses[0].value == "slip-"]
