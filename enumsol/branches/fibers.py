@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from itertools import combinations
-from math import comb
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from flint import fmpq
 
 from enumsol.branches.algebraic import to_fraction
 from enumsol.enumeration.exact_selections import ExactSelections, ExactSystem
-from enumsol.enumeration.solutions import MAX_BASES, ActiveSets, Codes, SelectionSolution, VertexLimitError
+from enumsol.enumeration.polytopes import dot
 from enumsol.selections import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.branches.path import ExactPath
-    from enumsol.enumeration.exact_selections import Form, Point
+    from enumsol.enumeration.polytopes import Form, Point, Table
+    from enumsol.enumeration.solutions import ActiveSets, Codes
 
 
 class FiberSelections(ExactSelections):
@@ -44,29 +40,13 @@ class FiberSelections(ExactSelections):
         rows, columns = self.reduced(codes)
         if not rows:
             return tuple(self._zero), 1
-        table = [[*(_dot(self._S[r], column) for column in columns), target[r]] for r in rows]
+        table = [[*(dot(self._S[r], column) for column in columns), target[r]] for r in rows]
         det = row_reduce(table)[0]
         if det == 0:
             return None
         y = [row[-1] for row in table]
-        point = tuple(_dot(y, [column[j] for column in columns]) for j in range(2 * self.p))
+        point = tuple(dot(y, [column[j] for column in columns]) for j in range(2 * self.p))
         return point, 1 if det > 0 else -1
-
-    def solve(self, codes: Codes) -> SelectionSolution | None:
-        """All roots in the selection, or None."""
-        regular = self._solve_reduced(codes, self.system.g)
-        equations, inequalities = self.forms(codes)
-        if regular is not None:
-            point, det_sign = regular
-            values = [_dot(form, point) + constant for form, constant in inequalities]
-            if any(v < 0 for v in values):
-                return None
-            return SelectionSolution(codes, (point,), 0, det_sign, all(v > 0 for v in values))
-        vertices = polytope_vertices(equations, inequalities)
-        if not vertices:
-            return None
-        rows = [[a - b for a, b in zip(v, vertices[0], strict=True)] for v in vertices[1:]]
-        return SelectionSolution(codes, tuple(vertices), _rank(rows), 0, strict=False)
 
     def forms(self, codes: Codes) -> tuple[list[Form], list[Form]]:
         """Equations and inequalities (>= 0) of a selection as forms over lambda."""
@@ -75,7 +55,7 @@ class FiberSelections(ExactSelections):
         return equations, inequalities + [self.force_form(i) for i, code in enumerate(codes) if code == STICK]
 
     def _w(self, point: Point) -> list[Any]:
-        return [g - _dot(row, point) for g, row in zip(self.system.g, self._S, strict=True)]
+        return [g - dot(row, point) for g, row in zip(self.system.g, self._S, strict=True)]
 
     def active(self, point: Point) -> ActiveSets:
         """Per node the codes whose conditions hold at the point, exactly."""
@@ -97,47 +77,27 @@ class FiberSelections(ExactSelections):
             result.append(frozenset(holds))
         return tuple(result)
 
-    def meet(self, a: SelectionSolution, b: SelectionSolution) -> bool:
-        """Whether both selections' conditions hold at a common point, exactly."""
-        first, second = self.forms(a.codes), self.forms(b.codes)
-        return bool(polytope_vertices(first[0] + second[0], first[1] + second[1]))
+    # -- the field -------------------------------------------------------------------------------------------------
 
-    def departure(self, solution: SelectionSolution, direction: NDArray[np.int64]) -> int | None:
-        """See SelectionSolver.departure."""
-        if solution.det_sign == 0:
-            return 0
-        push = tuple(fmpq(int(v)) for v in direction)
-        moved = self._solve_reduced(solution.codes, push)
-        if moved is None:  # det_sign says otherwise
-            raise AssertionError("a regular selection became singular")
-        step, det_sign = moved
-        rates = FiberSelections(self.path, self.alpha, push).forms(solution.codes)[1]
-        point = solution.vertices[0]
-        for (form, constant), (rate, push_constant) in zip(self.forms(solution.codes)[1], rates, strict=True):
-            if _dot(form, point) + constant == 0:
-                change = _dot(rate, step) + push_constant
-                if change == 0:
-                    return None
-                if change < 0:
-                    return 0
-        return det_sign
+    @staticmethod
+    def row_reduced(table: Table) -> tuple[Table, list[int]]:
+        """Rows of the reduced row echelon form that are not zero, and their pivot columns."""
+        pivots = row_reduce(table)[1]
+        return table[: len(pivots)], pivots
 
-    def forces(self, point: Point) -> NDArray[np.float64]:
-        """lambda as floats."""
-        return np.array([as_float(v) for v in point])
+    @staticmethod
+    def as_float(number: Any) -> float:
+        """The nearest float."""
+        return as_float(number)
 
-    def displacements(self, point: Point) -> NDArray[np.float64]:
-        """w = g - S lambda as floats, rounded once."""
-        return np.array([as_float(v) for v in self._w(point)])
+    def pushed(self, direction: tuple[Any, ...]) -> FiberSelections:
+        """The solver whose g is a direction."""
+        return FiberSelections(self.path, self.alpha, direction)
 
 
 def as_float(value: Any) -> float:
     """The nearest float of a field element."""
     return float(to_fraction(value)) if isinstance(value, fmpq) else float(value)
-
-
-def _dot(a: Any, b: Any) -> Any:
-    return sum((x * y for x, y in zip(a, b, strict=True) if x != 0 and y != 0), fmpq(0))
 
 
 def row_reduce(table: list[list[Any]]) -> tuple[Any, list[int]]:
@@ -163,73 +123,3 @@ def row_reduce(table: list[list[Any]]) -> tuple[Any, list[int]]:
         pivots.append(column)
     full = pivots == list(range(len(table)))
     return (det if full else fmpq(0)), pivots
-
-
-def _rank(rows: list[list[Any]]) -> int:
-    return len(row_reduce([list(row) for row in rows])[1]) if rows else 0
-
-
-def polytope_vertices(equations: list[Form], inequalities: list[Form]) -> list[Point]:
-    """Vertices of a bounded polyhedron {equations = 0, inequalities >= 0}; empty when it is.
-
-    Raises
-    ------
-    VertexLimitError
-        More than MAX_BASES bases would have to be tried.
-    """
-    table = [[*form, -constant] for form, constant in equations]
-    size = len(equations[0][0])
-    pivots = row_reduce(table)[1]
-    if size in pivots:
-        return []
-    origin: list[Any] = [fmpq(0)] * size
-    for row, pivot in zip(table, pivots, strict=False):
-        origin[pivot] = row[size]
-    kernel = []
-    for free in (j for j in range(size) if j not in pivots):
-        vector: list[Any] = [fmpq(0)] * size
-        vector[free] = fmpq(1)
-        for row, pivot in zip(table, pivots, strict=False):
-            vector[pivot] = -row[free]
-        kernel.append(vector)
-    rows = _distinct([([_dot(form, k) for k in kernel], _dot(form, origin) + c) for form, c in inequalities])
-    if any(value < 0 for row, value in rows if not any(row)):
-        return []
-    rows = [(row, value) for row, value in rows if any(row)]
-    if not kernel:
-        return [tuple(origin)]
-    return _corner_points(origin, kernel, rows)
-
-
-def _distinct(rows: list[tuple[list[Any], Any]]) -> list[tuple[list[Any], Any]]:
-    """Rows without repetition; every row is divided by the size of its first entry that is not zero."""
-    found: list[tuple[list[Any], Any]] = []
-    for row, value in rows:
-        head = next((v for v in row if v != 0), None)
-        if head is None:
-            scaled = (row, value)
-        else:
-            size = head if head > 0 else -head
-            scaled = ([v / size for v in row], value / size)
-        if scaled not in found:
-            found.append(scaled)
-    return found
-
-
-def _corner_points(origin: list[Any], kernel: list[list[Any]], rows: list[tuple[list[Any], Any]]) -> list[Point]:
-    size = len(kernel)
-    if comb(len(rows), size) > MAX_BASES:
-        raise VertexLimitError(
-            f"a family of roots has {comb(len(rows), size)} candidate vertices; at most {MAX_BASES} are enumerated"
-        )
-    found: list[Point] = []
-    for basis in combinations(rows, size):
-        table = [[*row, -value] for row, value in basis]
-        if row_reduce(table)[0] == 0:
-            continue
-        t = [row[-1] for row in table]
-        if all(_dot(row, t) + value >= 0 for row, value in rows):
-            point = tuple(o + _dot(t, [k[j] for k in kernel]) for j, o in enumerate(origin))
-            if point not in found:
-                found.append(point)
-    return found

@@ -12,7 +12,7 @@ from enumsol.enumeration.relaxation import INEQUALITY, RowKind, imposed_rows
 
 if TYPE_CHECKING:
     from enumsol.condensed import ScaledSystem
-    from enumsol.enumeration.exact_selections import Form
+    from enumsol.enumeration.polytopes import Form
     from enumsol.enumeration.relaxation import Relaxation
     from enumsol.enumeration.solutions import Codes, SelectionSolution
     from enumsol.enumeration.tree import Open

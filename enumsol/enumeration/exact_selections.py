@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import combinations
-from math import comb
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
 
-from enumsol.enumeration.solutions import MAX_BASES, ActiveSets, Codes, SelectionSolution, VertexLimitError
+from enumsol.enumeration.polytopes import polytope_vertices, value
+from enumsol.enumeration.solutions import ActiveSets, Codes, SelectionSolution
 from enumsol.errors import TooLargeError
 from enumsol.selections import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
@@ -20,14 +19,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from enumsol.enumeration.polytopes import Form, Point, Table
     from enumsol.problem import Alpha, ContactProblem
 
 #: Most degrees of freedom for which A, Bn, Bt and f themselves are condensed in rationals.
 EXACT_DOF_LIMIT = 250
-
-Point = tuple[Any, ...]
-#: a linear form over lambda and its constant: value = form . lambda + constant
-Form = tuple[list[Any], Any]
 
 
 def rational(value: Alpha) -> Any:
@@ -153,6 +149,24 @@ class ExactSelections:
                 inequalities += [self.force_form(i), self.gap_form(p + i, sign)]
         return equations, inequalities
 
+    # -- the field -------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def row_reduced(table: Table) -> tuple[Table, list[int]]:
+        """Rows of the reduced row echelon form that are not zero, and their pivot columns."""
+        reduced, rank = fmpq_mat(table).rref()
+        rows = reduced.tolist()[:rank]
+        return rows, [next(j for j, v in enumerate(row) if v != 0) for row in rows]
+
+    @staticmethod
+    def as_float(number: Any) -> float:
+        """The nearest float."""
+        return float(Fraction(int(number.p), int(number.q)))
+
+    def pushed(self, direction: tuple[Any, ...]) -> ExactSelections:
+        """The solver whose g is a direction."""
+        return ExactSelections(ExactSystem(self.system.S, direction, self.system.F))
+
     # -- solving ---------------------------------------------------------------------------------------------------
 
     def reduced(self, codes: Codes) -> tuple[list[int], list[list[Any]]]:
@@ -194,15 +208,15 @@ class ExactSelections:
         equations, inequalities = self.forms(codes)
         if regular is not None:
             point, sign = regular
-            least = min(_value(form, point) for form in inequalities)
-            if least < 0:
+            values = [value(form, point) for form in inequalities]
+            if any(v < 0 for v in values):
                 return None
-            return SelectionSolution(codes, (point,), 0, sign, bool(least > 0))
-        vertices = polytope_vertices(equations, inequalities)
+            return SelectionSolution(codes, (point,), 0, sign, all(v > 0 for v in values))
+        vertices = polytope_vertices(equations, inequalities, self.row_reduced)
         if not vertices:
             return None
         differences = [[a - b for a, b in zip(v, vertices[0], strict=True)] for v in vertices[1:]]
-        dimension = fmpq_mat(differences).rank() if differences else 0
+        dimension = len(self.row_reduced(differences)[1]) if differences else 0
         return SelectionSolution(codes, tuple(vertices), dimension, 0, strict=False)
 
     # -- decisions -------------------------------------------------------------------------------------------------
@@ -241,7 +255,7 @@ class ExactSelections:
     def meet(self, a: SelectionSolution, b: SelectionSolution) -> bool:
         """Whether both selections' conditions hold at a common point, exactly."""
         first, second = self.forms(a.codes), self.forms(b.codes)
-        return bool(polytope_vertices(first[0] + second[0], first[1] + second[1]))
+        return bool(polytope_vertices(first[0] + second[0], first[1] + second[1], self.row_reduced))
 
     def departure(self, solution: SelectionSolution, direction: NDArray[np.int64]) -> int | None:
         """See SelectionSolver.departure."""
@@ -253,12 +267,11 @@ class ExactSelections:
             raise AssertionError("a regular selection became singular")
         step, sign = moved
         _, inequalities = self.forms(solution.codes)
-        pushed = ExactSelections(ExactSystem(self.system.S, push, self.system.F))
-        _, rates = pushed.forms(solution.codes)
+        _, rates = self.pushed(push).forms(solution.codes)
         point = solution.vertices[0]
         for condition, rate in zip(inequalities, rates, strict=True):
-            if _value(condition, point) == 0:
-                change = _value(rate, step)
+            if value(condition, point) == 0:
+                change = value(rate, step)
                 if change == 0:
                     return None
                 if change < 0:
@@ -269,75 +282,8 @@ class ExactSelections:
 
     def forces(self, point: Point) -> NDArray[np.float64]:
         """lambda as floats."""
-        return np.array([_to_float(v) for v in point])
+        return np.array([self.as_float(v) for v in point])
 
     def displacements(self, point: Point) -> NDArray[np.float64]:
         """w = g - S lambda as floats, rounded once."""
-        return np.array([_to_float(v) for v in self._w(point)])
-
-
-def _to_float(value: Any) -> float:
-    return float(Fraction(int(value.p), int(value.q)))
-
-
-def _value(form: Form, point: Point) -> Any:
-    return sum((a * b for a, b in zip(form[0], point, strict=True) if a != 0), form[1])
-
-
-def polytope_vertices(equations: list[Form], inequalities: list[Form]) -> list[Point]:
-    """Vertices of a bounded polyhedron {equations = 0, inequalities >= 0} in rationals; empty when it is.
-
-    Raises
-    ------
-    VertexLimitError
-        More than MAX_BASES bases would have to be tried.
-    """
-    solved = _affine_solutions(equations)
-    if solved is None:
-        return []
-    origin, kernel = solved
-    C = [[_value((form, fmpq(0)), k) for k in kernel] for form, _ in inequalities]
-    d = [_value(form, origin) for form in inequalities]
-    if any(not any(row) and value < 0 for row, value in zip(C, d, strict=True)):
-        return []
-    rows = sorted({(tuple(row), value) for row, value in zip(C, d, strict=True) if any(row)}, key=str)
-    size = len(kernel)
-    if size == 0:
-        return [origin]
-    if comb(len(rows), size) > MAX_BASES:
-        raise VertexLimitError(
-            f"a family of roots has {comb(len(rows), size)} candidate vertices; at most {MAX_BASES} are enumerated"
-        )
-    found: dict[Point, None] = {}
-    for basis in combinations(rows, size):
-        matrix = fmpq_mat([list(row) for row, _ in basis])
-        if matrix.det() == 0:
-            continue
-        t = matrix.solve(fmpq_mat([[-value] for _, value in basis])).entries()
-        if all(sum((a * b for a, b in zip(row, t, strict=True)), value) >= 0 for row, value in rows):
-            point = tuple(
-                o + sum((k[j] * s for k, s in zip(kernel, t, strict=True)), fmpq(0)) for j, o in enumerate(origin)
-            )
-            found[point] = None
-    return list(found)
-
-
-def _affine_solutions(equations: list[Form]) -> tuple[Point, list[Point]] | None:
-    """One solution of the equations and a kernel basis, or None when they contradict each other."""
-    size = len(equations[0][0])
-    reduced, rank = fmpq_mat([[*form, -constant] for form, constant in equations]).rref()
-    table = reduced.tolist()[:rank]
-    pivots = [next(j for j, v in enumerate(row) if v != 0) for row in table]
-    if size in pivots:
-        return None
-    origin = [fmpq(0)] * size
-    for row, pivot in zip(table, pivots, strict=True):
-        origin[pivot] = row[size]
-    kernel = []
-    for free in (j for j in range(size) if j not in pivots):
-        vector = [fmpq(0)] * size
-        vector[free] = fmpq(1)
-        for row, pivot in zip(table, pivots, strict=True):
-            vector[pivot] = -row[free]
-        kernel.append(tuple(vector))
-    return tuple(origin), kernel
+        return np.array([self.as_float(v) for v in self._w(point)])
