@@ -43,6 +43,7 @@ class _Rows:
             "index_sum",
             "complete",
             "undecided",
+            "stopped",
             "nodes",
             "seconds",
         ]
@@ -82,7 +83,8 @@ def multiplicity_table(
     pandas.DataFrame
         One row an alpha, in the order given: alpha, roots, families, with_open, with_stick, with_slip_plus and
         with_slip_minus (isolated roots at which at least one node has the status), index_sum (missing where a degree is
-        not known), complete, undecided, nodes of the search, and seconds.
+        not known), complete, undecided, stopped (why the search ended early, or missing), nodes of the search, and
+        seconds.
 
     Raises
     ------
@@ -151,6 +153,7 @@ def table_row(problem: ContactProblem, alpha: Alpha, options: dict[str, Any]) ->
         "index_sum": roots.index_sum,
         "complete": roots.complete,
         "undecided": len(roots.undecided),
+        "stopped": roots.stopped,
         "nodes": roots.stats.nodes,
         "seconds": roots.stats.seconds,
     }

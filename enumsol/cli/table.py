@@ -131,7 +131,7 @@ def _open(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def _as_text(frame: pd.DataFrame, asked: int) -> str:
-    shown = frame.drop(columns=["nodes", "seconds"]).rename(columns=_NAMES)
+    shown = frame.drop(columns=["stopped", "nodes", "seconds"]).rename(columns=_NAMES)
     if not shown["undecided"].any():
         shown = shown.drop(columns="undecided")
     known = shown["index sum"].notna()

@@ -36,6 +36,14 @@ def test_the_table_counts_roots_families_and_kinds(square):
     assert family[["roots", "families"]].to_numpy().tolist() == [[0, 1]]
 
 
+def test_the_table_says_which_searches_were_cut_short(square):
+    table = multiplicity_table(square, [0.5, 3.5], max_nodes=10)
+    assert list(table["stopped"].notna()) == [False, True]
+    assert table["stopped"][1].startswith("stopped after max_nodes = 10 nodes")
+    assert list(table["complete"]) == [True, False]
+    assert table["undecided"][1] > 0
+
+
 def test_the_table_agrees_with_the_graph(rng):
     problem = generic_problem(rng, 3, "load")
     graph = branch_graph(problem, (0.0, 6.0))
