@@ -103,7 +103,8 @@ def branch_graph(
             search.stopped = f"interrupted after {search.nodes} nodes"
         candidates = search.selections
     searched = time.perf_counter()
-    gluing = Gluing(path, candidates, rational(a), rational(b), _stage(progress, "arcs"))
+    tick = _stage(progress, "arcs")
+    gluing = Gluing(path, candidates, rational(a), rational(b), tick, cut_short=search.stopped is not None)
     stats = GraphStats(
         pieces=len(search.pieces),
         nodes=search.nodes,

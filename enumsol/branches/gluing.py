@@ -102,6 +102,7 @@ class Gluing:
     candidates : codes of the selections that may hold somewhere in [a, b]
     a, b : fmpq
     tick : called with the share of the candidates done
+    cut_short : the search was stopped: selections that it did not give are left out, and arcs end without neighbours
 
     Attributes
     ----------
@@ -112,7 +113,18 @@ class Gluing:
         What stayed undecided or contradicts completeness; empty when nothing does.
     """
 
-    def __init__(self, path: ExactPath, candidates: Iterable[Codes], a: Any, b: Any, tick: Any = None) -> None:
+    def __init__(
+        self,
+        path: ExactPath,
+        candidates: Iterable[Codes],
+        a: Any,
+        b: Any,
+        tick: Any = None,
+        *,
+        cut_short: bool = False,
+    ) -> None:
+        self._cut_short = cut_short
+        self._waiting: list[tuple[Codes, Any]] = []
         self.path, self.a, self.b = path, a, b
         self.arcs: dict[Codes, SelectionArcs] = {}
         self.reasons: list[str] = []
@@ -128,7 +140,8 @@ class Gluing:
             self._add(codes)
             if tick is not None:
                 tick((k + 1) / len(todo))
-        self._close()
+        for codes in list(self.arcs):
+            self._close(codes)
         self._glue()
         self._make_vertices()
         self._make_edges()
@@ -155,31 +168,32 @@ class Gluing:
         self._fibers.append((alpha, solver))
         return solver
 
-    def _close(self) -> None:
-        """Decide the singular events: which have solutions, and the polytopes they form."""
-        for codes, arcs in list(self.arcs.items()):
-            for event in arcs.events:
-                if not (event.singular and event.holds):
-                    continue
-                solver = self._fiber(event.alpha)
-                try:
-                    solution = solver.solve(codes)
-                except VertexLimitError as error:
-                    self.reasons.append(f"alpha = {float(event.alpha):.17g}: {error}")
-                    continue
-                if solution is not None:
-                    self._solutions[id(event)] = (solver, solution)
-                elif arcs.beside(event):
-                    self._complain(f"an arc of selection {codes} has no limit at alpha = {float(event.alpha):.17g}")
-                else:
-                    event.holds = False
-            if arcs.empty:
-                del self.arcs[codes]
+    def _close(self, codes: Codes) -> None:
+        """Decide a selection's singular events: which have solutions, and the polytopes they form."""
+        arcs = self.arcs[codes]
+        for event in arcs.events:
+            if not (event.singular and event.holds):
+                continue
+            solver = self._fiber(event.alpha)
+            try:
+                solution = solver.solve(codes)
+            except VertexLimitError as error:
+                self.reasons.append(f"alpha = {float(event.alpha):.17g}: {error}")
+                continue
+            if solution is not None:
+                self._solutions[id(event)] = (solver, solution)
+            elif arcs.beside(event):
+                self._complain(f"an arc of selection {codes} has no limit at alpha = {float(event.alpha):.17g}")
+            else:
+                event.holds = False
+        if arcs.empty:
+            del self.arcs[codes]
 
     # -- gluing ----------------------------------------------------------------------------------------------------
 
     def _glue(self) -> None:
-        waiting = [(codes, event) for codes, arcs in self.arcs.items() for event in arcs.events if event.holds]
+        self._waiting = [(codes, event) for codes, arcs in self.arcs.items() for event in arcs.events if event.holds]
+        waiting = self._waiting
         origin = self.path.origin
         if origin is not None and self.a <= origin <= self.b:
             waiting += self._place_everywhere(CriticalAlpha.rational(origin))
@@ -248,18 +262,26 @@ class Gluing:
         return int(event.alpha.sign_of(arcs.functions.det))
 
     def _members(self, active: ActiveSets) -> Iterator[Codes]:
-        """Known selections among those that hold; the search is complete, so that a further one is a contradiction."""
+        """Known selections among those that hold; if the search is complete, a further one is a contradiction."""
         if prod(len(a) for a in active) > 2 * len(self.arcs) + 64:
             yield from [c for c in self.arcs if all(code in a for code, a in zip(c, active, strict=True))]
             return
         for codes in product(*(sorted(a) for a in active)):
-            if codes not in self.arcs:
-                self._add(codes)
-                if codes not in self.arcs:
-                    self._complain(f"selection {codes} holds and its own functions say otherwise")
-                    continue
-                self._complain(f"the search left out selection {codes}, which holds somewhere")
+            if codes not in self.arcs and (self._cut_short or not self._add_left_out(codes)):
+                continue
             yield codes
+
+    def _add_left_out(self, codes: Codes) -> bool:
+        """Take in a selection that a search without gaps should have given; whether it holds anywhere."""
+        self._add(codes)
+        if codes in self.arcs:
+            self._close(codes)
+        if codes not in self.arcs:
+            self._complain(f"selection {codes} holds and its own functions say otherwise")
+            return False
+        self._complain(f"the search left out selection {codes}, which holds somewhere")
+        self._waiting += [(codes, event) for event in self.arcs[codes].events if event.holds]
+        return True
 
     def _join_polytopes(self) -> None:
         """Join polytopes at one alpha that meet away from the vertices of both."""

@@ -153,3 +153,32 @@ def test_an_interrupted_search_keeps_its_arcs():
     assert not partial.complete
     assert any("interrupted" in reason for reason in partial.reasons)
     assert partial.proof is None
+
+
+@pytest.mark.parametrize("nodes", [20, 60, 150, 300, 600])
+@pytest.mark.parametrize("name", ["chain-4", "chain-4-coupled", "two-node-6.4"])
+def test_a_graph_cut_short_answers_all_the_same(name, nodes):
+    graph = branch_graph(gallery.get(name).build(), (0.0, 5.0), "fast", max_nodes=nodes)
+    assert all(0 <= arc.tail < len(graph.vertices) and 0 <= arc.head < len(graph.vertices) for arc in graph.arcs)
+    assert not graph.complete
+    assert repr(graph).splitlines()[-1].startswith("complete: ")
+    if graph.vertices:
+        assert len(graph.steps[0]) == len(graph.steps[1])
+        assert graph.uniqueness_limit is None or 0 <= graph.uniqueness_limit <= 5
+
+
+@pytest.mark.parametrize("name", ["two-node-6.4", "chain-4", "one-node-6.3"])
+def test_a_selection_that_the_search_left_out_is_taken_in_and_told(name):
+    problem = gallery.get(name).build()
+    whole = branch_graph(problem, (0.0, 5.0), "exact")
+    selections = {codes for arc in whole.arcs for codes in arc.selections}
+    a, b = fmpq(0), fmpq(5)
+    for missing in sorted(selections)[:: max(1, len(selections) // 6)]:
+        gluing = Gluing(whole.path, selections - {missing}, a, b)
+        assert any("left out" in reason for reason in gluing.reasons) or missing not in gluing.arcs
+        assert all(edge.tail >= 0 and edge.head >= 0 for edge in gluing.edges)
+        if missing in gluing.arcs:
+            assert len(gluing.edges) == len(whole.arcs)
+        short = Gluing(whole.path, selections - {missing}, a, b, cut_short=True)
+        assert missing not in short.arcs
+        assert all(edge.tail >= 0 and edge.head >= 0 for edge in short.edges)
