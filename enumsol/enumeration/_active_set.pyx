@@ -369,9 +369,10 @@ cdef class QPState:
 
     def gain(self, int row, int mode):
         """By how much one dual step on a row, imposed in that mode, raises the bound; inf: nothing is feasible."""
-        return self._gain(row, mode)
+        return self._gain(row, mode, False)
 
-    cdef double _gain(self, int row, int mode) noexcept nogil:
+    cdef double _gain(self, int row, int mode, bint quick) noexcept nogil:
+        """The gain; or, quick, an upper bound of it that leaves other multipliers out of account."""
         cdef Py_ssize_t n = self.data.n
         cdef double t, t1, d2, s = self.data.row_at(row, self.x, self.w)
         cdef double sgn = -1.0 if (mode == 2 and s > 0.0) else 1.0
@@ -380,6 +381,8 @@ cdef class QPState:
             return 0.0
         self._project(row, sgn)
         d2 = dot(self.d + self.q, self.d + self.q, n - self.q)
+        if quick:
+            return 0.5 * s * s / d2 if d2 > DEPENDENT * DEPENDENT else HUGE_VAL
         self._ratios(&t1)
         if d2 <= DEPENDENT * DEPENDENT:
             return t1 * s if t1 >= 0.0 else HUGE_VAL
@@ -388,23 +391,27 @@ cdef class QPState:
             t = t1
         return t * (s - 0.5 * t * d2)
 
-    cdef double _promise(self, Py_ssize_t i, signed char code, BranchingRule rule, double gap) noexcept nogil:
-        """How far branching on a contact node closes the gap, by one dual step a child; HUGE_VAL: all but one child."""
+    cdef double _promise(
+        self, Py_ssize_t i, signed char code, BranchingRule rule, double gap, bint quick) noexcept nogil:
+        """How far branching on a contact node closes the gap, by one dual step a child; HUGE_VAL: all but one child.
+
+        A finite promise is less than 1.01.
+        """
         cdef Py_ssize_t p = rule.p
         cdef double a, b, c, slip
         if code == UNDECIDED_:
             # open: no force; in contact: no gap
-            a = fmax(self._gain(<int> i, 2), self._gain(<int> (p + i), 2) if rule.F[i] > 0.0 else 0.0)
-            b = self._gain(<int> (4 * p + i), 2)
+            a = fmax(self._gain(<int> i, 2, quick), self._gain(<int> (p + i), 2, quick) if rule.F[i] > 0.0 else 0.0)
+            b = self._gain(<int> (4 * p + i), 2, quick)
             a = fmin(a / gap, 1.0)
             b = fmin(b / gap, 1.0)
             if a >= 1.0 or b >= 1.0:
                 return HUGE_VAL
             return (a + LEAST) * (b + LEAST)
         # stick: no slip; slip: the slip bound is reached, and the slip has its sign
-        slip = fmin(self._gain(<int> (5 * p + i), 2) / gap, 1.0)
-        a = fmin(self._gain(<int> rule.slip_row[0, i], rule.slip_mode[0, i]) / gap, 1.0)
-        b = fmin(self._gain(<int> rule.slip_row[1, i], rule.slip_mode[1, i]) / gap, 1.0)
+        slip = fmin(self._gain(<int> (5 * p + i), 2, quick) / gap, 1.0)
+        a = fmin(self._gain(<int> rule.slip_row[0, i], rule.slip_mode[0, i], quick) / gap, 1.0)
+        b = fmin(self._gain(<int> rule.slip_row[1, i], rule.slip_mode[1, i], quick) / gap, 1.0)
         if self.w[p + i] < 0.0:
             a = fmax(a, slip)
         else:
@@ -421,7 +428,7 @@ cdef class QPState:
         cdef double gap = fmax(target - self.bound, 1e-300)
         found = []
         for i in range(rule.p):
-            if codes[i] == UNDECIDED_ and self._promise(i, codes[i], rule, gap) == HUGE_VAL:
+            if codes[i] == UNDECIDED_ and self._promise(i, codes[i], rule, gap, False) == HUGE_VAL:
                 found.append(i)
         return tuple(found)
 
@@ -443,7 +450,7 @@ cdef class QPState:
 
     cdef Py_ssize_t _choose(self, signed char[::1] codes, BranchingRule rule, double target) noexcept nogil:
         cdef Py_ssize_t i, j, k, count = 0, best = -1, p = rule.p
-        cdef double slip, value, most = -1.0, gap = fmax(target - self.bound, 1e-300)
+        cdef double slip, value, worth, most = -1.0, gap = fmax(target - self.bound, 1e-300)
         for i in range(p):
             if codes[i] < CONTACT_:
                 continue
@@ -465,10 +472,18 @@ cdef class QPState:
             return rule.order[0]
         for k in range(count):
             i = rule.order[k]
-            value = self._promise(i, codes[i], rule, gap)
+            worth = fmax(rule.violation[k], 1e-12)
+            if best >= 0:
+                # what cannot win is not looked at, or not closely
+                if most >= 1.01 * worth:
+                    break
+                value = self._promise(i, codes[i], rule, gap, True)
+                if value != HUGE_VAL and value * worth <= most:
+                    continue
+            value = self._promise(i, codes[i], rule, gap, False)
             if value == HUGE_VAL:
                 return i
-            value *= fmax(rule.violation[k], 1e-12)
+            value *= worth
             if value > most:
                 most = value
                 best = i
