@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.linalg as spla
+from scipy.sparse.linalg import splu
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.problem import Alpha, finite_alpha
@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 
 #: A pivot of A below this fraction of its diagonal entry is rounding: A is singular in float64.
 PIVOT_TOLERANCE = 64 * float(np.finfo(np.float64).eps)
+#: Units of force and length lie between 2^-900 and 2^900; products and quotients of two of them and proofs need that.
+UNIT_EXPONENT = 900
+#: Squares of friction coefficients, times contact forces, must not overflow.
+LARGEST_FRICTION = 1e100
 #: Right-hand sides solved at once; bounds the dense memory of a condensation to this many vectors of length n.
 RHS_BLOCK = 16
 
@@ -42,24 +46,43 @@ class Factorization:
             )
         # powers of two: the scaling itself makes no rounding error
         self._scale = np.exp2(-np.round(0.5 * np.log2(diagonal)))
+        self._diagonal = self._scale * diagonal * self._scale
         scaling = sp.diags_array(self._scale)
-        self._scaled = sp.csc_array(scaling @ A @ scaling)
         options = {"SymmetricMode": True, "Equil": False}
         try:
-            self._lu = spla.splu(self._scaled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+            # the scaled copy of A is not kept: the factors are all that solving needs
+            self._lu = splu(
+                sp.csc_array(scaling @ A @ scaling),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options=options,
+            )
         except RuntimeError as error:  # SuperLU: "Factor is exactly singular"
             raise InvalidProblemError(_RIGID.format(ratio=0.0)) from error
 
     def check_positive_definite(self) -> None:
         """Raise InvalidProblemError unless every pivot is positive and above rounding."""
-        order = np.argsort(self._lu.perm_c)
-        pivots = self._lu.U.diagonal() / self._scaled.diagonal()[order]
+        pivots = self._pivots
         if not np.array_equal(self._lu.perm_r, self._lu.perm_c) or np.min(pivots) < -PIVOT_TOLERANCE:
             raise InvalidProblemError(
                 "A is not positive definite (an elimination pivot is negative); expected the stiffness of a stable body"
             )
         if np.min(pivots) <= PIVOT_TOLERANCE:
             raise InvalidProblemError(_RIGID.format(ratio=max(float(np.min(pivots)), 0.0)))
+
+    @cached_property
+    def _pivots(self) -> NDArray[np.float64]:
+        """The pivots relative to the diagonal entries of A, shape (n,).
+
+        Asking SuperLU for U makes sparse copies of L and of U, as large as the factors, which it keeps as long as it
+        lives. Nothing else needs them: both are emptied here.
+        """
+        L, U = self._lu.L, self._lu.U
+        pivots = U.diagonal() / self._diagonal[np.argsort(self._lu.perm_c)]
+        for copy in (L, U):
+            copy.data, copy.indices = copy.data[:0].copy(), copy.indices[:0].copy()
+            copy.indptr = np.zeros_like(copy.indptr)
+        return np.asarray(pivots)
 
     def solve(self, rhs: NDArray[np.float64]) -> NDArray[np.float64]:
         """A^{-1} rhs for rhs of shape (n,) or (n, k), with one step of iterative refinement."""
@@ -142,6 +165,18 @@ class ScaledSystem:
             first = np.exp2(np.floor(np.log2(largest)))
             energy = float(np.linalg.norm(np.linalg.solve(cholesky, g / first)))
             size = float(first * np.exp2(np.floor(np.log2(energy))))
+        with np.errstate(over="ignore", divide="ignore"):
+            units = np.concatenate([factor * size, size / factor])
+        if not np.all((units >= 2.0**-UNIT_EXPONENT) & (units <= 2.0**UNIT_EXPONENT)):
+            raise InvalidProblemError(
+                f"the load makes contact forces and displacements of size {np.min(units):.1e} to {np.max(units):.1e}, "
+                f"where float64 over- or underflows; expected data in other units"
+            )
+        if np.max(system.F) > LARGEST_FRICTION:
+            raise InvalidProblemError(
+                f"a friction coefficient is {np.max(system.F):g}, where float64 overflows; expected at most "
+                f"{LARGEST_FRICTION:g}"
+            )
         return cls(S, g / size, system.F, factor * size, size / factor, cholesky)
 
     @property
@@ -152,6 +187,8 @@ class ScaledSystem:
 
 def _cholesky(S: NDArray[np.float64]) -> NDArray[np.float64]:
     try:
+        # a pivot of the size of rounding may be positive by accident: the relaxations factorize 2 S, and would fail
+        np.linalg.cholesky(2.0 * S)
         return np.asarray(np.linalg.cholesky(S))
     except np.linalg.LinAlgError as error:
         raise InvalidProblemError(

@@ -113,7 +113,9 @@ class PiecewiseSmoothEquation:
         problem, r = self.problem, self.r
         bound = problem.friction_at(alpha) * lambda_n
         trial = lambda_t + r * (problem.Bt @ u - problem.slip_offset)
-        projected = np.minimum(bound, trial) + np.maximum(-bound, trial) - trial
+        # P by its pieces: the sum min + max - trial would lose the bound's digits where r u_t is much larger
+        inside = np.clip(trial, -np.abs(bound), np.abs(bound))
+        projected = np.where(bound >= 0, inside, -inside)
         return np.concatenate(
             [
                 self._equilibrium(u, lambda_n, lambda_t, alpha),

@@ -59,7 +59,8 @@ class BallLeafJudge:
         if enclosed is not None:
             codes = np.array([leaf.codes], dtype=np.intp)
             first = np.zeros(len(leaf.rows), dtype=np.intp)
-            return bool(interval_exclusion_margins(enclosed, codes, first, leaf.rows, leaf.values)[0] > _MARGIN)
+            margins = interval_exclusion_margins(enclosed, codes, first, leaf.rows, leaf.values, errors=2.0)
+            return bool(margins[0] > _MARGIN)
         if self._exact is None:
             return False
         self.used_rationals = True

@@ -272,7 +272,10 @@ class BranchGraph:
         F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node; evaluated in floats.
         """
         condensed, p = self.problem.condensed, self.problem.p
-        inverse = np.linalg.inv(condensed.S)
+        try:
+            inverse = np.linalg.inv(condensed.S)
+        except np.linalg.LinAlgError:  # S is singular within rounding, and the bound nearly zero
+            return None
         product = np.linalg.eigvalsh(inverse[:p, :p])[-1] * np.linalg.eigvalsh(condensed.S[p:, p:])[-1]
         largest = 1.0 / float(np.sqrt(product))
         a, b = self.interval

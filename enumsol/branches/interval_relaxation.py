@@ -31,7 +31,7 @@ from enumsol.enumeration.relaxation import (
     row_terms,
     status_rows,
 )
-from enumsol.errors import MissingDependencyError
+from enumsol.errors import InvalidProblemError, MissingDependencyError
 from enumsol.selections import FRICTIONLESS, SLIP_MINUS, SLIP_PLUS
 
 if TYPE_CHECKING:
@@ -120,9 +120,11 @@ class IntervalSystem:
             ends = np.stack([condensed.g1 if b > origin else -condensed.g1] * 2)
         else:
             ends = np.stack([condensed.g0 + alpha * condensed.g1 for alpha in (a, b)])
-        inverse = np.linalg.inv(condensed.S)
-        larger = int(np.argmax([g @ inverse @ g for g in ends]))
-        scaled = ScaledSystem.from_system(CondensedSystem(condensed.S, ends[larger], F_hi))
+        first = ScaledSystem.from_system(CondensedSystem(condensed.S, ends[0], F_hi))
+        with np.errstate(over="ignore", invalid="ignore"):
+            energies = [np.linalg.norm(np.linalg.solve(first.cholesky, g / first.length)) for g in ends]
+        larger = int(not energies[1] <= energies[0])
+        scaled = first if larger == 0 else ScaledSystem.from_system(CondensedSystem(condensed.S, ends[1], F_hi))
         ends = ends / scaled.length
         return cls(scaled.S, 0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]), F_lo, F_hi, scaled)
 
@@ -168,7 +170,8 @@ class IntervalEngine:
             self._data = _active_set.QPData(system.S, system.g, -system.S, system.g, start, index, value, rhs)
             self._always: list[int] = []
             return
-        curvature = 0.25 * float(system.half @ np.linalg.solve(system.S, system.half)) + RIDGE
+        # half' S^-1 half by the factor that is known to exist
+        curvature = 0.25 * float(np.linalg.norm(np.linalg.solve(system.scaled.cholesky, system.half))) ** 2 + RIDGE
         form = np.block(
             [[system.S, -0.5 * system.half[:, None]], [-0.5 * system.half[None, :], np.array([[curvature]])]]
         )
@@ -182,7 +185,13 @@ class IntervalEngine:
         rhs = np.concatenate([np.zeros(rows), [-1.0, -1.0]])
         W = np.column_stack([-system.S, system.half])
         load = np.append(system.g, 0.0)
-        self._data = _active_set.QPData(form, load, W, system.g, start, index, value, rhs)
+        try:
+            self._data = _active_set.QPData(form, load, W, system.g, start, index, value, rhs)
+        except np.linalg.LinAlgError as error:
+            raise InvalidProblemError(
+                "the energy over an interval of alpha is not convex to working precision; expected contact rows "
+                "[Bn; Bt] that are independent beyond rounding (are two contact nodes almost the same point?)"
+            ) from error
         self._always = [rows, rows + 1]
 
     def root(self, rows: list[int], modes: list[int]) -> Relaxation:

@@ -25,6 +25,8 @@ import scipy.sparse.linalg as spla
 from enumsol.errors import EnumsolError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from enumsol.problem import Alpha, ContactProblem
@@ -136,7 +138,7 @@ def sparse_eigenvalue_bound(A: sp.csc_array, estimate: float) -> float:
     """Lower bound on the smallest eigenvalue of a sparse symmetric matrix, from one factorization of A - mu I.
 
     With A - mu I = L U + E and U = D L' up to rounding, positive pivots D prove A - mu I >= -||E||; the bound
-    |E| <= gamma_k |L| |U| (Higham, Theorem 9.3) is summed by the Cauchy-Schwarz inequality.
+    |E| <= gamma_k |L| |U| (Higham, Theorem 9.3) is summed by rows and columns.
     """
     n = A.shape[0]
     largest = float(np.max(np.abs(A.diagonal())))
@@ -163,17 +165,33 @@ def _factor_error(A: sp.csc_array) -> float | None:
     d = U.diagonal()
     if not np.array_equal(lu.perm_r, lu.perm_c) or not np.all(d > 0) or not np.all(np.isfinite(U.data)):
         return None
+    del lu  # its own copy of the factors would stand beside L and U
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         k = int(np.max(np.bincount(L.indices))) + 2
-        s = np.sqrt(upper_sum(L.data * L.data * np.repeat(d, np.diff(L.indptr)))) * SAFE
-        t = np.sqrt(upper_sum(U.data * U.data * (1.0 / d)[U.indices]) * SAFE) * SAFE
         # U' D^{-1} should be L; the columns of U are the rows of U'
         mirrored = sp.csr_array((U.data * (1.0 / d)[U.indices], U.indices, U.indptr), shape=U.shape)
         difference = sp.csr_array(mirrored - L.tocsr())
-        e = np.sqrt(upper_sum(difference.data * difference.data * d[difference.indices])) * SAFE
+        del mirrored
+        for matrix in (difference, L, U):
+            np.abs(matrix.data, out=matrix.data)
+        product = _product_norm(L, U)
         # and the rounding of the quotients and of the difference, whose sizes are those of U' D^{-1} and of the result
-        e = (e + 4 * UNIT * t) * SAFE
-        return float((gamma(k) * s * t + s * e) * (1.0 + gamma(k + 4)) * SAFE)
+        rest = _product_norm(L, sp.csc_array(sp.diags_array(d) @ difference.T)) * (1.0 + 8 * UNIT) + 8 * UNIT * product
+        error = float((gamma(k) * product + rest) * (1.0 + gamma(k + 4)) * SAFE)
+    return error if np.isfinite(error) else None
+
+
+def _product_norm(left: sp.csc_array, right: sp.csc_array) -> float:
+    """Upper bound of ||left right|| for nonnegative matrices, by ||M||^2 <= ||M||_1 ||M||_inf.
+
+    The sums of the rows and columns of the product need no product. For the factors of a finite-element matrix they do
+    not grow with its size, as the Frobenius norms of the factors do.
+    """
+    ones = np.ones(left.shape[0])
+    rows = float(np.max(left @ (right @ ones)))
+    columns = float(np.max((ones @ left) @ right))
+    # two products of nonnegative numbers, each off by at most gamma(n + 1) of itself
+    return float(np.sqrt(rows * columns) * (1.0 + 2 * gamma(left.shape[0] + 2)) * SAFE + ROOT_TINY)
 
 
 @dataclass(frozen=True)
@@ -225,24 +243,27 @@ class CondensedEnclosure:
         loads = np.column_stack([_exact_product(array, scale) for array in (problem.f, slope)])
         # loads of size one, so that norms of their residuals neither overflow nor underflow
         lift = np.ldexp(1.0, np.clip(np.frexp(np.max(np.abs(loads), axis=0))[1], -1000, 1000))
-        K = np.column_stack([B.T.toarray(), _exact_product(loads, 1.0 / lift)])
-        X = np.empty_like(K)
-        for start in range(0, K.shape[1], _COLUMNS):
-            part = slice(start, start + _COLUMNS)
-            X[:, part] = problem.factorization.solve(K[:, part] / scale[:, None]) / scale[:, None]
+        K = sp.hstack([B.T, sp.csc_array(_exact_product(loads, 1.0 / lift))], format="csc")
+        # before there are dense columns: the factors of A - mu I are what takes most memory
         bound = sparse_eigenvalue_bound(sp.csc_array(A), _smallest_eigenvalue(problem, scale))
         if not bound > 0:
             raise NotEnclosedError(
                 "A is positive definite only within rounding: its smallest eigenvalue, after scaling to a unit "
                 "diagonal, could not be proven positive"
             )
-        mid, rad = _products(A, B, K, X, bound, 2 * p)
+        X = np.empty(K.shape)
+        for part in _column_blocks(K):
+            X[:, part] = problem.factorization.solve(K[:, part].toarray() / scale[:, None]) / scale[:, None]
+        mid, rad = _products(A, B, K, X, bound)
         S, S_rad = mid[:, : 2 * p], rad[:, : 2 * p]
         # the exact S is symmetric and lies in both triangles' balls
         sym = 0.5 * (S + S.T)
         S_rad = (np.maximum(S_rad, S_rad.T) + np.abs(S - S.T) + 2 * UNIT * np.abs(sym)) * SAFE
         offset = np.concatenate([problem.gap, problem.slip_offset])
         free, free_rad = mid[:, 2 * p :] * lift, rad[:, 2 * p :] * lift + TINY
+        # no load moves nothing, exactly: what covers underflow in a norm would be huge beside a tiny load
+        still = ~np.any(loads, axis=0)
+        free[:, still] = free_rad[:, still] = 0.0
         g0 = free[:, 0] - offset
         g0_rad = (free_rad[:, 0] + 2 * UNIT * np.abs(g0)) * SAFE + TINY
         return cls(sym, S_rad, g0, g0_rad, free[:, 1], free_rad[:, 1], bound, problem)
@@ -307,20 +328,28 @@ def _smallest_eigenvalue(problem: ContactProblem, scale: Array) -> float:
     return value
 
 
-def _products(A: sp.csr_array, B: sp.csr_array, K: Array, X: Array, bound: float, rows: int) -> tuple[Array, Array]:
-    """B A^{-1} K as a ball."""
-    n = A.shape[0]
-    R, R_rad = np.empty_like(K), np.empty_like(K)
+def _column_blocks(K: sp.csc_array) -> Iterator[slice]:
+    """Columns of K, as many at a time as are made dense."""
     for start in range(0, K.shape[1], _COLUMNS):
-        part = slice(start, start + _COLUMNS)
-        R[:, part], R_rad[:, part] = residual(A, X[:, part], K[:, part])
+        yield slice(start, min(start + _COLUMNS, K.shape[1]))
+
+
+def _products(A: sp.csr_array, B: sp.csr_array, K: sp.csc_array, X: Array, bound: float) -> tuple[Array, Array]:
+    """B A^{-1} K as a ball; of what is n long only X and a block of columns are dense."""
+    n, rows = A.shape[0], B.shape[0]
     first = B @ X
     k = int(np.max(np.diff(B.indptr))) + 1
-    first_rad = gamma(k) * (abs(B) @ np.abs(X)) * (1 + gamma(k)) * SAFE
-    XB = X[:, :rows]
-    second = XB.T @ R
-    second_rad = (np.abs(XB).T @ (R_rad + gamma(n + 1) * np.abs(R))) * (1 + gamma(n + 2)) * SAFE
-    norms = upper_norm(np.abs(R) + R_rad, axis=0) * SAFE
+    size = np.abs(X)
+    first_rad = gamma(k) * (abs(B) @ size) * (1 + gamma(k)) * SAFE
+    second, second_rad, norms = np.empty_like(first), np.empty_like(first), np.empty(K.shape[1])
+    for part in _column_blocks(K):
+        R, R_rad = residual(A, X[:, part], K[:, part].toarray())
+        second[:, part] = X[:, :rows].T @ R
+        np.abs(R, out=R)
+        norms[part] = upper_norm(R + R_rad, axis=0) * SAFE
+        R *= gamma(n + 1)
+        R += R_rad
+        second_rad[:, part] = (size[:, :rows].T @ R) * (1 + gamma(n + 2)) * SAFE
     third = norms[:rows, None] * norms[None, :] / bound * SAFE
     mid = first + second
     return mid, (first_rad + second_rad + third + 2 * UNIT * np.abs(mid)) * SAFE + (n + 2) * TINY

@@ -114,7 +114,12 @@ def vanishing_alpha(problem: ContactProblem, enclosure: CondensedEnclosure) -> F
 
 
 def interval_exclusion_margins(
-    piece: EnclosedPiece, codes: NDArray[np.intp], leaf: NDArray[np.intp], rows: NDArray[np.intp], values: Array
+    piece: EnclosedPiece,
+    codes: NDArray[np.intp],
+    leaf: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    values: Array,
+    errors: float = 1.0,
 ) -> Array:
     """Proven lower bounds on the energy over partial assignments and all alpha of a piece; positive excludes.
 
@@ -124,6 +129,7 @@ def interval_exclusion_margins(
     codes : (m, p) array of (partial) status codes
     leaf : (k,) array, the assignment to which each multiplier belongs
     rows, values : (k,) arrays of row numbers (kind * p + node, nine kinds) and multipliers
+    errors : how often the error bound is subtracted (see energy_bounds)
 
     Returns
     -------
@@ -158,5 +164,5 @@ def interval_exclusion_margins(
     # where friction is constant a cone row may be an equation, and its coefficient must be the exact one
     constant_rad = np.max([end.F_rad for end in piece.ends], axis=0) * (low == high)
     c_rad[:, :p] += constant_rad * (reach[:, 2] + reach[:, 3])
-    bounds = np.min([energy_bounds(end, y, c, c_rad * SAFE) for end in piece.ends], axis=0)
+    bounds = np.min([energy_bounds(end, y, c, c_rad * SAFE, errors) for end in piece.ends], axis=0)
     return np.where(refused | ~np.isfinite(bounds), -np.inf, bounds)

@@ -36,14 +36,21 @@ if TYPE_CHECKING:
 _CONTRACTION = 0.5
 
 
-def exclusion_margin(system: EnclosedSystem, codes: Sequence[int], rows: NDArray[np.intp], values: Array) -> float:
+def exclusion_margin(
+    system: EnclosedSystem, codes: Sequence[int], rows: NDArray[np.intp], values: Array, errors: float = 1.0
+) -> float:
     """Proven lower bound on the energy over one partial assignment (see exclusion_margins)."""
     leaf = np.zeros(len(rows), dtype=np.intp)
-    return float(exclusion_margins(system, np.array([codes], dtype=np.intp), leaf, rows, values)[0])
+    return float(exclusion_margins(system, np.array([codes], dtype=np.intp), leaf, rows, values, errors)[0])
 
 
 def exclusion_margins(
-    system: EnclosedSystem, codes: NDArray[np.intp], leaf: NDArray[np.intp], rows: NDArray[np.intp], values: Array
+    system: EnclosedSystem,
+    codes: NDArray[np.intp],
+    leaf: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    values: Array,
+    errors: float = 1.0,
 ) -> Array:
     """Proven lower bounds on the energy over partial assignments; positive means that one holds no solution.
 
@@ -60,17 +67,23 @@ def exclusion_margins(
     leaf : (k,) array, the assignment to which each multiplier belongs
     rows, values : (k,) arrays of row numbers (kind * p + node) and multipliers. A row that the assignment does not
         impose, or a multiplier of the wrong sign, makes that assignment's bound -inf.
+    errors : how often the error bound is subtracted (see energy_bounds)
 
     Returns
     -------
     (m,) array
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        return _margins(system, codes, leaf, rows, values)
+        return _margins(system, codes, leaf, rows, values, errors)
 
 
 def _margins(
-    system: EnclosedSystem, codes: NDArray[np.intp], leaf: NDArray[np.intp], rows: NDArray[np.intp], values: Array
+    system: EnclosedSystem,
+    codes: NDArray[np.intp],
+    leaf: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    values: Array,
+    errors: float,
 ) -> Array:
     m, p = codes.shape
     bad = (rows < 0) | (rows >= 7 * p) | ~np.isfinite(values)
@@ -94,12 +107,16 @@ def _margins(
     repeated = int(np.bincount(place, minlength=1).max())
     c_rad = gamma(4 * repeated + 8) * c_size
     c_rad[:, :p] += system.F_rad * cone_size
-    bound = energy_bounds(system, y, c, c_rad * SAFE)
+    bound = energy_bounds(system, y, c, c_rad * SAFE, errors)
     return np.where(refused | ~np.isfinite(bound), -np.inf, bound)
 
 
-def energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array) -> Array:
-    """Lower bounds on the energy for multipliers y (m, 2p) on S lambda - g and c, a ball, on lambda."""
+def energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array, errors: float = 1.0) -> Array:
+    """Lower bounds on the energy for multipliers y (m, 2p) on S lambda - g and c, a ball, on lambda.
+
+    ``errors`` is how often the error bound is subtracted: once proves the bound. Who writes a proof subtracts it twice,
+    so that a checker, which adds up in another order, finds a positive bound too.
+    """
     S, g = system.S, system.g
     # every inner product of up to 2p terms below is off by at most k times that of the absolute values
     k = gamma(4 * len(g) + 16)
@@ -122,7 +139,7 @@ def energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array) -> A
     total = 0.5 * first - 0.25 * y_form - 0.5 * cross + 0.25 * x_form
     error = 0.5 * (first_error + cross_error) + 0.25 * (system.form_error * (y_square + x_square) + tail)
     error += 8 * UNIT * (np.abs(first) + np.abs(y_form) + np.abs(cross) + np.abs(x_form))
-    return np.asarray(total - error * (1 + k) * SAFE * SAFE - TINY)
+    return np.asarray(total - errors * error * (1 + k) * SAFE * SAFE - TINY)
 
 
 def _dots(a: Array, b: Array) -> Array:

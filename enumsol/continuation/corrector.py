@@ -48,11 +48,12 @@ def moore_penrose(equation: CondensedEquation, x: Vector, tangent: Vector, optio
     T: Vector = tangent
     residual = np.inf
     for count in range(1, options.k_max + 2):
-        J = equation.jacobian(equation.test_functions(x) > 0, x)
+        rows = equation.test_functions(x) > 0
+        J = equation.jacobian(rows, x)
         bordered = np.vstack([J, equation.metric @ T])
         right = np.zeros((size + 1, 2))
         right[:size, 0] = J @ T
-        right[:size, 1] = equation.residual(x)
+        right[:size, 1] = equation.selection_residual(rows, x)
         if not (np.all(np.isfinite(bordered)) and np.all(np.isfinite(right))):
             break
         try:

@@ -102,9 +102,17 @@ class CondensedEquation:
             samples += list(np.linspace(low, high, _LOAD_SAMPLES))
         loads = np.array([self.path.at(alpha).g for alpha in samples]) / sigma
         loads = loads[np.all(np.isfinite(loads), axis=1)]
-        energy = np.einsum("ij,ij->i", loads, np.linalg.solve(self.S, loads.T).T)
-        largest = math.sqrt(max(float(np.max(energy, initial=0.0)), 0.0))
-        return largest if largest > 0 else 1.0
+        size = float(np.max(np.abs(loads), initial=0.0))
+        if size == 0:
+            return 1.0
+        # loads of size one: their squares neither overflow nor underflow
+        loads = loads / size
+        try:
+            forces = np.linalg.solve(self.S, loads.T)
+        except np.linalg.LinAlgError:  # S is singular within rounding
+            forces = np.linalg.lstsq(self.S, loads.T, rcond=None)[0]
+        energy = float(np.max(np.einsum("ij,ji->i", loads, forces)))
+        return size * math.sqrt(energy) if energy > 0 else size
 
     # -- values ----------------------------------------------------------------------------------------------------
 
@@ -157,44 +165,67 @@ class CondensedEquation:
     # -- H and its selections ----------------------------------------------------------------------------------------
 
     def test_functions(self, x: Vector) -> Vector:
-        """theta1, theta2, theta3 as columns, shape (p, 3)."""
+        """theta1, theta2, theta3 as columns, shape (p, 3): their signs are what the r of H decides."""
+        return self._test_functions(x, self.r)
+
+    def _test_functions(self, x: Vector, r: Vector) -> Vector:
         p = self.p
-        trial = x[:-1] + self.r * self.w(x)
+        trial = x[:-1] + r * self.w(x)
         bound = self.at(x).F * x[:p]
         return np.column_stack([trial[:p], trial[p:] - bound, trial[p:] + bound])
 
     def residual(self, x: Vector) -> Vector:
-        """H(x), shape (2p,)."""
-        p = self.p
-        trial = x[:-1] + self.r * self.w(x)
-        bound, tangential = self.at(x).F * x[:p], trial[p:]
-        projected = np.minimum(bound, tangential) + np.maximum(-bound, tangential) - tangential
-        return np.concatenate([x[:p] - np.maximum(0.0, trial[:p]), x[p:-1] - projected])
+        """H(x) for each node's own r, shape (2p,).
+
+        Solutions do not depend on r, and no more may the decision whether x is one: a tiny r would make any
+        displacement small, a huge one any rounding large.
+        """
+        return self._projected(x, np.ones(2 * self.p))
+
+    def merit(self, x: Vector) -> float:
+        """Norm of H(x) for the given r, which its Newton directions lower."""
+        return float(np.linalg.norm(self._projected(x, self.r)))
+
+    def _projected(self, x: Vector, r: Vector) -> Vector:
+        """H(x), piece by piece: the projections lose nothing of w where r is small, nor of lambda where it is large."""
+        p, w = self.p, self.w(x)
+        closed, slips, count = _pieces(self._test_functions(x, r) > 0)
+        bound = self.at(x).F * x[:p]
+        tangential = (1 - count) * x[p:-1] - slips * bound - count * r[p:] * w[p:]
+        return np.concatenate([np.where(closed, -r[:p] * w[:p], x[:p]), tangential])
 
     def selection(self, codes: Codes) -> NDArray[np.bool_]:
         """Sign rows of the selection in which the nodes have these statuses, shape (p, 3)."""
         return np.array([_ROWS[code] for code in codes], dtype=bool).reshape(-1, 3)
 
     def selection_residual(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
-        """The named selection function of H, shape (2p,)."""
+        """The named selection function of H, shape (2p,), its rows scaled by positive factors to size one."""
         p = self.p
         closed, slips, count = _pieces(rows)
+        lengths, forces = self._shares(count)
         w = self.w(x)
-        normal = np.where(closed, -self.r[:p] * w[:p], x[:p])
+        normal = np.where(closed, -w[:p], x[:p])
         bound = self.at(x).F * x[:p]
-        tangential = (1 - count) * x[p:-1] - slips * bound - count * self.r[p:] * w[p:]
-        return np.concatenate([normal, tangential])
+        return np.concatenate([normal, forces * x[p:-1] - slips * bound - lengths * w[p:]])
+
+    def _shares(self, count: Vector) -> tuple[Vector, Vector]:
+        """Factors of w_t and lambda_t in the tangential rows; only the fourth piece, 2 lambda_t + r w_t, needs r."""
+        r = self.r[self.p :]
+        fourth = count < 0
+        scale = np.where(fourth, 2.0 / (1.0 + r), 1.0)
+        return np.where(fourth, -r * scale, count), (1 - count) * scale
 
     def jacobian(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
-        """Gradient of the named selection function, shape (2p, 2p + 1)."""
+        """Gradient of the named selection function (see selection_residual), shape (2p, 2p + 1)."""
         p, values = self.p, self.at(x)
         closed, slips, count = _pieces(rows)
-        share = np.concatenate([closed.astype(float), count]) * self.r
+        lengths, forces = self._shares(count)
+        share = np.concatenate([closed.astype(float), lengths])
         J = np.empty((2 * p, 2 * p + 1))
         J[:, :-1] = share[:, None] * self.S
         node = np.arange(p)
         J[node, node] += ~closed
-        J[p + node, p + node] += 1 - count
+        J[p + node, p + node] += forces
         J[p + node, node] -= slips * values.F
         J[:, -1] = -share * values.dg
         J[p:, -1] -= slips * values.dF * x[:p]
@@ -272,7 +303,8 @@ class CondensedEquation:
 
     def codes(self, x: Vector, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
         """Statuses at a solution by the signs of the test functions; ``prefer`` is kept where it holds too."""
-        theta = self.test_functions(x)
+        # statuses of a solution do not depend on r
+        theta = self._test_functions(x, np.ones(2 * self.p))
         active = None if prefer is None else self.active(x, tolerance)
         out = []
         for i in range(self.p):

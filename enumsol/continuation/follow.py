@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 #: The default alpha scale is this fraction of the interval.
 ALPHA_FRACTION = 0.05
+#: A change of the problem over the whole interval that is too small to follow: conditions within STATUS_TOLERANCE of
+#: zero count as met with equality, and must not all be within it.
+RESOLUTION = 1e-6
 #: Norm of H above which a start is not a root.
 START_TOLERANCE = 1e-6
 
@@ -151,7 +154,20 @@ class _Setup:
             scale = ALPHA_FRACTION * (high - low) if math.isfinite(high - low) else 1.0
         path: ParameterPath = AffinePath(problem) if smooth_path is None else CallablePath(problem, smooth_path, alpha)
         self.equation = CondensedEquation(path, self.interval, alpha, self.options.r, scale)
+        if smooth_path is None and math.isfinite(high - low):
+            self._check_resolution(alpha, (high - low) / scale)
         self.x = self._on_solution(alpha, forces)
+
+    def _check_resolution(self, alpha: float, width: float) -> None:
+        """Refuse an interval over which the problem changes by little more than what counts as equal."""
+        equation = self.equation
+        values = equation.at(equation.point(alpha, np.zeros(2 * equation.p)))
+        change = max(np.max(np.abs(values.dg)), np.max(np.abs(values.dF) / (1.0 + values.F))) * width
+        if 0 < change < RESOLUTION:
+            raise InvalidArgumentError(
+                f"interval is ({self.interval[0]:.17g}, {self.interval[1]:.17g}), over which friction and load change "
+                f"by {change:.1e} of their size; expected at least {RESOLUTION:g} (branch_graph works without rounding)"
+            )
 
     def _on_solution(self, alpha: float, forces: Vector) -> Vector:
         equation = self.equation

@@ -114,7 +114,7 @@ def _iterate(equation: CondensedEquation, x: Vector, alpha: float, max_iteration
         damped = damped or rows.tobytes() in seen
         seen.add(rows.tobytes())
         step = _newton_step(equation, rows, x)
-        fraction = _fraction(equation, x, step, residual) if damped else 1.0
+        fraction = _fraction(equation, x, step) if damped else 1.0
         history.append(NewtonIteration(residual, fraction, changes))
         if fraction < MIN_FRACTION:
             raise NotConverged(alpha, history, "no step along Newton's direction lowers the residual")
@@ -126,7 +126,7 @@ def _iterate(equation: CondensedEquation, x: Vector, alpha: float, max_iteration
 def _newton_step(equation: CondensedEquation, rows: NDArray[np.bool_], x: Vector) -> Vector:
     """Newton step in the active selection; the shortest least-squares one where it is singular."""
     J = equation.jacobian(rows, x)[:, :-1]
-    residual = equation.residual(x)
+    residual = equation.selection_residual(rows, x)
     try:
         step = np.linalg.solve(J, residual)
     except np.linalg.LinAlgError:
@@ -136,13 +136,13 @@ def _newton_step(equation: CondensedEquation, rows: NDArray[np.bool_], x: Vector
     return np.asarray(step)
 
 
-def _fraction(equation: CondensedEquation, x: Vector, step: Vector, residual: float) -> float:
+def _fraction(equation: CondensedEquation, x: Vector, step: Vector) -> float:
     """Largest 2^-k that lowers the residual sufficiently."""
-    fraction = 1.0
+    fraction, residual = 1.0, equation.merit(x)
     while fraction >= MIN_FRACTION:
         trial = x.copy()
         trial[:-1] -= fraction * step
-        if np.linalg.norm(equation.residual(trial)) <= (1 - SUFFICIENT_DECREASE * fraction) * residual:
+        if equation.merit(trial) <= (1 - SUFFICIENT_DECREASE * fraction) * residual:
             return fraction
         fraction *= 0.5
     return 0.0

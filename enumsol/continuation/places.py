@@ -171,6 +171,8 @@ class GraphMap:
             if best <= _EXACT * self.tolerance or step == 0:
                 break
             other = alpha + step if alpha + step <= high else alpha - step
+            if other == alpha:  # an arc of a few floats' length
+                break
             slope = (self.on_arc(arc, other) - y) / (other - alpha)
             alpha = min(max(alpha + self.equation.dot(x - y, slope) / self.equation.dot(slope, slope), low), high)
         return best

@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 
 #: Selections examined at one point (Remark 5.1); six nodes in a corner of three statuses have 729.
 MAX_SELECTIONS = 4096
-#: A singular value of a selection's gradient below this fraction of the largest counts as zero.
+#: A singular value of a selection's balanced gradient below this fraction of the largest counts as zero.
 RANK_TOLERANCE = 1e-10
+#: Sweeps that balance rows and columns of a gradient: each takes the root of what is left of their sizes.
+_BALANCING = 6
 #: The rate of a vanishing condition along an admissible tangent may be negative by rounding, as much as this.
 RATE_TOLERANCE = 1e-8
 #: Two tangents closer than this are one.
@@ -75,11 +77,13 @@ def curve_tangent(equation: CondensedEquation, codes: Codes, x: Vector, sign: in
     J = equation.jacobian(equation.selection(codes), x)
     if not np.all(np.isfinite(J)):
         return None
-    Q, R = np.linalg.qr(J.T, mode="complete")
+    balanced, scale = _balanced(J)
+    Q, R = np.linalg.qr(balanced.T, mode="complete")
     pivots = np.abs(np.diagonal(R))
     if np.min(pivots) <= RANK_TOLERANCE * np.max(pivots):
         return None
-    vector = Q[:, -1] / equation.norm(Q[:, -1])
+    kernel = scale * Q[:, -1]
+    vector = kernel / equation.norm(kernel)
     bordered = np.vstack([J, equation.metric @ vector])
     return np.asarray(vector if np.linalg.slogdet(bordered)[0] == sign else -vector)
 
@@ -142,10 +146,31 @@ def _leaves_into(equation: CondensedEquation, codes: Codes, x: Vector, vector: V
     return bool(np.all(rates[at_zero] >= -RATE_TOLERANCE))
 
 
+def _balanced(J: Vector) -> tuple[Vector, Vector]:
+    """Rows and columns of size one at most, and the columns' factors: ranks do not depend on how large F is.
+
+    Kernel vectors of J are the factors times those of the balanced matrix. Columns are not scaled up: one of nearly
+    zeros (alpha where nothing depends on it) is a zero column.
+    """
+    scaled, columns = J.copy(), np.ones(J.shape[1])
+    for _ in range(_BALANCING):
+        for axis in (1, 0):
+            size = np.max(np.abs(scaled), axis=axis, keepdims=True)
+            factor = np.exp2(-np.round(0.5 * np.log2(np.where(size > 0, size, 1.0))))
+            if axis == 0:
+                factor = np.minimum(factor, 1.0)
+                columns *= factor[0]
+            scaled *= factor
+    return scaled, columns
+
+
 def _kernel(J: Vector) -> Vector:
-    _, sigma, Vt = np.linalg.svd(J)
+    """Orthonormal basis of the kernel."""
+    balanced, scale = _balanced(J)
+    _, sigma, Vt = np.linalg.svd(balanced)
     rank = int(np.sum(sigma > RANK_TOLERANCE * sigma[0]))
-    return np.asarray(Vt[rank:].T)
+    basis = scale[:, None] * Vt[rank:].T
+    return np.asarray(np.linalg.qr(basis)[0])
 
 
 def _directions(equation: CondensedEquation, codes: Codes, x: Vector) -> Iterator[Vector]:

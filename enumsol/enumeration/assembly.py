@@ -93,6 +93,9 @@ class RootBuilder:
         elif isinstance(point, tuple):
             mid = (self._solver.forces(point), self._solver.displacements(point))
             rad = (np.spacing(np.abs(mid[0])) * (mid[0] != 0), np.spacing(np.abs(mid[1])) * (mid[1] != 0))
+        elif not np.any(point) and self._problem.is_unloaded(self._alpha):
+            # nothing but lambda = 0, w = 0 solves, exactly
+            mid = rad = (np.zeros(2 * p), np.zeros(2 * p))
         else:
             return None
         low = [np.where(r > 0, np.nextafter(m - r, -np.inf), m) for m, r in zip(mid, rad, strict=True)]
@@ -135,8 +138,12 @@ class RootBuilder:
 
     def _values(self, codes: Codes, solution: SelectionSolution) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Forces and displacements with the zeros that the statuses impose set exactly."""
-        p, point = self._problem.p, solution.vertices[0]
-        force, w = self._solver.forces(point), self._solver.displacements(point)
+        p, point, ball = self._problem.p, solution.vertices[0], self._verified.get(solution.codes)
+        if ball is None:
+            force, w = self._solver.forces(point), self._solver.displacements(point)
+        else:
+            # the floats' own S and g may be off by more than the ball's radius
+            force, w = ball.force * self._floats.system.force, ball.w * self._floats.system.length
         for i, code in enumerate(codes):
             if code == OPEN:
                 force[[i, p + i]] = 0.0

@@ -45,10 +45,14 @@ class FloatSelections:
         self._force_scale = np.sqrt(np.diagonal(inverse))
         self._length_scale = np.sqrt(np.diagonal(S))
         nn, tt, nt = np.diagonal(inverse)[:p], np.diagonal(inverse)[p:], np.diagonal(inverse, p)
-        self._cone_scale = np.sqrt(np.maximum(F**2 * nn + tt - 2 * F * nt * np.array([[1.0], [-1.0]]), 0.0))
+        turn = np.array([[1.0], [-1.0]])
+        # F = size * f: the square of F may overflow
+        size = np.maximum(F, 1.0)
+        f, one = F / size, 1.0 / size
+        self._cone_scale = size * np.sqrt(np.maximum(f**2 * nn + one**2 * tt - 2 * f * one * nt * turn, 0.0))
         snn, stt, snt = np.diagonal(S)[:p], np.diagonal(S)[p:], np.diagonal(S, p)
         # energy norm of the force direction (1, +F) or (1, -F) of a slipping node
-        self._slip_scale = np.sqrt(snn + F**2 * stt + 2 * F * snt * np.array([[1.0], [-1.0]]))
+        self._slip_scale = size * np.sqrt(np.maximum(one**2 * snn + f**2 * stt + 2 * f * one * snt * turn, 0.0))
 
     def row_norms(self) -> NDArray[np.float64]:
         """Norms by which the rows of relaxation.RowKind are measured, in the order of their numbers kind * p + node."""

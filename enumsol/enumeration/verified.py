@@ -179,7 +179,7 @@ def _margins(system: EnclosedSystem) -> Callable[[Codes, NDArray[np.intp], Array
     try:
         from enumsol.enumeration._margin import Margins
     except ImportError:
-        return partial(exclusion_margin, system)
+        return partial(exclusion_margin, system, errors=2.0)
     return Margins(system).margin
 
 

@@ -3,13 +3,29 @@
 from fractions import Fraction
 
 import numpy as np
+import pandas as pd
 import pytest
 from generators import integer_problem
 
 import enumsol
-from enumsol import ContactProblem, enumerate_roots, fem, gallery, verify
+from enumsol import (
+    ContactProblem,
+    ContinuationOptions,
+    audit,
+    branch_graph,
+    enumerate_roots,
+    fem,
+    follow,
+    gallery,
+    newton,
+    verify,
+)
 from enumsol.certification import enclosure
+from enumsol.certification.kernel import exclusion_margin
+from enumsol.continuation import NotConverged, start_tangents
 from enumsol.enumeration import exact_selections
+from enumsol.enumeration.workbench import Workbench
+from enumsol.selections import PiecewiseSmoothEquation
 
 
 def check(problem, alpha, *, exact=True, roots=None):
@@ -181,3 +197,204 @@ def test_nothing_can_be_proven_about_a_body_on_the_verge(monkeypatch):
     report = verify(problem, found.proof)
     assert report.ok
     assert report.undecided == 1
+
+
+# -- regressions found by studies/extremes.py --------------------------------------------------------------------------
+
+
+def rescaled(problem, stiffness=1.0, load=1.0):
+    """The problem in other units of stiffness and load."""
+    gap, offset = (load / stiffness * part for part in (problem.gap, problem.slip_offset))
+    A, f = stiffness * problem.A, load * problem.f
+    return ContactProblem(A, problem.Bn, problem.Bt, f, gap, problem.friction, None, offset)
+
+
+def test_values_of_a_root_lie_within_their_enclosure():
+    # S and g in floats are less accurate than their enclosure: a node that is open by 7e-23 must not penetrate
+    found = check(gallery.one_node_triangle((1.0 + 1e-16, -2.0)), 3.0)
+    problems = [gallery.two_node_square(gap_free, (1.0, -1.0)) for gap_free in ((1.0, -3.0), (1e-9, -3.0))]
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        base = integer_problem(rng, 3)
+        problems.append(rescaled(base, *(10.0 ** rng.uniform(-12, 12, 2))))
+    for problem in problems:
+        for root in (*enumerate_roots(problem, 1.0), *found):
+            for name in ("lambda_n", "lambda_t", "u_n", "u_t"):
+                bounds, value = getattr(root.enclosure, name), getattr(root, name)
+                assert np.all((bounds[:, 0] <= value) & (value <= bounds[:, 1]))
+            assert np.all(root.u_n <= 0) or not root.regular
+
+
+def test_the_unloaded_root_has_an_enclosure():
+    (root,) = enumerate_roots(gallery.clamped_block(3, 2, traction=(0.0, 0.0)), 1.0)
+    assert not np.any(root.enclosure.lambda_n)
+    assert not np.any(root.enclosure.u_t)
+
+
+@pytest.mark.parametrize("load", [1e-250, 1e-200])
+def test_a_tiny_load_needs_no_rationals(load):
+    # the radius of a load slope that is zero must not be that of the load's underflow
+    found = enumerate_roots(rescaled(gallery.wedge(2, 3), load=load), 1.0)
+    assert found.complete
+    assert len(found) == 3
+    assert found.stats.escalations.rationals == 0
+
+
+@pytest.mark.parametrize("f", [(5e-324, 1.0e-323), (1e-300, 1e-305)])
+def test_loads_next_to_underflow_are_refused(f):
+    # units beyond 2^-900 were written into a proof that the checker then refused
+    with pytest.raises(enumsol.InvalidProblemError, match="other units"):
+        enumerate_roots(gallery.one_node_triangle(f), 1.0)
+
+
+@pytest.mark.parametrize("arithmetic", ["fast", "verified", "exact"])
+def test_huge_friction(arithmetic):
+    for F in (1e20, 1e99):
+        problem = ContactProblem(np.eye(2), [[1.0, 0.0]], [[0.0, 1.0]], [1.0, 0.5], friction=F)
+        assert len(enumerate_roots(problem, 0.0, arithmetic)) == 1
+    with pytest.raises(enumsol.InvalidProblemError, match="friction coefficient is 1e"):
+        enumerate_roots(
+            ContactProblem(np.eye(2), [[1.0, 0.0]], [[0.0, 1.0]], [1.0, 0.5], friction=1e200), 0.0, arithmetic
+        )
+
+
+def test_a_compliance_that_is_definite_by_accident_is_refused():
+    # its Cholesky factorization succeeds, that of twice the same matrix does not
+    rng = np.random.default_rng(3)
+    for exponent in (4, 6, 8):
+        rows, X, f = rng.normal(size=(4, 6)), rng.normal(size=(6, 8)), rng.normal(size=6)
+        rows[1] = rows[0] + 10.0**-exponent * rows[1]
+        rows[3] = rows[2] + 10.0**-exponent * rows[3]
+    with pytest.raises(enumsol.InvalidProblemError, match="independent beyond rounding"):
+        enumerate_roots(ContactProblem(X @ X.T, rows[:2], rows[2:], f, friction=1.0), 0.0, "fast")
+
+
+def test_the_checker_finds_better_bounds_than_the_search():
+    # a body almost free to move: an approximate inverse of S has a small residual on one of its sides only
+    problem = gallery.wedge(2, 2, springs=(1e-8, 1e-8))
+    margins = pytest.importorskip("enumsol.enumeration._margin").Margins
+    bench = Workbench(problem, 1.0, "verified", 1e-9)
+    system, rng = bench.enclosed, np.random.default_rng(1)
+    search = margins(system)
+    p, compared = problem.p, 0
+    for _ in range(200):
+        # rows -w_n >= 0 of all nodes and cones, with the multipliers of any size that no exclusion would have
+        rows = np.concatenate([2 * p + np.arange(p), 3 * p + np.arange(p), 4 * p + np.arange(p)])
+        values = 10.0 ** rng.uniform(-3, 3, len(rows))
+        bounds = search.margin((6,) * p, rows, values), exclusion_margin(system, (6,) * p, rows, values)
+        compared += np.isfinite(bounds[0])
+        assert bounds[1] >= bounds[0]
+    assert compared
+    assert verify(problem, enumerate_roots(problem, 1.0, max_nodes=400).proof).ok
+
+
+def test_large_bodies_are_certified_as_given():
+    # ||L|| ||U|| in the Frobenius norm grows with n; sums of rows and columns of |L| |U| do not
+    problem = gallery.clamped_block(60, 60, contact=4)
+    assert enclosure._factor_error(problem.A) < 1e-11
+    found = enumerate_roots(problem, 1.0)
+    assert found.complete
+    assert found.certified_data == "problem"
+
+
+R = (1e-12, 1e-6, 1e6, 1e12)
+
+
+@pytest.mark.parametrize("r", R)
+def test_solutions_do_not_depend_on_r(r):
+    for name in ("one-node-6.1", "two-node-6.4", "wedge-8-3", "clamped-block-8"):
+        entry = gallery.get(name)
+        problem = entry.build()
+        roots = enumerate_roots(problem, entry.alpha)
+        largest = max(float(np.max(root.lambda_n)) for root in roots)
+        for root in roots:
+            assert newton(problem, entry.alpha, root, r=r).statuses == root.statuses
+        for start in (None, np.full(2 * problem.p, 0.3 * largest)):
+            try:
+                found = newton(problem, entry.alpha, start, r=r)
+            except NotConverged:
+                continue
+            # at r = 1e-12 any point with lambda_n > 0 passed for a root
+            assert found.regular
+            assert any(np.allclose(found.lambda_n, root.lambda_n, atol=1e-8 * largest) for root in roots)
+
+
+@pytest.mark.parametrize("r", R)
+def test_paths_do_not_depend_on_r(r):
+    problem = gallery.get("two-node-6.4").build()
+    graph = branch_graph(problem, (0.0, 10.0))
+    for start in graph.starting_points():
+        path = follow(problem, start, 1, (0.0, 10.0), ContinuationOptions(r=r))
+        usual = follow(problem, start, 1, (0.0, 10.0))
+        assert audit(path, graph).ok
+        assert path.status == usual.status
+        assert [t.alpha for t in path.transitions] == pytest.approx([t.alpha for t in usual.transitions])
+
+
+@pytest.mark.parametrize("r", [1e-12, 1e12])
+def test_projections_keep_the_slip_bound(r):
+    problem = gallery.one_node_triangle()
+    root = next(root for root in enumerate_roots(problem, 5.0) if root.statuses[0].value == "slip-")
+    x = np.concatenate([root.u, root.lambda_n, root.lambda_t])
+    tangential = PiecewiseSmoothEquation(problem, r).residual(x, 5.0)[-1]
+    assert abs(tangential) <= 1e-15 * np.max(np.abs(root.lambda_t))
+
+
+def test_paths_with_huge_friction_and_tiny_loads():
+    problem = gallery.two_node_square()
+    for high in (1e6, 1e13):
+        graph = branch_graph(problem, (0.0, high))
+        for start in graph.starting_points():
+            # the gradient of a regular selection is not singular because F is large
+            assert len(start_tangents(problem, start, (0.0, high))) == 2
+    small = rescaled(problem, load=1e-200)
+    graph = branch_graph(small, (0.0, 10.0))
+    for start in graph.starting_points():
+        for direction in (1, -1):
+            assert audit(follow(small, start, direction, (0.0, 10.0)), graph).ok
+
+
+def test_an_interval_below_the_resolution_is_refused():
+    problem = gallery.two_node_square()
+    interval = (3.0 - 1e-9, 3.0 + 1e-9)
+    graph = branch_graph(problem, interval)
+    assert graph.complete
+    start = graph.starting_points()[0]
+    with pytest.raises(enumsol.InvalidArgumentError, match="branch_graph works without rounding"):
+        follow(problem, start, 1, interval)
+
+
+def test_audit_on_arcs_of_a_few_floats():
+    # the difference quotient along an arc between neighbouring floats was 0 / 0
+    problem = gallery.two_node_square()
+    graph = branch_graph(problem, (3.0 - 1e-15, 3.0 + 1e-15))
+    arc = graph.arcs[0]
+    lambda_n, lambda_t = arc.values(arc.lo)
+    frame = {"alpha": [arc.lo] * 2}
+    for i in range(2):
+        frame[f"lambda_n_{i}"] = [lambda_n[i] + 0.1] * 2
+        frame[f"lambda_t_{i}"] = [lambda_t[i]] * 2
+    assert len(audit(pd.DataFrame(frame), graph).off) == 2
+
+
+def test_graphs_of_contact_rows_that_are_almost_dependent():
+    # proven and accepted by the checker, or refused with a sentence: not a LinAlgError, nor a proof that fails
+    outcomes = set()
+    for seed in range(6):
+        for exponent in (6, 8, 9):
+            rng = np.random.default_rng(seed)
+            rows, X = rng.normal(size=(4, 6)), rng.normal(size=(6, 8))
+            rows[[1, 3]] = rows[[0, 2]] + 10.0**-exponent * rows[[1, 3]]
+            f, slope = rng.normal(size=(2, 6))
+            problem = ContactProblem(X @ X.T, rows[:2], rows[2:], f, friction=1.0, load_slope=slope)
+            try:
+                graph = branch_graph(problem, (0.0, 3.0))
+            except enumsol.InvalidProblemError as error:
+                outcomes.add("refused" if "independent beyond rounding" in str(error) else str(error))
+                continue
+            outcomes.add(graph.complete)
+            assert graph.uniqueness_bound is None or graph.uniqueness_bound >= 0.0
+            assert graph.proof is None or verify(problem, graph.proof).ok
+            exact = enumerate_roots(problem, Fraction(3, 2), "exact", method="exhaustive")
+            assert not graph.complete or graph.multiplicity_at(1.5) == len(exact) + len(exact.families)
+    assert outcomes == {"refused", True}
