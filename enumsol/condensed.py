@@ -84,10 +84,12 @@ class Factorization:
             copy.indptr = np.zeros_like(copy.indptr)
         return np.asarray(pivots)
 
-    def solve(self, rhs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A^{-1} rhs for rhs of shape (n,) or (n, k), with one step of iterative refinement."""
+    def solve(self, rhs: NDArray[np.float64], *, refined: bool = True) -> NDArray[np.float64]:
+        """A^{-1} rhs for rhs of shape (n,) or (n, k), by default with one step of iterative refinement."""
         d = self._scale if rhs.ndim == 1 else self._scale[:, None]
         x = d * self._lu.solve(d * rhs)
+        if not refined:
+            return np.asarray(x)
         residual = rhs - self._A @ x
         return np.asarray(x + d * self._lu.solve(d * residual))
 

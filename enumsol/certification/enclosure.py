@@ -253,7 +253,9 @@ class CondensedEnclosure:
             )
         X = np.empty(K.shape)
         for part in _column_blocks(K):
-            X[:, part] = problem.factorization.solve(K[:, part].toarray() / scale[:, None]) / scale[:, None]
+            # not refined: the products below correct X by its residual
+            columns = problem.factorization.solve(K[:, part].toarray() / scale[:, None], refined=False)
+            X[:, part] = columns / scale[:, None]
         mid, rad = _products(A, B, K, X, bound)
         S, S_rad = mid[:, : 2 * p], rad[:, : 2 * p]
         # the exact S is symmetric and lies in both triangles' balls
@@ -322,7 +324,7 @@ def _smallest_eigenvalue(problem: ContactProblem, scale: Array) -> float:
     value = 1.0
     for _ in range(4):
         vector /= np.linalg.norm(vector)
-        image = problem.factorization.solve(vector / scale) / scale
+        image = problem.factorization.solve(vector / scale, refined=False) / scale
         value = 1.0 / float(np.linalg.norm(image))
         vector = image
     return value
