@@ -19,7 +19,7 @@ import numpy as np
 from enumsol.certification.enclosure import SAFE, CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.certification.format import FRICTIONLESS, UNDECIDED, children_of, row_signs
 from enumsol.certification.graph_checker import GraphChecker, GraphVerificationReport
-from enumsol.certification.kernel import contradicts, exclusion_margins, solve_selection
+from enumsol.certification.kernel import exclusion_margins, holds_no_root, solve_selection
 from enumsol.certification.proof import Proof, fraction_from, unpacked
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.problem import ContactProblem
@@ -311,7 +311,7 @@ class Checker:
     def _solved(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         ball = solve_selection(self.system, codes)
         if record[0] == "n":
-            if (ball is not None and ball.is_excluded) or contradicts(self.system, codes):
+            if holds_no_root(self.system, codes, ball):
                 return None
             return "its candidate does not break a condition strictly, nor do its equations contradict each other"
         if ball is None:

@@ -1,6 +1,6 @@
 """The trusted kernel: exclusion inequalities and verified selection solves on an EnclosedSystem (theory, section 6).
 
-Everything that makes the word "complete" true for a regular problem passes through the three functions of this module,
+Everything that makes the word "complete" true for a regular problem passes through the functions of this module,
 in the search and in the checker alike. Codes and row kinds are plain integers with the meaning documented in
 ``enumsol.certification.format``.
 """
@@ -184,6 +184,14 @@ def solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSel
     """The verified solution of a complete selection, or None when its matrix is not proven regular."""
     with np.errstate(over="ignore", invalid="ignore"):
         return _solve_selection(system, codes)
+
+
+def holds_no_root(system: EnclosedSystem, codes: Sequence[int], ball: VerifiedSelection | None) -> bool:
+    """Whether a complete selection is proven to hold no root; ``ball`` is its verified solution, if it has one.
+
+    The one criterion of the search, which writes such a leaf, and of the checker, which reads it.
+    """
+    return (ball is not None and ball.is_excluded) or contradicts(system, codes)
 
 
 def contradicts(system: EnclosedSystem, codes: Sequence[int]) -> bool:

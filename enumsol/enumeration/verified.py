@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.certification.format import FREE, NONNEGATIVE, row_signs
-from enumsol.certification.kernel import VerifiedSelection, contradicts, exclusion_margin, solve_selection
+from enumsol.certification.kernel import VerifiedSelection, exclusion_margin, holds_no_root, solve_selection
 from enumsol.certification.proof import fraction_text, packed
 from enumsol.enumeration.solutions import SelectionSolution
 from enumsol.enumeration.tree import Open
@@ -133,9 +133,7 @@ class VerifiedJudge:
         if ball is not None and ball.is_root:
             self.escalations.balls += 1
             return self._regular(codes, ball)
-        if (ball is not None and ball.is_excluded) or (
-            self._enclosed is not None and contradicts(self._enclosed, codes)
-        ):
+        if self._enclosed is not None and holds_no_root(self._enclosed, codes, ball):
             self.escalations.balls += 1
             self._leaf("n")
             return None
