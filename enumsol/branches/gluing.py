@@ -172,28 +172,32 @@ class Gluing:
         """Decide a selection's singular events: which have solutions, and the polytopes they form."""
         arcs = self.arcs[codes]
         for event in arcs.events:
-            if not (event.singular and event.holds):
+            if not (event.singular and event.holds) or self._solve(codes, event):
                 continue
-            solver = self._fiber(event.alpha)
-            try:
-                solution = solver.solve(codes)
-            except VertexLimitError as error:
-                self.reasons.append(f"alpha = {float(event.alpha):.17g}: {error}")
-                continue
-            if solution is not None:
-                self._solutions[id(event)] = (solver, solution)
-            elif arcs.beside(event):
+            if arcs.beside(event):
                 self._complain(f"an arc of selection {codes} has no limit at alpha = {float(event.alpha):.17g}")
             else:
                 event.holds = False
         if arcs.empty:
             del self.arcs[codes]
 
+    def _solve(self, codes: Codes, event: Any) -> bool:
+        """Find the polytope of a selection at a singular event; False when it holds nothing there."""
+        solver = self._fiber(event.alpha)
+        try:
+            solution = solver.solve(codes)
+        except VertexLimitError as error:
+            self._complain(f"alpha = {float(event.alpha):.17g}: {error}")
+            return True
+        if solution is not None:
+            self._solutions[id(event)] = (solver, solution)
+        return solution is not None
+
     # -- gluing ----------------------------------------------------------------------------------------------------
 
     def _glue(self) -> None:
-        self._waiting = [(codes, event) for codes, arcs in self.arcs.items() for event in arcs.events if event.holds]
         waiting = self._waiting
+        waiting += [(codes, event) for codes, arcs in self.arcs.items() for event in arcs.events if event.holds]
         origin = self.path.origin
         if origin is not None and self.a <= origin <= self.b:
             waiting += self._place_everywhere(CriticalAlpha.rational(origin))
@@ -217,7 +221,8 @@ class Gluing:
                     if new:
                         waiting.append((other, theirs))
                         theirs.singular = partner.functions.singular
-                        self._solve_new(other, theirs)
+                        if theirs.singular:
+                            self._solve(other, theirs)
                     self._union.join(id(event), id(theirs))
         self._join_polytopes()
 
@@ -235,13 +240,6 @@ class Gluing:
 
     def _everything(self) -> ActiveSets:
         return tuple(frozenset((0, 4)) if without else frozenset(range(4)) for without in self.path.frictionless)
-
-    def _solve_new(self, codes: Codes, event: Any) -> None:
-        if event.singular:
-            solver = self._fiber(event.alpha)
-            solution = solver.solve(codes)
-            if solution is not None:
-                self._solutions[id(event)] = (solver, solution)
 
     def _active_at(self, codes: Codes, event: Any) -> list[ActiveSets]:
         """Active sets of the selection's solution at an event: one, or one for every vertex of its polytope."""
