@@ -123,3 +123,10 @@ def _integer_trial(rng, p):
     w[p:] += np.where(codes == 0, rng.integers(-1, 2, size=p), 0)
     eye = np.eye(2 * p)
     return ContactProblem(A, eye[:p], eye[p:], A @ w + np.concatenate([n, t]), friction=(F, 0.0))
+
+
+def through_the_unloaded_state():
+    """One node whose load vanishes inside the interval, with that interval."""
+    triangle = gallery.one_node_triangle()
+    load = {"load_slope": [1.5, -4.0], "friction": 3.0}
+    return ContactProblem(triangle.A, triangle.Bn, triangle.Bt, [0.0, 0.0], **load), (-1.0, 2.0)

@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from generators import through_the_unloaded_state
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from oracles import exact_solutions
@@ -14,12 +15,6 @@ from enumsol import ContactProblem, branch_graph, gallery, verify
 
 QUICK = settings(max_examples=120, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 SAMPLES = 25
-
-
-def through_the_unloaded_state():
-    triangle = gallery.one_node_triangle()
-    load = {"load_slope": [1.5, -4.0], "friction": 3.0}
-    return ContactProblem(triangle.A, triangle.Bn, triangle.Bt, [0.0, 0.0], **load), (-1.0, 2.0)
 
 
 def two_loads():

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from generators import through_the_unloaded_state
 from proof_tools import multipliers, proof_of, records_of, with_multipliers
 
 from enumsol import branch_graph, enumerate_roots, gallery, verify
@@ -22,12 +23,6 @@ def friction_path():
 def cut_path():
     """A wedge whose interval is searched in several pieces, about S and g as computed."""
     return gallery.get("wedge-8-5").build(), (0.0, 5.0)
-
-
-def through_the_unloaded_state():
-    triangle = gallery.one_node_triangle()
-    load = {"load_slope": [1.5, -4.0], "friction": 3.0}
-    return ContactProblem(triangle.A, triangle.Bn, triangle.Bt, [0.0, 0.0], **load), (-1.0, 2.0)
 
 
 def varying_load_and_friction():
