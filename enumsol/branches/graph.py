@@ -13,9 +13,9 @@ import numpy as np
 from enumsol.branches.algebraic import CriticalAlpha
 from enumsol.branches.assembly import make_branches, make_components, multigraph
 from enumsol.branches.fiber_roots import roots_of
+from enumsol.checks import alpha_value
 from enumsol.enumeration.exact_selections import rational
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import finite_alpha
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from enumsol.branches.parts import Arc, Branch, Component, Vertex
     from enumsol.branches.path import ExactPath
     from enumsol.certification.proof import Proof
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.checks import AlphaLike
+    from enumsol.problem import ContactProblem
     from enumsol.results import Root, RootFamily, RootSet
 
 
@@ -190,10 +191,9 @@ class BranchGraph:
 
     # -- solutions at one alpha ------------------------------------------------------------------------------------
 
-    def _located(self, alpha: Alpha) -> tuple[list[Arc], list[Vertex]]:
+    def _located(self, alpha: AlphaLike) -> tuple[list[Arc], list[Vertex]]:
         """Arcs over an alpha and vertices at it, decided exactly."""
-        finite_alpha(alpha)
-        value = Fraction(alpha)
+        value = Fraction(alpha_value(alpha))
         if not self.exact_interval[0] <= value <= self.exact_interval[1]:
             raise InvalidArgumentError(
                 f"alpha is {float(value):.17g}; expected a value in the graph's interval "
@@ -204,11 +204,11 @@ class BranchGraph:
         arcs = [arc for arc in self.arcs if order[arc.tail] < 0 < order[arc.head]]
         return arcs, [v for v, o in zip(self.vertices, order, strict=True) if o == 0]
 
-    def arcs_at(self, alpha: Alpha) -> tuple[Arc, ...]:
+    def arcs_at(self, alpha: AlphaLike) -> tuple[Arc, ...]:
         """Arcs and sheets that pass over an alpha inside the interval (vertices at it do not count)."""
         return tuple(self._located(alpha)[0])
 
-    def roots_at(self, alpha: Alpha) -> RootSet:
+    def roots_at(self, alpha: AlphaLike) -> RootSet:
         """All solutions at one alpha, as enumerate_roots returns them.
 
         Raises
@@ -218,9 +218,9 @@ class BranchGraph:
         """
         arcs, vertices = self._located(alpha)
         codes = {c for arc in arcs for c in arc.selections} | {c for v in vertices for c in v.selections}
-        return roots_of(self, alpha, sorted(codes))
+        return roots_of(self, alpha_value(alpha), sorted(codes))
 
-    def multiplicity_at(self, alpha: Alpha) -> int:
+    def multiplicity_at(self, alpha: AlphaLike) -> int:
         """Number of isolated roots and of families at one alpha, together.
 
         Raises

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.checks import one_of, positive_integer
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.selections import ContactStatus
 
@@ -78,8 +79,8 @@ def plot_graph(
     MissingDependencyError
         matplotlib is not installed.
     """
-    if quantity not in QUANTITIES:
-        raise InvalidArgumentError(f"quantity is {quantity!r}; expected one of {', '.join(QUANTITIES)}")
+    one_of(quantity, "quantity", QUANTITIES)
+    samples = positive_integer(samples, "samples", 2)
     figure_class, canvas = _matplotlib()
     curves = {arc.number: _curve(arc, quantity, samples) for arc in graph.arcs if not arc.dimension}
     chosen = _nodes(graph, nodes, curves)

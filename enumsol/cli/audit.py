@@ -108,8 +108,8 @@ def _interval(frame: pd.DataFrame, first: str | None, last: str | None) -> tuple
         return parse_interval(first, last)
     if "alpha" not in frame.columns or not _is_number(frame["alpha"]):
         raise InvalidArgumentError("POINTS has no column 'alpha' of numbers; expected one, or --from and --to")
-    low = float(frame["alpha"].min()) if first is None else parse_alpha(first)
-    high = float(frame["alpha"].max()) if last is None else parse_alpha(last)
+    low = float(frame["alpha"].min()) if first is None else parse_alpha(first, "--from")
+    high = float(frame["alpha"].max()) if last is None else parse_alpha(last, "--to")
     if not low < high:
         raise InvalidArgumentError(
             f"alpha goes from {float(low):g} to {float(high):g}; expected an interval, by --from and --to"

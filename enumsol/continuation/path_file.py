@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.checks import file_path
 from enumsol.continuation.local_test import LocalBranchTest
 from enumsol.continuation.options import ContinuationOptions
 from enumsol.continuation.path import ARRAYS, Path, PathStats, Transition
@@ -37,14 +37,14 @@ def save_path(path: Path, file: str | os.PathLike[str]) -> None:
         "names": [[status.value for status in point.statuses] for point in path],
     }
     arrays = {name: getattr(path, name) for name in ARRAYS}
-    with FilePath(file).open("wb") as stream:
+    with file_path(file, "path").open("wb") as stream:
         np.savez_compressed(stream, allow_pickle=False, meta=np.array(json.dumps(meta)), **arrays)
 
 
 def load_path(file: str | os.PathLike[str]) -> Path:
     """Read a path; see Path.load."""
     try:
-        with np.load(FilePath(file), allow_pickle=False) as data:
+        with np.load(file_path(file, "path"), allow_pickle=False) as data:
             meta = json.loads(str(data["meta"]))
             arrays = {name: data[name] for name in ARRAYS}
     except (KeyError, ValueError, TypeError) as error:
