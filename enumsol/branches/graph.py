@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,9 +17,10 @@ from enumsol.branches.fiber_roots import roots_of
 from enumsol.checks import alpha_value
 from enumsol.enumeration.exact_selections import rational
 from enumsol.errors import InvalidArgumentError
+from enumsol.sealed import Immutable
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     import pandas as pd
@@ -55,7 +57,7 @@ class GraphStats:
     seconds: float = 0.0
 
 
-class BranchGraph:
+class BranchGraph(Immutable):
     """All solutions over an interval of alpha: arcs of single selections, glued at vertices (made by ``branch_graph``).
 
     Attributes
@@ -105,6 +107,7 @@ class BranchGraph:
         self.graph = multigraph(self.vertices, self.arcs)
         self.search_reasons = tuple(reasons)
         self.reasons = (*reasons, *self._imbalances())
+        self._freeze()
 
     def _imbalances(self) -> list[str]:
         """Violations of the balance of degrees (theory, section 7); each proves that something is missing."""
@@ -145,9 +148,9 @@ class BranchGraph:
         return make_branches(self.components, self.vertices)
 
     @cached_property
-    def branch_of(self) -> dict[int, int]:
+    def branch_of(self) -> Mapping[int, int]:
         """Number of the branch of every arc, by the arc's number."""
-        return {arc.number: branch.number for branch in self.branches for arc in branch.arcs}
+        return MappingProxyType({arc.number: branch.number for branch in self.branches for arc in branch.arcs})
 
     def _of_kind(self, *kinds: str) -> tuple[Vertex, ...]:
         return tuple(v for v in self.vertices if v.kind in kinds)

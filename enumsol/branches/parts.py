@@ -165,7 +165,7 @@ class Arc:
         g = self._path.at(rational(alpha_value(alpha)))[0]
         w = [
             a - sum((s * v for s, v in zip(row, point, strict=True)), rational(0))
-            for a, row in zip(g, self._path.S.tolist(), strict=True)
+            for a, row in zip(g, self._path.rows, strict=True)
         ]
         moves = np.array([float(Fraction(int(v.p), int(v.q))) for v in w])
         return moves[: self._path.p], moves[self._path.p :]

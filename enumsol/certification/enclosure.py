@@ -275,7 +275,7 @@ class CondensedEnclosure(Sealed):
 
     def at(self, alpha: AlphaLike, force: Array, length: Array) -> EnclosedSystem:
         """The enclosed system at one alpha, in units given by powers of two (see enumsol.condensed.ScaledSystem)."""
-        a = Fraction(alpha_value(alpha))
+        a = alpha if isinstance(alpha, Fraction) else Fraction(alpha_value(alpha))
         F0, F1 = self.problem.friction
         exact = [Fraction(float(x)) + a * Fraction(float(y)) for x, y in zip(F0, F1, strict=True)]
         try:
