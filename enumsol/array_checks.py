@@ -57,7 +57,7 @@ def real_array(
     raw = plain_array(value, name, error=error)
     if not hasattr(value, "dtype") and raw.dtype.kind == "f" and np.any(np.abs(raw) >= _EXACT_INTEGERS):
         # numpy has rounded the integers of lists and frames that hold floats as well
-        raw = np.asarray(value, dtype=object)
+        raw = np.asarray(value.astype(object) if hasattr(value, "astype") else value, dtype=object)
     if raw.dtype.kind not in "fiubO":
         raise _no_numbers(name, _KINDS.get(raw.dtype.kind, f"type {raw.dtype}"), error)
     if raw.dtype.kind == "b" and raw.ndim == 0:
@@ -84,6 +84,8 @@ def plain_array(value: Any, name: str, *, error: type[EnumsolError]) -> NDArray[
     try:
         if sp.issparse(value):
             raise _no_numbers(name, f"a sparse {type(value).__name__}", error)
+        if isinstance(value, (bytes, bytearray)):  # text, whose bytes numpy would take for numbers
+            raise _no_numbers(name, type(value).__name__, error)
         if _has_masked(value):
             raise _no_numbers(name, "masked values", error)
         raw = np.asarray(value)
@@ -229,13 +231,11 @@ def _check_sums(
     entries: NDArray[np.float64], row: NDArray[Any], column: NDArray[Any], name: str, error: type[EnumsolError]
 ) -> None:
     """Refuse integers at one place whose sum float64 may have rounded."""
-    sizes = sp.csc_array((np.abs(entries), (row, column)))
-    sizes.sum_duplicates()
-    k = int(np.argmax(sizes.data))
-    if sizes.data[k] > _EXACT_INTEGERS:
-        raise error(
-            f"{name} has integers at index {_place(sizes, k)} that add up to more than 2^53; expected float64 values"
-        )
+    sizes, counts = (sp.csc_array((part, (row, column))) for part in (np.abs(entries), np.ones(len(row))))
+    large = (sizes.data >= _EXACT_INTEGERS) & (counts.data > 1)
+    if np.any(large):
+        where = _place(sizes, int(np.argmax(large)))
+        raise error(f"{name} has integers at index {where} that add up to 2^53 or more; expected float64 values")
 
 
 def vector_2d(value: Any, name: str) -> NDArray[np.float64]:

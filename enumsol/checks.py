@@ -4,7 +4,7 @@ Everything that takes alpha reads it here, in Python and on the command line, so
 
 - a real number of any type (int, float, Fraction, Decimal, NumPy scalar, array without dimensions) is the exact number
   that it is: ``numpy.float32(0.1)`` is that float32, an integer above 2^53 is not rounded;
-- a text is a fraction such as ``"8/3"``, taken exactly, or a decimal number, read as float64;
+- a text is an integer or a fraction such as ``"8/3"``, taken exactly, or a decimal number, read as float64;
 - bool, complex, nan, infinities, and what float64 can only round to zero or to infinity are refused.
 
 Every refusal is one sentence: which argument, what was found, what was expected.
@@ -17,6 +17,7 @@ import numbers
 import operator
 import os
 import re
+from contextlib import contextmanager
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -28,7 +29,7 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Iterator
 
     from numpy.typing import NDArray
 
@@ -41,7 +42,7 @@ MAX_BITS = 4096
 #: Most characters of a text: enough for every fraction within MAX_BITS.
 MAX_TEXT = 2600
 _DECIMAL = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-_FRACTION = re.compile(r"([+-]?\d+)\s*/\s*(\d+)", re.ASCII)
+_FRACTION = re.compile(r"([+-]?\d+)(?:\s*/\s*(\d+))?", re.ASCII)
 _EXPECTED = "expected a finite real number such as 2.5 or a fraction such as 8/3"
 _RANGE = "expected a finite real number in the range of float64: 0, or 5e-324 to 1.8e308 in size"
 _SHOWN = 60
@@ -90,7 +91,7 @@ def shown(value: object) -> str:
 
 
 def alpha_value(value: Any, name: str = "alpha") -> Alpha:
-    """The exact value of alpha: a float where it is one, otherwise a Fraction.
+    """The exact value of alpha: a float where it is one, otherwise (and for fractions that were given) a Fraction.
 
     Parameters
     ----------
@@ -118,7 +119,8 @@ def alpha_value(value: Any, name: str = "alpha") -> Alpha:
         )
     if not _in_range(number):
         raise InvalidArgumentError(f"{name} is {shown(value)}; {_RANGE}")
-    return number if isinstance(value, (Fraction, str)) or Fraction(float(number)) != number else float(number)
+    kept = isinstance(value, Fraction) or (isinstance(value, str) and "/" in value)
+    return number if kept or Fraction(float(number)) != number else float(number)
 
 
 def _in_range(number: Fraction) -> bool:
@@ -170,7 +172,7 @@ def _from_text(text: str, name: str) -> float | Fraction | None:
     stripped = text.strip() if len(text) <= MAX_TEXT else ""
     fraction = _FRACTION.fullmatch(stripped)
     if fraction is not None:
-        denominator = int(fraction[2])
+        denominator = int(fraction[2] or 1)
         return Fraction(int(fraction[1]), denominator) if denominator else None
     if _DECIMAL.fullmatch(stripped) is None:
         return None
@@ -248,17 +250,19 @@ def _pair(value: Any, name: str) -> list[Any]:
 # -- counts and numbers ----------------------------------------------------------------------------------------------
 
 
-def positive_integer(value: Any, name: str, least: int = 1) -> int:
-    """Value as an int of at least ``least``.
+def positive_integer(value: Any, name: str, least: int = 1, most: int | None = None) -> int:
+    """Value as an int of at least ``least`` and, where that is given, at most ``most``.
 
     Raises
     ------
     InvalidArgumentError
-        The value is not an integer, or is smaller.
+        The value is not an integer, or not within these bounds.
     """
     number = _integer(value)
     if number is None or number < least:
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected an integer of at least {least}")
+    if most is not None and number > most:
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected an integer of at most {most}")
     return number
 
 
@@ -323,7 +327,7 @@ def share(value: Any, name: str = "tolerance") -> float:
 
 
 def finite_number(value: Any, name: str) -> float:
-    """Value as a finite float, rounded if need be.
+    """Value as a finite float, which it is exactly.
 
     Raises
     ------
@@ -333,6 +337,8 @@ def finite_number(value: Any, name: str) -> float:
     number = _real(value)
     if not math.isfinite(number):
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number")
+    if number != exact_number(value):
+        raise InvalidArgumentError(f"{name} is {shown(value)}, which float64 would round; expected a finite number")
     return number
 
 
@@ -466,6 +472,26 @@ def file_path(value: Any, name: str, expected: str = "the name of a file") -> Pa
         text = None
     if not isinstance(text, str):
         raise InvalidArgumentError(f"{name} is a {type(value).__name__}; expected {expected}")
+    if not text:
+        raise InvalidArgumentError(f"{name} is an empty text; expected {expected}")
     if "\0" in text:
         raise InvalidArgumentError(f"{name} is {shown(text)}, with a null character in it; expected {expected}")
     return Path(text)
+
+
+@contextmanager
+def writing(place: Path, name: str) -> Iterator[None]:
+    """Turn what the operating system says against writing a file into an error of ours.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file cannot be written.
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or error
+        raise InvalidArgumentError(
+            f"{name} {place} cannot be written ({reason}); expected a path for a new file"
+        ) from error

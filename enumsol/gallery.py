@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     Friction = float | tuple[ArrayLike, ArrayLike]
 
 Pair = tuple[float, float]
+#: Most triangles of a chain.
+_MOST_TRIANGLES = 1_000_000
 
 
 def one_node_triangle(f: Pair = (1.5, -4.0), lame: Pair = (1.0, 1.0)) -> ContactProblem:
@@ -173,7 +175,7 @@ def clamped_block(
     cells = len(mesh.bottom) - 1
     count = cells if contact is None else positive_integer(contact, "contact")
     if cells % count:
-        raise InvalidArgumentError(f"contact is {count}; expected a divisor of nx = {cells}")
+        raise InvalidArgumentError(f"contact is {shown(count)}; expected a divisor of nx = {cells}")
     return fem.contact_problem(
         mesh.points,
         mesh.triangles,
@@ -274,7 +276,7 @@ def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.
     Parameters
     ----------
     p : int
-        Number of triangles, at least 1.
+        Number of triangles, 1 to a million.
     coupling : float
         Stiffness of each connecting spring, at least 0 [force / length].
     f : (float, float)
@@ -287,7 +289,7 @@ def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.
     InvalidArgumentError
         An argument is not of the stated form.
     """
-    count = positive_integer(p, "p")
+    count = positive_integer(p, "p", most=_MOST_TRIANGLES)
     spring = nonnegative_number(coupling, "coupling")
     # the graph Laplacian of the row: a spring pulls on both of its ends
     link = np.arange(count - 1)

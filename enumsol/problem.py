@@ -199,11 +199,11 @@ class ContactProblem(Immutable):
 
     def is_unloaded(self, alpha: AlphaLike) -> bool:
         """Whether load, gap and slip offset are exactly zero at alpha: then only lambda = 0, w = 0 solves."""
+        a = Fraction(alpha_value(alpha))
         if np.any(self.gap) or np.any(self.slip_offset):
             return False
         if self.load_slope is None:
             return not np.any(self.f)
-        a = Fraction(alpha_value(alpha))
         pairs = zip(self.f.tolist(), self.load_slope.tolist(), strict=True)
         return all(Fraction(x) + a * Fraction(y) == 0 for x, y in pairs)
 

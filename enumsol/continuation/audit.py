@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.checks import nonnegative_number
 from enumsol.continuation.path import Path
 from enumsol.continuation.places import GraphLike, GraphMap, Place
 from enumsol.errors import InvalidArgumentError
@@ -199,7 +200,7 @@ def audit(
     InvalidArgumentError
         A column is missing, or the points do not fit the graph's problem.
     """
-    return audit_on(GraphMap(graph, tolerance), path, detour)
+    return audit_on(GraphMap(graph, tolerance), path, nonnegative_number(detour, "detour"))
 
 
 def audit_on(chart: GraphMap, path: Any, detour: float) -> AuditReport:

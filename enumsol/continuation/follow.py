@@ -89,8 +89,8 @@ def follow(
     """
     direction = direction_value(direction)
     setup = _Setup(problem, start, interval, options, smooth_path)
-    if not isinstance(visited, Sequence) or not all(isinstance(path, Path) for path in visited):
-        raise InvalidArgumentError(f"visited is {shown(visited)}; expected a sequence of Path")
+    if not isinstance(visited, (list, tuple)) or not all(isinstance(path, Path) for path in visited):
+        raise InvalidArgumentError(f"visited is {shown(visited)}; expected a list of Path")
     chosen = _choose(setup, direction, tangent)
     first = CurvePoint(setup.x, chosen.codes, chosen.vector)
     sign = chosen.orientation or direction
@@ -179,7 +179,8 @@ class _Setup:
     def _on_solution(self, alpha: float, forces: Vector) -> Vector:
         equation = self.equation
         x = equation.point(alpha, forces)
-        residual = float(np.linalg.norm(equation.residual(x)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            residual = float(np.linalg.norm(equation.residual(x)))
         if not residual <= START_TOLERANCE:
             raise InvalidArgumentError(
                 f"start is not a root at alpha = {alpha:g}: the residual of H is {residual:.2e} relative to the load; "

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checks import alpha_interval, instance_of, optional_callable
+from enumsol.checks import alpha_interval, instance_of, optional_callable, positive_integer, shown
 from enumsol.continuation.audit import DETOUR, POINT_TOLERANCE, AuditReport, audit_on
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follow import follow, start_tangents
 from enumsol.continuation.path import Path, PathStats
-from enumsol.continuation.places import GraphMap
+from enumsol.continuation.places import GraphMap, checked_graph
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.problem import ContactProblem
 
@@ -109,6 +109,7 @@ def follow_all(
         from enumsol.branches import branch_graph  # python-flint and networkx, slow to import
 
         graph = branch_graph(problem, ends)
+    checked_graph(graph)
     if graph.problem is not problem and graph.problem.p != problem.p:
         raise InvalidArgumentError(f"graph has {graph.problem.p} contact nodes; expected the problem's {problem.p}")
     crew = _Crew(problem, (float(ends[0]), float(ends[1])), options, graph, progress)
@@ -209,10 +210,15 @@ def follow_arc(
     InvalidArgumentError
         The arc does not end at the vertex, or is a sheet.
     """
+    instance_of(problem, ContactProblem, "problem")
+    checked_graph(graph)
+    vertex, arc = positive_integer(vertex, "vertex", 0), positive_integer(arc, "arc", 0)
     chosen = next((item for item in graph.arcs if item.number == arc), None)
     point = next((item for item in graph.vertices if item.number == vertex), None)
     if chosen is None or point is None or vertex not in (chosen.tail, chosen.head) or chosen.dimension:
-        raise InvalidArgumentError(f"arc {arc} is not an arc of single roots that ends at vertex {vertex} of the graph")
+        raise InvalidArgumentError(
+            f"arc {shown(arc)} is not an arc of single roots that ends at vertex {shown(vertex)} of the graph"
+        )
     span: Any = interval if interval is not None else (float(graph.interval[0]), float(graph.interval[1]))
     sign = 1 if vertex == chosen.tail else -1
     if point.family is None:

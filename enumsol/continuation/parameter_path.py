@@ -132,7 +132,20 @@ class CallablePath:
         self._smooth = smooth
         self._affine = AffinePath(problem)
         self._start = alpha
+        self._check_start(alpha)
         self._check_derivatives(alpha)
+
+    def _check_start(self, alpha: float) -> None:
+        """Refuse friction and load that are no such thing where the path starts."""
+        values = self.at(alpha)
+        if not (np.all(np.isfinite(values.F)) and np.all(values.F >= 0)):
+            node = int(np.argmin(np.isfinite(values.F) & (values.F >= 0)))
+            raise InvalidArgumentError(
+                f"SmoothPath.F gives {values.F[node]:g} for contact node {self.problem.node_ids[node]} at "
+                f"alpha = {alpha:g}; expected F >= 0"
+            )
+        if not np.all(np.isfinite(values.g)):
+            raise InvalidArgumentError(f"SmoothPath.f is not finite at alpha = {alpha:g}; expected a load")
 
     @cached_property
     def _influence(self) -> NDArray[np.float64]:

@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from enumsol.checks import nonnegative_number, shown
 from enumsol.continuation.equation import CondensedEquation
 from enumsol.continuation.follow import ALPHA_FRACTION
 from enumsol.continuation.parameter_path import AffinePath
+from enumsol.errors import InvalidArgumentError
+from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -20,7 +23,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.continuation.equation import Vector
-    from enumsol.problem import ContactProblem
     from enumsol.selections import ContactStatus
 
 #: Points at which the length of an arc is measured.
@@ -73,6 +75,22 @@ class GraphLike(Protocol):
         """Regular roots, one or more on every branch."""
 
 
+def checked_graph(graph: Any) -> GraphLike:
+    """The argument ``graph``, which is a branch graph.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is something else.
+    """
+    parts = ("interval", "arcs", "vertices", "branches", "starting_points")
+    problem = getattr(graph, "problem", None)
+    if not isinstance(problem, ContactProblem) or not all(hasattr(graph, name) for name in parts):
+        raise InvalidArgumentError(f"graph is {shown(graph)}; expected a BranchGraph")
+    found: GraphLike = graph
+    return found
+
+
 @dataclass(frozen=True)
 class Place:
     """Where a point lies.
@@ -102,7 +120,7 @@ class GraphMap:
     """
 
     def __init__(self, graph: GraphLike, tolerance: float) -> None:
-        self.graph, self.tolerance = graph, tolerance
+        self.graph, self.tolerance = checked_graph(graph), nonnegative_number(tolerance, "tolerance")
         low, high = (float(end) for end in graph.interval)
         scale = ALPHA_FRACTION * (high - low)
         self.equation = CondensedEquation(AffinePath(graph.problem), (low, high), low, alpha_scale=scale)

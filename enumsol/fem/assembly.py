@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+#: Areas are computed of coordinates up to this.
+LARGEST_COORDINATE = 1e150
+
 
 def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]) -> sp.csc_array:
     """Stiffness of the unconstrained body in plane strain, (2N, 2N), assembled by scikit-fem.
@@ -274,6 +277,11 @@ def _points(points: ArrayLike) -> NDArray[np.float64]:
     nodes = real_array(points, "points", error=InvalidArgumentError)
     if nodes.ndim != 2 or nodes.shape[1] != 2:
         raise InvalidArgumentError(f"points has shape {nodes.shape}; expected (N, 2)")
+    size = float(np.max(np.abs(nodes), initial=0.0))
+    if size > LARGEST_COORDINATE:
+        raise InvalidArgumentError(
+            f"points has the coordinate {size:g}, whose square overflows; expected at most {LARGEST_COORDINATE:g}"
+        )
     return nodes
 
 

@@ -30,9 +30,12 @@ with warnings.catch_warnings(record=True) as caught:
     warnings.simplefilter("always")
     assert len(enumsol.enumerate_roots(problem, 5.0, "fast")) == 3
 print(*(str(item.message) for item in caught), sep="\\n")
-for call in (lambda: enumsol.branch_graph(problem, (0, 1)), lambda: enumsol.enumerate_roots(problem, 1, engine="active-set")):
+for call, argument, options in (
+    (enumsol.branch_graph, (0, 1), {}),
+    (enumsol.enumerate_roots, 1, {"engine": "active-set"}),
+):
     try:
-        call()
+        call(problem, argument, **options)
     except enumsol.MissingDependencyError as error:
         print(error)
 """
