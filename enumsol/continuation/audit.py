@@ -14,6 +14,7 @@ from enumsol.continuation.path import Path
 from enumsol.continuation.places import GraphLike, GraphMap, Place
 from enumsol.errors import InvalidArgumentError
 from enumsol.results import summary
+from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -79,7 +80,7 @@ class MissedArc:
 
 
 @dataclass(frozen=True)
-class AuditReport:
+class AuditReport(Sealed):
     """Result of an audit.
 
     Attributes
