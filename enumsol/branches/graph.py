@@ -1,4 +1,4 @@
-"""BranchGraph: all solutions over an interval of alpha, and the questions it answers (theory, section 7)."""
+"""BranchGraph: all solutions over an interval of alpha, and the questions it answers (theory, section 7.11)."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class BranchGraph:
         self.reasons = (*reasons, *self._imbalances())
 
     def _imbalances(self) -> list[str]:
-        """Violations of the balance of degrees (theory, section 7); each proves that something is missing."""
+        """Violations of the balance of degrees (theory, (7.3)); each proves that something is missing."""
         found = []
         for v in self.vertices:
             if v.index_left is None or v.index_right is None:
@@ -267,7 +267,7 @@ class BranchGraph:
 
     @property
     def uniqueness_bound(self) -> float | None:
-        """An alpha up to which uniqueness follows without any search (theory, section 5); None when for no alpha.
+        """An alpha up to which uniqueness follows without any search (theory, section 5.6); None when for no alpha.
 
         F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node; evaluated in floats.
         """
