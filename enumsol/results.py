@@ -63,7 +63,7 @@ class Root:
     u_n, u_t : (p,) arrays
         Bn u - gap <= 0 and Bt u - slip_offset [length].
     index : int or None
-        Local degree (theory, section 6): sign det of the selection at a regular root. It says nothing about physical
+        Local degree (theory, section 6.7): sign det of the selection at a regular root. It says nothing about physical
         stability. None when it could not be found within the limits of the local analysis.
     regular : bool
         Exactly one status holds at every node, strictly, and the selection is not singular.
@@ -105,7 +105,7 @@ class Root:
         return self._condensed.displacement(self.alpha, np.concatenate([self.lambda_n, self.lambda_t]))
 
     def local_branch_test(self) -> LocalBranchTest:
-        """Whether a local Lipschitz branch of solutions passes through the root (Section 4, Theorem 4.1).
+        """Whether a local Lipschitz branch of solutions passes through the root (theory, section 3.2).
 
         Its ``exists`` is True when the determinants of all selections that hold at the root have one and the same
         sign; ``differing`` names those that break this. A regular root always has such a branch. ``premise`` tells

@@ -15,7 +15,7 @@ FOLLOW = ("follow", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--start", 
 
 @pytest.fixture
 def points(capsys, tmp_path):
-    """All branches of Example 6.1, followed."""
+    """All branches of the paper's Example 6.1, followed."""
     file = tmp_path / "points.csv"
     assert run(capsys, *FOLLOW, "--csv", file)[0] == 0
     return file

@@ -1,4 +1,4 @@
-"""Vertices, arcs, components and branches in the user's terms, made from a gluing (theory, section 7)."""
+"""Vertices, arcs, components and branches in the user's terms, made from a gluing (theory, section 7.11)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ends of arcs glued into vertices by the statuses that hold there, never by distance (theory, section 7).
+"""Ends of arcs glued into vertices by the statuses that hold there, never by distance (theory, section 7.6).
 
 Two selections share a point at a critical alpha when both hold there, which the signs at one of them decide exactly.
 Isolated points need only their selection's own functions; where a selection is singular its polytope of solutions is

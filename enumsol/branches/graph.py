@@ -1,4 +1,4 @@
-"""BranchGraph: all solutions over an interval of alpha, and the questions it answers (theory, section 7)."""
+"""BranchGraph: all solutions over an interval of alpha, and the questions it answers (theory, section 7.11)."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class BranchGraph:
         self.reasons = (*reasons, *self._gaps())
 
     def _gaps(self) -> list[str]:
-        """Violations of the balance of degrees, and vertices that are not settled (theory, section 7).
+        """Violations of the balance of degrees, and vertices that are not settled (theory, (7.3)).
 
         Each of them proves that something is missing.
         """
@@ -313,7 +313,7 @@ class BranchGraph:
 
     @property
     def uniqueness_bound(self) -> float | None:
-        """An alpha up to which uniqueness follows without any search (theory, section 5); None when for no alpha.
+        """An alpha up to which uniqueness follows without any search (theory, section 5.6); None when for no alpha.
 
         F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node; evaluated in floats.
         """

@@ -1,4 +1,4 @@
-"""What a branch graph is made of: vertices, arcs, components and branches (theory, section 7)."""
+"""What a branch graph is made of: vertices, arcs, components and branches (theory, section 7.11)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""multiplicity_table: the roots at many alphas, counted (theory, sections 2 and 6)."""
+"""multiplicity_table: the roots at many alphas, counted (theory, section 7.12)."""
 
 from __future__ import annotations
 

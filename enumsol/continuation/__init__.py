@@ -1,4 +1,4 @@
-"""Piecewise smooth Newton and Moore-Penrose continuation (Algorithm 5.1), the local branch test and audits."""
+"""Piecewise smooth Newton and Moore-Penrose continuation (paper, Algorithm 5.1), the local branch test and audits."""
 
 from enumsol.continuation.audit import AuditReport, Jump, MissedArc, audit
 from enumsol.continuation.errors import AmbiguousStart, NewtonIteration, NotConverged

@@ -64,7 +64,7 @@ def enumerate_roots(
         tolerance, never claimed to be complete. "exact": the data are read as exact rationals and everything is
         decided without rounding (small problems).
     method : {"tree", "exhaustive"}
-        "tree": pruned search (theory, section 5). "exhaustive": all 4^p selections, the oracle for small p.
+        "tree": pruned search (theory, section 5.4). "exhaustive": all 4^p selections, the oracle for small p.
     executor : concurrent.futures.Executor, optional
         Runs subtrees in parallel (method "tree").
     progress : callable, optional

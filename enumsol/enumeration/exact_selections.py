@@ -1,4 +1,4 @@
-"""Selections solved in rational arithmetic: the given data read as exact rationals (theory, section 6)."""
+"""Selections solved in rational arithmetic: the given data read as exact rationals (theory, section 6.5)."""
 
 from __future__ import annotations
 

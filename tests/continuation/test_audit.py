@@ -46,7 +46,7 @@ class Branch:
 
 @dataclass
 class Graph:
-    """Example 6.1 in closed form, sharing nothing with the package but the problem."""
+    """The paper's Example 6.1 in closed form, sharing nothing with the package but the problem."""
 
     problem: object
     interval: tuple = (0.0, 20.0)
