@@ -1,4 +1,4 @@
-"""What a branch graph may claim: the one place that knows how far its statements reach (theory, section 7).
+"""What a branch graph may claim: the one place that knows how far its statements reach (theory, section 7.13).
 
 Arcs and settled vertices of any graph are solutions, whatever cut the search short: each arc is one of regular roots,
 and no two of them meet between their ends. So a graph that is not complete gives lower bounds. A number of solutions,

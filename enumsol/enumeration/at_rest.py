@@ -1,4 +1,4 @@
-"""The unloaded body, g = 0: it rests, lambda = 0 and w = 0, and nothing else solves (theory, section 5)."""
+"""The unloaded body, g = 0: it rests, lambda = 0 and w = 0, and nothing else solves (theory, section 5.1)."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class AtRest:
         return True
 
     def departure(self, solution: SelectionSolution, direction: NDArray[np.int64]) -> int | None:
-        """None: the degree follows from the theory and not from single selections."""
+        """None: the degree is that of all roots together, and not one of single selections."""
         del solution, direction
         return None
 
