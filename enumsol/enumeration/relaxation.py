@@ -147,6 +147,7 @@ class ActiveSetEngine:
     """Own dual active-set method, warm-started from the parent (compiled; see ``_active_set.pyx``)."""
 
     name = "active-set"
+    module = "enumsol.enumeration._active_set"
 
     def __init__(self, system: ScaledSystem) -> None:
         from enumsol.enumeration import _active_set  # compiled; its absence is handled by make_engine
