@@ -24,7 +24,7 @@ REPEATS = 5
 
 
 def bounds(system):
-    """Intervals of lambda and w over the ellipsoid e(lambda) <= 0 of theory, section 5."""
+    """Intervals of lambda and w over the ellipsoid e(lambda) <= 0 of theory, (5.3)."""
     centre = 0.5 * np.linalg.solve(system.S, system.g)
     radius = np.sqrt(system.g @ centre * 0.5)
     reach = radius * np.sqrt(np.diagonal(np.linalg.inv(system.S)))

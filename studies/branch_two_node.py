@@ -1,4 +1,4 @@
-"""What do two contact nodes show? Exact branch graphs of the gallery's square under the loads of Examples 6.4-6.7.
+"""What do two contact nodes show? Exact branch graphs of the gallery's square, loads of the paper's Examples 6.4-6.7.
 
 The geometry is our own (the paper's coordinates were never published), so that the paper's printed facts describe what
 such problems can show; the last column says which of them this geometry shows. Figures: results/branch_two_node_*.png.

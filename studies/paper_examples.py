@@ -1,9 +1,9 @@
-"""Do the paper's examples come out? Examples 6.1-6.3 against their closed forms, 6.4-6.7 on a geometry of our own.
+"""Do the paper's examples come out? The paper's Examples 6.1-6.3 against closed forms, 6.4-6.7 on our own geometry.
 
 Three tables. The first compares the exact branch graphs of the one-node examples with every printed fact, and 6.3' (a
 perturbed 6.3) with its closed form; a fact that fails stops the script. The second applies the loads of 6.4-6.7 to
 `gallery.two_node_square`: the paper's coordinates were never published, so that its printed numbers are not to be
-expected here; they stand beside ours. The third follows every branch of every graph by Algorithm 5.1 with the paper's
+expected here; they stand beside ours. The third follows all branches of all graphs by the paper's Algorithm 5.1 and its
 settings, from each of its ends: every transition must be passed in both directions, and the audit must miss nothing.
 
 Figures: results/paper_6.1.png .. paper_6.7-plus.png, with the adaptive steps as dots.
@@ -53,7 +53,7 @@ def paper_options(h_max):
     return ContinuationOptions(h_max=h_max, alpha_scale=1.0)
 
 
-# -- Examples 6.1-6.3: printed facts -----------------------------------------------------------------------------------
+# -- paper, Examples 6.1-6.3: printed facts ---------------------------------------------------------------------------
 
 
 class Facts:
@@ -141,7 +141,7 @@ def example_3(facts, name, graph, f):
     facts.curve(name, "branch 2, stick, lambda_n = 1", lambda a: 1.0, arc_of(graph, STICK, 5.0), (2.0, 20.0))
 
 
-# -- Examples 6.4-6.7: own geometry ------------------------------------------------------------------------------------
+# -- paper, Examples 6.4-6.7: own geometry ----------------------------------------------------------------------------
 
 
 def own_row(example, graph):

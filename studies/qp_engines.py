@@ -3,7 +3,7 @@
 The tree is searched once with the own method. Its partial assignments, in the order in which they are met, are then
 given to the others, so that all see the same sequence: the own method starts from the parent's optimum, daqp both from
 scratch and warm (one workspace, only bounds and the active set change), clarabel from scratch. An infeasible node is
-"proven" when the multipliers that come back give a positive lower bound on the energy (theory, section 6).
+"proven" when the multipliers that come back give a positive lower bound on the energy (theory, (6.1)).
 
 Run: python studies/qp_engines.py [largest p]
 """

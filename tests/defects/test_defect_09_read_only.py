@@ -244,9 +244,7 @@ def results():
     }
 
 
-@pytest.mark.parametrize(
-    "name", ["roots", "exact", "family", "vertices", "components", "path", "point", "tangents", "audit"]
-)
+@pytest.mark.parametrize("name", ["roots", "exact", "family", "vertices", "components", "path", "point", "tangents"])
 def test_no_array_of_a_result_can_be_written(results, name):
     found = dict(reachable(results[name], name))
     assert found
