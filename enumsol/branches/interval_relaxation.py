@@ -21,13 +21,13 @@ import numpy as np
 from enumsol.condensed import CondensedSystem, ScaledSystem
 from enumsol.enumeration.relaxation import (
     BRANCHING_CANDIDATES,
+    COMPILED,
     CONTACT,
     EQUALITY,
     FEASIBILITY_TOLERANCE,
     INEQUALITY,
     PRUNE_MARGIN,
     UNDECIDED,
-    ActiveSetEngine,
     RowKind,
     row_terms,
     status_rows,
@@ -159,7 +159,7 @@ class IntervalEngine:
 
             raise MissingDependencyError(
                 "branch_graph needs the compiled active-set solver, which is not available: "
-                f"{why_missing(ActiveSetEngine.module, error)}"
+                f"{why_missing(COMPILED, error)}"
             ) from error
         p = system.p
         self.size = 2 * p

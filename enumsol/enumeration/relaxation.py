@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from enumsol.enumeration._active_set import QPState
     from enumsol.enumeration.solutions import Codes
 
+#: The compiled module of the active-set method.
+COMPILED = "enumsol.enumeration._active_set"
 #: Codes of nodes whose status is not final yet; final codes are those of enumsol.selections.
 CONTACT, UNDECIDED = 5, 6
 #: Largest violation of a row (rows of unit length in the norm of S^{-1}) that the QP takes for none.
@@ -147,7 +149,6 @@ class ActiveSetEngine:
     """Own dual active-set method, warm-started from the parent (compiled; see ``_active_set.pyx``)."""
 
     name = "active-set"
-    module = "enumsol.enumeration._active_set"
 
     def __init__(self, system: ScaledSystem) -> None:
         from enumsol.enumeration import _active_set  # compiled; its absence is handled by make_engine

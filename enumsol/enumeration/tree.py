@@ -19,7 +19,15 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from enumsol.enumeration.fallback import InteriorPointEngine
-from enumsol.enumeration.relaxation import CONTACT, UNDECIDED, ActiveSetEngine, Engine, Relaxation, status_rows
+from enumsol.enumeration.relaxation import (
+    COMPILED,
+    CONTACT,
+    UNDECIDED,
+    ActiveSetEngine,
+    Engine,
+    Relaxation,
+    status_rows,
+)
 from enumsol.enumeration.solutions import Codes, SelectionSolution
 from enumsol.errors import MissingDependencyError
 from enumsol.selections import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
@@ -141,7 +149,7 @@ def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
     except ImportError as error:
         from enumsol.compiled import why_missing  # seldom needed
 
-        missing = f"the compiled active-set solver is not available: {why_missing(ActiveSetEngine.module, error)}"
+        missing = f"the compiled active-set solver is not available: {why_missing(COMPILED, error)}"
         if name is not None:
             raise MissingDependencyError(missing) from error
         warnings.warn(f"{missing}; the much slower interior-point solver is used", RuntimeWarning, stacklevel=2)

@@ -169,7 +169,10 @@ def test_friction_that_vanishes_at_a_fraction():
 
 
 def test_friction_that_underflows_is_refused():
+    problem = gallery.two_node_square(friction=(0.0, 1e-200))
     with pytest.raises(enumsol.InvalidArgumentError, match="too small for float64"):
+        enumerate_roots(problem, 1e-200)
+    with pytest.raises(enumsol.InvalidArgumentError, match="in the range of float64"):
         enumerate_roots(gallery.one_node_triangle(), Fraction(1, 10**400))
 
 
