@@ -1,106 +1,100 @@
 """What does a proof cost? Verified against fast and exact arithmetic, and the checker against the search.
 
-Gallery blocks and wedges. Every figure is the least of some runs on a fresh problem, by process time, so that the
-condensed problem, its enclosure and the proof are made within the clock; the problem's own factorization is not. Exact
-arithmetic is tried where the body has at most 250 degrees of freedom and given up after a minute. The wedge at p = 64
-is left out: its tree takes tens of minutes.
+Blocks and wedges of the gallery. Every figure is the least of some runs on a fresh problem, by process time: making the
+condensed problem, its enclosure and the proof is inside the clock, factorizing A is not. Exact arithmetic is tried
+where the body has few enough degrees of freedom, and given up after a minute. The wedge at p = 64 is left out: its tree
+takes tens of minutes.
 
-Run: python studies/certification_cost.py [largest p]
+Read ``verified / fast``: what certainty costs; and ``check / verified``: what it costs to check the proof.
 """
 
 from __future__ import annotations
 
-import sys
-import time
 from functools import partial
+from typing import TYPE_CHECKING
 
-from _output import report
+from shared.clock import least_time, timed
+from shared.loads import PRESSED, block, oblique_wedge, straight_wedge
+from shared.results import yes
 
 import enumsol
-from enumsol import gallery
 from enumsol.enumeration.exact_selections import EXACT_DOF_LIMIT
 
+if TYPE_CHECKING:
+    from shared.results import Run
+
 EXACT_SECONDS = 60.0
-#: Searches shorter than this are repeated.
-SHORT = 2.0
+#: Searches longer than this are not repeated.
+ENOUGH = 2.0
 RUNS = 5
 #: A safeguard; no search here comes that far.
 MAX_NODES = 30_000
+#: Drags the block towards its clamp, which makes the search longer.
+TOWARDS_CLAMP = (-0.3, -1.0)
 
 
-def problems(largest):
-    """(name, builder, alpha)."""
-    for p in (14, 32, 64):
-        if p > largest:
-            return
-        for traction in ((0.3, -1.0), (-0.3, -1.0)):
-            name = f"block {p} ({traction[0]:g}, {traction[1]:g})"
-            yield p, name, lambda p=p, t=traction: gallery.clamped_block(p, p // 2, traction=t), 3.0
-        if p < 64:  # the wedge's tree at p = 64 takes tens of minutes
-            yield p, f"wedge {p} straight", lambda p=p: gallery.wedge(4, p // 2), 1.0
-            yield p, f"wedge {p} oblique", lambda p=p: gallery.wedge(4, p // 2, (4e-4, 1e-3)), 2.2
+def problems(smoke):
+    """Loaded bodies."""
+    for p in (8,) if smoke else (14, 32, 64):
+        yield block(p, PRESSED, 3.0)
+        yield block(p, TOWARDS_CLAMP, 3.0)
+        if p < 64:
+            yield straight_wedge(p)
+            yield oblique_wedge(p)
 
 
-def timed(build, action, *arguments):
-    """Least process time of some runs, and the last answer; the problem is made outside the clock."""
-    best, runs = float("inf"), 0
-    while runs < RUNS:
-        prepared = build()
-        start = time.process_time()
-        answer = action(prepared, *arguments)
-        best = min(best, time.process_time() - start)
-        runs = RUNS if best > SHORT else runs + 1
-    return best, answer
+def exact_seconds(problem, alpha, expected):
+    """Process time of exact arithmetic, None where it is too slow."""
+    if problem.n > EXACT_DOF_LIMIT:
+        return None
+    action = partial(enumsol.enumerate_roots, problem, alpha, "exact", time_limit=EXACT_SECONDS)
+    roots, seconds = timed(action)
+    if not roots.complete:
+        return None
+    assert len(roots) == expected
+    return seconds
 
 
-def run(largest):
-    for p, name, build, alpha in problems(largest):
-        fast, found = timed(build, partial(enumsol.enumerate_roots, max_nodes=MAX_NODES), alpha, "fast")
-        verified, roots = timed(build, partial(enumsol.enumerate_roots, max_nodes=MAX_NODES), alpha)
-        check, verdict = timed(build, enumsol.verify, roots.proof)
-        exact = None
-        problem = build()
-        if problem.n <= EXACT_DOF_LIMIT:
-            start = time.process_time()
-            rational = enumsol.enumerate_roots(problem, alpha, "exact", time_limit=EXACT_SECONDS)
-            if rational.complete:
-                exact = time.process_time() - start
-                assert len(rational) == len(roots)
-        assert verdict.ok
-        assert len(found) == len(roots)
-        counts = roots.stats.escalations
-        yield {
-            "problem": name,
-            "p": p,
-            "n": problem.n,
-            "roots": len(roots),
-            "nodes": roots.stats.nodes,
-            "complete": "yes" if roots.complete and verdict.complete else "no",
-            "fast s": fast,
-            "verified s": verified,
-            "exact s": "-" if exact is None else exact,
-            "verified / fast": verified / fast,
-            "check s": check,
-            "check / verified": check / verified,
-            "proof kB": roots.proof.size / 1000,
-            "by balls": counts.balls,
-            "by rationals": counts.rationals,
-            "refined": counts.refined,
-            "undecided": counts.undecided,
-        }
+def row(loaded, runs):
+    """One problem."""
+    build, alpha = loaded.build, loaded.alpha
+    least = partial(least_time, build, runs=runs, enough=ENOUGH)
+    found, fast = least(lambda problem: enumsol.enumerate_roots(problem, alpha, "fast", max_nodes=MAX_NODES))
+    roots, verified = least(lambda problem: enumsol.enumerate_roots(problem, alpha, max_nodes=MAX_NODES))
+    verdict, check = least(lambda problem: enumsol.verify(problem, roots.proof))
+    assert verdict.ok
+    assert len(found) == len(roots)
+    problem = build()
+    exact = exact_seconds(problem, alpha, len(roots))
+    counts = roots.stats.escalations
+    return {
+        "problem": loaded.name,
+        "p": problem.p,
+        "n": problem.n,
+        "roots": len(roots),
+        "nodes": roots.stats.nodes,
+        "complete": yes(roots.complete and verdict.complete),
+        "fast s": fast,
+        "verified s": verified,
+        "exact s": "-" if exact is None else exact,
+        "verified / fast": verified / fast,
+        "check s": check,
+        "check / verified": check / verified,
+        "proof kB": roots.proof.size / 1000,
+        "by balls": counts.balls,
+        "by rationals": counts.rationals,
+        "refined": counts.refined,
+        "undecided": counts.undecided,
+    }
 
 
-def main():
-    rows = list(run(int(sys.argv[1]) if len(sys.argv) > 1 else 64))
+def main(run: Run) -> None:
+    rows = [row(loaded, 1 if run.smoke else RUNS) for loaded in problems(run.smoke)]
     worst = max(row["verified / fast"] for row in rows if row["p"] <= 32)
     slowest = max(row["check / verified"] for row in rows)
-    report(
+    run.table(
         "certification_cost",
         rows,
-        f"verified over fast at p = 14 and 32: at most {worst:.2f}",
+        f"verified over fast for p <= 32: at most {worst:.2f}",
         f"check over search: at most {slowest:.2f}",
     )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,9 +1,10 @@
-"""What does condensation cost? A body with 200,000 degrees of freedom and 40 contact nodes.
+"""What does condensation cost for a body with 200,000 degrees of freedom and 40 contact nodes?
 
-Time and memory of the sparse factorization and of S = B A^-1 B'. numpy's arrays are seen by tracemalloc, SuperLU's
-factors by the peak resident size of the process. A dense n x n matrix would show at once: it has 320 GB.
+Time and memory of the sparse factorization of A and of S = B A^-1 B'. tracemalloc sees numpy's arrays; the factors
+show in the peak resident size of the process.
 
-Run: python studies/condensation.py
+Read ``condense / solve``, which should be near the 81 right-hand sides, and the memory beside that of one dense n x n
+matrix.
 """
 
 from __future__ import annotations
@@ -11,37 +12,42 @@ from __future__ import annotations
 import resource
 import time
 import tracemalloc
+from typing import TYPE_CHECKING
 
 import numpy as np
-from _output import report
 
 import enumsol
 from enumsol import gallery
 
-CELLS = ((40, 40), (80, 80), (160, 160), (320, 312))
+if TYPE_CHECKING:
+    from shared.results import Run
+
+CELLS, SMOKE_CELLS = ((40, 40), (80, 80), (160, 160), (320, 312)), ((40, 40),)
 CONTACT = 40
 GIGA = 2.0**30
 
 
-def peak() -> float:
+def peak():
     """Peak resident size of this process in GB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / GIGA
 
 
-def run(nx, ny):
+def clocked(action):
+    """What an action returns, and its wall time."""
     start = time.perf_counter()
-    problem = gallery.clamped_block(nx, ny, contact=CONTACT)
-    built = time.perf_counter() - start
+    answer = action()
+    return answer, time.perf_counter() - start
+
+
+def row(nx, ny):
+    """One body."""
+    problem, built = clocked(lambda: gallery.clamped_block(nx, ny, contact=CONTACT))
     before = peak()
     tracemalloc.start()
-    start = time.perf_counter()
-    condensed = problem.condensed
-    seconds = time.perf_counter() - start
+    condensed, seconds = clocked(lambda: problem.condensed)
     arrays = tracemalloc.get_traced_memory()[1] / GIGA
     tracemalloc.stop()
-    start = time.perf_counter()
-    problem.factorization.solve(problem.f)
-    solve = time.perf_counter() - start
+    _, solve = clocked(lambda: problem.factorization.solve(problem.f))
     roots = enumsol.enumerate_roots(problem, 1.0, "fast")
     return {
         "n": problem.n,
@@ -62,10 +68,10 @@ def run(nx, ny):
     }
 
 
-def main() -> None:
-    rows = [run(*cells) for cells in CELLS]
+def main(run: Run) -> None:
+    rows = [row(*cells) for cells in (SMOKE_CELLS if run.smoke else CELLS)]
     last = rows[-1]
-    report(
+    run.table(
         "condensation",
         rows,
         f"Conclusion: n = {last['n']}, p = {last['p']}: {last['build and factorize s']:.1f} s to build and factorize, "
@@ -73,7 +79,3 @@ def main() -> None:
         f"right-hand sides), arrays of {last['arrays GB']:.2f} GB, process {last['process GB']:.2f} GB, "
         f"where one dense n x n matrix has {last['dense n x n GB']:.0f} GB.",
     )
-
-
-if __name__ == "__main__":
-    main()

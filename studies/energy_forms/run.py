@@ -1,4 +1,4 @@
-"""Another convex form than the energy, for small friction and many slipping nodes: does it prune better?.
+"""Does another convex form than the energy prune better, for small friction and many slipping nodes?
 
 At a solution lambda_n w_n = 0 and lambda_t w_t >= 0 node by node, and F^2 lambda_n^2 - lambda_t^2 >= 0. So for any
 weights theta_i in [0, 1] and tau_i >= 0
@@ -7,25 +7,29 @@ weights theta_i in [0, 1] and tau_i >= 0
 
 is at most zero there. The energy is theta = 1, tau = 0. With theta = 0 slip work does not slacken the bound, but the
 form need not be convex: the study goes from the energy towards theta = 0, tau = kappa (S_tt)_ii as far as it stays so.
+
+Read the nodes of the tree with the energy beside those for each kappa; ``share`` tells how far from the energy the form
+could go (1: all the way). A cut search has a dash.
 """
 
 from __future__ import annotations
 
-import csv
-from pathlib import Path
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
+from shared.loads import DRAGGED, PRESSED, STRAIGHT
+from shared.searches import search
 
 from enumsol import gallery
-from enumsol.enumeration import _active_set
-from enumsol.enumeration.float_selections import FloatSelections
-from enumsol.enumeration.judges import FastJudge
-from enumsol.enumeration.relaxation import ActiveSetEngine, row_terms
-from enumsol.enumeration.tree import SearchLimits, TreeSearch
+from enumsol.enumeration.relaxation import ActiveSetEngine
 
-RESULTS = Path(__file__).parent / "results"
-TRACTIONS = ((0.3, -1.0), (1.0, -0.3), (0.0, -1.0))
-FRICTION = (0.1, 0.3, 0.5, 1.0)
+if TYPE_CHECKING:
+    from shared.results import Run
+
+#: Cells along the bottom and upwards, and length of the blocks.
+BLOCKS, SMOKE_BLOCKS = ((16, 8, 1.0), (32, 8, 2.0), (64, 16, 2.0)), ((8, 4, 1.0),)
+FRICTION, SMOKE_FRICTION = (0.1, 0.3, 0.5, 1.0), (0.3,)
 KAPPA = (0.02, 0.1, 0.5)
 MAX_NODES = 20_000
 #: The form must keep this share of the energy, so that the QP stays well conditioned.
@@ -33,7 +37,7 @@ FLOOR = 0.02
 
 
 def weighted_form(system, kappa):
-    """Hessian and linear term of the form nearest to theta = 0 that is convex, and how far it got (1: all the way)."""
+    """The form nearest to theta = 0 that is convex, as (H, h), and how far it got (1: all the way)."""
     p, S = system.p, system.S
     weight = np.concatenate([np.ones(p), np.zeros(p)])
     target = weight[:, None] * S
@@ -42,44 +46,39 @@ def weighted_form(system, kappa):
     inverse = np.linalg.inv(system.cholesky)
     lowest = float(np.linalg.eigvalsh(inverse @ (target - S) @ inverse.T)[0])
     share = 1.0 if 1.0 + lowest >= FLOOR else (1.0 - FLOOR) / -lowest
-    return S + share * (target - S), system.g * (1.0 + share * (weight - 1.0)), share
+    return (S + share * (target - S), system.g * (1.0 + share * (weight - 1.0))), share
 
 
-def nodes(system, form=None):
-    """Nodes of the tree with the energy, or with another form."""
-    search = TreeSearch(system, FastJudge(FloatSelections(system)), limits=SearchLimits(max_nodes=MAX_NODES))
-    if form is not None:
-        engine = ActiveSetEngine(system)
-        start, index, value = row_terms(system.p, system.F)
-        rhs = np.zeros(len(start) - 1)
-        engine._data = _active_set.QPData(*form, -system.S, system.g, start, index, value, rhs)
-        search.engine = engine
-    outcome = search.run()
-    return outcome.nodes if outcome.stopped is None else None
+def nodes(problem, F, form=None):
+    """Nodes of the tree with the energy, or with another form; a dash when the search was cut."""
+    outcome = search(problem, F, partial(ActiveSetEngine, form=form), max_nodes=MAX_NODES)
+    return outcome.nodes if outcome.stopped is None else "-"
 
 
-def main():
+def row(problem, F):
+    """One problem: nodes with the energy and with every kappa."""
+    found = {"F": F, "energy": nodes(problem, F)}
+    for kappa in KAPPA:
+        form, share = weighted_form(problem.condensed.at(F).scaled, kappa)
+        found |= {f"kappa {kappa}": nodes(problem, F, form), f"share {kappa}": round(share, 2)}
+    return found
+
+
+def main(run: Run) -> None:
     rows = []
-    for p, ny, length in ((16, 8, 1.0), (32, 8, 2.0), (64, 16, 2.0)):
-        for traction in TRACTIONS:
+    for p, ny, length in SMOKE_BLOCKS if run.smoke else BLOCKS:
+        for traction in (PRESSED, DRAGGED, STRAIGHT):
             problem = gallery.clamped_block(p, ny, length=length, traction=traction)
-            for F in FRICTION:
-                system = problem.condensed.at(F).scaled
-                row = {"p": p, "length": length, "traction": str(traction), "F": F, "energy": nodes(system)}
-                for kappa in KAPPA:
-                    H, h, share = weighted_form(system, kappa)
-                    row[f"kappa {kappa}"] = nodes(system, (H, h))
-                    row[f"share {kappa}"] = round(share, 2)
-                rows.append(row)
-                print("  ".join(f"{k} {'>' + str(MAX_NODES) if v is None else v}" for k, v in row.items()), flush=True)
-    RESULTS.mkdir(exist_ok=True)
-    with (RESULTS / "energy_forms.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0])
-        writer.writeheader()
-        writer.writerows(rows)
-    better = sum((r["kappa 0.1"] or MAX_NODES) < (r["energy"] or MAX_NODES) for r in rows)
-    print(f"kappa = 0.1 needs fewer nodes than the energy in {better} of {len(rows)} cases; the energy stays")
+            for F in SMOKE_FRICTION if run.smoke else FRICTION:
+                rows.append({"p": p, "length": length, "traction": traction, **row(problem, F)})
+    count = {kappa: sum(fewer(line[f"kappa {kappa}"], line["energy"]) for line in rows) for kappa in KAPPA}
+    run.table(
+        "energy_forms",
+        rows,
+        *(f"kappa = {kappa} needs fewer nodes than the energy in {n} of {len(rows)} cases" for kappa, n in count.items()),
+    )
 
 
-if __name__ == "__main__":
-    main()
+def fewer(one, other):
+    """Whether one number of nodes is less than another; a dash is more than all."""
+    return one != "-" and (other == "-" or one < other)

@@ -1,4 +1,4 @@
-"""Random problems on friction paths and loading paths, generic and degenerate, for studies of continuation."""
+"""Random problems on friction paths and loading paths, generic and degenerate."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from enumsol import ContactProblem
 FRICTION_INTERVAL, LOADING_INTERVAL = (0.0, 20.0), (-5.0, 5.0)
 
 
-def random_path(seed, p, *, loading):
+def random_path(seed: int, p: int, *, loading: bool) -> tuple[ContactProblem, tuple[float, float]]:
     """A stable body with p contact nodes; friction grows with alpha, or the load does at fixed friction."""
     rng = np.random.default_rng([seed, p, loading])
     n = 2 * p + int(rng.integers(0, 3))
@@ -22,7 +22,7 @@ def random_path(seed, p, *, loading):
     return problem, LOADING_INTERVAL if loading else FRICTION_INTERVAL
 
 
-def integer_path(seed, p):
+def integer_path(seed: int, p: int) -> tuple[ContactProblem, tuple[float, float]]:
     """Small integer data: grazing, loads in proportion, nodes without load or friction."""
     rng = np.random.default_rng([seed, p])
     A = np.zeros((2 * p, 2 * p))
