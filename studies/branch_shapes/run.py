@@ -1,27 +1,35 @@
-"""Closed branches, branches that go back and forth, bifurcations that a push destroys: which parameters show them.
+"""Which parameters show closed branches, branches that go back and forth, bifurcations that a push destroys?
 
 A random search over loads, load slopes and friction of the two-node square (every graph in exact arithmetic, proven
 complete), chains of two coupled triangles under equal loads, and a mirror-symmetric pair of nodes that is not of the
 gallery and shows the pitchfork proper. The best finds are pinned in tests/branches.
 
-Run: python studies/branch_search.py [number of squares]
+Read the column ``parameters``: the most remarkable squares of each kind, then all bifurcations of the symmetric pairs
+with what a push of 0.001 leaves of them.
 """
 
 from __future__ import annotations
 
-import sys
+from typing import TYPE_CHECKING
 
 import numpy as np
-from _output import report
 
-from enumsol import ContactProblem, gallery
-from enumsol.branches import branch_graph
+from enumsol import ContactProblem, branch_graph, gallery
 
-COUNT = 1500
+if TYPE_CHECKING:
+    from shared.results import Run
+
+COUNT, SMOKE_COUNT = 1500, 40
+INTERVAL, SYMMETRIC_INTERVAL = (0.0, 5.0), (0.0, 10.0)
 PUSH = 1e-3
+#: Squares of each kind that are listed.
+LISTED = 4
+COUPLINGS = (0.05, 0.1, 0.2, 0.4, 0.8)
 
 
 def random_square(rng):
+    """Loads and options of a two-node square, with one decimal each."""
+
     def draw(low, high):
         return float(np.round(rng.uniform(low, high), 1))
 
@@ -36,34 +44,40 @@ def squares(count):
     closed, turning, incomplete = [], [], 0
     for _ in range(count):
         loads, options = random_square(rng)
-        graph = branch_graph(gallery.two_node_square(*loads, **options), (0.0, 5.0), "exact")
+        graph = branch_graph(gallery.two_node_square(*loads, **options), INTERVAL, "exact")
         incomplete += not graph.complete
         for branch in graph.branches:
-            item = (len(branch.arcs), branch.interval[1] - branch.interval[0], loads, options, branch)
+            length = branch.interval[1] - branch.interval[0]
             if branch.closed:
-                closed.append(item)
+                closed.append((len(branch.arcs), length, loads, options, branch))
             elif len(branch.folds) >= 2:
-                turning.append((len(branch.folds), *item[1:]))
-    rows = []
-    for kind, found in (("closed branch", closed), ("goes back and forth", turning)):
-        for number, length, loads, options, branch in sorted(found, key=lambda item: item[:2], reverse=True)[:4]:
-            rows.append(
-                {
-                    "shows": kind,
-                    "parameters": f"two_node_square({loads[0]}, {loads[1]}, {options})",
-                    "arcs": len(branch.arcs),
-                    "folds": " ".join(f"{v.alpha:.5g}" for v in branch.folds),
-                    "length": length,
-                    "detail": f"{number} {'arcs' if branch.closed else 'folds'}",
-                }
-            )
-    note = f"{count} squares, {incomplete} not complete: {len(closed)} closed branches, {len(turning)} with folds"
+                turning.append((len(branch.folds), length, loads, options, branch))
+    rows = [
+        {
+            "shows": kind,
+            "parameters": f"two_node_square({loads[0]}, {loads[1]}, {options})",
+            "arcs": len(branch.arcs),
+            "folds": alphas(branch.folds),
+            "length": length,
+            "detail": f"{number} {'arcs' if branch.closed else 'folds'}",
+        }
+        for kind, found in (("closed branch", closed), ("goes back and forth", turning))
+        for number, length, loads, options, branch in sorted(found, key=lambda item: item[:2], reverse=True)[:LISTED]
+    ]
+    note = (
+        f"{count} squares, {incomplete} not complete; {len(closed)} closed branches, {len(turning)} branches with two "
+        "folds or more"
+    )
     return rows, note
 
 
-def symmetric():
+def alphas(vertices):
+    return " ".join(f"{v.alpha:.5g}" for v in vertices) or "-"
+
+
+def symmetric(couplings):
     """(name, problem) of pairs of nodes under equal or mirrored loads."""
-    for coupling in (0.05, 0.1, 0.2, 0.4, 0.8):
+    for coupling in couplings:
         for f in ((1.5, -4.0), (0.5, -3.0)):
             yield f"chain(2, {coupling}, {f})", gallery.chain(2, coupling, f)
     A = [[21.0, 10.0, 6.0, 5.0], [10.0, 22.0, -5.0, 2.0], [6.0, -5.0, 21.0, -10.0], [5.0, 2.0, -10.0, 22.0]]
@@ -71,13 +85,14 @@ def symmetric():
     yield "mirror-symmetric pair (own)", ContactProblem(A, rows[[0, 2]], rows[[1, 3]], [1.0, 3.0, 1.0, -3.0])
 
 
-def bifurcations():
+def bifurcations(couplings):
+    """One row a bifurcation of a symmetric pair, with what is left after a push on one node."""
     rows = []
-    for name, problem in symmetric():
-        graph = branch_graph(problem, (0.0, 10.0), "exact")
+    for name, problem in symmetric(couplings):
+        graph = branch_graph(problem, SYMMETRIC_INTERVAL, "exact")
         push = np.array([0.0, 0.0, PUSH, 0.0])
         moved = ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f + push)
-        after = branch_graph(moved, (0.0, 10.0), "exact")
+        after = branch_graph(moved, SYMMETRIC_INTERVAL, "exact")
         for v in graph.bifurcations:
             left = sum(arc.head == v.number for arc in graph.arcs)
             right = sum(arc.tail == v.number for arc in graph.arcs)
@@ -86,7 +101,7 @@ def bifurcations():
                     "shows": f"{v.kind}, {left} to {right} arcs",
                     "parameters": name,
                     "arcs": len(graph.arcs),
-                    "folds": " ".join(f"{w.alpha:.5g}" for w in graph.folds) or "-",
+                    "folds": alphas(graph.folds),
                     "length": 0.0,
                     "detail": f"at {v.alpha:.6g}; {len(after.bifurcations)} left after a push of {PUSH:g}",
                 }
@@ -94,11 +109,6 @@ def bifurcations():
     return rows
 
 
-def main():
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else COUNT
-    rows, note = squares(count)
-    report("branch_search", rows + bifurcations(), note)
-
-
-if __name__ == "__main__":
-    main()
+def main(run: Run) -> None:
+    rows, note = squares(SMOKE_COUNT if run.smoke else COUNT)
+    run.table("branch_search", rows + bifurcations(COUPLINGS[: 1 if run.smoke else None]), note)

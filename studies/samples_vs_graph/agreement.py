@@ -1,26 +1,30 @@
-"""Does the exact graph equal the enumeration? 200 random alphas each, on 30 random problems and the wedge at p = 14.
-
-Run: python studies/branch_agreement.py [alphas for each problem]
-"""
+"""Part "agreement": does the graph hold the roots that an enumeration finds? At random alphas, on random problems."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
-from _output import report
+from shared.random_paths import random_path
+from shared.results import yes
 
-from enumsol import enumerate_roots, gallery
-from enumsol.branches import branch_graph
+from enumsol import branch_graph, enumerate_roots, gallery
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from branches.problems import generic_problem
+COUNT, SMOKE_COUNT = 200, 10
+PROBLEMS, SMOKE_PROBLEMS = 30, 4
+WEDGES = ("wedge-14-5", "wedge-14-3")
 
-COUNT = 200
+
+def problems(smoke):
+    """Name, problem and interval."""
+    for seed in range(SMOKE_PROBLEMS if smoke else PROBLEMS):
+        loading = seed % 2 == 1
+        name = f"random {seed} ({'load' if loading else 'friction'})"
+        yield name, *random_path(seed, 1 + seed // 2 % 4, loading=loading)
+    for name in () if smoke else WEDGES:
+        yield name, gallery.get(name).build(), (0.0, 5.0)
 
 
 def agrees(ours, theirs):
+    """Whether two sets of roots are the same: statuses, degrees and forces."""
     return len(ours) == len(theirs) and all(
         a.statuses == b.statuses
         and a.index == b.index
@@ -30,36 +34,23 @@ def agrees(ours, theirs):
     )
 
 
-def problems():
-    for seed in range(30):
-        rng = np.random.default_rng(seed)
-        kind = ("friction", "load", "both")[seed % 3]
-        yield f"random {seed} ({kind})", generic_problem(rng, int(rng.integers(1, 5)), kind), (0.0, 6.0)
-    yield "wedge-14-5", gallery.get("wedge-14-5").build(), (0.0, 5.0)
-    yield "wedge-14-3", gallery.get("wedge-14-3").build(), (0.0, 5.0)
+def row(name, problem, interval, count):
+    """One problem."""
+    graph = branch_graph(problem, interval)
+    alphas = np.random.default_rng(1).uniform(*interval, size=count).tolist()
+    return {
+        "problem": name,
+        "p": problem.p,
+        "arcs": len(graph.arcs),
+        "branches": len(graph.branches),
+        "alphas": count,
+        "agree": sum(agrees(graph.roots_at(alpha), enumerate_roots(problem, alpha, "fast")) for alpha in alphas),
+        "balanced": yes(not graph.reasons),
+    }
 
 
-def main():
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else COUNT
-    rows = []
-    for name, problem, interval in problems():
-        graph = branch_graph(problem, interval)
-        alphas = np.random.default_rng(1).uniform(*interval, size=count).tolist()
-        same = sum(agrees(graph.roots_at(alpha), enumerate_roots(problem, alpha, "fast")) for alpha in alphas)
-        rows.append(
-            {
-                "problem": name,
-                "p": problem.p,
-                "arcs": len(graph.arcs),
-                "branches": len(graph.branches),
-                "alphas": count,
-                "agree": same,
-                "balanced": "no" if graph.reasons else "yes",
-            }
-        )
-    total = sum(row["alphas"] for row in rows)
-    report("branch_agreement", rows, f"{sum(row['agree'] for row in rows)} of {total} root sets agree")
-
-
-if __name__ == "__main__":
-    main()
+def main(run):
+    count = SMOKE_COUNT if run.smoke else COUNT
+    rows = [row(*problem, count) for problem in problems(run.smoke)]
+    total, same = (sum(row[name] for row in rows) for name in ("alphas", "agree"))
+    run.table("branch_agreement", rows, f"{same} of {total} root sets agree")
