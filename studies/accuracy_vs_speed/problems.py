@@ -1,4 +1,4 @@
-"""Problems at a known distance from a degeneracy, with their exact answers, for the study of accuracy against speed.
+"""Problems at a known distance from a degeneracy, with their exact answers.
 
 Two kinds of degeneracy. In "alpha" the exact branch graph gives the values at which statuses change (transitions,
 folds, bifurcations, continua), as algebraic numbers; alpha is put at a chosen distance from one of them, as a rational
@@ -16,15 +16,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
-from _random_paths import integer_path, random_path
+from flint import fmpq
+from shared.random_paths import integer_path, random_path
 
-from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery
+from enumsol import ContactProblem, InvalidProblemError, branch_graph, enumerate_roots, gallery
 from enumsol.branches.algebraic import merge
-from enumsol.condensed import CondensedProblem
-from enumsol.enumeration.exact_selections import rational
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -34,8 +33,9 @@ if TYPE_CHECKING:
 DISTANCES = (*(Fraction(1, 10**k) for k in range(17)), Fraction(0))
 #: Distances of the two contact nodes. Soon below 1e-6 float64 takes S for singular and the program refuses the problem.
 NODE_DISTANCES = DISTANCES[:7]
+SMOKE_DISTANCES, SMOKE_NODE_DISTANCES = (*DISTANCES[:15:7], Fraction(0)), (DISTANCES[0], DISTANCES[6])
 #: An irrational critical alpha is known to this width, far below the smallest distance.
-WIDTH = Fraction(1, 2**90)
+WIDTH = fmpq(1, 2**90)
 #: Critical alphas tried on one path.
 EVENTS_PER_PATH = 4
 RAREST = ("family", "bifurcation", "touch", "point", "sheet", "fold", "transition")
@@ -63,15 +63,12 @@ class Scene:
     @cached_property
     def single(self) -> ContactProblem:
         """The problem with S and g condensed in float32 from data rounded to float32."""
-        problem = _copy(self.problem)
-        # condensed is a cached property: what is put into its place is what the program works on
-        problem.__dict__["condensed"] = condensed_in_single(problem)
-        return problem
+        return in_single(self.problem)
 
     @cached_property
     def padded(self) -> ContactProblem:
         """The problem beside springs that touch nothing: same S and g, too many degrees of freedom for rationals."""
-        return _copy(self.problem, PADDING)
+        return padded(self.problem, PADDING)
 
 
 @dataclass(frozen=True)
@@ -91,19 +88,29 @@ class Case:
         return self.scene.problem.load_at(self.alpha)
 
 
-def _copy(problem: ContactProblem, padding: int = 0) -> ContactProblem:
-    def wider(B: sp.csr_array) -> sp.csr_array:
-        return sp.hstack([B, sp.csr_array((problem.p, padding))], format="csr") if padding else B
+def padded(problem: ContactProblem, count: int) -> ContactProblem:
+    """The problem with so many more degrees of freedom, each held by a spring of its own and not loaded."""
 
-    A = sp.block_diag([problem.A, sp.eye_array(padding)], format="csc") if padding else problem.A
-    zeros = np.zeros(padding)
+    def wider(B: sp.csr_array) -> sp.csr_array:
+        return sp.hstack([B, sp.csr_array((problem.p, count))], format="csr")
+
+    A = sp.block_diag([problem.A, sp.eye_array(count)], format="csc")
+    zeros = np.zeros(count)
     slope = None if problem.load_slope is None else np.concatenate([problem.load_slope, zeros])
     f, gap, offset = np.concatenate([problem.f, zeros]), problem.gap, problem.slip_offset
     return ContactProblem(A, wider(problem.Bn), wider(problem.Bt), f, gap, problem.friction, slope, offset)
 
 
-def condensed_in_single(problem: ContactProblem) -> CondensedProblem:
-    """S, g0 and g1 in float32 arithmetic from float32 data, written as float64."""
+def in_single(problem: ContactProblem) -> ContactProblem:
+    """A problem in the forces alone whose condensed data are S, g0 and g1 in float32 arithmetic from float32 data.
+
+    Its stiffness is the inverse of that S in float64, which differs from it by far less than float32 can tell.
+
+    Raises
+    ------
+    InvalidProblemError
+        That S is not positive definite.
+    """
     A = problem.A.toarray().astype(np.float32)
     B = np.vstack([problem.Bn.toarray(), problem.Bt.toarray()]).astype(np.float32)
     offset = np.concatenate([problem.gap, problem.slip_offset]).astype(np.float32)
@@ -111,14 +118,22 @@ def condensed_in_single(problem: ContactProblem) -> CondensedProblem:
     S = B @ np.linalg.solve(A, B.T)
     g0 = B @ np.linalg.solve(A, problem.f.astype(np.float32)) - offset
     g1 = B @ np.linalg.solve(A, slope.astype(np.float32))
-    arrays = (0.5 * (S + S.T)).astype(float), g0.astype(float), g1.astype(float)
-    return CondensedProblem(*arrays, *problem.friction, problem)
+    S = (0.5 * (S + S.T)).astype(float)
+    try:
+        np.linalg.cholesky(S)
+        K = np.linalg.inv(S)
+    except np.linalg.LinAlgError as error:
+        raise InvalidProblemError("S in float32 is not positive definite") from error
+    K = 0.5 * (K + K.T)
+    eye = np.eye(2 * problem.p)
+    rows = eye[: problem.p], eye[problem.p :]
+    return ContactProblem(K, *rows, K @ g0, friction=problem.friction, load_slope=K @ g1)
 
 
 # -- scenes --------------------------------------------------------------------------------------------------------
 
 
-def _one_node(f: tuple[float, float], slope: tuple[float, float], F: float) -> ContactProblem:
+def one_node(f: tuple[float, float], slope: tuple[float, float], F: float) -> ContactProblem:
     """One node with a loading path; F = 2 and f along (1, -2) make a continuum."""
     return ContactProblem([[2, -1], [-1, 2]], [[1, 0]], [[0, 1]], f, friction=F, load_slope=slope)
 
@@ -148,8 +163,19 @@ def planted_family(seed: int, p: int) -> ContactProblem:
             return problem
 
 
-def scenes() -> Iterator[Scene]:
-    """Gallery, hand-made, random and integer paths with p = 1 to 4, and a wedge with p = 8."""
+def scenes(*, smoke: bool = False) -> Iterator[Scene]:
+    """Gallery, hand-made, random and integer paths with p = 1 to 4, and a wedge with p = 8; one of each when smoke."""
+    if smoke:
+        yield Scene("one-node-6.1", gallery.get("one-node-6.1").build(), (0.0, 10.0))
+        yield Scene("planted 0, p = 1", planted_family(0, 1), (-3.0, 3.0))
+        yield from islice(eventful("integer, p = 1", partial(integer_path, p=1)), 1)
+    else:
+        yield from known_scenes()
+        yield from random_scenes()
+
+
+def known_scenes() -> Iterator[Scene]:
+    """Problems of the gallery, and two loads made to lead through a continuum and a fold."""
     for name in ("one-node-6.1", "one-node-6.2", "one-node-6.3", "one-node-6.3-perturbed"):
         yield Scene(name, gallery.get(name).build(), (0.0, 10.0))
     for name in ("two-node-6.4", "two-node-6.5", "two-node-6.6", "two-node-5", "chain-2", "chain-2-coupled"):
@@ -161,8 +187,12 @@ def scenes() -> Iterator[Scene]:
     yield Scene("wedge-8-5", gallery.get("wedge-8-5").build(), (1.0, 4.0), events=2)
     yield Scene("chain-2 at a continuum", gallery.chain(2, f=(1, -2)), (0.0, 10.0))
     yield Scene("chain-2-coupled at a continuum", gallery.chain(2, 0.125, f=(1, -2)), (0.0, 10.0))
-    yield Scene("one node, load through a continuum", _one_node((1, -3), (0, 1), 2), (-3.0, 3.0))
-    yield Scene("one node, load through a fold", _one_node((1, -4), (1, 1), 3), (-3.0, 3.0))
+    yield Scene("one node, load through a continuum", one_node((1, -3), (0, 1), 2), (-3.0, 3.0))
+    yield Scene("one node, load through a fold", one_node((1, -4), (1, 1), 3), (-3.0, 3.0))
+
+
+def random_scenes() -> Iterator[Scene]:
+    """Planted continua, random paths and integer paths."""
     for p, seeds in ((1, 2), (2, 5), (3, 4)):
         for seed in range(seeds):
             yield Scene(f"planted {seed}, p = {p}", planted_family(seed, p), (-3.0, 3.0))
@@ -170,12 +200,12 @@ def scenes() -> Iterator[Scene]:
         for loading in (False, True):
             build = partial(random_path, p=p, loading=loading)
             kind = "loading" if loading else "friction"
-            yield from islice(_eventful(f"random {kind}, p = {p}", build), count)
+            yield from islice(eventful(f"random {kind}, p = {p}", build), count)
     for p, count in ((1, 2), (2, 4), (3, 4)):
-        yield from islice(_eventful(f"integer, p = {p}", partial(integer_path, p=p)), count)
+        yield from islice(eventful(f"integer, p = {p}", partial(integer_path, p=p)), count)
 
 
-def _eventful(name: str, build: partial[tuple[ContactProblem, tuple[float, float]]]) -> Iterator[Scene]:
+def eventful(name: str, build: partial[tuple[ContactProblem, tuple[float, float]]]) -> Iterator[Scene]:
     """Random scenes on whose way statuses change."""
     for seed in range(1000):
         scene = Scene(f"{name}, seed {seed}", *build(seed))
@@ -186,15 +216,22 @@ def _eventful(name: str, build: partial[tuple[ContactProblem, tuple[float, float
 # -- cases ---------------------------------------------------------------------------------------------------------
 
 
-def near_events(scene: Scene) -> Iterator[Case]:
+def cases(*, smoke: bool = False) -> Iterator[Case]:
+    """All cases: scenes near their events, then two close nodes."""
+    for scene in scenes(smoke=smoke):
+        yield from near_events(scene, SMOKE_DISTANCES if smoke else DISTANCES)
+    yield from close_nodes((2,), 1, SMOKE_NODE_DISTANCES) if smoke else close_nodes((2, 3, 4), 3, NODE_DISTANCES)
+
+
+def near_events(scene: Scene, distances: Sequence[Fraction]) -> Iterator[Case]:
     """The scene at all distances from some of its events, on both sides, where no other event is as near."""
-    events = _events(scene.graph)
+    events = events_of(scene.graph)
     low, high = scene.graph.exact_interval
     chosen = sorted(events, key=lambda event: RAREST.index(event[1]))[: scene.events]
     for centre, kind, is_rational in chosen:
         others = [other for other, *_ in events if other != centre]
         unit = max(Fraction(1), abs(centre))
-        for distance in DISTANCES:
+        for distance in distances:
             if distance == 0 and not is_rational:
                 continue
             for side in (-1, 1) if distance else (0,):
@@ -206,38 +243,38 @@ def near_events(scene: Scene) -> Iterator[Case]:
                         yield Case(scene, alpha, distance, "alpha", kind, exact)
 
 
-def _events(graph: BranchGraph) -> list[tuple[Fraction, str, bool]]:
+def events_of(graph: BranchGraph) -> list[tuple[Fraction, str, bool]]:
     """(alpha, rarest kind there, whether alpha is rational) of all critical alphas inside the interval."""
     inner = [v for v in graph.vertices if not v.border]
-    kind_of = {id(v.exact): v.kind for v in inner}
     found = []
     for group in merge([v.exact for v in inner]):
+        kinds = [v.kind for v in inner if any(v.exact is number for number in group)]
         number = group[0]
         number.minimal_polynomial()  # finds out whether it is rational
-        number.narrow(rational(WIDTH))
+        number.narrow(WIDTH)
         lo, hi = number.enclosure()
-        found.append(((lo + hi) / 2, min((kind_of[id(g)] for g in group), key=RAREST.index), number.is_rational))
+        found.append(((lo + hi) / 2, min(kinds, key=RAREST.index), number.is_rational))
     return found
 
 
-def close_nodes() -> Iterator[Case]:
+def close_nodes(sizes: Sequence[int], seeds: int, distances: Sequence[Fraction]) -> Iterator[Case]:
     """Random problems two of whose nodes are nearly the same, the distance of their rows being given."""
-    for p in (2, 3, 4):
+    for p in sizes:
         for loading in (False, True):
-            for seed in range(3):
+            for seed in range(seeds):
                 problem, interval = random_path(seed, p, loading=loading)
-                for distance in NODE_DISTANCES:
-                    yield from _at_places(_with_close_nodes(problem, float(distance)), interval, distance)
+                for distance in distances:
+                    yield from at_places(with_close_nodes(problem, float(distance)), interval, distance)
 
 
-def _with_close_nodes(problem: ContactProblem, distance: float) -> ContactProblem:
+def with_close_nodes(problem: ContactProblem, distance: float) -> ContactProblem:
     rows = [np.array(B.toarray()) for B in (problem.Bn, problem.Bt)]
     for B in rows:
         B[1] = B[0] + distance * B[1]
     return ContactProblem(problem.A, *rows, problem.f, friction=problem.friction, load_slope=problem.load_slope)
 
 
-def _at_places(problem: ContactProblem, interval: tuple[float, float], distance: Fraction) -> Iterator[Case]:
+def at_places(problem: ContactProblem, interval: tuple[float, float], distance: Fraction) -> Iterator[Case]:
     scene = Scene(f"two nodes {float(distance):g} apart", problem, interval)
     for place in PLACES:
         alpha = Fraction(interval[0] + place * (interval[1] - interval[0]))

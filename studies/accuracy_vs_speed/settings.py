@@ -1,4 +1,4 @@
-"""Part 1 of accuracy_vs_speed: arithmetic, tolerance and condensation against distance to the next degeneracy.
+"""The settings that are compared, what each makes of every case, and checks of the exact answers.
 
 Exact arithmetic is the reference. Its own counts are therefore zero by construction; ``checks`` compares it with all
 4^p selections and with the branch graphs.
@@ -6,18 +6,18 @@ Exact arithmetic is the reference. Its own counts are therefore zero by construc
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from _trade_matching import Comparison, compare
-from _trade_problems import DISTANCES, NODE_DISTANCES, Case, Scene, close_nodes, near_events, scenes
+from accuracy_vs_speed.matching import Comparison, compare
+from accuracy_vs_speed.problems import Case, Scene
+from shared.clock import timed
 
 from enumsol import InvalidProblemError, enumerate_roots
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
     from fractions import Fraction
 
 DEFAULT = 1e-9
@@ -38,9 +38,7 @@ class Setting:
     def run(self, case: Case):
         """All solutions, and the process time."""
         problem = getattr(case.scene, self.variant)
-        started = time.process_time()
-        roots = enumerate_roots(problem, case.alpha, self.arithmetic, tolerance=self.tolerance)
-        return roots, time.process_time() - started
+        return timed(lambda: enumerate_roots(problem, case.alpha, self.arithmetic, tolerance=self.tolerance))
 
 
 FAST = Setting(f"fast {DEFAULT:.0e}", "problem", "fast")
@@ -91,19 +89,14 @@ class Measurement:
         return self.refused or self.undecided > 0
 
 
-def cases() -> Iterator[Case]:
-    for scene in scenes():
-        yield from near_events(scene)
-    yield from close_nodes()
-
-
-def measure(all_cases: Iterable[Case]) -> list[Measurement]:
+def measure(all_cases: Sequence[Case]) -> list[Measurement]:
     """Every setting on every case."""
     warm: set[tuple[Scene, Setting]] = set()
-    return [item for case in all_cases for item in _measure_case(case, warm)]
+    return [item for case in all_cases for item in measure_case(case, warm)]
 
 
-def _measure_case(case: Case, warm: set[tuple[Scene, Setting]]) -> Iterator[Measurement]:
+def measure_case(case: Case, warm: set[tuple[Scene, Setting]]) -> Iterator[Measurement]:
+    """Every setting on one case; ``warm`` are the scenes that a setting has met before."""
     FAST.run(case)  # the first run at an alpha is slower than the next
     unit = None
     for setting in (FAST, *(s for s in SETTINGS if s is not FAST)):
@@ -134,17 +127,14 @@ def _measure_case(case: Case, warm: set[tuple[Scene, Setting]]) -> Iterator[Meas
 def table(measured: Sequence[Measurement]) -> list[dict[str, object]]:
     """One row a kind of degeneracy, setting and distance."""
     groups: dict[tuple[str, Setting, Fraction], list[Measurement]] = {}
-    for item in measured:
+    order = {setting: k for k, setting in enumerate(SETTINGS)}
+    for item in sorted(measured, key=lambda item: (item.case.degeneracy, order[item.setting], -item.case.distance)):
         groups.setdefault((item.case.degeneracy, item.setting, item.case.distance), []).append(item)
-    return [
-        summary(groups[degeneracy, setting, distance], degeneracy, setting, distance)
-        for degeneracy, distances in (("alpha", DISTANCES), ("two nodes", NODE_DISTANCES))
-        for setting in SETTINGS
-        for distance in distances
-    ]
+    return [summary(items, *group) for group, items in groups.items()]
 
 
 def summary(items: Sequence[Measurement], degeneracy: str, setting: Setting, distance: Fraction) -> dict[str, object]:
+    """Sums over the cases of one group."""
     counts = {
         name: sum(getattr(item.comparison, name) for item in items)
         for name in ("missed", "invented", "duplicates", "renamed", "outside")
