@@ -1,17 +1,18 @@
-"""The cases of extremes.py at one alpha: scales, friction, material, geometry, sizes, degeneracies, random mixtures."""
+"""The cases at one alpha: scales, friction, material, geometry, sizes, degeneracies, random mixtures, many roots."""
 
 from __future__ import annotations
 
 from fractions import Fraction
 from functools import cache, partial
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from _extremes_judge import Case, backwards, rescaled
+from extremes.judge import Case
+from extremes.transformed import backwards, rescaled
+from flint import fmpq
 
-from enumsol import ContactProblem, branch_graph, fem, gallery
-from enumsol.certification.rational import fmpq_of
+from enumsol import ContactProblem, branch_graph, enumerate_roots, fem, gallery
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -206,8 +207,6 @@ def distances() -> Iterator[Case]:
 
 def _change_of_status(build: partial[ContactProblem]) -> Fraction:
     """An alpha within rounding of one at which the one root changes a status, by bisection."""
-    from enumsol import enumerate_roots
-
     problem = build()
 
     def statuses(alpha: Fraction) -> object:
@@ -240,22 +239,14 @@ def _critical(name: str, seed: int) -> tuple[ContactProblem, tuple[tuple[str, fl
     return problem, tuple((v.kind, v.alpha, *_around(v.exact, v.alpha)) for v in inner)
 
 
-def _around(exact: object, alpha: float) -> tuple[Fraction, Fraction]:
-    """Rationals below and above an algebraic alpha, at most 1e-25 apart; equal where it is rational."""
-    from enumsol.branches.algebraic import CriticalAlpha
-
-    def order(value: Fraction) -> int:
-        return exact.compare(CriticalAlpha.rational(fmpq_of(value)))
-
-    if order(Fraction(alpha)) == 0:
-        return Fraction(alpha), Fraction(alpha)
-    low, high = Fraction(np.nextafter(alpha, -1.0)), Fraction(np.nextafter(alpha, 100.0))
-    while high - low > Fraction(1, 10**25):
-        middle = (low + high) / 2
-        sign = order(middle)
-        if sign == 0:
-            return middle, middle
-        low, high = (middle, high) if sign > 0 else (low, middle)
+def _around(exact: Any, alpha: float) -> tuple[Fraction, Fraction]:
+    """Rationals below and above an algebraic alpha, at most 1e-25 apart; equal where it is a float."""
+    exact.minimal_polynomial()  # finds out whether it is rational
+    exact.narrow(fmpq(1, 10**25))
+    low, high = exact.enclosure()
+    if low == high and low != Fraction(alpha):
+        half = Fraction(1, 2 * 10**25)
+        return low - half, high + half
     return low, high
 
 
@@ -339,4 +330,24 @@ def mixture(seed: int) -> ContactProblem:
     return rescaled(base, stiffness, load, nodes, dofs)
 
 
-GROUPS = (scales, alphas, frictions, materials, weakly_held, geometries, sizes, distances, samples, loads, mixtures)
+def many_roots() -> Iterator[Case]:
+    """Thousands of roots: separate and coupled one-node triangles."""
+    for p, coupling in ((6, 0.0), (7, 0.0), (8, 0.0), (6, 0.05), (7, 0.05)):
+        name = f"chain of {p}, coupling {coupling:g}"
+        yield Case("many roots", name, partial(gallery.chain, p, coupling), 5.0, "closed form", 3**p)
+
+
+GROUPS = (
+    scales,
+    alphas,
+    frictions,
+    materials,
+    weakly_held,
+    geometries,
+    sizes,
+    distances,
+    samples,
+    loads,
+    mixtures,
+    many_roots,
+)

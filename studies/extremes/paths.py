@@ -1,4 +1,4 @@
-"""The cases of extremes.py on Newton's method, continuation and branch graphs: the parameter r of H, extreme scales."""
+"""The cases on Newton's method, continuation and branch graphs: the parameter r of H, extreme scales."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from _extremes_judge import Finding, count, guarded, rescaled, row
+from extremes.judge import Finding, count, guarded, row
+from extremes.transformed import rescaled
 
 from enumsol import (
     ContactProblem,
     ContinuationOptions,
     InvalidArgumentError,
+    NotConverged,
+    PiecewiseSmoothEquation,
     audit,
     branch_graph,
     enumerate_roots,
@@ -23,8 +26,6 @@ from enumsol import (
     newton,
     verify,
 )
-from enumsol.continuation import NotConverged
-from enumsol.selections import PiecewiseSmoothEquation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
