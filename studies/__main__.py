@@ -34,7 +34,9 @@ def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(
         prog=f"python studies {name}", description=study.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--smoke", action="store_true", help="a size of seconds, with results in a new temporary folder")
+    parser.add_argument(
+        "--smoke", action="store_true", help="a size of seconds, with results in a new temporary folder"
+    )
     parser.add_argument("--results", type=Path, metavar="DIR", help="folder for the results")
     if hasattr(study, "options"):
         study.options(parser)

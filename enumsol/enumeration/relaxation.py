@@ -174,9 +174,7 @@ class ActiveSetEngine:
         self._data = _active_set.QPData(H, h, -system.S, system.g, start, index, value, rhs)
         self._module = _active_set
         cones = np.array([RowKind.CONE_PLUS, RowKind.CONE_MINUS])[:, None] * p + np.arange(p)
-        self.rule = _active_set.BranchingRule(
-            system.F, cones, np.full((2, p), EQUALITY, dtype=np.int8), candidates
-        )
+        self.rule = _active_set.BranchingRule(system.F, cones, np.full((2, p), EQUALITY, dtype=np.int8), candidates)
         self.limit = 200 + 20 * p
 
     def root(self, rows: list[int], modes: list[int]) -> Relaxation:

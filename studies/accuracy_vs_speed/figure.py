@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from accuracy_vs_speed.settings import EXACT, FAST, LARGE, SINGLE, SINGLE_WIDE, SWEEP, VERIFIED
 from shared.figures import BLUE, GREEN, GREY, ORANGE, RED, panels
 

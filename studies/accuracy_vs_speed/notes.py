@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+
 from accuracy_vs_speed.settings import EXACT, FAST, LARGE, SETTINGS, SINGLE, SINGLE_WIDE, SWEEP, VERIFIED
 
 if TYPE_CHECKING:
@@ -104,8 +105,8 @@ def conclusions(
     for setting in (SINGLE, SINGLE_WIDE):
         line = lines[setting.name]
         yield (
-            f"{setting.name}: right from a distance of {text_of(line['right from'])}, {line['on: wrong %']:.0f} % wrong "
-            f"exactly on it; forces within {line['force error']:.0e} from {SEPARATED:g} on (float64: "
+            f"{setting.name}: right from a distance of {text_of(line['right from'])}, {line['on: wrong %']:.0f} % "
+            f"wrong exactly on it; forces within {line['force error']:.0e} from {SEPARATED:g} on (float64: "
             f"{lines[FAST.name]['force error']:.0e}); two close nodes {line['two nodes: open %']:.0f} % refused; "
             f"time {line['time ratio']:.2f}"
         )

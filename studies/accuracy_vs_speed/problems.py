@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 from flint import fmpq
-from shared.random_paths import integer_path, random_path
 
 from enumsol import ContactProblem, InvalidProblemError, branch_graph, enumerate_roots, gallery
 from enumsol.branches.algebraic import merge
+from shared.random_paths import integer_path, random_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -58,6 +58,7 @@ class Scene:
 
     @cached_property
     def graph(self) -> BranchGraph:
+        """The branch graph in rational arithmetic."""
         return branch_graph(self.problem, self.interval, "exact")
 
     @cached_property

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
 from accuracy_vs_speed.matching import Comparison, compare
 from accuracy_vs_speed.problems import Case, Scene
-from shared.clock import timed
-
 from enumsol import InvalidProblemError, enumerate_roots
+from shared.clock import timed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

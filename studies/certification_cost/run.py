@@ -13,12 +13,11 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
+import enumsol
+from enumsol.enumeration.exact_selections import EXACT_DOF_LIMIT
 from shared.clock import least_time, timed
 from shared.loads import PRESSED, block, oblique_wedge, straight_wedge
 from shared.results import yes
-
-import enumsol
-from enumsol.enumeration.exact_selections import EXACT_DOF_LIMIT
 
 if TYPE_CHECKING:
     from shared.results import Run

@@ -15,10 +15,9 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from enumsol import branch_graph, follow_all, gallery
 from shared.clock import timed
 from shared.random_paths import integer_path, random_path
-
-from enumsol import branch_graph, follow_all, gallery
 
 if TYPE_CHECKING:
     from shared.results import Run
@@ -48,7 +47,9 @@ COLUMNS = (
 
 def cases(smoke):
     """Kind of path, p, problem and interval of each."""
-    count, integers, chains = (SMOKE_COUNT, SMOKE_INTEGER_COUNT, SMOKE_CHAINS) if smoke else (COUNT, INTEGER_COUNT, CHAINS)
+    count, integers, chains = (
+        (SMOKE_COUNT, SMOKE_INTEGER_COUNT, SMOKE_CHAINS) if smoke else (COUNT, INTEGER_COUNT, CHAINS)
+    )
     for number in range(count):
         p, loading = 1 + number % LARGEST, number // LARGEST % 2 == 1
         yield "loading" if loading else "friction", p, *random_path(number, p, loading=loading)
@@ -65,7 +66,9 @@ def causes(result):
     found += ["jump"] * len(result.report.jumps) + ["point off the graph"] * len(result.report.off)
     for item in result.report.missed:
         length = item.interval[1] - item.interval[0]
-        found.append("sheet" if item.sheet else (f"arc shorter than {SHORT:g} missed" if length < SHORT else "arc missed"))
+        found.append(
+            "sheet" if item.sheet else (f"arc shorter than {SHORT:g} missed" if length < SHORT else "arc missed")
+        )
     return found + ["continuum missed"] * len(result.report.missed_families)
 
 

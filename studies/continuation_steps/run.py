@@ -1,4 +1,4 @@
-"""Which step length and tolerance should continuation have, and what go wrong with others?
+"""Which step length and tolerance should continuation have, and what goes wrong with others?
 
 Every branch of twelve paths is followed from one starting point in both directions, with checked steps and with the
 algorithm as printed (``check_steps=False``), for step lengths h_max and tolerances eps. The audit against the exact
@@ -14,12 +14,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from enumsol import ContinuationOptions, audit, follow
 from shared.clock import timed
 from shared.figures import BLUE, GREY, ORANGE, panels
 from shared.paths import located, paths
 from shared.results import series
-
-from enumsol import ContinuationOptions, audit, follow
 
 if TYPE_CHECKING:
     from shared.results import Run

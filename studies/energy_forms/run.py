@@ -18,11 +18,11 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from shared.loads import DRAGGED, PRESSED, STRAIGHT
-from shared.searches import search
 
 from enumsol import gallery
 from enumsol.enumeration.relaxation import ActiveSetEngine
+from shared.loads import DRAGGED, PRESSED, STRAIGHT
+from shared.searches import search
 
 if TYPE_CHECKING:
     from shared.results import Run
@@ -64,18 +64,25 @@ def row(problem, F):
     return found
 
 
-def main(run: Run) -> None:
-    rows = []
-    for p, ny, length in SMOKE_BLOCKS if run.smoke else BLOCKS:
+def table(blocks, friction):
+    """One row a block, traction and friction coefficient."""
+    for p, ny, length in blocks:
         for traction in (PRESSED, DRAGGED, STRAIGHT):
             problem = gallery.clamped_block(p, ny, length=length, traction=traction)
-            for F in SMOKE_FRICTION if run.smoke else FRICTION:
-                rows.append({"p": p, "length": length, "traction": traction, **row(problem, F)})
+            for F in friction:
+                yield {"p": p, "length": length, "traction": traction, **row(problem, F)}
+
+
+def main(run: Run) -> None:
+    rows = list(table(SMOKE_BLOCKS, SMOKE_FRICTION) if run.smoke else table(BLOCKS, FRICTION))
     count = {kappa: sum(fewer(line[f"kappa {kappa}"], line["energy"]) for line in rows) for kappa in KAPPA}
     run.table(
         "energy_forms",
         rows,
-        *(f"kappa = {kappa} needs fewer nodes than the energy in {n} of {len(rows)} cases" for kappa, n in count.items()),
+        *(
+            f"kappa = {kappa} needs fewer nodes than the energy in {n} of {len(rows)} cases"
+            for kappa, n in count.items()
+        ),
     )
 
 

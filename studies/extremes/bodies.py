@@ -7,12 +7,12 @@ import resource
 import subprocess
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from extremes.judge import Finding, guarded, row
-
 from enumsol import enumerate_roots, gallery, verify
+from extremes.judge import Finding, guarded, row
 
 #: Cells along both sides; every tenth part of the bottom carries a contact node.
 BODIES, SMOKE_BODIES = (40, 160, 500), (20,)
@@ -43,7 +43,7 @@ def body(cells: int) -> dict[str, Any]:
     """One large body; the reason holds the seconds of every stage and the peak memory."""
     stages = [("", time.process_time())]
     finding = guarded(lambda: judged(cells, lambda name: stages.append((name, time.process_time()))))
-    parts = [f"{name} {at - before:.1f} s" for (_, before), (name, at) in zip(stages, stages[1:], strict=False)]
+    parts = [f"{name} {at - before:.1f} s" for (_, before), (name, at) in pairwise(stages)]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2.0**20
     finding.reasons.append(", ".join(parts) + f", peak {peak:.2f} GB")
     return row("body", name_of(cells), "closed form", finding, time.process_time() - stages[0][1])

@@ -8,11 +8,11 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from extremes.judge import Case
-from extremes.transformed import backwards, rescaled
 from flint import fmpq
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, fem, gallery
+from extremes.judge import Case
+from extremes.transformed import backwards, rescaled
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

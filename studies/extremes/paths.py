@@ -9,8 +9,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from extremes.judge import Finding, count, guarded, row
-from extremes.transformed import rescaled
 
 from enumsol import (
     ContactProblem,
@@ -26,6 +24,8 @@ from enumsol import (
     newton,
     verify,
 )
+from extremes.judge import Finding, count, guarded, row
+from extremes.transformed import rescaled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from matplotlib.figure import Figure
+
     from shared.results import Run
 
 VERDICTS = (RIGHT, UNDECIDED, WRONG)

@@ -14,11 +14,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from enumsol import branch_graph, gallery
 from paper_examples.one_node import INTERVAL, ONE_NODE, Facts
 from paper_examples.two_nodes import TWO_NODES, own_row
 from paper_examples.walks import continuation_row, draw
-
-from enumsol import branch_graph, gallery
 
 if TYPE_CHECKING:
     from shared.results import Run

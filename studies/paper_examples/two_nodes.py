@@ -1,6 +1,6 @@
 """Loads of Examples 6.4 to 6.7 on the gallery's square of two nodes: which of the printed facts it shows.
 
-The paper's coordinates were never published, so that its printed numbers are not to be expected; they stand beside ours.
+The paper's coordinates were never published: its printed numbers are not to be expected here, they stand beside ours.
 """
 
 from __future__ import annotations

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from paper_examples.one_node import MINUS, OPEN, STICK
 
 from enumsol import ContinuationOptions, follow, follow_all
 from enumsol.continuation import follow_arc, start_tangents
+from paper_examples.one_node import MINUS, OPEN, STICK
 
 
 def paper_options(h_max):

@@ -15,11 +15,11 @@ from collections import defaultdict
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from enumsol.enumeration.relaxation import PRUNE_MARGIN
 from qp_engines.solvers import INSTALLED, SOLVERS, Recording
 from shared.loads import DRAGGED, PRESSED, block, oblique_wedge, straight_wedge
 from shared.searches import search
-
-from enumsol.enumeration.relaxation import PRUNE_MARGIN
 
 if TYPE_CHECKING:
     from shared.results import Run

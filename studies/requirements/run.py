@@ -22,11 +22,10 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from enumsol import gallery, write_problem
 from requirements.cases import CASES
 from requirements.notes import conclusions, draw, merged
 from shared.versions import before, interpreters, new_process, version_options
-
-from enumsol import gallery, write_problem
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from shared.random_paths import random_path
-from shared.results import yes
 
 from enumsol import branch_graph, enumerate_roots, gallery
+from shared.random_paths import random_path
+from shared.results import yes
 
 COUNT, SMOKE_COUNT = 200, 10
 PROBLEMS, SMOKE_PROBLEMS = 30, 4

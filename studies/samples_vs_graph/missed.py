@@ -12,14 +12,13 @@ from __future__ import annotations
 
 from functools import partial
 
+from enumsol import branch_graph, link_samples
 from samples_vs_graph.thin import INTERVAL, thin_problem
 from shared.clock import timed
 from shared.figures import BLUE, GREEN, GREY, ORANGE, RED, panels
 from shared.paths import exact_path, located, paths
 from shared.random_paths import random_path
 from shared.results import series
-
-from enumsol import branch_graph, link_samples
 
 SAMPLES, SMOKE_SAMPLES = (10, 30, 100, 300, 1000), (10, 30)
 #: Lengths in alpha of closed branches beside an open one.

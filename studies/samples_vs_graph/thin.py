@@ -9,9 +9,9 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from shared.results import yes
 
 from enumsol import ContactProblem, branch_graph, link_samples
+from shared.results import yes
 
 INTERVAL = (0.0, 4.0)
 LENGTHS, SMOKE_LENGTHS = (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6), (1.0, 1e-3)

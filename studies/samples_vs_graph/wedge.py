@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from shared.loads import OBLIQUE
-from shared.results import yes
 
 from enumsol import branch_graph, enumerate_roots, gallery
+from shared.loads import OBLIQUE
+from shared.results import yes
 
 INTERVAL = (0.0, 5.0)
 SIZES, SMOKE_SIZES = (4, 6, 8, 10, 12, 14, 16), (4, 6)

@@ -17,21 +17,20 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import tempfile
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+import enumsol
+from enumsol import gallery
 from search_profile.notes import conclusions, draw, merged
 from search_profile.sampler import PARTS, sampled, unknown_functions
 from shared.clock import timed
 from shared.loads import DRAGGED, PRESSED, Loaded, block
 from shared.versions import before, interpreters, new_process, version_options
-
-import enumsol
-from enumsol import gallery
 
 if TYPE_CHECKING:
     from shared.results import Run

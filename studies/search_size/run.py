@@ -13,10 +13,10 @@ from collections import defaultdict
 from typing import TYPE_CHECKING
 
 import numpy as np
-from shared.figures import panels
-from shared.loads import DRAGGED, PRESSED, STRAIGHT, block, oblique_wedge, straight_wedge
 
 import enumsol
+from shared.figures import panels
+from shared.loads import DRAGGED, PRESSED, STRAIGHT, block, oblique_wedge, straight_wedge
 
 if TYPE_CHECKING:
     from shared.results import Run

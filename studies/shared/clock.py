@@ -18,9 +18,7 @@ def timed(action: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
     return answer, time.process_time() - started
 
 
-def least_time(
-    make: Callable[[], Any], action: Callable[[Any], Any], *, runs: int, enough: float
-) -> tuple[Any, float]:
+def least_time(make: Callable[[], Any], action: Callable[[Any], Any], *, runs: int, enough: float) -> tuple[Any, float]:
     """The last answer of ``action(make())`` and the least process time of some runs; ``make`` is outside the clock.
 
     A run that takes longer than ``enough`` seconds is the last one.

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from shared.random_paths import random_path
-
 from enumsol import BranchGraph, ContactProblem, branch_graph, gallery
+from shared.random_paths import random_path
 
 if TYPE_CHECKING:
     from typing import Any

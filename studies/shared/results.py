@@ -62,11 +62,6 @@ def series(rows: list[dict[str, Any]], name: str) -> str:
     return " ".join(f"{row[name]:.3g}" if isinstance(row[name], float) else str(row[name]) for row in rows)
 
 
-def named(values: dict[str, Any]) -> str:
-    """Names and values as text."""
-    return ", ".join(f"{name} {value}" for name, value in values.items())
-
-
 def yes(fact: object) -> str:
     """A fact in a table."""
     return "yes" if fact else "no"

@@ -1,4 +1,4 @@
-"""This version of the package beside an older one, each in processes of its own, taking turns.
+"""Two versions of the package beside each other, each in processes of its own, taking turns.
 
 What was measured of the older version is kept as JSON among the results, and read again when no older version is named.
 """
@@ -26,7 +26,7 @@ def version_options(parser: ArgumentParser, rounds: int) -> None:
 
 
 def interpreters(given: Namespace) -> list[str]:
-    """This interpreter and, where an older version is named, that one's."""
+    """Path of the interpreter that runs, and of that with an older version where one is named."""
     found = [sys.executable, *([given.against] if given.against else [])]
     homes = [new_process(python, "-c", "import enumsol; print(enumsol.__file__)")[1] for python in found]
     if len(set(homes)) < len(homes):
