@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from accuracy_vs_speed.settings import EXACT, FAST, LARGE, SETTINGS, SINGLE, SINGLE_WIDE, SWEEP, VERIFIED
+from accuracy_vs_speed.settings import EXACT, FAST, LARGE, SETTINGS, SINGLE, SINGLE_WIDE, SWEEP, VERIFIED, median_time
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -62,10 +60,6 @@ def text_of(distance: float | str) -> str:
 
 def share(items: Sequence[Measurement], bad: Callable[[Measurement], bool]) -> float:
     return 100.0 * sum(map(bad, items)) / len(items)
-
-
-def median_time(items: Sequence[Measurement]) -> float:
-    return float(np.nanmedian([item.time_ratio for item in items]))
 
 
 def conclusions(

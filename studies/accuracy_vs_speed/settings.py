@@ -152,8 +152,14 @@ def summary(items: Sequence[Measurement], degeneracy: str, setting: Setting, dis
         "wrong and flagged": sum(item.wrong and item.flagged for item in items),
         "wrong claims": sum(item.claimed and item.wrong for item in items),
         "force error": max((item.comparison.error for item in items), default=0.0),
-        "time ratio": float(np.nanmedian([item.time_ratio for item in items])),
+        "time ratio": median_time(items),
     }
+
+
+def median_time(items: Sequence[Measurement]) -> float:
+    """Median of the time ratios where there is an answer."""
+    ratios = [item.time_ratio for item in items if not item.refused]
+    return float(np.median(ratios)) if ratios else np.nan
 
 
 def checks(all_cases: Sequence[Case]) -> dict[str, tuple[int, int]]:

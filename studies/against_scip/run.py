@@ -1,8 +1,9 @@
-"""How much faster is the tree than a general solver that counts solutions? Wedges with p = 14 against SCIP.
+"""How much faster is the tree than a general solver that counts solutions?
 
-SCIP gets the condensed, scaled problem with one binary for every status of every node, the conditions of the status as
-indicator constraints (or, second, as big-M rows) and, to its advantage, the bounds on forces and displacements that the
-energy implies. It counts the assignments of the binaries that admit a solution; at regular roots these are the roots.
+Wedges with p = 14 against SCIP. It gets the condensed, scaled problem with one binary for every status of every node,
+the conditions of the status as indicator constraints (or, second, as big-M rows) and, to its advantage, the bounds on
+forces and displacements that the energy implies. It counts the assignments of the binaries that admit a solution; at
+regular roots these are the roots.
 
 Read ``ratio``: SCIP's wall time over the tree's. ``roots`` and ``SCIP counts`` must agree. Needs pyscipopt; without it
 SCIP's columns are empty.

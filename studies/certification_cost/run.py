@@ -1,9 +1,9 @@
-"""What does a proof cost? Verified against fast and exact arithmetic, and the checker against the search.
+"""What does a proof cost, and what does checking it?
 
-Blocks and wedges of the gallery. Every figure is the least of some runs on a fresh problem, by process time: making the
-condensed problem, its enclosure and the proof is inside the clock, factorizing A is not. Exact arithmetic is tried
-where the body has few enough degrees of freedom, and given up after a minute. The wedge at p = 64 is left out: its tree
-takes tens of minutes.
+Verified against fast and exact arithmetic, and the checker against the search, on blocks and wedges of the gallery.
+Every figure is the least of some runs on a fresh problem, by process time: making the condensed problem, its enclosure
+and the proof is inside the clock, factorizing A is not. Exact arithmetic is tried where the body has few enough degrees
+of freedom, and given up after a minute. The wedge at p = 64 is left out: its tree takes tens of minutes.
 
 Read ``verified / fast``: what certainty costs; and ``check / verified``: what it costs to check the proof.
 """

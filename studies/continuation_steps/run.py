@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from shared.results import Run
 
 LENGTHS, SMOKE_LENGTHS = (0.1, 0.25, 0.5, 1.0, 2.5, 5.0), (1.0, 5.0)
-TOLERANCES, SMOKE_TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12), (1e-2, 1e-6)
+TOLERANCES, SMOKE_TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9, 1e-12), (1e-6,)
 #: Step length and tolerance of the default settings, and the step length at which printed steps' tolerances are tried.
 DEFAULT_LENGTH, DEFAULT_TOLERANCE, SHORT = 1.0, 1e-6, 0.1
 CHECKED, PRINTED = "checked steps", "as printed"

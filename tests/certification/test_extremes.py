@@ -199,7 +199,7 @@ def test_nothing_can_be_proven_about_a_body_on_the_verge(monkeypatch):
     assert report.undecided == 1
 
 
-# -- regressions found by studies/extremes.py --------------------------------------------------------------------------
+# -- regressions found by studies/extremes -----------------------------------------------------------------------------
 
 
 def rescaled(problem, stiffness=1.0, load=1.0):
