@@ -5,13 +5,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import enumsol
+
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 
 
 def test_every_benchmark_runs_once(tmp_path):
     command = [sys.executable, "-m", "pytest", "studies/benchmarks", "-n", "0", "-p", "no:benchmark", "-p", "once"]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join((str(ROOT), str(HERE)))}
+    path = os.pathsep.join((str(HERE), str(Path(enumsol.__file__).parents[1])))
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": path}
     done = subprocess.run(
         [*command, "-o", f"cache_dir={tmp_path}"],
         cwd=ROOT,
