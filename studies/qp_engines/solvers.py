@@ -17,6 +17,8 @@ from enumsol.enumeration.relaxation import EQUALITY, PRUNE_MARGIN, ActiveSetEngi
 INSTALLED = find_spec("daqp") is not None
 #: daqp's marks of a row: equality, active at its lower bound; and what it takes for no bound.
 EQUAL, ACTIVE_LOWER, FREE = 5, 3, 1e30
+#: Multipliers whose squares overflow are a ray: daqp sets no size where it finds no point.
+HUGE = 1e100
 
 
 class Met(NamedTuple):
@@ -76,6 +78,9 @@ def proves(engine, rows, values):
     """Whether multipliers, or a multiple of them, give a positive lower bound on the energy."""
     if not np.all(np.isfinite(values)) or not np.any(values):
         return False
+    largest = np.max(np.abs(values))
+    if largest > HUGE:
+        values = values / largest
     if engine.dual_bound(rows, values) > PRUNE_MARGIN:
         return True
     # a ray: the best multiple of it, dual_bound(t) = -c t^2 + b t + a
