@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from enumsol.enumeration import SearchProgress, enumerate_roots
     from enumsol.errors import (
         EnumsolError,
+        IncompleteGraphError,
         Interrupted,
         InvalidArgumentError,
         InvalidProblemError,
@@ -55,6 +56,7 @@ _HOMES = {
     "enumsol.enumeration": ("SearchProgress", "enumerate_roots"),
     "enumsol.errors": (
         "EnumsolError",
+        "IncompleteGraphError",
         "Interrupted",
         "InvalidArgumentError",
         "InvalidProblemError",
@@ -92,6 +94,7 @@ __all__ = [
     "ContinuationOptions",
     "Enclosure",
     "EnumsolError",
+    "IncompleteGraphError",
     "Interrupted",
     "InvalidArgumentError",
     "InvalidProblemError",

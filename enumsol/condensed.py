@@ -1,4 +1,4 @@
-"""Condensation to the contact nodes: S = B A^{-1} B', g(alpha) and F(alpha) (theory, section 4)."""
+"""Condensation to the contact nodes: S = B A^{-1} B', g(alpha) and F(alpha) (theory, section 4.1)."""
 
 from __future__ import annotations
 

@@ -85,10 +85,10 @@ def two_node_square(
 
     With l = m = 1 it shows
 
-    - f1 = (1, -3), f2 = (1, -1) (Example 6.4): 1 root for alpha < 3, 5 for 3 < alpha < 3.828, then 3;
+    - f1 = (1, -3), f2 = (1, -1) (paper, Example 6.4): 1 root for alpha < 3, 5 for 3 < alpha < 3.828, then 3;
     - f1 = (1, -4), f2 = (1.5, -3.5): 5 well separated roots at alpha = 5;
     - f1 = (0.4, 0.2), f2 = (1.8, -0.1), friction = 4, load_slope = ((0.1, -1.1), (0.2, -0.8)), the loading path of
-      Example 6.7: 3 roots for alpha between 1.2 and 2.6, else one. The other reading of its signs,
+      paper, Example 6.7: 3 roots for alpha between 1.2 and 2.6, else one. The other reading of its signs,
       load_slope = ((0.1, 1.1), (0.2, 0.8)), has 3 roots between -1.2 and -0.75.
 
     Parameters

@@ -28,7 +28,7 @@ Alpha = float | Fraction
 
 
 class ContactProblem:
-    """A linear elastic body on a rigid foundation with Coulomb friction (theory: equilibrium, Signorini, Coulomb).
+    """A linear elastic body on a rigid foundation with Coulomb friction (theory, section 1.1).
 
     Find u, lambda_n, lambda_t with::
 
@@ -129,7 +129,7 @@ class ContactProblem:
 
     @cached_property
     def condensed(self) -> CondensedProblem:
-        """The problem condensed to its 2p contact forces (theory, section 4)."""
+        """The problem condensed to its 2p contact forces (theory, section 4.1)."""
         from enumsol.condensed import CondensedProblem  # as above
 
         return CondensedProblem.from_problem(self)

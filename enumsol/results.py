@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from enumsol.condensed import CondensedProblem
     from enumsol.continuation import LocalBranchTest
     from enumsol.enumeration.linearisation import SelectionTangent
+    from enumsol.enumeration.slip_signs import SlipSigns
     from enumsol.enumeration.verified import Escalations
     from enumsol.problem import Alpha
 
@@ -53,15 +54,16 @@ class Root:
     alpha : float or Fraction
     statuses : tuple of p ContactStatus
         Where several hold, the first of OPEN, STICK, SLIP_PLUS, SLIP_MINUS. At a node with F = 0 in contact the sign
-        of u_t names it.
+        of u_t names it: in verified and exact arithmetic that of the enclosure, or in rationals.
     active : tuple of p frozensets of ContactStatus
-        All statuses that hold at the node.
+        All statuses that hold at the node; at a node with F = 0 in contact, all that the sign of u_t does not exclude
+        (of a body too large for rationals, n > 250, the enclosure of u_t may hold zero and leave the sign open).
     lambda_n, lambda_t : (p,) arrays
         Contact forces on the nodes (nodal forces, not pressures) [force].
     u_n, u_t : (p,) arrays
         Bn u - gap <= 0 and Bt u - slip_offset [length].
     index : int or None
-        Local degree (theory, section 6): sign det of the selection at a regular root. It says nothing about physical
+        Local degree (theory, section 6.7): sign det of the selection at a regular root. It says nothing about physical
         stability. None when it could not be found within the limits of the local analysis.
     regular : bool
         Exactly one status holds at every node, strictly, and the selection is not singular.
@@ -85,6 +87,7 @@ class Root:
     enclosure: Enclosure | None = field(repr=False, compare=False)
     _condensed: CondensedProblem = field(repr=False, compare=False)
     _tangent: SelectionTangent | None = field(repr=False, compare=False)
+    _slips: SlipSigns | None = field(repr=False, compare=False, default=None)
 
     @cached_property
     def condition(self) -> float:
@@ -102,7 +105,7 @@ class Root:
         return self._condensed.displacement(self.alpha, np.concatenate([self.lambda_n, self.lambda_t]))
 
     def local_branch_test(self) -> LocalBranchTest:
-        """Whether a local Lipschitz branch of solutions passes through the root (Section 4, Theorem 4.1).
+        """Whether a local Lipschitz branch of solutions passes through the root (theory, section 3.2).
 
         Its ``exists`` is True when the determinants of all selections that hold at the root have one and the same
         sign; ``differing`` names those that break this. A regular root always has such a branch. ``premise`` tells
@@ -117,14 +120,23 @@ class Root:
 
         return local_branch_test(self._condensed.problem, self)
 
+    def _slip_sign(self, node: int) -> int:
+        sign = None if self._slips is None else self._slips.sign(node)
+        return int(np.sign(self.u_t[node])) if sign is None else sign
+
     @property
     def signs(self) -> NDArray[np.int8]:
-        """Signs of the test functions at the root, shape (p, 3); 0 where a test function vanishes."""
+        """Signs of the test functions at the root, shape (p, 3); 0 where a test function vanishes.
+
+        At an open node theta2 and theta3 have the sign of u_t. In verified and exact arithmetic it follows from the
+        enclosure or from rationals; of a body too large for these (n > 250) whose enclosure holds zero, it is that of
+        the computed value.
+        """
         signs = sign_array(self.statuses)
         for i, holds in enumerate(self.active):
             if ContactStatus.OPEN in holds:
                 signs[i, 0] = 0 if len(holds) > 1 else -1
-                signs[i, 1:] = int(np.sign(self.u_t[i]))
+                signs[i, 1:] = self._slip_sign(i)
             else:
                 if ContactStatus.SLIP_PLUS in holds and ContactStatus.STICK in holds:
                     signs[i, 1] = 0
@@ -245,6 +257,9 @@ class RootSet(Sequence[Root]):
     arithmetic, method : str
     stopped : str or None
         Why the search ended early, or None.
+    at_least : int
+        Number of isolated roots and families together if nothing is known to be missing; otherwise a lower bound of it,
+        in which roots and families that a continuum not found may join are counted as one.
     stats : SearchStats
     certified_data : str
         What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed).
@@ -264,6 +279,7 @@ class RootSet(Sequence[Root]):
         stopped: str | None,
         stats: SearchStats,
         node_ids: tuple[Any, ...],
+        at_least: int | None = None,
         certified_data: str = "problem",
         proof: Proof | None = None,
     ) -> None:
@@ -275,6 +291,7 @@ class RootSet(Sequence[Root]):
         self.method = method
         self.stopped = stopped
         self.stats = stats
+        self.at_least = len(self._roots) + len(self.families) if at_least is None else at_least
         self.node_ids = node_ids
         self.certified_data = certified_data
         self.proof = proof
@@ -282,11 +299,21 @@ class RootSet(Sequence[Root]):
     @property
     def complete(self) -> bool:
         """Whether completeness is proven: exact arithmetic, nothing undecided, search not cut short."""
-        return self.arithmetic != "fast" and self.stopped is None and not self.undecided
+        return self.arithmetic != "fast" and self.whole
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is known to be missing: the search ran to its end and left nothing undecided."""
+        return self.stopped is None and not self.undecided
 
     @property
     def index_sum(self) -> int | None:
-        """Sum of the indices of all roots and families: +1 when nothing is missing; None if one is unknown."""
+        """Sum of the indices of all roots and families: +1 when nothing is missing; None if one is unknown.
+
+        It is unknown, too, after a search that was cut short or left something undecided.
+        """
+        if not self.whole:
+            return None
         indices = [root.index for root in self._roots] + [family.index for family in self.families]
         return None if any(index is None for index in indices) else sum(index for index in indices if index is not None)
 
@@ -336,6 +363,8 @@ class RootSet(Sequence[Root]):
         heading = f"RootSet at alpha = {float(self.alpha):g}: {_count(len(self), 'root')}"
         if self.families:
             heading += f", {_count(len(self.families), 'family', 'families')}"
+        if not self.whole:
+            heading += f" found, at least {self.at_least} in all"
         lines = [f"{heading} ({self.arithmetic}, {self.method})"]
         if len(self):
             lines.append(f"{'':>6} {'index':>5} {'regular':>7} {'margin':>9} {'max lambda_n':>12}  contact")
@@ -358,9 +387,7 @@ class RootSet(Sequence[Root]):
         lines += [f"undecided, {count} times: {reason} ({hint})" for (reason, hint), count in alike.most_common(5)]
         total = self.index_sum
         # a sum other than +1 proves that something is missing or wrong
-        note = (
-            "unknown" if total is None else (f"{total:+d}" if total == 1 or self.stopped else f"{total:+d} (not +1!)")
-        )
+        note = "unknown" if total is None else f"{total:+d}" if total == 1 else f"{total:+d} (not +1!)"
         lines.append(f"index sum: {note}")
         lines.append(self.completeness())
         return "\n".join(lines)

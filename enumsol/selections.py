@@ -1,4 +1,4 @@
-"""Statuses, sign arrays, test functions and the piecewise smooth residual H with its selections (theory, 1-2)."""
+"""Statuses, sign arrays, test functions and the piecewise smooth residual H (theory, sections 1.2 and 2)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class ContactStatus(enum.Enum):
 #: Statuses in the order of their integer codes 0..3; a root at which several hold shows the first.
 STATUSES = (ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP_PLUS, ContactStatus.SLIP_MINUS)
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS = range(4)
-#: Inside the searches a node with F = 0 that is in contact: lambda_t = 0 and u_t free (theory, section 2).
+#: Inside the searches a node with F = 0 that is in contact: lambda_t = 0 and u_t free (theory, section 2.1).
 FRICTIONLESS = 4
 
 _SIGNS = {
@@ -49,7 +49,7 @@ _SIGNS = {
 
 
 def sign_array(statuses: Sequence[ContactStatus]) -> NDArray[np.int8]:
-    """Signs of the test functions that name the selection of ``statuses``, shape (p, 3) (theory, table of section 2).
+    """Signs of the test functions that name the selection of ``statuses``, shape (p, 3) (theory, section 2.1).
 
     At an open node theta2 = theta3 at a root and their sign does not matter; (-, -, -) is returned.
     """
@@ -58,7 +58,7 @@ def sign_array(statuses: Sequence[ContactStatus]) -> NDArray[np.int8]:
 
 @dataclass(frozen=True)
 class PiecewiseSmoothEquation:
-    """The equation H(x) = 0 of a contact problem, x = (u, lambda_n, lambda_t) at a parameter alpha (theory, section 1).
+    """The equation H(x) = 0 of a contact problem, x = (u, lambda_n, lambda_t) at a parameter alpha (theory, (1.5)).
 
     The third block uses P(x) = min(b, x) + max(a, x) - x with a = -F lambda_n and b = F lambda_n, which stays piecewise
     linear and continuous where lambda_n < 0 and the interval turns around.
@@ -182,7 +182,7 @@ class PiecewiseSmoothEquation:
 def selection_systems(
     S: NDArray[np.float64], g: NDArray[np.float64], F: NDArray[np.float64], codes: NDArray[np.int8]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Linear systems M lambda = b of condensed selections (theory, section 2, with w = g - S lambda).
+    """Linear systems M lambda = b of condensed selections (theory, section 2.3).
 
     Parameters
     ----------

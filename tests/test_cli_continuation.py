@@ -8,14 +8,14 @@ import pandas as pd
 import pytest
 from test_cli import assert_refused, on_terminal, run
 
-from enumsol import gallery, write_problem
+from enumsol import Interrupted, branch_graph, gallery, write_problem
 
 FOLLOW = ("follow", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--start", 5)
 
 
 @pytest.fixture
 def points(capsys, tmp_path):
-    """All branches of Example 6.1, followed."""
+    """All branches of the paper's Example 6.1, followed."""
     file = tmp_path / "points.csv"
     assert run(capsys, *FOLLOW, "--csv", file)[0] == 0
     return file
@@ -204,6 +204,26 @@ def test_audit_reads_stdin(points):
         done = subprocess.run(command, stdin=file, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert ": ok, complete" in done.stdout
+
+
+def test_audit_reads_points_before_it_searches(capsys, tmp_path, monkeypatch):
+    file = tmp_path / "bad.csv"
+    file.write_text("alpha,lambda_n_0\n1,2\n2,2\n")
+    monkeypatch.setattr("enumsol.cli.audit.build", lambda *_, **__: pytest.fail("the graph was built"))
+    assert_refused(*run(capsys, "audit", "gallery:one-node-6.1", file), "no column 'lambda_t_0'")
+
+
+def test_ctrl_c_audits_what_was_found(capsys, points, monkeypatch):
+    body = gallery.get("one-node-6.1").build()
+    partial = branch_graph(body, (0.0, 20.0), max_nodes=3)
+
+    def interrupted(*_, **__):
+        raise Interrupted("interrupted", partial)
+
+    monkeypatch.setattr("enumsol.cli.audit.build", interrupted)
+    status, out, _ = run(capsys, "audit", "gallery:one-node-6.1", points)
+    assert status == 130
+    assert "but the graph is not complete: stopped" in out
 
 
 # -- bad input ---------------------------------------------------------------------------------------------------------

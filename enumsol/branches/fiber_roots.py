@@ -43,6 +43,7 @@ def roots_of(graph: BranchGraph, alpha: Alpha, selections: Sequence[Codes]) -> R
     families = [builder.family(c, proven=exact) for c in components if c.dimension > 0]
     roots.sort(key=lambda root: ([s.value for s in root.statuses], root.lambda_n.tolist(), root.lambda_t.tolist()))
     families.sort(key=lambda family: family.vertices.tolist())
+    whole = sum(c.whole for c in components)
     return RootSet(
         alpha=alpha,
         roots=roots,
@@ -53,6 +54,7 @@ def roots_of(graph: BranchGraph, alpha: Alpha, selections: Sequence[Codes]) -> R
         stopped=None if not graph.reasons else "the branch graph is not complete",
         stats=SearchStats(selections=len(selections)),
         node_ids=problem.node_ids,
+        at_least=whole + int(whole < len(components)) if graph.reasons else None,
     )
 
 

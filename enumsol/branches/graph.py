@@ -1,4 +1,4 @@
-"""BranchGraph: all solutions over an interval of alpha, and the questions it answers (theory, section 7)."""
+"""BranchGraph: all solutions over an interval of alpha, and the questions it answers (theory, section 7.11)."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ import numpy as np
 
 from enumsol.branches.algebraic import CriticalAlpha
 from enumsol.branches.assembly import make_branches, make_components, multigraph
+from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps, Standing
 from enumsol.branches.fiber_roots import roots_of
+from enumsol.branches.parts import UNSETTLED
 from enumsol.enumeration.exact_selections import rational
-from enumsol.errors import InvalidArgumentError
+from enumsol.errors import IncompleteGraphError, InvalidArgumentError
 from enumsol.problem import finite_alpha
 
 if TYPE_CHECKING:
@@ -56,6 +58,11 @@ class GraphStats:
 
 class BranchGraph:
     """All solutions over an interval of alpha: arcs of single selections, glued at vertices (made by ``branch_graph``).
+
+    A graph with ``reasons`` is not complete. It shows what was found, and every part of it is true: arcs are solutions,
+    and a vertex has a kind only where everything that meets there is known (it is "unsettled" otherwise). What needs
+    the whole graph (``multiplicity_at``, ``steps``, ``uniqueness_limit``) raises IncompleteGraphError then;
+    ``at_least`` and ``claims`` tell what is known.
 
     Attributes
     ----------
@@ -103,12 +110,20 @@ class BranchGraph:
         self.proof = proof
         self.graph = multigraph(self.vertices, self.arcs)
         self.search_reasons = tuple(reasons)
-        self.reasons = (*reasons, *self._imbalances())
+        self.reasons = (*reasons, *self._gaps())
 
-    def _imbalances(self) -> list[str]:
-        """Violations of the balance of degrees (theory, section 7); each proves that something is missing."""
+    def _gaps(self) -> list[str]:
+        """Violations of the balance of degrees, and vertices that are not settled (theory, (7.3)).
+
+        Each of them proves that something is missing.
+        """
         found = []
+        unsettled = sum(v.kind == UNSETTLED for v in self.vertices)
+        if unsettled and not self.search_reasons:
+            found.append(f"selections that were not examined hold at {unsettled} of {len(self.vertices)} vertices")
         for v in self.vertices:
+            if v.kind == UNSETTLED:
+                continue
             if v.index_left is None or v.index_right is None:
                 found.append(f"vertex {v.number} at alpha = {v.alpha:.17g}: the degree of an arc is not known")
             elif not v.border and v.index_left != v.index_right:
@@ -117,7 +132,8 @@ class BranchGraph:
                     f"and {v.index_right:+d} to the right do not balance"
                 )
         start = [v.index_right for v in self.vertices if v.border and v.alpha == self.interval[0]]
-        if None not in start and (total := sum(k for k in start if k is not None)) != 1:
+        total = sum(k for k in start if k is not None)
+        if not self.search_reasons and None not in start and total != 1:
             found.append(f"the degrees of all arcs at alpha = {self.interval[0]:g} sum to {total:+d} and not to +1")
         return found
 
@@ -125,6 +141,17 @@ class BranchGraph:
     def complete(self) -> bool:
         """Whether it is proven that no solution is missing: proven leaves, nothing undecided, degrees balanced."""
         return self.arithmetic != "fast" and not self.reasons
+
+    @cached_property
+    def claims(self) -> Claims:
+        """What may be said about the number of solutions: numbers of a graph without gaps, lower bounds otherwise."""
+        whole = Standing.PROVEN if self.complete else Standing.NOT_PROVEN
+        return Claims(self.vertices, self.arcs, self.interval, Standing.INCOMPLETE if self.reasons else whole)
+
+    def _whole(self, name: str, instead: str) -> None:
+        """Refuse a statement about all solutions unless nothing is known to be missing."""
+        if not self.claims.whole:
+            raise IncompleteGraphError(f"{name} is not known: the graph is not complete ({self.reasons[0]}); {instead}")
 
     @property
     def certified_data(self) -> str:
@@ -135,7 +162,7 @@ class BranchGraph:
 
     @cached_property
     def components(self) -> tuple[Component, ...]:
-        """Connected components in the order of their smallest alpha."""
+        """Connected components of what was found, in the order of their smallest alpha."""
         return make_components(self.graph, self.vertices, self.arcs)
 
     @cached_property
@@ -183,10 +210,14 @@ class BranchGraph:
 
     @property
     def jumps(self) -> tuple[Vertex, ...]:
-        """Vertices that no arc leaves to the right: where following a branch with increasing alpha must leave it."""
+        """Settled vertices that no arc leaves to the right: with increasing alpha a branch must be left there."""
         tails = {arc.tail for arc in self.arcs}
         heads = {arc.head for arc in self.arcs}
-        return tuple(v for v in self.vertices if not v.border and v.number in heads and v.number not in tails)
+        return tuple(
+            v
+            for v in self.vertices
+            if not v.border and v.kind != UNSETTLED and v.number in heads and v.number not in tails
+        )
 
     # -- solutions at one alpha ------------------------------------------------------------------------------------
 
@@ -209,7 +240,7 @@ class BranchGraph:
         return tuple(self._located(alpha)[0])
 
     def roots_at(self, alpha: Alpha) -> RootSet:
-        """All solutions at one alpha, as enumerate_roots returns them.
+        """All solutions at one alpha, as enumerate_roots returns them; of a graph with gaps, those that were found.
 
         Raises
         ------
@@ -227,47 +258,62 @@ class BranchGraph:
         ------
         InvalidArgumentError
             alpha is outside the interval.
+        IncompleteGraphError
+            The graph has gaps; ``at_least`` gives a lower bound.
         """
-        arcs, vertices = self._located(alpha)
-        return len(arcs) + len(vertices)
+        found = self._multiplicity(alpha)
+        self._whole("the number of solutions", f"there are {found} at alpha = {float(alpha):.8g}")
+        return found.count
+
+    def at_least(self, alpha: Alpha) -> int:
+        """Lower bound of the number of isolated roots and families at one alpha, for graphs with gaps too.
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is outside the interval.
+        """
+        return self._multiplicity(alpha).count
+
+    def _multiplicity(self, alpha: Alpha) -> Multiplicity:
+        return self.claims.multiplicity(*self._located(alpha))
 
     @cached_property
+    def _steps(self) -> MultiplicitySteps:
+        return self.claims.steps()
+
+    @property
     def steps(self) -> tuple[list[Fraction], list[int], list[int]]:
-        """Multiplicity as a step function: critical alphas (rounded), values at them and on the intervals between."""
-        groups: list[list[Vertex]] = []
-        for v in self.vertices:
-            if groups and groups[-1][0].exact.compare(v.exact) == 0:
-                groups[-1].append(v)
-            else:
-                groups.append([v])
-        place = {v.number: k for k, group in enumerate(groups) for v in group}
-        change = np.zeros(len(groups) + 1, dtype=int)
-        through = np.zeros(len(groups) + 1, dtype=int)
-        for arc in self.arcs:
-            tail, head = place[arc.tail], place[arc.head]
-            change[tail] += 1
-            change[head] -= 1
-            through[tail + 1] += 1
-            through[head] -= 1
-        between = np.cumsum(change)[:-2].tolist()
-        at = [len(group) + int(k) for group, k in zip(groups, np.cumsum(through)[:-1], strict=True)]
-        return [Fraction(group[0].alpha) for group in groups], at, between
+        """Multiplicity as a step function: critical alphas (rounded), values at them and on the intervals between.
+
+        Raises
+        ------
+        IncompleteGraphError
+            The graph has gaps; ``claims.steps()`` gives lower bounds.
+        """
+        self._whole("the number of solutions", "claims.steps() gives lower bounds")
+        return list(self._steps.alphas), list(self._steps.at), list(self._steps.between)
 
     # -- answers ---------------------------------------------------------------------------------------------------
 
     @property
     def uniqueness_limit(self) -> float | None:
-        """The critical alpha: the solution is unique from the interval's first alpha up to it; None when throughout."""
-        alphas, at, between = self.steps
-        for k, (alpha, number) in enumerate(zip(alphas, at, strict=True)):
-            several = number != 1 or any(v.family is not None for v in self.vertices if v.alpha == alpha)
-            if several or (k < len(between) and between[k] != 1):
-                return float(alpha)
-        return None
+        """The critical alpha: the solution is unique from the interval's first alpha up to it; None when throughout.
+
+        Raises
+        ------
+        IncompleteGraphError
+            The graph has gaps; ``claims.uniqueness()`` tells what is known.
+        """
+        found = self.claims.uniqueness()
+        several = found.several_by
+        known = "no second solution was found" if several is None else f"it is not beyond alpha = {several:.8g}"
+        self._whole("up to where the solution is unique", known)
+        return found.limit
 
     @property
     def uniqueness_bound(self) -> float | None:
-        """An alpha up to which uniqueness follows without any search (theory, section 5); None when for no alpha.
+        """An alpha up to which uniqueness follows without any search (theory, section 5.6); None when for no alpha.
 
         F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node; evaluated in floats.
         """
@@ -297,7 +343,7 @@ class BranchGraph:
         return None
 
     def starting_points(self) -> tuple[Root, ...]:
-        """One regular root on every branch that has any, as starting points of continuation, in order."""
+        """One regular root on every branch that was found and has any, as starting points of continuation, in order."""
         found = (self.starting_point(branch) for branch in self.branches)
         return tuple(root for root in found if root is not None)
 
@@ -396,18 +442,19 @@ class BranchGraph:
 
     def __repr__(self) -> str:
         kinds = Counter(v.kind for v in self.vertices)
-        order = ("transition", "fold", "bifurcation", "family", "sheet", "touch", "point", "broken", "end")
+        order = ("transition", "fold", "bifurcation", "family", "sheet", "touch", "point", UNSETTLED, "broken", "end")
         numbers = ", ".join(f"{kinds[k]} {k}" for k in order if kinds[k])
         a, b = self.interval
+        found = "" if self.claims.whole else ", not complete; of what was found:"
         lines = [
-            f"BranchGraph for alpha in [{a:g}, {b:g}] ({self.arithmetic})",
+            f"BranchGraph for alpha in [{a:g}, {b:g}] ({self.arithmetic}){found}",
             f"  components {len(self.components)}, branches {len(self.branches)}, arcs {len(self.arcs)}",
-            f"  vertices {len(self.vertices)}: {numbers}",
+            f"  vertices {len(self.vertices)}" + (f": {numbers}" if numbers else ""),
         ]
         for branch in self.branches[:20]:
             lo, hi = branch.interval
             folds = ", ".join(f"{v.alpha:.6g}" for v in branch.folds)
-            shape = "sheet" if branch.sheet else ("closed" if branch.closed else "open")
+            shape = _shape(branch)
             width = f", length {hi - lo:.3g}" if f"{lo:.6g}" == f"{hi:.6g}" else ""
             text = f"  branch {branch.number}: {shape}, {len(branch.arcs)} arcs, alpha in [{lo:.6g}, {hi:.6g}]{width}"
             lines.append(text + (f", folds at {folds}" if folds else ""))
@@ -417,11 +464,13 @@ class BranchGraph:
         return "\n".join(lines)
 
     def summary(self) -> dict[str, Any]:
-        """Counts and answers as plain values, for JSON."""
+        """Counts and answers as plain values, for JSON; what is not known is None."""
+        uniqueness, steps = self.claims.uniqueness(), self._steps
         return {
             "interval": list(self.interval),
             "arithmetic": self.arithmetic,
             "complete": self.complete,
+            "standing": self.claims.standing.value,
             "reasons": list(self.reasons),
             "components": len(self.components),
             "branches": len(self.branches),
@@ -430,7 +479,23 @@ class BranchGraph:
             "folds": [v.alpha for v in self.folds],
             "bifurcations": [v.alpha for v in self.bifurcations],
             "jumps": [v.alpha for v in self.jumps],
-            "uniqueness_limit": self.uniqueness_limit,
+            "unique_throughout": uniqueness.throughout,
+            "uniqueness_limit": uniqueness.limit,
+            "several_solutions_by": uniqueness.several_by,
             "uniqueness_bound": self.uniqueness_bound,
+            "multiplicity": {
+                "exact": steps.exact,
+                "alphas": [float(alpha) for alpha in steps.alphas],
+                "at": list(steps.at),
+                "between": list(steps.between),
+            },
             "stats": asdict(self.stats),
         }
+
+
+def _shape(branch: Branch) -> str:
+    if branch.sheet:
+        return "sheet"
+    if branch.closed:
+        return "closed"
+    return "unfinished" if any(v.kind == UNSETTLED for v in branch.vertices) else "open"

@@ -1,4 +1,4 @@
-"""The relaxation of a partial assignment for all alpha in an interval: one convex QP (theory, sections 5 and 7).
+"""The relaxation of a partial assignment for all alpha in an interval: one convex QP (theory, section 7.8).
 
 The cone of a status is the union of its cones over the interval: |lambda_t| <= F_hi lambda_n, and for a slipping node
 lambda_t between F_lo lambda_n and F_hi lambda_n. On a loading path alpha = middle + tau half is a further unknown,

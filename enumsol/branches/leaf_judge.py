@@ -1,4 +1,4 @@
-"""Leaves proven empty over a whole piece of the interval in rational arithmetic (theory, sections 6 and 7)."""
+"""Leaves proven empty over a whole piece of the interval in rational arithmetic (theory, section 7.9)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a branch graph is made of: vertices, arcs, components and branches (theory, section 7)."""
+"""What a branch graph is made of: vertices, arcs, components and branches (theory, section 7.11)."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ if TYPE_CHECKING:
     from enumsol.results import RootFamily
     from enumsol.selections import ContactStatus
 
+#: Kind of a vertex at which selections hold that the search did not reach: arcs that were not found may end there.
+UNSETTLED = "unsettled"
 #: Kinds of vertices at which branches are cut.
-CUTS = ("bifurcation", "family", "sheet")
+CUTS = ("bifurcation", "family", "sheet", UNSETTLED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +43,9 @@ class Vertex:
         "transition" (one arc from the left goes on as another to the right), "fold" (alpha turns back), "bifurcation"
         (any other number of arcs), "touch" (a status is met and left again), "point" (no arc at all), "family" (a
         continuum of solutions at one alpha: a vertical arc), "sheet" (the border of a sheet), "end" (on the interval's
-        border), or "broken" (an arc ends for no reason: something is missing, and the graph is not complete).
+        border), "unsettled" (selections hold here that were not examined, because the search was cut short or a limit
+        was reached: arcs that were not found may end here, so that nothing is said about its kind), or "broken" (an arc
+        ends for no reason: something is missing, and the graph is not complete).
     border : bool
         It lies at the first or last alpha.
     statuses : tuple of p ContactStatus
@@ -52,7 +56,8 @@ class Vertex:
         Values at the vertex; of a family, at one of its points [force, length].
     family : RootFamily or None
     index_left, index_right : int or None
-        Sums of the indices of the arcs that end and begin here; equal inside the interval (balance of degrees).
+        Sums of the indices of the arcs that end and begin here; equal inside the interval (balance of degrees). None
+        where one is not known, or not all arcs.
     selections : tuple of status codes that hold here
     exact : CriticalAlpha
     """

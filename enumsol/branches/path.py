@@ -1,4 +1,4 @@
-"""The condensed problem for all alpha in rationals, and selections as rational functions of it (theory, 4 and 7)."""
+"""The condensed problem for all alpha in rationals; selections as rational functions of it (theory, section 7.1)."""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.branches.parts import UNSETTLED
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.selections import ContactStatus
 
@@ -101,6 +102,8 @@ def plot_graph(
     axes[-1].set_xlabel("alpha")
     axes[-1].set_xlim(*graph.interval)
     _legend(figure, graph)
+    if not graph.complete:
+        axes[0].set_title(graph.completeness(), fontsize=8, color=_FAMILY, wrap=True)
     if file is not None:
         figure.savefig(file, dpi=150)
     return figure
@@ -156,14 +159,22 @@ def _panel(axis: Any, graph: BranchGraph, quantity: str, node: int, curves: dict
     axis.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
 
 
-_MARKERS = {"transition": "o", "touch": "o", "fold": "s", "bifurcation": "D", "point": "x", "broken": "X"}
+_MARKERS = {
+    "transition": "o",
+    "touch": "o",
+    "fold": "s",
+    "bifurcation": "D",
+    "point": "x",
+    "broken": "X",
+    UNSETTLED: "4",
+}
 
 
 def _marker(axis: Any, v: Vertex, value: float) -> None:
     marker = _MARKERS.get(v.kind)
     if marker is None:
         return
-    filled = "#333333" if marker in "xX" else "white"
+    filled = "#333333" if marker in "xX4" else "white"
     axis.plot([v.alpha], [value], marker=marker, markersize=4.5, color=_FAMILY, markerfacecolor=filled, zorder=4)
 
 
@@ -214,16 +225,19 @@ def _sheet(axis: Any, graph: BranchGraph, arc: Arc, quantity: str, node: int) ->
 
 
 def _steps(axis: Any, graph: BranchGraph) -> None:
-    alphas, at, between = graph.steps
-    edges = [float(alpha) for alpha in alphas]
-    axis.stairs(between, edges, color=_FAMILY, linewidth=1.4, baseline=None)
+    steps = graph.claims.steps()
+    edges = [float(alpha) for alpha in steps.alphas]
+    if steps.between:
+        axis.stairs(steps.between, edges, color=_FAMILY, linewidth=1.4, baseline=None)
     special = [
-        (x, n) for k, (x, n) in enumerate(zip(edges, at, strict=True)) if n not in between[max(k - 1, 0) : k + 1]
+        (x, n)
+        for k, (x, n) in enumerate(zip(edges, steps.at, strict=True))
+        if n not in steps.between[max(k - 1, 0) : k + 1]
     ]
     if special:
         axis.plot([x for x, _ in special], [n for _, n in special], ".", color=_FAMILY, markersize=5)
-    axis.set_ylabel("solutions")
-    axis.set_ylim(0, max([*between, *at]) + 0.8)
+    axis.set_ylabel("solutions" if steps.exact else "solutions,\nat least")
+    axis.set_ylim(0, max([*steps.between, *steps.at], default=1) + 0.8)
     axis.yaxis.get_major_locator().set_params(integer=True)
 
 
@@ -239,10 +253,16 @@ def _legend(figure: Any, graph: BranchGraph) -> None:
         )
     ]
     kinds = {v.kind for v in graph.vertices}
-    for kind, label in (("transition", "transition"), ("fold", "fold"), ("bifurcation", "bifurcation")):
+    for kind, label in (
+        ("transition", "transition"),
+        ("fold", "fold"),
+        ("bifurcation", "bifurcation"),
+        (UNSETTLED, "not followed further"),
+    ):
         if kind in kinds:
+            filled = "#333333" if kind == UNSETTLED else "white"
             handles.append(
-                Line2D([], [], linestyle="", marker=_MARKERS[kind], color=_FAMILY, markerfacecolor="white", label=label)
+                Line2D([], [], linestyle="", marker=_MARKERS[kind], color=_FAMILY, markerfacecolor=filled, label=label)
             )
     if any(v.family is not None for v in graph.vertices):
         handles.append(Line2D([], [], color=_FAMILY, linewidth=2.4, label="continuum"))

@@ -1,4 +1,4 @@
-"""link_samples: roots at sampled alphas joined into a graph, and what sampling misses (theory, section 7)."""
+"""link_samples: roots at sampled alphas joined into a graph, and what sampling misses (theory, section 7.12)."""
 
 from __future__ import annotations
 

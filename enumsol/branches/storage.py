@@ -25,7 +25,9 @@ from enumsol.selections import ContactStatus
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-FORMAT, VERSION = "enumsol-branch-graph", 1
+FORMAT, VERSION = "enumsol-branch-graph", 2
+#: Version 1 gave kinds to the vertices of graphs that were not complete; only its complete graphs are read.
+_READ = (1, 2)
 
 
 def save_graph(graph: BranchGraph, file: str | Path) -> None:
@@ -59,9 +61,14 @@ def load_graph(file: str | Path) -> BranchGraph:
         raise InvalidArgumentError(f"graph {file} cannot be read ({error.strerror}); expected a saved graph") from error
     except ValueError as error:
         raise InvalidArgumentError(f"graph {file} is not a JSON file ({error}); expected a saved graph") from error
-    if not isinstance(record, dict) or record.get("format") != FORMAT or record.get("version") != VERSION:
+    if not isinstance(record, dict) or record.get("format") != FORMAT or record.get("version") not in _READ:
         raise InvalidArgumentError(f"graph {file} has another format; expected {FORMAT}, version {VERSION}")
     try:
+        if record["version"] == 1 and record["reasons"]:
+            raise InvalidArgumentError(
+                f"graph {file} is not complete and was saved by an earlier version, which said more about such graphs "
+                "than is known; expected a complete one, or one saved by this version"
+            )
         return _from_record(record)
     except (KeyError, TypeError, IndexError) as error:
         raise InvalidArgumentError(f"graph {file} is damaged (at {error}); expected a saved graph") from error
@@ -218,7 +225,7 @@ def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], path: Ex
 
 def write_graphml(graph: BranchGraph, file: str | Path) -> None:
     """Write vertices and arcs as GraphML, arrays as text."""
-    plain = nx.MultiGraph()
+    plain = nx.MultiGraph(complete=graph.complete, standing=graph.claims.standing.value)
     for v in graph.vertices:
         plain.add_node(
             v.number,

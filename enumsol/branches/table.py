@@ -1,4 +1,4 @@
-"""multiplicity_table: the roots at many alphas, counted (theory, sections 2 and 6)."""
+"""multiplicity_table: the roots at many alphas, counted (theory, section 7.12)."""
 
 from __future__ import annotations
 
@@ -47,7 +47,8 @@ class _Rows:
             "nodes",
             "seconds",
         ]
-        return pd.DataFrame([self.done[k] for k in sorted(self.done)], columns=columns)
+        table = pd.DataFrame([self.done[k] for k in sorted(self.done)], columns=columns)
+        return table.astype({"index_sum": "Int64"})  # whole numbers, and missing ones
 
 
 #: Columns with the number of roots at which at least one node has the status.
@@ -84,7 +85,8 @@ def multiplicity_table(
         One row an alpha, in the order given: alpha, roots, families, with_open, with_stick, with_slip_plus and
         with_slip_minus (isolated roots at which at least one node has the status), index_sum (missing where a degree is
         not known), complete, undecided, stopped (why the search ended early, or missing), nodes of the search, and
-        seconds.
+        seconds. Where a search was cut short or left something undecided, the counts are those of what was found, and
+        so lower bounds.
 
     Raises
     ------

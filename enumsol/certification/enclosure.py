@@ -1,4 +1,4 @@
-"""Rigorous enclosures of the condensed problem, from the user's own A, Bn, Bt, f (theory, sections 4 and 6).
+"""Rigorous enclosures of the condensed problem, from the user's own A, Bn, Bt, f (theory, section 4.4).
 
 All bounds are a-priori rounding-error bounds of IEEE double arithmetic with rounding to nearest; they hold for any
 order of summation and for fused multiply-adds, so ordinary dense kernels may be used. A ball is a pair of arrays
@@ -196,7 +196,7 @@ def _product_norm(left: sp.csc_array, right: sp.csc_array) -> float:
 
 @dataclass(frozen=True)
 class CondensedEnclosure:
-    """Balls that hold S, g0 and g1 of a problem for its exact data (theory, section 4).
+    """Balls that hold S, g0 and g1 of a problem for its exact data (theory, section 4.4).
 
     Attributes
     ----------

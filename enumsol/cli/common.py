@@ -62,6 +62,7 @@ class ExitStatus(enum.IntEnum):
     DONE = 0
     BAD_INPUT = 2
     INCOMPLETE = 3
+    NOT_COMPARED = 4
     INTERRUPTED = 130
     BROKEN_PIPE = 141
 

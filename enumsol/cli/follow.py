@@ -1,4 +1,4 @@
-"""``enumsol follow``: branches of solutions by continuation (Algorithm 5.1)."""
+"""``enumsol follow``: branches of solutions by continuation (paper, Algorithm 5.1)."""
 
 from __future__ import annotations
 

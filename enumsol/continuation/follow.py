@@ -1,4 +1,4 @@
-"""Piecewise smooth Moore-Penrose continuation (Algorithm 5.1): one branch of solutions from a start."""
+"""Piecewise smooth Moore-Penrose continuation (theory, section 8): one branch of solutions from a start."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def follow(
     tangent: int | None = None,
     visited: Sequence[Path] = (),
 ) -> Path:
-    """The branch of solutions through a start, in one direction, by Algorithm 5.1.
+    """The branch of solutions through a start, in one direction, by the paper's Algorithm 5.1.
 
     Predictions along the tangent are corrected by the piecewise smooth Moore-Penrose method. When corrections fail even
     for the shortest step, the selection is changed at the test function that vanishes next (Step 8). Transition points
@@ -59,7 +59,7 @@ def follow(
     start : Root, PathPoint, or tuple (alpha, lambda_n, lambda_t)
         A root, for example of enumerate_roots, newton or ``graph.starting_points()``.
     direction : {+1, -1}
-        +1 is the positively oriented tangent of Definition 5.1; alpha then increases where the root's index is +1.
+        +1 is the positively oriented tangent (theory, (8.2)); alpha then increases where the root's index is +1.
     interval : (float, float) or None
         Range of alpha; infinite ends are allowed. None: all alpha with F >= 0.
     options : ContinuationOptions or None
@@ -100,7 +100,7 @@ def start_tangents(
     options: ContinuationOptions | None = None,
     smooth_path: SmoothPath | None = None,
 ) -> tuple[Tangent, ...]:
-    """All tangents along which solutions leave a root, in the order of their selections (Remark 5.1).
+    """All tangents along which solutions leave a root, in the order of their selections (paper, Remark 5.1).
 
     Two at a regular root and at an ordinary transition point; more at a bifurcation point. ``tangent=k`` of `follow`
     takes the k-th. Parameters are those of `follow`.

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.continuation.audit import DETOUR, POINT_TOLERANCE, AuditReport, audit_on
+from enumsol.continuation.audit import DETOUR, POINT_TOLERANCE, audit_on
+from enumsol.continuation.audit_report import AuditReport
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follow import follow, start_tangents
 from enumsol.continuation.path import Path, PathStats
 from enumsol.continuation.places import GraphMap
+from enumsol.continuation.points import read_points
 from enumsol.errors import InvalidArgumentError, TooLargeError
 
 if TYPE_CHECKING:
@@ -49,7 +51,7 @@ class FollowAllResult:
 
     @property
     def complete(self) -> bool:
-        """Every arc was visited, every point lies on the graph, and there is no jump."""
+        """The graph is proven complete, every arc was visited, every point lies on it, and there is no jump."""
         return self.report.ok and self.report.complete
 
     @property
@@ -79,7 +81,8 @@ def follow_all(
     """Every branch in the interval followed in both directions, and the audit of all paths.
 
     Paths start from ``graph.starting_points()``; starts on arcs that were already passed are left out. Arcs missed by
-    these, which may happen beyond bifurcations, are started anew.
+    these, which may happen beyond bifurcations, are started anew. Points outside the graph's interval, as those of an
+    ``overshoot``, are not compared, and the result is then not complete.
 
     Parameters
     ----------
@@ -98,21 +101,22 @@ def follow_all(
     Raises
     ------
     InvalidArgumentError
-        The graph belongs to another problem.
+        The graph belongs to another problem, or is no branch graph.
     """
     if graph is None:
         from enumsol.branches import branch_graph  # python-flint and networkx, slow to import
 
         graph = branch_graph(problem, interval)
+    chart = GraphMap(graph, POINT_TOLERANCE)
     if graph.problem is not problem and graph.problem.p != problem.p:
         raise InvalidArgumentError(f"graph has {graph.problem.p} contact nodes; expected the problem's {problem.p}")
-    crew = _Crew(problem, interval, options, graph, progress)
+    crew = _Crew(problem, interval, options, chart, progress)
     for start in graph.starting_points():
         crew.start(start)
     seeded = len(crew.paths)
     for seed in crew.missed_seeds():
         crew.start(seed)
-    report = audit_on(crew.chart, crew.paths, DETOUR)
+    report = audit_on(chart, read_points(crew.paths, graph.problem), DETOUR)
     return FollowAllResult(tuple(crew.paths), report, tuple(crew.failures), len(crew.paths) - seeded, graph)
 
 
@@ -124,12 +128,12 @@ class _Crew:
         problem: ContactProblem,
         interval: tuple[float, float],
         options: ContinuationOptions | None,
-        graph: GraphLike,
+        chart: GraphMap,
         progress: Callable[[int, int], object] | None,
     ) -> None:
         self.problem, self.interval, self.options = problem, interval, options
-        self.graph, self.progress = graph, progress
-        self.chart = GraphMap(graph, POINT_TOLERANCE)
+        self.graph, self.progress = chart.graph, progress
+        self.chart = chart
         self.paths: list[Path] = []
         self.failures: list[tuple[float, str]] = []
         self.visited: set[int] = set()
@@ -148,7 +152,7 @@ class _Crew:
             self.paths.append(path)
             if path.status in ("stalled", "dead end", "step limit"):
                 self.failures.append((float(path.alpha[-1]), path.message))
-            self.visited |= audit_on(self.chart, path, DETOUR).visited
+            self.visited |= audit_on(self.chart, read_points(path, self.problem), DETOUR).visited
             if self.progress is not None:
                 self.progress(len(self.visited), len(self.graph.arcs))
             if path.closed:

@@ -1,4 +1,4 @@
-"""Whether a local Lipschitz branch passes through a root: coherent orientation of the normal map (Section 4)."""
+"""Whether a local Lipschitz branch passes through a root: coherent orientation of the normal map (theory, (3.3))."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ class LocalBranchTest:
 
     The contact forces are a Lipschitz function of the load near the root, at fixed friction, exactly when the
     determinants of the normal map have one and the same sign, not zero, over all statuses that hold there. By
-    Theorem 4.1 they then are one of the friction coefficients too, provided that F > 0 at every node.
+    paper, Theorem 4.1, they then are one of the friction coefficients too, provided that F > 0 at every node.
 
     Attributes
     ----------
     exists : bool
         A local Lipschitz branch in the load exists.
     premise : bool
-        F > 0 at every node: the premise of Theorem 4.1 for a branch in F.
+        F > 0 at every node: the premise of the paper's Theorem 4.1 for a branch in F.
     signs : tuple of (statuses, sign)
         Every selection that holds at the root with the sign of its determinant: +1, -1 or 0.
     differing : tuple of tuples of ContactStatus
@@ -72,7 +72,7 @@ class LocalBranchTest:
 
 
 def local_branch_test(problem: ContactProblem, root: Root) -> LocalBranchTest:
-    """Whether a local Lipschitz branch of solutions passes through a root (Section 4, Theorem 4.1).
+    """Whether a local Lipschitz branch of solutions passes through a root (theory, section 3.2).
 
     The test looks at the normal map G(z) = w + S lambda, which does not depend on the parameter r of H, over the
     statuses that hold at the root (``root.active``).

@@ -1,4 +1,4 @@
-"""Settings of Algorithm 5.1."""
+"""Settings of the paper's Algorithm 5.1."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class ContinuationOptions:
-    """Settings of `follow`; the defaults are those of the paper's Section 6.
+    """Settings of `follow`; the defaults are those of paper, Section 6.
 
     Lengths and residuals are without units. Contact forces are measured in the energy norm relative to the load,
     sqrt(lambda' S lambda) / sqrt(g' S^-1 g), which is at most one at every solution, and alpha in units of
@@ -45,12 +45,12 @@ class ContinuationOptions:
         Accuracy to which transition points are located, at most 1e-8: the checks of steps rely on it.
     check_steps : bool
         Accept a step only when its end is the continuation of its start: in the same selection, or behind one located
-        change of status. False is Algorithm 5.1 as printed, which may jump between branches when steps are long.
+        change of status. False is the paper's Algorithm 5.1 as printed; with long steps it may jump between branches.
     overshoot : float
         How far outside the interval the path is followed in the hope that it returns, in the units of alpha.
     choose : callable or None
-        Called with the admissible tangents where more than one continues the path (Remark 5.1); returns an index. None:
-        the one that turns least.
+        Called with the admissible tangents where several continue the path (theory, section 8.8); returns an index.
+        None: the one that turns least.
     """
 
     eps: float = 1e-6

@@ -44,7 +44,7 @@ class PathPoint:
     statuses : tuple of p ContactStatus
         The selection on which the path leaves the point.
     kind : {"start", "step", "transition", "end"}
-        "step" is an accepted step of Algorithm 5.1; the others were located.
+        "step" is an accepted step of the paper's Algorithm 5.1; the others were located.
     """
 
     alpha: float
@@ -73,7 +73,7 @@ class Transition:
     local_test : LocalBranchTest or None
         Whether a local Lipschitz branch exists there; None when too many selections hold to tell.
     alternatives : tuple of Tangent
-        Further directions in which solutions leave the point (Remark 5.1); not kept in files.
+        Further directions in which solutions leave the point (paper, Remark 5.1); not kept in files.
     """
 
     point: int
@@ -150,7 +150,7 @@ class Path(Sequence[PathPoint]):
     message : str
         The same as a sentence, with what may be done.
     orientation : int
-        +1 when it was followed in the positive orientation of Definition 5.1, else -1.
+        +1 when it was followed in the positive orientation of theory, (8.2), else -1.
     interval : (float, float)
     options : ContinuationOptions
         With the ``alpha_scale`` that was used.

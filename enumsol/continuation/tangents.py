@@ -1,4 +1,4 @@
-"""Tangents of solution curves: orientation, and all that are admissible at a point (Definition 5.1, Remark 5.1)."""
+"""Tangents of solution curves: orientation, and all that are admissible at a point (theory, section 8.3)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from enumsol.continuation.equation import Codes, CondensedEquation, Vector
     from enumsol.selections import ContactStatus
 
-#: Selections examined at one point (Remark 5.1); six nodes in a corner of three statuses have 729.
+#: Selections examined at one point (paper, Remark 5.1); six nodes in a corner of three statuses have 729.
 MAX_SELECTIONS = 4096
 #: A singular value of a selection's balanced gradient below this fraction of the largest counts as zero.
 RANK_TOLERANCE = 1e-10
@@ -47,7 +47,7 @@ class Tangent:
     dlambda : (p, 2) array
         Derivatives of (lambda_n, lambda_t) [force].
     orientation : int
-        +1 positively oriented (Definition 5.1), -1 negatively, 0 undecided.
+        +1 positively oriented (theory, (8.2)), -1 negatively, 0 undecided.
     codes, vector :
         The same in the variables of the continuation.
     """

@@ -7,10 +7,9 @@ import time
 from fractions import Fraction
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
 from enumsol.certification.proof import Proof, ProofWriter
 from enumsol.enumeration.assembly import RootBuilder
+from enumsol.enumeration.at_rest import AtRest
 from enumsol.enumeration.components import Component, connected_components
 from enumsol.enumeration.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
 from enumsol.enumeration.float_selections import SIGN_TOLERANCE, FloatSelections
@@ -65,7 +64,7 @@ def enumerate_roots(
         tolerance, never claimed to be complete. "exact": the data are read as exact rationals and everything is
         decided without rounding (small problems).
     method : {"tree", "exhaustive"}
-        "tree": pruned search (theory, section 5). "exhaustive": all 4^p selections, the oracle for small p.
+        "tree": pruned search (theory, section 5.4). "exhaustive": all 4^p selections, the oracle for small p.
     executor : concurrent.futures.Executor, optional
         Runs subtrees in parallel (method "tree").
     progress : callable, optional
@@ -116,6 +115,7 @@ class _Enumeration:
         self.bench, self.method, self.progress, self.engine = bench, method, progress, engine
         self.started = time.perf_counter()
         self.outcome = SearchOutcome()
+        self.at_rest: AtRest | None = None
         self.solver: SelectionSolver = bench.floats
         if bench.arithmetic == "exact" and bench.exact is not None:
             self.solver = bench.exact
@@ -161,8 +161,9 @@ class _Enumeration:
         search = TreeSearch(bench.scaled, self.judge, engine=self.engine, limits=limits, progress=self.progress)
         self.outcome = search.outcome
         if bench.unloaded():
-            # the energy bound is then lambda' S lambda <= 0: lambda = 0 and nothing else
-            self.outcome.solutions.append(self._unloaded())
+            if isinstance(self.judge, VerifiedJudge):
+                self.judge.unloaded()
+            self.at_rest = AtRest(bench.floats.F_positive, proven=bench.arithmetic != "fast")
         elif (reason := bench.undecidable) is not None:
             # without any means of proof the tree would only grow
             codes = search.first().codes
@@ -172,18 +173,6 @@ class _Enumeration:
             run_parallel(executor, bench, search, self.engine, bench.floats.tolerance)
         else:
             search.run()
-
-    def _unloaded(self) -> SelectionSolution:
-        if isinstance(self.judge, VerifiedJudge):
-            self.judge.unloaded()
-        p = self.bench.problem.p
-        solver = self.solver
-        if solver is self.bench.floats:
-            return SelectionSolution((0,) * p, (np.zeros(2 * p),), 0, 1, strict=False)
-        solution = solver.solve((0,) * p)
-        if solution is None:
-            raise AssertionError("the unloaded body must rest open")
-        return solution
 
     def _exhaustive(self, limits: SearchLimits) -> None:
         outcome, reported = self.outcome, self.started
@@ -213,6 +202,8 @@ class _Enumeration:
 
     def _components(self) -> list[tuple[list[Component], SelectionSolver]]:
         """Components of the root set with the solver whose points they hold."""
+        if self.at_rest is not None:
+            return [([self.at_rest.component], self.at_rest)]
         solutions = self.outcome.solutions
         exact = [s for s in solutions if isinstance(s.vertices[0], tuple)]
         floats = [s for s in solutions if not isinstance(s.vertices[0], tuple)]
@@ -229,15 +220,20 @@ class _Enumeration:
     def _result(self) -> RootSet:
         outcome, bench = self.outcome, self.bench
         roots, families = [], []
+        apart, joinable = 0, False
         verified = self.judge.verified if isinstance(self.judge, VerifiedJudge) else {}
         for components, solver in self._components():
             builder = RootBuilder(bench.problem, bench.alpha, solver, bench.floats, verified)
+            # of a component that was not examined whole it is not known what joins it
+            apart += sum(c.whole for c in components)
+            joinable = joinable or not all(c.whole for c in components)
             roots += [builder.root(c) for c in components if c.dimension == 0]
             proven = solver is not bench.floats
             families += [builder.family(c, proven=proven) for c in components if c.dimension > 0]
         roots.sort(key=lambda root: ([s.value for s in root.statuses], root.lambda_n.tolist(), root.lambda_t.tolist()))
         families.sort(key=lambda family: family.vertices.tolist())
         builder = RootBuilder(bench.problem, bench.alpha, self.solver, bench.floats, verified)
+        whole = outcome.stopped is None and not outcome.undecided
         counts = (outcome.nodes, outcome.pruned, outcome.selections, outcome.qps, outcome.fallback_qps)
         return RootSet(
             alpha=bench.alpha,
@@ -254,6 +250,7 @@ class _Enumeration:
                 outcome.presolved,
             ),
             node_ids=bench.problem.node_ids,
+            at_least=None if whole else apart + int(joinable),
             certified_data=bench.data,
             proof=self._proof(len(roots), len(families)),
         )

@@ -1,4 +1,4 @@
-"""The relaxation of a partial assignment: a convex QP in lambda, its rows and its engines (theory, section 5)."""
+"""The relaxation of a partial assignment: a convex QP in lambda, its rows and its engines (theory, section 5.2)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tree search: partial assignments, pruned by the energy-bounded relaxation (theory, section 5).
+"""The tree search: partial assignments, pruned by the energy-bounded relaxation (theory, section 5.4).
 
 Every node of the tree is a partial assignment of statuses. Its relaxation is solved, warm-started from its parent; it
 is pruned when the judge accepts the multipliers as a proof that it holds no solution, branched on otherwise, and handed

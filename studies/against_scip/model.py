@@ -11,7 +11,7 @@ TIME_LIMIT = 300.0
 
 
 def bounds(system):
-    """Intervals of lambda and of w over the ellipsoid on which the energy is at most zero."""
+    """Intervals of lambda and w over the ellipsoid e(lambda) <= 0 of theory, (5.3)."""
     centre = 0.5 * np.linalg.solve(system.S, system.g)
     radius = np.sqrt(system.g @ centre * 0.5)
     reach = radius * np.sqrt(np.diagonal(np.linalg.inv(system.S)))

@@ -64,6 +64,9 @@ def causes(result):
     """Why a problem is not settled, one text a cause."""
     found = [f"path stalled at {place(result.graph, alpha)}" for alpha, _ in result.failures]
     found += ["jump"] * len(result.report.jumps) + ["point off the graph"] * len(result.report.off)
+    # a graph with a hole does not tell whether these are right
+    found += ["point not compared"] * len(result.report.not_compared)
+    found += ["pair not joined"] * len(result.report.unjoined)
     for item in result.report.missed:
         length = item.interval[1] - item.interval[0]
         found.append(

@@ -170,7 +170,7 @@ def sizes() -> Iterator[Case]:
 
 
 def _six_three(d: float | Fraction, F0: float = 2.0) -> ContactProblem:
-    """Example 6.3 with the friction at which its two branches meet; f_n = 1 + alpha is off by alpha."""
+    """The paper's Example 6.3 with the friction at which its two branches meet; f_n = 1 + alpha is off by alpha."""
     del d
     return ContactProblem(
         gallery.one_node_triangle().A, [[1.0, 0.0]], [[0.0, 1.0]], [1.0, -2.0], friction=F0, load_slope=[1.0, 0.0]

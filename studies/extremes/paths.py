@@ -149,7 +149,9 @@ def check_path(path: Any, graph: Any, finding: Finding) -> None:
         finding.undecided(f"a path {path.status}")
     if report.ok:
         return
-    if any(item.local_test is None or not item.local_test.exists for item in path.transitions):
+    if not report.off and not report.jumps:
+        finding.undecided("a path is where the graph has a hole, or outside its interval")
+    elif any(item.local_test is None or not item.local_test.exists for item in path.transitions):
         finding.undecided("behind a bifurcation within rounding a path is off, as the audit tells")
     else:
         finding.wrong(f"a path is off the graph: {len(report.off)} points, {len(report.jumps)} jumps")

@@ -1,4 +1,4 @@
-"""Examples 6.1 to 6.3 and 6.3' (a perturbed 6.3), one node: the branch graph against every printed fact."""
+"""The paper's Examples 6.1 to 6.3 and 6.3' (a perturbed 6.3), one node: the branch graph against every printed fact."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 """Do the paper's examples come out?
 
-Three tables. The first (``one_node.py``) compares the exact branch graphs of Examples 6.1 to 6.3, and of 6.3' (a
-perturbed 6.3), with every printed fact; a fact that fails stops the study. The second (``two_nodes.py``) applies the
-loads of 6.4 to 6.7 to ``gallery.two_node_square``: the paper's coordinates were never published, so that its printed
-numbers are not to be expected here; they stand beside ours. The third (``walks.py``) follows every branch of every
-graph by Algorithm 5.1 with the paper's settings, from each of its ends: every transition must be passed in both
-directions, and the audit must miss nothing.
+Three tables. The first (``one_node.py``) compares the exact branch graphs of the paper's Examples 6.1 to 6.3, and of
+6.3' (a perturbed 6.3), with every printed fact; a fact that fails stops the study. The second (``two_nodes.py``)
+applies the loads of 6.4 to 6.7 to ``gallery.two_node_square``: the paper's coordinates were never published, so that
+its printed numbers are not to be expected here; they stand beside ours. The third (``walks.py``) follows every branch
+of every graph by the paper's Algorithm 5.1 with its settings, from each end of the branch: every transition must be
+passed in both directions, and the audit must miss nothing.
 
 Read the figures ``paper_6.*`` as the paper's: dots are the accepted steps.
 """

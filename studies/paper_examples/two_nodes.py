@@ -1,4 +1,4 @@
-"""Loads of Examples 6.4 to 6.7 on the gallery's square of two nodes: which of the printed facts it shows.
+"""Loads of the paper's Examples 6.4 to 6.7 on the gallery's square of two nodes: which of the printed facts it shows.
 
 The paper's coordinates were never published: its printed numbers are not to be expected here, they stand beside ours.
 """

@@ -1,4 +1,4 @@
-"""Every branch of a graph followed by Algorithm 5.1 with the paper's settings, from each of its ends."""
+"""Every branch of a graph followed by the paper's Algorithm 5.1 with its settings, from each end of the branch."""
 
 from __future__ import annotations
 
