@@ -10,12 +10,14 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from enumsol.checks import alpha_value
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.problem import Alpha, finite_alpha
+from enumsol.sealed import Immutable, Sealed, SealedMatrix, sealed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from enumsol.checks import AlphaLike
     from enumsol.problem import ContactProblem
 
 #: A pivot of A below this fraction of its diagonal entry is rounding: A is singular in float64.
@@ -28,7 +30,7 @@ LARGEST_FRICTION = 1e100
 RHS_BLOCK = 16
 
 
-class Factorization:
+class Factorization(Immutable):
     """Sparse symmetric factorization A = L D L' with diagonal pivots, after scaling A to unit diagonal.
 
     Parameters
@@ -37,7 +39,7 @@ class Factorization:
     """
 
     def __init__(self, A: sp.csc_array) -> None:
-        self._A = A
+        self._A = SealedMatrix.of(A)
         diagonal = A.diagonal()
         if np.any(diagonal <= 0):
             row = int(np.argmin(diagonal))
@@ -45,8 +47,8 @@ class Factorization:
                 f"A is not positive definite: its diagonal entry {row} is {diagonal[row]:g}; expected a positive value"
             )
         # powers of two: the scaling itself makes no rounding error
-        self._scale = np.exp2(-np.round(0.5 * np.log2(diagonal)))
-        self._diagonal = self._scale * diagonal * self._scale
+        self._scale = sealed(np.exp2(-np.round(0.5 * np.log2(diagonal))))
+        self._diagonal = sealed(self._scale * diagonal * self._scale)
         scaling = sp.diags_array(self._scale)
         options = {"SymmetricMode": True, "Equil": False}
         try:
@@ -59,6 +61,7 @@ class Factorization:
             )
         except RuntimeError as error:  # SuperLU: "Factor is exactly singular"
             raise InvalidProblemError(_RIGID.format(ratio=0.0)) from error
+        self._freeze()
 
     def check_positive_definite(self) -> None:
         """Raise InvalidProblemError unless every pivot is positive and above rounding."""
@@ -82,7 +85,7 @@ class Factorization:
         for copy in (L, U):
             copy.data, copy.indices = copy.data[:0].copy(), copy.indices[:0].copy()
             copy.indptr = np.zeros_like(copy.indptr)
-        return np.asarray(pivots)
+        return sealed(np.asarray(pivots))
 
     def solve(self, rhs: NDArray[np.float64], *, refined: bool = True) -> NDArray[np.float64]:
         """A^{-1} rhs for rhs of shape (n,) or (n, k), by default with one step of iterative refinement."""
@@ -90,7 +93,7 @@ class Factorization:
         x = d * self._lu.solve(d * rhs)
         if not refined:
             return np.asarray(x)
-        residual = rhs - self._A @ x
+        residual = rhs - self._A.matrix() @ x
         return np.asarray(x + d * self._lu.solve(d * residual))
 
 
@@ -200,7 +203,7 @@ def _cholesky(S: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True)
-class CondensedProblem:
+class CondensedProblem(Sealed):
     """The problem condensed for all alpha: S, g(alpha) = g0 + alpha g1, F(alpha) = F0 + alpha F1.
 
     Attributes
@@ -239,11 +242,9 @@ class CondensedProblem:
         F0, F1 = problem.friction
         if not (np.all(np.isfinite(S)) and np.all(np.isfinite(g0)) and np.all(np.isfinite(g1))):
             raise InvalidProblemError("A, f: the condensed problem overflows float64; expected data in smaller units")
-        for array in (S, g0, g1):
-            array.setflags(write=False)
         return cls(S, g0, g1, F0, F1, problem)
 
-    def at(self, alpha: Alpha) -> CondensedSystem:
+    def at(self, alpha: AlphaLike) -> CondensedSystem:
         """The condensed system at one alpha.
 
         Raises
@@ -251,7 +252,7 @@ class CondensedProblem:
         InvalidArgumentError
             alpha is not finite or makes a friction coefficient negative.
         """
-        value = finite_alpha(alpha)
+        value = float(alpha_value(alpha))
         F = self.problem.friction_at(alpha)
         with np.errstate(over="ignore", invalid="ignore"):
             g = self.g0 + value * self.g1
@@ -259,7 +260,7 @@ class CondensedProblem:
             raise InvalidArgumentError(f"alpha = {value:g} makes the load overflow float64; expected a smaller value")
         return CondensedSystem(self.S, g, F)
 
-    def displacement(self, alpha: Alpha, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+    def displacement(self, alpha: AlphaLike, forces: NDArray[np.float64]) -> NDArray[np.float64]:
         """u = A^{-1} (f(alpha) - B' lambda), shape (n,), for forces of shape (2p,)."""
         problem, p = self.problem, self.problem.p
         rhs = problem.load_at(alpha) - problem.Bn.T @ forces[:p] - problem.Bt.T @ forces[p:]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from enumsol.sealed import Immutable, Sealed, sealed
 from enumsol.selections import ContactStatus, sign_array
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ _PRINTED_ROOTS = 20
 
 
 @dataclass(frozen=True)
-class Enclosure:
+class Enclosure(Sealed):
     """Proven bounds of a root's forces and displacements.
 
     Attributes
@@ -46,7 +47,7 @@ class Enclosure:
 
 
 @dataclass(frozen=True)
-class Root:
+class Root(Sealed):
     """An isolated solution at one alpha.
 
     Attributes
@@ -97,7 +98,8 @@ class Root:
     @cached_property
     def dlambda_dalpha(self) -> NDArray[np.float64] | None:
         """Derivatives of (lambda_n, lambda_t) along the branch, shape (p, 2); None unless the root is regular."""
-        return None if self._tangent is None else self._tangent.derivative()
+        derivative = None if self._tangent is None else self._tangent.derivative()
+        return None if derivative is None else sealed(derivative)
 
     @property
     def u(self) -> NDArray[np.float64]:
@@ -146,7 +148,7 @@ class Root:
 
 
 @dataclass(frozen=True)
-class Polytope:
+class Polytope(Sealed):
     """A convex set of roots in one selection.
 
     Attributes
@@ -190,7 +192,7 @@ class RootFamily:
     @cached_property
     def vertices(self) -> NDArray[np.float64]:
         """All vertices, shape (k, p, 2), without repetition, in lexical order."""
-        return np.unique(np.concatenate([part.vertices for part in self.polytopes]), axis=0)
+        return sealed(np.unique(np.concatenate([part.vertices for part in self.polytopes]), axis=0))
 
 
 @dataclass(frozen=True)
@@ -244,7 +246,7 @@ class SearchStats:
     presolved: int = 0
 
 
-class RootSet(Sequence[Root]):
+class RootSet(Sequence[Root], Immutable):
     """All solutions at one alpha, as a sequence of the isolated roots in a deterministic order.
 
     Attributes
@@ -295,6 +297,7 @@ class RootSet(Sequence[Root]):
         self.node_ids = node_ids
         self.certified_data = certified_data
         self.proof = proof
+        self._freeze()
 
     @property
     def complete(self) -> bool:

@@ -9,14 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.array_checks import plain_array, real_array
+from enumsol.checks import instance_of, positive_number, shown
 from enumsol.errors import InvalidArgumentError
+from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.checks import AlphaLike
 
 
 class ContactStatus(enum.Enum):
@@ -53,7 +56,10 @@ def sign_array(statuses: Sequence[ContactStatus]) -> NDArray[np.int8]:
 
     At an open node theta2 = theta3 at a root and their sign does not matter; (-, -, -) is returned.
     """
-    return np.array([_SIGNS[status] for status in statuses], dtype=np.int8).reshape(-1, 3)
+    try:
+        return np.array([_SIGNS[status] for status in statuses], dtype=np.int8).reshape(-1, 3)
+    except (KeyError, TypeError):
+        raise InvalidArgumentError(f"statuses is {shown(statuses)}; expected a sequence of ContactStatus") from None
 
 
 @dataclass(frozen=True)
@@ -79,8 +85,8 @@ class PiecewiseSmoothEquation:
     r: float = 1.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.r) and self.r > 0):
-            raise InvalidArgumentError(f"r is {self.r}; expected a positive finite number")
+        instance_of(self.problem, ContactProblem, "problem")
+        object.__setattr__(self, "r", positive_number(self.r, "r"))
 
     @property
     def size(self) -> int:
@@ -90,12 +96,12 @@ class PiecewiseSmoothEquation:
     def split(self, x: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """u (n,), lambda_n (p,) and lambda_t (p,) as parts of x (n + 2p,)."""
         n, p = self.problem.n, self.problem.p
-        array = np.asarray(x, dtype=np.float64)
+        array = real_array(x, "x", error=InvalidArgumentError, finite=False)
         if array.shape != (n + 2 * p,):
             raise InvalidArgumentError(f"x has shape {array.shape}; expected (n + 2p,) = ({n + 2 * p},)")
         return array[:n], array[n : n + p], array[n + p :]
 
-    def test_functions(self, x: ArrayLike, alpha: Alpha) -> NDArray[np.float64]:
+    def test_functions(self, x: ArrayLike, alpha: AlphaLike) -> NDArray[np.float64]:
         """theta1 = lambda_n + r u_n and theta2, theta3 = lambda_t + r u_t -+ F lambda_n, shape (p, 3)."""
         u, lambda_n, lambda_t = self.split(x)
         problem = self.problem
@@ -103,11 +109,11 @@ class PiecewiseSmoothEquation:
         trial = lambda_t + self.r * (problem.Bt @ u - problem.slip_offset)
         return np.column_stack([lambda_n + self.r * (problem.Bn @ u - problem.gap), trial - bound, trial + bound])
 
-    def signs(self, x: ArrayLike, alpha: Alpha) -> NDArray[np.int8]:
+    def signs(self, x: ArrayLike, alpha: AlphaLike) -> NDArray[np.int8]:
         """Signs in {-1, 0, 1} of the test functions, shape (p, 3)."""
         return np.sign(self.test_functions(x, alpha)).astype(np.int8)
 
-    def residual(self, x: ArrayLike, alpha: Alpha) -> NDArray[np.float64]:
+    def residual(self, x: ArrayLike, alpha: AlphaLike) -> NDArray[np.float64]:
         """H(x, alpha), shape (n + 2p,), evaluated from the projections themselves."""
         u, lambda_n, lambda_t = self.split(x)
         problem, r = self.problem, self.r
@@ -124,7 +130,7 @@ class PiecewiseSmoothEquation:
             ]
         )
 
-    def selection_residual(self, signs: ArrayLike, x: ArrayLike, alpha: Alpha) -> NDArray[np.float64]:
+    def selection_residual(self, signs: ArrayLike, x: ArrayLike, alpha: AlphaLike) -> NDArray[np.float64]:
         """The selection function of H that ``signs`` (p, 3) names, at x; equals H where the test functions agree."""
         u, lambda_n, lambda_t = self.split(x)
         problem, r = self.problem, self.r
@@ -142,7 +148,7 @@ class PiecewiseSmoothEquation:
             ]
         )
 
-    def selection_jacobian(self, signs: ArrayLike, x: ArrayLike, alpha: Alpha) -> sp.csc_array:
+    def selection_jacobian(self, signs: ArrayLike, x: ArrayLike, alpha: AlphaLike) -> sp.csc_array:
         """Jacobian of the named selection with respect to (x, alpha), sparse (n + 2p, n + 2p + 1)."""
         _, lambda_n, _ = self.split(x)
         problem, r = self.problem, self.r
@@ -163,7 +169,7 @@ class PiecewiseSmoothEquation:
         )
 
     def _pieces(self, signs: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
-        array = np.asarray(signs)
+        array = plain_array(signs, "signs", error=InvalidArgumentError)
         if array.shape != (self.problem.p, 3) or not np.all(np.isin(array, (-1, 1))):
             raise InvalidArgumentError(
                 f"signs has shape {array.shape}; expected (p, 3) = ({self.problem.p}, 3) with entries -1 or 1"
@@ -171,7 +177,7 @@ class PiecewiseSmoothEquation:
         return array[:, 0] > 0, array[:, 1] > 0, array[:, 2] > 0
 
     def _equilibrium(
-        self, u: NDArray[np.float64], lambda_n: NDArray[np.float64], lambda_t: NDArray[np.float64], alpha: Alpha
+        self, u: NDArray[np.float64], lambda_n: NDArray[np.float64], lambda_t: NDArray[np.float64], alpha: AlphaLike
     ) -> NDArray[np.float64]:
         problem = self.problem
         return np.asarray(

@@ -267,15 +267,15 @@ def test_bad_problems_get_one_sentence(capsys, tmp_path, case):
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (("roots", "gallery:chain-2", "--alpha", "nan"), "alpha is nan; expected a finite real number"),
-        (("roots", "gallery:chain-2", "--alpha", "inf"), "alpha is inf; expected a finite real number"),
-        (("roots", "gallery:chain-2", "--alpha", "1e999"), "alpha is inf; expected a finite real number"),
+        (("roots", "gallery:chain-2", "--alpha", "nan"), "--alpha is 'nan'; expected a finite real number"),
+        (("roots", "gallery:chain-2", "--alpha", "inf"), "--alpha is 'inf'; expected a finite real number"),
+        (("roots", "gallery:chain-2", "--alpha", "1e999"), "--alpha is '1e999'; expected a finite real number"),
         (
             ("roots", "gallery:chain-2", "--alpha", "five"),
-            "alpha is 'five'; expected a number such as 2.5 or a fraction",
+            "--alpha is 'five'; expected a finite real number such as 2.5 or a fraction such as 8/3",
         ),
-        (("roots", "gallery:chain-2", "--alpha", "1/0"), "alpha is '1/0'; expected a number"),
-        (("roots", "gallery:chain-2", "--alpha", "1/2/3"), "alpha is '1/2/3'; expected a number"),
+        (("roots", "gallery:chain-2", "--alpha", "1/0"), "--alpha is '1/0'; expected a finite real number"),
+        (("roots", "gallery:chain-2", "--alpha", "1/2/3"), "--alpha is '1/2/3'; expected a finite real number"),
         (("roots", "gallery:chain-2", "--alpha", "1" + 400 * "0" + "/3"), "expected a finite real number"),
         (
             ("roots", "gallery:chain-2", "--alpha", "-1"),

@@ -236,7 +236,7 @@ def test_ctrl_c_audits_what_was_found(capsys, points, monkeypatch):
         (("--root", 3), "--root is 3; expected a number below 3, the number of roots at alpha = 5"),
         (("--tangent", 0), "--tangent is given without --root or --direction"),
         (("--root", 0, "--direction", "+1", "--tangent", 9), "tangent is 9; expected an index below 2"),
-        (("--h-max", -1), "options.h_init"),
+        (("--h-max", -1), "options.h_max is -1.0; expected a finite number > 0"),
         (("--h-min", 3), "options.h_init is 0.05"),
         (("--eps", 0), "options.eps is 0.0"),
         (("--graph", "graph.json"), "--graph is given without --plot"),
@@ -257,7 +257,7 @@ def test_bad_follow_calls_get_one_sentence(capsys, tmp_path, monkeypatch, option
     [
         (25, "one-node-6.1", "--start is 25; expected an alpha between 0 and 20"),
         (2, "one-node-6.3", "there is no isolated root at alpha = 2 (complete: yes (proven))"),
-        ("two", "one-node-6.3", "alpha is 'two'"),
+        ("two", "one-node-6.3", "--start is 'two'"),
     ],
 )
 def test_bad_starts(capsys, alpha, name, part):

@@ -161,7 +161,7 @@ def test_test_functions_and_split():
 
 @pytest.mark.parametrize("r", [0.0, -1.0, np.nan, np.inf])
 def test_r_must_be_positive(r):
-    with pytest.raises(InvalidArgumentError, match=r"r is .*; expected a positive finite number"):
+    with pytest.raises(InvalidArgumentError, match=r"r is .*; expected a finite number > 0"):
         PiecewiseSmoothEquation(gallery.one_node_triangle(), r)
 
 

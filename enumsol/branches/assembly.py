@@ -157,7 +157,7 @@ def _values(gluing: Gluing, glued: GluedVertex) -> tuple[Any, Any]:
         (fmpq(0),) * (2 * p),
     )
     g = path.at(alpha)[0]
-    S = path.S.tolist()
+    S = path.rows
     w = np.array(
         [as_float(a - sum((s * v for s, v in zip(r, exact, strict=True)), fmpq(0))) for a, r in zip(g, S, strict=True)]
     )
@@ -201,7 +201,7 @@ def _without_repetition(parts: Sequence[Polytope]) -> list[Polytope]:
 
 
 def multigraph(vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> Any:
-    """The networkx.MultiGraph: vertices by number, arcs as edges keyed by their number."""
+    """The networkx.MultiGraph, frozen: vertices by number, arcs as edges keyed by their number."""
     graph = nx.MultiGraph()
     for v in vertices:
         graph.add_node(
@@ -229,7 +229,7 @@ def multigraph(vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> Any:
             values=arc.values,
             arc=arc,
         )
-    return graph
+    return nx.freeze(graph)
 
 
 def make_components(graph: Any, vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> tuple[Component, ...]:

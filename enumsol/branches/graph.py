@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,12 +16,13 @@ from enumsol.branches.assembly import make_branches, make_components, multigraph
 from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps, Standing
 from enumsol.branches.fiber_roots import roots_of
 from enumsol.branches.parts import UNSETTLED
+from enumsol.checks import alpha_value
 from enumsol.enumeration.exact_selections import rational
 from enumsol.errors import IncompleteGraphError, InvalidArgumentError
-from enumsol.problem import finite_alpha
+from enumsol.sealed import Immutable
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     import pandas as pd
@@ -29,7 +31,8 @@ if TYPE_CHECKING:
     from enumsol.branches.parts import Arc, Branch, Component, Vertex
     from enumsol.branches.path import ExactPath
     from enumsol.certification.proof import Proof
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.checks import AlphaLike
+    from enumsol.problem import ContactProblem
     from enumsol.results import Root, RootFamily, RootSet
 
 
@@ -56,7 +59,7 @@ class GraphStats:
     seconds: float = 0.0
 
 
-class BranchGraph:
+class BranchGraph(Immutable):
     """All solutions over an interval of alpha: arcs of single selections, glued at vertices (made by ``branch_graph``).
 
     A graph with ``reasons`` is not complete. It shows what was found, and every part of it is true: arcs are solutions,
@@ -111,6 +114,7 @@ class BranchGraph:
         self.graph = multigraph(self.vertices, self.arcs)
         self.search_reasons = tuple(reasons)
         self.reasons = (*reasons, *self._gaps())
+        self._freeze()
 
     def _gaps(self) -> list[str]:
         """Violations of the balance of degrees, and vertices that are not settled (theory, (7.3)).
@@ -171,9 +175,9 @@ class BranchGraph:
         return make_branches(self.components, self.vertices)
 
     @cached_property
-    def branch_of(self) -> dict[int, int]:
+    def branch_of(self) -> Mapping[int, int]:
         """Number of the branch of every arc, by the arc's number."""
-        return {arc.number: branch.number for branch in self.branches for arc in branch.arcs}
+        return MappingProxyType({arc.number: branch.number for branch in self.branches for arc in branch.arcs})
 
     def _of_kind(self, *kinds: str) -> tuple[Vertex, ...]:
         return tuple(v for v in self.vertices if v.kind in kinds)
@@ -221,10 +225,9 @@ class BranchGraph:
 
     # -- solutions at one alpha ------------------------------------------------------------------------------------
 
-    def _located(self, alpha: Alpha) -> tuple[list[Arc], list[Vertex]]:
+    def _located(self, alpha: AlphaLike) -> tuple[list[Arc], list[Vertex]]:
         """Arcs over an alpha and vertices at it, decided exactly."""
-        finite_alpha(alpha)
-        value = Fraction(alpha)
+        value = Fraction(alpha_value(alpha))
         if not self.exact_interval[0] <= value <= self.exact_interval[1]:
             raise InvalidArgumentError(
                 f"alpha is {float(value):.17g}; expected a value in the graph's interval "
@@ -235,11 +238,11 @@ class BranchGraph:
         arcs = [arc for arc in self.arcs if order[arc.tail] < 0 < order[arc.head]]
         return arcs, [v for v, o in zip(self.vertices, order, strict=True) if o == 0]
 
-    def arcs_at(self, alpha: Alpha) -> tuple[Arc, ...]:
+    def arcs_at(self, alpha: AlphaLike) -> tuple[Arc, ...]:
         """Arcs and sheets that pass over an alpha inside the interval (vertices at it do not count)."""
         return tuple(self._located(alpha)[0])
 
-    def roots_at(self, alpha: Alpha) -> RootSet:
+    def roots_at(self, alpha: AlphaLike) -> RootSet:
         """All solutions at one alpha, as enumerate_roots returns them; of a graph with gaps, those that were found.
 
         Raises
@@ -249,9 +252,9 @@ class BranchGraph:
         """
         arcs, vertices = self._located(alpha)
         codes = {c for arc in arcs for c in arc.selections} | {c for v in vertices for c in v.selections}
-        return roots_of(self, alpha, sorted(codes))
+        return roots_of(self, alpha_value(alpha), sorted(codes))
 
-    def multiplicity_at(self, alpha: Alpha) -> int:
+    def multiplicity_at(self, alpha: AlphaLike) -> int:
         """Number of isolated roots and of families at one alpha, together.
 
         Raises
@@ -265,7 +268,7 @@ class BranchGraph:
         self._whole("the number of solutions", f"there are {found} at alpha = {float(alpha):.8g}")
         return found.count
 
-    def at_least(self, alpha: Alpha) -> int:
+    def at_least(self, alpha: AlphaLike) -> int:
         """Lower bound of the number of isolated roots and families at one alpha, for graphs with gaps too.
 
         Raises
@@ -275,7 +278,7 @@ class BranchGraph:
         """
         return self._multiplicity(alpha).count
 
-    def _multiplicity(self, alpha: Alpha) -> Multiplicity:
+    def _multiplicity(self, alpha: AlphaLike) -> Multiplicity:
         return self.claims.multiplicity(*self._located(alpha))
 
     @cached_property

@@ -27,6 +27,7 @@ from enumsol.enumeration.relaxation import (
     INEQUALITY,
     PRUNE_MARGIN,
     UNDECIDED,
+    ActiveSetEngine,
     RowKind,
     row_terms,
     status_rows,
@@ -154,9 +155,11 @@ class IntervalEngine:
         try:
             from enumsol.enumeration import _active_set
         except ImportError as error:
+            from enumsol.compiled import why_missing  # seldom needed
+
             raise MissingDependencyError(
-                "branch_graph needs the compiled active-set solver, which this installation lacks; expected enumsol "
-                "installed with a C compiler"
+                "branch_graph needs the compiled active-set solver, which is not available: "
+                f"{why_missing(ActiveSetEngine.module, error)}"
             ) from error
         p = system.p
         self.size = 2 * p

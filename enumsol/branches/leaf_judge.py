@@ -40,7 +40,7 @@ class ExactLeafJudge:
     def __init__(self, path: ExactPath) -> None:
         self._path = path
         self._inverse: Any = None
-        self._S = path.S.tolist()
+        self._S = path.rows
         self._bounds: tuple[Piece, tuple[Any, ...], tuple[Any, ...]] | None = None
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:

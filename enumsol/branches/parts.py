@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.branches.path import SelectionFunctions
+from enumsol.checks import alpha_value
 from enumsol.enumeration.exact_selections import rational
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import Alpha, finite_alpha
+from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.branches.algebraic import CriticalAlpha
     from enumsol.branches.path import ExactPath
+    from enumsol.checks import AlphaLike
     from enumsol.enumeration.solutions import Codes
     from enumsol.results import RootFamily
     from enumsol.selections import ContactStatus
@@ -30,7 +32,7 @@ CUTS = ("bifurcation", "family", "sheet", UNSETTLED)
 
 
 @dataclass(frozen=True, eq=False)
-class Vertex:
+class Vertex(Sealed):
     """A connected set of solutions at one critical alpha, where arcs begin and end.
 
     Attributes
@@ -135,8 +137,9 @@ class Arc:
     def _functions(self) -> SelectionFunctions:
         return SelectionFunctions(self._path, self.selections[0])
 
-    def _point(self, alpha: Alpha) -> tuple[object, ...]:
-        value = finite_alpha(alpha)
+    def _point(self, alpha: AlphaLike) -> tuple[object, ...]:
+        exact = alpha_value(alpha)
+        value = float(exact)
         if self.dimension:
             raise InvalidArgumentError(
                 f"arc {self.number} is a sheet and has many solutions at one alpha; use roots_at(alpha).families"
@@ -145,12 +148,12 @@ class Arc:
             raise InvalidArgumentError(
                 f"alpha is {value:.17g}; expected a value on the arc, [{self.lo!r}, {self.hi!r}]"
             )
-        point = self._functions.forces_at(rational(Fraction(alpha)))
+        point = self._functions.forces_at(rational(exact))
         if point is None:  # bounded arcs have no poles, but a rounded end may lie beyond the exact one
             point = self._functions.forces_at(rational(self.sample))
         return point if point is not None else ()
 
-    def values(self, alpha: Alpha) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def values(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(lambda_n, lambda_t) at an alpha of the arc, arrays of shape (p,) [force]; exact, then rounded.
 
         Raises
@@ -161,13 +164,13 @@ class Arc:
         forces = np.array([float(Fraction(int(v.p), int(v.q))) for v in self._point(alpha)])  # type: ignore[attr-defined]
         return forces[: self._path.p], forces[self._path.p :]
 
-    def displacements(self, alpha: Alpha) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def displacements(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(u_n, u_t) at an alpha of the arc, two arrays of shape (p,) [length]; errors as ``values``."""
         point = self._point(alpha)
-        g = self._path.at(rational(Fraction(alpha)))[0]
+        g = self._path.at(rational(alpha_value(alpha)))[0]
         w = [
             a - sum((s * v for s, v in zip(row, point, strict=True)), rational(0))
-            for a, row in zip(g, self._path.S.tolist(), strict=True)
+            for a, row in zip(g, self._path.rows, strict=True)
         ]
         moves = np.array([float(Fraction(int(v.p), int(v.q))) for v in w])
         return moves[: self._path.p], moves[self._path.p :]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.parts import UNSETTLED
+from enumsol.checks import one_of, positive_integer, shown
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.selections import ContactStatus
 
@@ -79,8 +80,8 @@ def plot_graph(
     MissingDependencyError
         matplotlib is not installed.
     """
-    if quantity not in QUANTITIES:
-        raise InvalidArgumentError(f"quantity is {quantity!r}; expected one of {', '.join(QUANTITIES)}")
+    one_of(quantity, "quantity", QUANTITIES)
+    samples = positive_integer(samples, "samples", 2, 100_000)
     figure_class, canvas = _matplotlib()
     curves = {arc.number: _curve(arc, quantity, samples) for arc in graph.arcs if not arc.dimension}
     chosen = _nodes(graph, nodes, curves)
@@ -129,10 +130,14 @@ def _curve(arc: Arc, quantity: str, samples: int) -> tuple[NDArray[np.float64], 
 def _nodes(graph: BranchGraph, nodes: Sequence[Any] | None, curves: dict[int, Any]) -> list[int]:
     ids = list(graph.problem.node_ids)
     if nodes is not None:
-        unknown = [node for node in nodes if node not in ids]
-        if unknown or not nodes:
-            raise InvalidArgumentError(f"nodes contains {unknown}; expected labels among {ids[:12]}")
-        return [ids.index(node) for node in nodes]
+        row = {label: k for k, label in enumerate(ids)}
+        try:
+            chosen = [row[node] for node in nodes]
+        except (KeyError, TypeError):
+            chosen = []
+        if not chosen:
+            raise InvalidArgumentError(f"nodes is {shown(nodes)}; expected labels among {shown(ids)}")
+        return chosen
     if len(ids) <= _MAX_PANELS or not curves:
         return list(range(min(len(ids), _MAX_PANELS)))
     values = np.concatenate([values for _, values in curves.values()])

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import asdict
 from fractions import Fraction
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import networkx as nx
@@ -17,6 +17,7 @@ from enumsol.branches.algebraic import CriticalAlpha
 from enumsol.branches.graph import BranchGraph, GraphStats
 from enumsol.branches.parts import Arc, Vertex
 from enumsol.branches.path import ExactPath
+from enumsol.checks import file_path, writing
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.results import Polytope, RootFamily
@@ -24,10 +25,12 @@ from enumsol.selections import ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
 FORMAT, VERSION = "enumsol-branch-graph", 2
 #: Version 1 gave kinds to the vertices of graphs that were not complete; only its complete graphs are read.
 _READ = (1, 2)
+_FRACTION = re.compile(r"-?\d+(/\d+)?", re.ASCII)
 
 
 def save_graph(graph: BranchGraph, file: str | Path) -> None:
@@ -44,7 +47,9 @@ def save_graph(graph: BranchGraph, file: str | Path) -> None:
         "vertices": [_vertex_record(v) for v in graph.vertices],
         "arcs": [_arc_record(arc) for arc in graph.arcs],
     }
-    Path(file).write_text(json.dumps(record), encoding="utf-8")
+    place = file_path(file, "file")
+    with writing(place, "file"):
+        place.write_text(json.dumps(record), encoding="utf-8")
 
 
 def load_graph(file: str | Path) -> BranchGraph:
@@ -55,8 +60,9 @@ def load_graph(file: str | Path) -> BranchGraph:
     InvalidArgumentError
         The file cannot be read or is not such a graph.
     """
+    place = file_path(file, "file")
     try:
-        record = json.loads(Path(file).read_text(encoding="utf-8"))
+        record = json.loads(place.read_text(encoding="utf-8"))
     except OSError as error:
         raise InvalidArgumentError(f"graph {file} cannot be read ({error.strerror}); expected a saved graph") from error
     except ValueError as error:
@@ -70,14 +76,14 @@ def load_graph(file: str | Path) -> BranchGraph:
                 "than is known; expected a complete one, or one saved by this version"
             )
         return _from_record(record)
-    except (KeyError, TypeError, IndexError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise InvalidArgumentError(f"graph {file} is damaged (at {error}); expected a saved graph") from error
 
 
 def _from_record(record: dict[str, Any]) -> BranchGraph:
     problem = _problem(record["problem"])
     path = ExactPath.from_problem(problem, exact=record["condensed_exactly"])
-    first, last = (Fraction(end) for end in record["interval"])
+    first, last = (_fraction(end) for end in record["interval"])
     vertices = [_vertex(k, item) for k, item in enumerate(record["vertices"])]
     arcs = [_arc(k, item, vertices, path) for k, item in enumerate(record["arcs"])]
     stats = GraphStats(**record["stats"])
@@ -160,8 +166,15 @@ def _vertex_record(v: Vertex) -> dict[str, Any]:
     }
 
 
+def _fraction(text: str) -> Fraction:
+    """The fraction that str made a text of; no other text, such as one with an exponent of millions."""
+    if _FRACTION.fullmatch(text) is None:
+        raise ValueError(f"{text[:20]!r}, which is no fraction")
+    return Fraction(text)
+
+
 def _vertex(number: int, item: dict[str, Any]) -> Vertex:
-    lo, hi = (fmpq(*Fraction(item[end]).as_integer_ratio()) for end in ("lo", "hi"))
+    lo, hi = (fmpq(*_fraction(item[end]).as_integer_ratio()) for end in ("lo", "hi"))
     coefficients = item["polynomial"]
     poly = None if coefficients is None else fmpz_poly([fmpz(c) for c in coefficients])
     family = None
@@ -215,7 +228,7 @@ def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], path: Ex
         item["dimension"],
         item["grazing"],
         tuple(tuple(codes) for codes in item["selections"]),
-        Fraction(item["sample"]),
+        _fraction(item["sample"]),
         path,
     )
 
@@ -246,4 +259,6 @@ def write_graphml(graph: BranchGraph, file: str | Path) -> None:
             dimension=arc.dimension,
             branch=graph.branch_of[arc.number],
         )
-    nx.write_graphml(plain, file)
+    place = file_path(file, "file")
+    with writing(place, "file"):
+        nx.write_graphml(plain, place)

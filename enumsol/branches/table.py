@@ -7,9 +7,10 @@ from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from enumsol.checks import alpha_list, instance_of, optional_callable, optional_executor
 from enumsol.enumeration import enumerate_roots
-from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.errors import Interrupted
+from enumsol.problem import ContactProblem
 from enumsol.selections import STATUSES, ContactStatus
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from enumsol.checks import AlphaLike
     from enumsol.problem import Alpha
     from enumsol.results import RootSet
 
@@ -57,7 +59,7 @@ _KINDS = {status: f"with_{status.name.lower()}" for status in STATUSES}
 
 def multiplicity_table(
     problem: ContactProblem,
-    alphas: Iterable[Alpha],
+    alphas: Iterable[AlphaLike],
     *,
     arithmetic: str = "verified",
     executor: Executor | None = None,
@@ -69,7 +71,7 @@ def multiplicity_table(
     Parameters
     ----------
     problem : ContactProblem
-    alphas : iterable of float or Fraction
+    alphas : iterable of float, Fraction or whatever enumerate_roots takes for alpha
     arithmetic : str
         Of ``enumerate_roots``.
     executor : concurrent.futures.Executor, optional
@@ -91,15 +93,15 @@ def multiplicity_table(
     Raises
     ------
     InvalidArgumentError
-        An alpha is not a finite number, or makes a friction coefficient negative.
+        ``alphas`` is one number, an alpha is not a finite number, or makes a friction coefficient negative.
     Interrupted
         On Ctrl-C; ``partial`` is the table of what was done.
     """
-    if not isinstance(problem, ContactProblem):
-        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
-    rows = _Rows(list(alphas))
+    instance_of(problem, ContactProblem, "problem")
+    optional_executor(executor)
+    optional_callable(progress, "progress")
+    rows = _Rows(alpha_list(alphas))
     for alpha in rows.alphas:
-        finite_alpha(alpha)
         problem.friction_at(alpha)
     options = {"arithmetic": arithmetic, **options}
     try:

@@ -21,6 +21,7 @@ from enumsol.certification.format import FRICTIONLESS, UNDECIDED, children_of, r
 from enumsol.certification.graph_checker import GraphChecker, GraphVerificationReport
 from enumsol.certification.kernel import exclusion_margins, holds_no_root, solve_selection
 from enumsol.certification.proof import Proof, fraction_from, unpacked
+from enumsol.checks import optional_callable
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.problem import ContactProblem
 
@@ -114,6 +115,7 @@ def verify(
     for name, value, kind in (("problem", problem, ContactProblem), ("proof", proof, Proof)):
         if not isinstance(value, kind):
             raise InvalidArgumentError(f"{name} is a {type(value).__name__}; expected a {kind.__name__}")
+    optional_callable(progress, "progress")
     proof.check_integrity()
     records = proof.records()
     header = next(records, None)

@@ -22,14 +22,17 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
+from enumsol.checks import alpha_value
 from enumsol.errors import EnumsolError
+from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.checks import AlphaLike
+    from enumsol.problem import ContactProblem
 
     Array = NDArray[np.float64]
 
@@ -195,7 +198,7 @@ def _product_norm(left: sp.csc_array, right: sp.csc_array) -> float:
 
 
 @dataclass(frozen=True)
-class CondensedEnclosure:
+class CondensedEnclosure(Sealed):
     """Balls that hold S, g0 and g1 of a problem for its exact data (theory, section 4.4).
 
     Attributes
@@ -270,9 +273,9 @@ class CondensedEnclosure:
         g0_rad = (free_rad[:, 0] + 2 * UNIT * np.abs(g0)) * SAFE + TINY
         return cls(sym, S_rad, g0, g0_rad, free[:, 1], free_rad[:, 1], bound, problem)
 
-    def at(self, alpha: Alpha, force: Array, length: Array) -> EnclosedSystem:
+    def at(self, alpha: AlphaLike, force: Array, length: Array) -> EnclosedSystem:
         """The enclosed system at one alpha, in units given by powers of two (see enumsol.condensed.ScaledSystem)."""
-        a = Fraction(alpha)
+        a = alpha if isinstance(alpha, Fraction) else Fraction(alpha_value(alpha))
         F0, F1 = self.problem.friction
         exact = [Fraction(float(x)) + a * Fraction(float(y)) for x, y in zip(F0, F1, strict=True)]
         try:

@@ -137,8 +137,8 @@ def _status(report: AuditReport) -> ExitStatus:
 def _interval(runs: Sequence[PointRun], first: str | None, last: str | None) -> tuple[Alpha, Alpha]:
     if first is not None and last is not None:
         return parse_interval(first, last)
-    low = min(float(run.alpha.min()) for run in runs) if first is None else parse_alpha(first)
-    high = max(float(run.alpha.max()) for run in runs) if last is None else parse_alpha(last)
+    low = min(float(run.alpha.min()) for run in runs) if first is None else parse_alpha(first, "--from")
+    high = max(float(run.alpha.max()) for run in runs) if last is None else parse_alpha(last, "--to")
     if not low < high:
         raise InvalidArgumentError(
             f"alpha goes from {float(low):g} to {float(high):g}; expected an interval, by --from and --to"

@@ -138,7 +138,7 @@ def follow(
     if tangent is not None and (root is None or direction == "both"):
         raise InvalidArgumentError("--tangent is given without --root or --direction; expected one root and direction")
     options = _options(h_max, h_min, h_init, eps, max_steps, check_steps)
-    interval, alpha, signs = parse_interval(first, last), parse_alpha(start), _directions(direction)
+    interval, alpha, signs = parse_interval(first, last), parse_alpha(start, "--start"), _directions(direction)
     body = load_problem(problem)
     row = node_row(body, node)
     over = None if graph_file is None else read_graph(graph_file, body)

@@ -103,7 +103,7 @@ def _alphas(first: str | None, last: str | None, samples: int, listed: str | Non
     if listed is not None:
         if first is not None or last is not None:
             raise InvalidArgumentError("--alphas and --from or --to are both given; expected one or the other")
-        return [parse_alpha(text.strip()) for text in listed.split(",")]
+        return [parse_alpha(text, f"--alphas[{k}]") for k, text in enumerate(listed.split(","))]
     if first is None or last is None:
         raise InvalidArgumentError("expected --from and --to, or --alphas")
     low, high = parse_interval(first, last)

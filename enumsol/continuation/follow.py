@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.array_checks import real_array
+from enumsol.checks import alpha_value, direction_value, instance_of, row_number, shown, unbounded_interval
 from enumsol.continuation.equation import CondensedEquation
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follower import Follower
@@ -17,9 +19,10 @@ from enumsol.continuation.parameter_path import AffinePath, CallablePath, Smooth
 from enumsol.continuation.path import Path
 from enumsol.continuation.tangents import Tangent, admissible_tangents, curve_tangent
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
+    from enumsol.checks import AlphaLike
     from enumsol.continuation.equation import Vector
     from enumsol.continuation.parameter_path import ParameterPath
 
@@ -36,7 +39,7 @@ def follow(
     problem: ContactProblem,
     start: Any,
     direction: int = +1,
-    interval: tuple[float, float] | None = None,
+    interval: tuple[AlphaLike, AlphaLike] | None = None,
     options: ContinuationOptions | None = None,
     smooth_path: SmoothPath | None = None,
     *,
@@ -60,7 +63,7 @@ def follow(
         A root, for example of enumerate_roots, newton or ``graph.starting_points()``.
     direction : {+1, -1}
         +1 is the positively oriented tangent (theory, (8.2)); alpha then increases where the root's index is +1.
-    interval : (float, float) or None
+    interval : pair of alphas or None
         Range of alpha; infinite ends are allowed. None: all alpha with F >= 0.
     options : ContinuationOptions or None
     smooth_path : SmoothPath or None
@@ -84,9 +87,10 @@ def follow(
     Interrupted
         On Ctrl-C; ``partial`` holds the path so far.
     """
-    if direction not in (1, -1):
-        raise InvalidArgumentError(f"direction is {direction!r}; expected +1 or -1")
+    direction = direction_value(direction)
     setup = _Setup(problem, start, interval, options, smooth_path)
+    if not isinstance(visited, (list, tuple)) or not all(isinstance(path, Path) for path in visited):
+        raise InvalidArgumentError(f"visited is {shown(visited)}; expected a list of Path")
     chosen = _choose(setup, direction, tangent)
     first = CurvePoint(setup.x, chosen.codes, chosen.vector)
     sign = chosen.orientation or direction
@@ -96,7 +100,7 @@ def follow(
 def start_tangents(
     problem: ContactProblem,
     start: Any,
-    interval: tuple[float, float] | None = None,
+    interval: tuple[AlphaLike, AlphaLike] | None = None,
     options: ContinuationOptions | None = None,
     smooth_path: SmoothPath | None = None,
 ) -> tuple[Tangent, ...]:
@@ -112,7 +116,7 @@ def start_tangents(
 def resume_path(
     path: Path,
     problem: ContactProblem | None,
-    interval: tuple[float, float] | None,
+    interval: tuple[AlphaLike, AlphaLike] | None,
     options: ContinuationOptions | None,
     smooth_path: SmoothPath | None,
 ) -> Path:
@@ -121,7 +125,8 @@ def resume_path(
         raise InvalidArgumentError("problem is missing; a path loaded from a file needs it: path.resume(problem)")
     if path.status in ("closed", "dead end"):
         raise InvalidArgumentError(f"the path cannot go on: {path.message}")
-    setup = _Setup(problem, path[-1], interval or path.interval, options or path.options, smooth_path)
+    span = path.interval if interval is None else interval
+    setup = _Setup(problem, path[-1], span, path.options if options is None else options, smooth_path)
     codes = tuple(int(code) for code in path.codes[-1])
     vector = curve_tangent(setup.equation, codes, setup.x, path.orientation)
     if vector is None:
@@ -139,13 +144,15 @@ class _Setup:
         self,
         problem: ContactProblem,
         start: Any,
-        interval: tuple[float, float] | None,
+        interval: tuple[AlphaLike, AlphaLike] | None,
         options: ContinuationOptions | None,
         smooth_path: SmoothPath | None,
     ) -> None:
-        if not isinstance(problem, ContactProblem):
-            raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
-        self.options = options or ContinuationOptions()
+        instance_of(problem, ContactProblem, "problem")
+        if smooth_path is not None:
+            instance_of(smooth_path, SmoothPath, "smooth_path")
+        chosen = ContinuationOptions() if options is None else options
+        self.options = instance_of(chosen, ContinuationOptions, "options")
         alpha, forces = _start_values(start, problem.p)
         self.interval = _interval(problem, interval, alpha, smooth_path)
         low, high = self.interval
@@ -172,7 +179,8 @@ class _Setup:
     def _on_solution(self, alpha: float, forces: Vector) -> Vector:
         equation = self.equation
         x = equation.point(alpha, forces)
-        residual = float(np.linalg.norm(equation.residual(x)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            residual = float(np.linalg.norm(equation.residual(x)))
         if not residual <= START_TOLERANCE:
             raise InvalidArgumentError(
                 f"start is not a root at alpha = {alpha:g}: the residual of H is {residual:.2e} relative to the load; "
@@ -190,21 +198,21 @@ def _start_values(start: Any, p: int) -> tuple[float, Vector]:
         raise InvalidArgumentError(
             f"start is a {type(start).__name__}; expected a Root, a PathPoint or (alpha, lambda_n, lambda_t)"
         )
-    parts = [np.atleast_1d(np.asarray(part, dtype=np.float64)) for part in (lambda_n, lambda_t)]
-    if any(part.shape != (p,) or not np.all(np.isfinite(part)) for part in parts):
-        raise InvalidArgumentError(f"start has contact forces of shape {parts[0].shape}; expected finite arrays ({p},)")
-    return finite_alpha(alpha), np.concatenate(parts)
+    parts = []
+    for name, part in (("lambda_n", lambda_n), ("lambda_t", lambda_t)):
+        parts.append(np.atleast_1d(real_array(part, f"{name} of start", error=InvalidArgumentError)))
+        if parts[-1].shape != (p,):
+            raise InvalidArgumentError(f"{name} of start has shape {parts[-1].shape}; expected ({p},)")
+    return float(alpha_value(alpha, "alpha of start")), np.concatenate(parts)
 
 
 def _interval(
-    problem: ContactProblem, interval: tuple[float, float] | None, start: float, smooth_path: SmoothPath | None
+    problem: ContactProblem, interval: tuple[AlphaLike, AlphaLike] | None, start: float, smooth_path: SmoothPath | None
 ) -> tuple[float, float]:
     affine = smooth_path is None or smooth_path.F is None
     if interval is None:
         return friction_domain(problem) if affine else (-math.inf, math.inf)
-    low, high = (float(end) for end in interval)
-    if not low < high:
-        raise InvalidArgumentError(f"interval is ({low:g}, {high:g}); expected two numbers, the first the smaller")
+    low, high = unbounded_interval(interval)
     if not low <= start <= high:
         raise InvalidArgumentError(f"start has alpha = {start:g}, outside the interval ({low:g}, {high:g})")
     if affine:
@@ -229,9 +237,8 @@ def friction_domain(problem: ContactProblem) -> tuple[float, float]:
 def _choose(setup: _Setup, direction: int, index: int | None) -> Tangent:
     tangents = admissible_tangents(setup.equation, setup.x, ACTIVE_TOLERANCE)
     if index is not None:
-        if not 0 <= index < len(tangents):
-            raise InvalidArgumentError(f"tangent is {index}; expected an index below {len(tangents)} of start_tangents")
-        return tangents[index]
+        count = len(tangents)
+        return tangents[row_number(index, "tangent", count, f"an index below {count} of start_tangents")]
     fitting = [t for t in tangents if t.orientation == direction]
     if len(fitting) != 1:
         listing = "; ".join(f"{k}: {t!r}" for k, t in enumerate(tangents)) or "none"

@@ -7,21 +7,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.checks import alpha_interval, instance_of, optional_callable, positive_integer, shown
 from enumsol.continuation.audit import DETOUR, POINT_TOLERANCE, audit_on
 from enumsol.continuation.audit_report import AuditReport
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follow import follow, start_tangents
 from enumsol.continuation.path import Path, PathStats
-from enumsol.continuation.places import GraphMap
+from enumsol.continuation.places import GraphMap, checked_graph
 from enumsol.continuation.points import read_points
 from enumsol.errors import InvalidArgumentError, TooLargeError
+from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from enumsol.checks import AlphaLike
     from enumsol.continuation.options import ContinuationOptions
     from enumsol.continuation.places import GraphLike
-    from enumsol.problem import ContactProblem
 
 #: Where on a missed arc it is started anew, as fractions of its interval; its ends are transition points.
 _SEEDS = (0.5, 0.25, 0.75)
@@ -72,7 +74,7 @@ class FollowAllResult:
 
 def follow_all(
     problem: ContactProblem,
-    interval: tuple[float, float],
+    interval: tuple[AlphaLike, AlphaLike],
     options: ContinuationOptions | None = None,
     *,
     graph: GraphLike | None = None,
@@ -87,7 +89,7 @@ def follow_all(
     Parameters
     ----------
     problem : ContactProblem
-    interval : (float, float)
+    interval : pair of alphas
     options : ContinuationOptions or None
     graph : BranchGraph or None
         Of this problem over this interval; made by ``branch_graph`` when None.
@@ -103,14 +105,17 @@ def follow_all(
     InvalidArgumentError
         The graph belongs to another problem, or is no branch graph.
     """
+    instance_of(problem, ContactProblem, "problem")
+    ends = alpha_interval(interval)
+    optional_callable(progress, "progress")
     if graph is None:
         from enumsol.branches import branch_graph  # python-flint and networkx, slow to import
 
-        graph = branch_graph(problem, interval)
-    chart = GraphMap(graph, POINT_TOLERANCE)
+        graph = branch_graph(problem, ends)
+    chart = GraphMap(checked_graph(graph), POINT_TOLERANCE)
     if graph.problem is not problem and graph.problem.p != problem.p:
         raise InvalidArgumentError(f"graph has {graph.problem.p} contact nodes; expected the problem's {problem.p}")
-    crew = _Crew(problem, interval, options, chart, progress)
+    crew = _Crew(problem, (float(ends[0]), float(ends[1])), options, chart, progress)
     for start in graph.starting_points():
         crew.start(start)
     seeded = len(crew.paths)
@@ -185,7 +190,7 @@ def follow_arc(
     graph: GraphLike,
     vertex: int,
     arc: int,
-    interval: tuple[float, float] | None = None,
+    interval: tuple[AlphaLike, AlphaLike] | None = None,
     options: ContinuationOptions | None = None,
 ) -> Path:
     """A path that leaves a vertex of the graph on one of the arcs that meet there (branch switching).
@@ -208,11 +213,16 @@ def follow_arc(
     InvalidArgumentError
         The arc does not end at the vertex, or is a sheet.
     """
+    instance_of(problem, ContactProblem, "problem")
+    checked_graph(graph)
+    vertex, arc = positive_integer(vertex, "vertex", 0), positive_integer(arc, "arc", 0)
     chosen = next((item for item in graph.arcs if item.number == arc), None)
     point = next((item for item in graph.vertices if item.number == vertex), None)
     if chosen is None or point is None or vertex not in (chosen.tail, chosen.head) or chosen.dimension:
-        raise InvalidArgumentError(f"arc {arc} is not an arc of single roots that ends at vertex {vertex} of the graph")
-    span = interval if interval is not None else (float(graph.interval[0]), float(graph.interval[1]))
+        raise InvalidArgumentError(
+            f"arc {shown(arc)} is not an arc of single roots that ends at vertex {shown(vertex)} of the graph"
+        )
+    span: Any = interval if interval is not None else (float(graph.interval[0]), float(graph.interval[1]))
     sign = 1 if vertex == chosen.tail else -1
     if point.family is None:
         tangents = start_tangents(problem, point, span, options)

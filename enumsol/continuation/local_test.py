@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.checks import instance_of
 from enumsol.continuation.equation import CondensedEquation
 from enumsol.continuation.parameter_path import AffinePath
 from enumsol.continuation.tangents import MAX_SELECTIONS
 from enumsol.errors import InvalidArgumentError, TooLargeError
+from enumsol.problem import ContactProblem
 from enumsol.results import Root
 from enumsol.selections import FRICTIONLESS, OPEN, SLIP_MINUS, STICK
 
@@ -20,7 +22,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.continuation.equation import Codes, Vector
-    from enumsol.problem import ContactProblem
     from enumsol.selections import ContactStatus
 
 #: A singular value of the normal map's scaled matrix below this counts as zero, as in arithmetic "fast".
@@ -93,6 +94,7 @@ def local_branch_test(problem: ContactProblem, root: Root) -> LocalBranchTest:
     TooLargeError
         More than MAX_SELECTIONS selections hold at the root.
     """
+    instance_of(problem, ContactProblem, "problem")
     if not isinstance(root, Root) or len(root.statuses) != problem.p:
         raise InvalidArgumentError(f"root is {type(root).__name__}; expected a Root with {problem.p} contact nodes")
     alpha = float(root.alpha)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.results import summary
+from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:
     import os
@@ -33,7 +34,7 @@ KINDS = ("start", "step", "transition", "end")
 
 
 @dataclass(frozen=True)
-class PathPoint:
+class PathPoint(Sealed):
     """One point of a path.
 
     Attributes
@@ -127,7 +128,7 @@ def _values(stats: PathStats) -> tuple[Any, ...]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Path(Sequence[PathPoint]):
+class Path(Sequence[PathPoint], Sealed):
     """A followed branch of solutions: a sequence of its points.
 
     Attributes
@@ -325,7 +326,8 @@ class Path(Sequence[PathPoint]):
         """
         from enumsol.continuation.follow import resume_path
 
-        return resume_path(self, problem or self._problem, interval, options, smooth_path or self._smooth_path)
+        body = self._problem if problem is None else problem
+        return resume_path(self, body, interval, options, self._smooth_path if smooth_path is None else smooth_path)
 
     def joined(self, more: Path) -> Path:
         """The path followed by one that starts at its end."""

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from enumsol.checks import shown
 from enumsol.continuation.equation import CondensedEquation
 from enumsol.continuation.follow import ALPHA_FRACTION
 from enumsol.continuation.parameter_path import AffinePath
 from enumsol.continuation.selection_distance import selection_distance
 from enumsol.errors import InvalidArgumentError
+from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -22,7 +24,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.continuation.equation import Codes, Vector
-    from enumsol.problem import ContactProblem
     from enumsol.selections import ContactStatus
 
 #: Points at which the length of an arc is measured.
@@ -34,7 +35,8 @@ _DIFFERENCE = 1e-6
 _EXACT = 1e-4
 #: A vertex is nearer than the arcs that end there only when it is so by more than rounding.
 _NEARER = 1 - 1e-9
-_ASKED = ("problem", "interval", "arcs", "vertices", "branches", "complete", "reasons")
+#: What is asked of a graph.
+_ASKED = ("problem", "interval", "arcs", "vertices", "branches", "complete", "reasons", "starting_points")
 
 
 class ArcLike(Protocol):
@@ -91,6 +93,25 @@ class GraphLike(Protocol):
         """Regular roots, one or more on every branch."""
 
 
+def checked_graph(graph: Any) -> GraphLike:
+    """The argument ``graph``, which is a branch graph.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is something else.
+    """
+    lacking = [name for name in _ASKED if not hasattr(graph, name)]
+    if lacking or not isinstance(graph.problem, ContactProblem):
+        why = f", which has no {lacking[0]}" if lacking else ""
+        raise InvalidArgumentError(
+            f"graph is {shown(graph)}{why}; expected a BranchGraph, which holds arcs over an interval "
+            "(of branch_graph or BranchGraph.load)"
+        )
+    found: GraphLike = graph
+    return found
+
+
 @dataclass(frozen=True)
 class Place:
     """Where a point lies.
@@ -139,14 +160,8 @@ class GraphMap:
     """
 
     def __init__(self, graph: GraphLike, tolerance: float) -> None:
-        lacking = [name for name in _ASKED if not hasattr(graph, name)]
-        if lacking:
-            raise InvalidArgumentError(
-                f"graph is a {type(graph).__name__}, which has no {lacking[0]}; expected a BranchGraph, which holds "
-                "arcs over an interval (of branch_graph or BranchGraph.load)"
-            )
         check_tolerance(tolerance)
-        self.graph, self.tolerance = graph, tolerance
+        self.graph, self.tolerance = checked_graph(graph), tolerance
         low, high = (float(end) for end in graph.interval)
         scale = ALPHA_FRACTION * (high - low)
         self.equation = CondensedEquation(AffinePath(graph.problem), (low, high), low, alpha_scale=scale)

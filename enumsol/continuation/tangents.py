@@ -11,6 +11,7 @@ import numpy as np
 
 from enumsol.continuation.equation import STATUS_TOLERANCE
 from enumsol.errors import TooLargeError
+from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -35,7 +36,7 @@ ORIENTATION_STEP = 1e-4
 
 
 @dataclass(frozen=True)
-class Tangent:
+class Tangent(Sealed):
     """A direction in which a solution curve leaves a point.
 
     Attributes

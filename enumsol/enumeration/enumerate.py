@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import math
 import time
-from fractions import Fraction
 from typing import TYPE_CHECKING, Literal
 
 from enumsol.certification.proof import Proof, ProofWriter
+from enumsol.checks import (
+    alpha_value,
+    file_path,
+    instance_of,
+    one_of,
+    optional_callable,
+    optional_count,
+    optional_executor,
+    optional_seconds,
+    share,
+)
 from enumsol.enumeration.assembly import RootBuilder
 from enumsol.enumeration.at_rest import AtRest
 from enumsol.enumeration.components import Component, connected_components
@@ -20,7 +30,7 @@ from enumsol.enumeration.tree import Open, SearchLimits, SearchOutcome, SearchPr
 from enumsol.enumeration.verified import VerifiedJudge
 from enumsol.enumeration.workbench import Arithmetic, Workbench
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.problem import ContactProblem
 from enumsol.results import RootSet, SearchStats
 
 if TYPE_CHECKING:
@@ -28,8 +38,8 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from pathlib import Path
 
+    from enumsol.checks import AlphaLike
     from enumsol.enumeration.solutions import ActiveSets, SelectionSolver
-    from enumsol.problem import Alpha
 
 Method = Literal["tree", "exhaustive"]
 #: The exhaustive method reports progress this often [seconds].
@@ -38,7 +48,7 @@ _REPORT_SECONDS = 0.1
 
 def enumerate_roots(
     problem: ContactProblem,
-    alpha: Alpha,
+    alpha: AlphaLike,
     arithmetic: Arithmetic = "verified",
     method: Method = "tree",
     executor: Executor | None = None,
@@ -56,8 +66,9 @@ def enumerate_roots(
     Parameters
     ----------
     problem : ContactProblem
-    alpha : float or Fraction
-        The parameter; a float is read as the exact rational number that it is.
+    alpha : float, Fraction, any other real number, or str
+        The parameter, read as the exact number that it is; a text is a fraction such as "8/3" or a decimal number,
+        which is read as float64.
     arithmetic : {"verified", "fast", "exact"}
         "verified": every root is enclosed and every excluded selection proven by rigorous error bounds for the data as
         given, in rationals where a sign cannot be decided otherwise; what stays open is listed. "fast": float64 and a
@@ -95,10 +106,18 @@ def enumerate_roots(
     Interrupted
         On Ctrl-C; ``partial`` holds what was found.
     """
-    _check(problem, alpha, arithmetic, method, stop_after, max_nodes, time_limit, tolerance, engine)
+    instance_of(problem, ContactProblem, "problem")
+    value = alpha_value(alpha)
+    one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
+    one_of(method, "method", ("tree", "exhaustive"))
+    one_of(engine, "engine", (None, "active-set", "clarabel"))
+    optional_executor(executor)
+    optional_callable(progress, "progress")
+    counts = optional_count(stop_after, "stop_after"), optional_count(max_nodes, "max_nodes")
+    seconds, tolerance = optional_seconds(time_limit), share(tolerance)
     _check_proof(arithmetic, method, proof_path)
-    bench = Workbench(problem, alpha, arithmetic, tolerance)
-    return _Enumeration(bench, method, progress, engine, proof_path).run(executor, stop_after, max_nodes, time_limit)
+    bench = Workbench(problem, value, arithmetic, tolerance)
+    return _Enumeration(bench, method, progress, engine, proof_path).run(executor, *counts, seconds)
 
 
 class _Enumeration:
@@ -268,37 +287,6 @@ class _Enumeration:
         return proof if whole else None
 
 
-def _check(
-    problem: object,
-    alpha: Alpha,
-    arithmetic: str,
-    method: str,
-    stop_after: int | None,
-    max_nodes: int | None,
-    time_limit: float | None,
-    tolerance: float,
-    engine: str | None,
-) -> None:
-    if not isinstance(problem, ContactProblem):
-        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
-    if not isinstance(alpha, Fraction):
-        finite_alpha(alpha)
-    for name, value, known in (
-        ("arithmetic", arithmetic, ("fast", "verified", "exact")),
-        ("method", method, ("tree", "exhaustive")),
-        ("engine", engine, (None, "active-set", "clarabel")),
-    ):
-        if value not in known:
-            raise InvalidArgumentError(f"{name} is {value!r}; expected one of {', '.join(map(repr, known))}")
-    for name, count in (("stop_after", stop_after), ("max_nodes", max_nodes)):
-        if count is not None and (not isinstance(count, int) or count < 1):
-            raise InvalidArgumentError(f"{name} is {count!r}; expected a positive integer or None")
-    if time_limit is not None and not time_limit > 0:
-        raise InvalidArgumentError(f"time_limit is {time_limit!r}; expected a positive number of seconds or None")
-    if not 0 <= tolerance < 1:
-        raise InvalidArgumentError(f"tolerance is {tolerance!r}; expected a number in [0, 1)")
-
-
 def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None) -> None:
     if method == "exhaustive" and arithmetic == "verified":
         raise InvalidArgumentError(
@@ -308,3 +296,5 @@ def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None) ->
         raise InvalidArgumentError(
             f'proof_path is given with arithmetic {arithmetic!r}; expected "verified", which alone writes proofs'
         )
+    if proof_path is not None:
+        file_path(proof_path, "proof_path")

@@ -157,6 +157,7 @@ class ActiveSetEngine:
     """
 
     name = "active-set"
+    module = "enumsol.enumeration._active_set"
 
     def __init__(
         self,
