@@ -306,7 +306,7 @@ def optional_seconds(value: Any, name: str = "time_limit") -> float | None:
     """
     if value is None:
         return None
-    number = _real(value)
+    number = real_or_nan(value)
     if not number > 0:
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected a positive number of seconds or None")
     return number
@@ -320,7 +320,7 @@ def share(value: Any, name: str = "tolerance") -> float:
     InvalidArgumentError
         The value is no such number.
     """
-    number = _real(value)
+    number = real_or_nan(value)
     if not 0 <= number < 1:
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected a number in [0, 1)")
     return number
@@ -334,7 +334,7 @@ def finite_number(value: Any, name: str) -> float:
     InvalidArgumentError
         The value is no such number.
     """
-    number = _real(value)
+    number = real_or_nan(value)
     if not math.isfinite(number):
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number")
     if number != exact_number(value):
@@ -364,7 +364,7 @@ def positive_number(value: Any, name: str) -> float:
     InvalidArgumentError
         The value is no such number.
     """
-    number = _real(value)
+    number = real_or_nan(value)
     if not (math.isfinite(number) and number > 0):
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number > 0")
     return number
@@ -378,7 +378,7 @@ def nonnegative_number(value: Any, name: str) -> float:
     InvalidArgumentError
         The value is no such number.
     """
-    number = _real(value)
+    number = real_or_nan(value)
     if not (math.isfinite(number) and number >= 0):
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number >= 0")
     return number
@@ -393,8 +393,8 @@ def _integer(value: Any) -> int | None:
         return None
 
 
-def _real(value: Any) -> float:
-    """A real number as a float, nan for what is none."""
+def real_or_nan(value: Any) -> float:
+    """A real number of any type as a float, rounded if need be; nan for what is none."""
     number = exact_number(value)
     try:
         return math.nan if number is None else float(number)

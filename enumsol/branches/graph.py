@@ -265,7 +265,7 @@ class BranchGraph(Immutable):
             The graph has gaps; ``at_least`` gives a lower bound.
         """
         found = self._multiplicity(alpha)
-        self._whole("the number of solutions", f"there are {found} at alpha = {float(alpha):.8g}")
+        self._whole("the number of solutions", f"there are {found} at alpha = {float(alpha_value(alpha)):.8g}")
         return found.count
 
     def at_least(self, alpha: AlphaLike) -> int:

@@ -95,9 +95,9 @@ def audit(
     """
     from enumsol.continuation import audit as check
     from enumsol.continuation import read_points
-    from enumsol.continuation.places import check_tolerance
+    from enumsol.continuation.places import checked_tolerance
 
-    check_tolerance(tolerance)
+    checked_tolerance(tolerance)
     check_outputs(json=json_file, csv=csv_file)
     if graph_file is not None and (first is not None or last is not None):
         raise InvalidArgumentError("--graph and --from or --to are both given; a graph has its own interval")

@@ -7,6 +7,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from enumsol.checks import real_or_nan, shown
 from enumsol.continuation.audit_report import AuditedPoint, AuditReport, Jump, MissedArc
 from enumsol.continuation.path import Path
 from enumsol.continuation.places import GraphLike, GraphMap, Place
@@ -66,10 +67,11 @@ def audit(
         The points cannot be read, a column is missing, a row names no path, the points do not fit the graph's problem,
         the graph is no branch graph, or the tolerance or detour is out of range.
     """
-    if not 1 <= detour < math.inf:
-        raise InvalidArgumentError(f"detour is {detour!r}; expected a finite number of at least 1")
+    factor = real_or_nan(detour)
+    if not 1 <= factor < math.inf:
+        raise InvalidArgumentError(f"detour is {shown(detour)}; expected a finite number of at least 1")
     chart = GraphMap(graph, tolerance)
-    return audit_on(chart, read_points(path, graph.problem, columns=columns), detour)
+    return audit_on(chart, read_points(path, graph.problem, columns=columns), factor)
 
 
 def audit_on(chart: GraphMap, runs: Sequence[PointRun], detour: float) -> AuditReport:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.checks import shown
+from enumsol.checks import real_or_nan, shown
 from enumsol.continuation.equation import CondensedEquation
 from enumsol.continuation.follow import ALPHA_FRACTION
 from enumsol.continuation.parameter_path import AffinePath
@@ -36,7 +36,7 @@ _EXACT = 1e-4
 #: A vertex is nearer than the arcs that end there only when it is so by more than rounding.
 _NEARER = 1 - 1e-9
 #: What is asked of a graph.
-_ASKED = ("problem", "interval", "arcs", "vertices", "branches", "complete", "reasons", "starting_points")
+_ASKED = ("problem", "interval", "arcs", "vertices", "branches", "complete", "reasons")
 
 
 class ArcLike(Protocol):
@@ -105,7 +105,7 @@ def checked_graph(graph: Any) -> GraphLike:
     if lacking or not isinstance(graph.problem, ContactProblem):
         why = f", which has no {lacking[0]}" if lacking else ""
         raise InvalidArgumentError(
-            f"graph is {shown(graph)}{why}; expected a BranchGraph, which holds arcs over an interval "
+            f"graph is a {type(graph).__name__}{why}; expected a BranchGraph, which holds arcs over an interval "
             "(of branch_graph or BranchGraph.load)"
         )
     found: GraphLike = graph
@@ -132,16 +132,18 @@ class Place:
     distance: float
 
 
-def check_tolerance(tolerance: float) -> None:
-    """Refuse a tolerance that is none: the forces of every solution have at most length one.
+def checked_tolerance(tolerance: float) -> float:
+    """The argument ``tolerance``, which is one: the forces of every solution have at most length one.
 
     Raises
     ------
     InvalidArgumentError
         It is not a number between 0 and 1.
     """
-    if not 0 < tolerance < 1:
-        raise InvalidArgumentError(f"tolerance is {tolerance!r}; expected a number above 0 and below 1")
+    number = real_or_nan(tolerance)
+    if not 0 < number < 1:
+        raise InvalidArgumentError(f"tolerance is {shown(tolerance)}; expected a number above 0 and below 1")
+    return number
 
 
 class GraphMap:
@@ -160,8 +162,7 @@ class GraphMap:
     """
 
     def __init__(self, graph: GraphLike, tolerance: float) -> None:
-        check_tolerance(tolerance)
-        self.graph, self.tolerance = checked_graph(graph), tolerance
+        self.graph, self.tolerance = checked_graph(graph), checked_tolerance(tolerance)
         low, high = (float(end) for end in graph.interval)
         scale = ALPHA_FRACTION * (high - low)
         self.equation = CondensedEquation(AffinePath(graph.problem), (low, high), low, alpha_scale=scale)
