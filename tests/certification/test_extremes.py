@@ -169,9 +169,9 @@ def test_friction_that_vanishes_at_a_fraction():
 
 
 def test_friction_that_underflows_is_refused():
+    triangle = gallery.one_node_triangle()
+    slight = ContactProblem(triangle.A, triangle.Bn, triangle.Bt, triangle.f, friction=(0.0, 1e-300))
     with pytest.raises(enumsol.InvalidArgumentError, match="too small for float64"):
-        triangle = gallery.one_node_triangle()
-        slight = ContactProblem(triangle.A, triangle.Bn, triangle.Bt, triangle.f, friction=(0.0, 1e-300))
         enumerate_roots(slight, Fraction(1, 10**100))
 
 
