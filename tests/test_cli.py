@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 from enumsol import Proof, gallery, read_problem, verify, write_problem
 from enumsol.cli import main
 from enumsol.cli.app import app
+from enumsol.enumeration.relaxation import ActiveSetEngine
 
 A = np.array([[2.0, -0.5, 0.0, 0.0], [-0.5, 2.0, -0.5, 0.0], [0.0, -0.5, 2.0, -0.5], [0.0, 0.0, -0.5, 2.0]])
 DENSE = {"A": A, "Bn": np.eye(4)[[0, 2]], "Bt": np.eye(4)[[1, 3]], "f": np.array([1.0, -2.0, 0.5, 1.0])}
@@ -338,11 +339,12 @@ def test_every_bad_input_is_status_2_of_the_process_too(tmp_path):
 
 @pytest.mark.filterwarnings("default")
 def test_warnings_are_lines_without_source_code(capsys, monkeypatch):
-    def failing(*_args):
-        raise ImportError
+    class Missing(ActiveSetEngine):
+        def __init__(self, *_args):
+            raise ImportError
 
     # an installation without the compiled engine
-    monkeypatch.setattr("enumsol.enumeration.tree.ActiveSetEngine", failing)
+    monkeypatch.setattr("enumsol.enumeration.tree.ActiveSetEngine", Missing)
     status, out, err = run(capsys, "roots", "gallery:one-node-6.1", "--alpha", 5, "--arithmetic", "fast")
     assert status == 0
     assert "3 roots" in out

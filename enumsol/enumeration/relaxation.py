@@ -24,7 +24,7 @@ CONTACT, UNDECIDED = 5, 6
 FEASIBILITY_TOLERANCE = 1e-11
 #: A leaf is pruned when its energy bound exceeds this; g' S^{-1} g lies in [1, 4), so it is relative to the data.
 PRUNE_MARGIN = 1e-9
-#: Nodes whose children are bounded before one of them is branched on (measured in studies/branching.py).
+#: Nodes whose children are bounded before one of them is branched on (measured in studies/branching_rule).
 BRANCHING_CANDIDATES = 16
 
 
@@ -146,22 +146,37 @@ class Engine(Protocol):
 
 
 class ActiveSetEngine:
-    """Own dual active-set method, warm-started from the parent (compiled; see ``_active_set.pyx``)."""
+    """Own dual active-set method, warm-started from the parent (compiled; see ``_active_set.pyx``).
+
+    Parameters
+    ----------
+    system : ScaledSystem
+    candidates : int
+        Nodes whose children are bounded before one of them is branched on.
+    form : (H, h), optional
+        Shapes (2p, 2p) and (2p,): minimise lambda' H lambda - h' lambda in place of the energy, H = S and h = g. H must
+        be positive definite, and the form at most zero at every solution.
+    """
 
     name = "active-set"
 
-    def __init__(self, system: ScaledSystem) -> None:
+    def __init__(
+        self,
+        system: ScaledSystem,
+        *,
+        candidates: int = BRANCHING_CANDIDATES,
+        form: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    ) -> None:
         from enumsol.enumeration import _active_set  # compiled; its absence is handled by make_engine
 
         p = system.p
         start, index, value = row_terms(p, system.F)
         rhs = np.zeros(len(start) - 1)
-        self._data = _active_set.QPData(system.S, system.g, -system.S, system.g, start, index, value, rhs)
+        H, h = (system.S, system.g) if form is None else form
+        self._data = _active_set.QPData(H, h, -system.S, system.g, start, index, value, rhs)
         self._module = _active_set
         cones = np.array([RowKind.CONE_PLUS, RowKind.CONE_MINUS])[:, None] * p + np.arange(p)
-        self.rule = _active_set.BranchingRule(
-            system.F, cones, np.full((2, p), EQUALITY, dtype=np.int8), BRANCHING_CANDIDATES
-        )
+        self.rule = _active_set.BranchingRule(system.F, cones, np.full((2, p), EQUALITY, dtype=np.int8), candidates)
         self.limit = 200 + 20 * p
 
     def root(self, rows: list[int], modes: list[int]) -> Relaxation:

@@ -169,11 +169,10 @@ def test_friction_that_vanishes_at_a_fraction():
 
 
 def test_friction_that_underflows_is_refused():
-    problem = gallery.two_node_square(friction=(0.0, 1e-200))
+    triangle = gallery.one_node_triangle()
+    slight = ContactProblem(triangle.A, triangle.Bn, triangle.Bt, triangle.f, friction=(0.0, 1e-300))
     with pytest.raises(enumsol.InvalidArgumentError, match="too small for float64"):
-        enumerate_roots(problem, 1e-200)
-    with pytest.raises(enumsol.InvalidArgumentError, match="in the range of float64"):
-        enumerate_roots(gallery.one_node_triangle(), Fraction(1, 10**400))
+        enumerate_roots(slight, Fraction(1, 10**100))
 
 
 @pytest.mark.parametrize("gap", [-1e-12, -1e-3, -1.0, -1e6, 1e-12, 1e6])
@@ -202,7 +201,7 @@ def test_nothing_can_be_proven_about_a_body_on_the_verge(monkeypatch):
     assert report.undecided == 1
 
 
-# -- regressions found by studies/extremes.py --------------------------------------------------------------------------
+# -- regressions found by studies/extremes -----------------------------------------------------------------------------
 
 
 def rescaled(problem, stiffness=1.0, load=1.0):
