@@ -216,14 +216,15 @@ def _sheet(axis: Any, graph: BranchGraph, arc: Arc, quantity: str, node: int) ->
 def _steps(axis: Any, graph: BranchGraph) -> None:
     alphas, at, between = graph.steps
     edges = [float(alpha) for alpha in alphas]
-    axis.stairs(between, edges, color=_FAMILY, linewidth=1.4, baseline=None)
+    if between:  # a graph without arcs has no steps
+        axis.stairs(between, edges, color=_FAMILY, linewidth=1.4, baseline=None)
     special = [
         (x, n) for k, (x, n) in enumerate(zip(edges, at, strict=True)) if n not in between[max(k - 1, 0) : k + 1]
     ]
     if special:
         axis.plot([x for x, _ in special], [n for _, n in special], ".", color=_FAMILY, markersize=5)
     axis.set_ylabel("solutions")
-    axis.set_ylim(0, max([*between, *at]) + 0.8)
+    axis.set_ylim(0, max([*between, *at], default=1) + 0.8)
     axis.yaxis.get_major_locator().set_params(integer=True)
 
 
