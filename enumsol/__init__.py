@@ -28,7 +28,9 @@ if TYPE_CHECKING:
         InvalidArgumentError,
         InvalidProblemError,
         MissingDependencyError,
+        OutputError,
         TooLargeError,
+        WorkerError,
     )
     from enumsol.io import read_problem, write_problem
     from enumsol.problem import ContactProblem
@@ -59,7 +61,9 @@ _HOMES = {
         "InvalidArgumentError",
         "InvalidProblemError",
         "MissingDependencyError",
+        "OutputError",
         "TooLargeError",
+        "WorkerError",
     ),
     "enumsol.io": ("read_problem", "write_problem"),
     "enumsol.problem": ("ContactProblem",),
@@ -97,6 +101,7 @@ __all__ = [
     "InvalidProblemError",
     "MissingDependencyError",
     "NotConverged",
+    "OutputError",
     "Path",
     "PiecewiseSmoothEquation",
     "Polytope",
@@ -111,6 +116,7 @@ __all__ = [
     "TooLargeError",
     "Undecided",
     "VerificationReport",
+    "WorkerError",
     "audit",
     "branch_graph",
     "enumerate_roots",
