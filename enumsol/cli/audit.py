@@ -19,7 +19,7 @@ from enumsol.cli.common import (
     parse_interval,
 )
 from enumsol.cli.graph import build, read_graph
-from enumsol.cli.output import as_json, check_outputs, write_text
+from enumsol.cli.output import as_json, check_outputs, deliver, write_text
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -66,7 +66,8 @@ def audit(
     arcs in the interval no path visited.
 
     Exit status: 0 when every point is on the graph, nothing jumped and nothing was missed; 3 otherwise, or when the
-    graph is known to be incomplete; 2 on bad input; 130 on Ctrl-C.
+    graph is known to be incomplete; 2 on bad input; 130 on Ctrl-C; 74 when a result could not be written, 141 when
+    nobody read it any more.
     """
     from enumsol.continuation import audit as check
 
@@ -79,16 +80,21 @@ def audit(
         build(body, _interval(frame, first, last), arithmetic) if graph_file is None else read_graph(graph_file, body)
     )
     report = check(frame, found, tolerance=tolerance)
-    if "-" not in (json_file, csv_file):
-        low, high = found.interval
-        typer.echo(repr(report))
-        typer.echo(f"graph for alpha in [{low:g}, {high:g}], {len(found.arcs)} arcs; {found.completeness()}")
-    if json_file is not None:
-        write_text(json_file, as_json({"problem": problem, **_content(report, found)}))
-    if csv_file is not None:
-        write_text(csv_file, report.to_frame().to_csv(index=False))
+    deliver(
+        None if "-" in (json_file, csv_file) else lambda: typer.echo(_as_text(report, found)),
+        None
+        if json_file is None
+        else lambda: write_text(json_file, as_json({"problem": problem, **_content(report, found)})),
+        None if csv_file is None else lambda: write_text(csv_file, report.to_frame().to_csv(index=False)),
+    )
     passed = report.ok and report.complete and not found.reasons
     raise typer.Exit(ExitStatus.DONE if passed else ExitStatus.INCOMPLETE)
+
+
+def _as_text(report: AuditReport, found: BranchGraph) -> str:
+    low, high = found.interval
+    about = f"graph for alpha in [{low:g}, {high:g}], {len(found.arcs)} arcs; {found.completeness()}"
+    return f"{report!r}\n{about}"
 
 
 def _read(points: str) -> pd.DataFrame:

@@ -39,6 +39,8 @@ from enumsol.problem import ContactProblem
 
 __all__ = ["read_problem", "write_problem"]
 
+#: Endings of the files that hold a problem.
+SUFFIXES = (".npz", *fclib.SUFFIXES)
 _FORMATS = "a .npz file, a directory of MatrixMarket files, or an fclib file (.h5, .hdf5)"
 
 
