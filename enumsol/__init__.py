@@ -6,7 +6,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from enumsol import branches as branches
+    from enumsol import certification as certification
+    from enumsol import condensed as condensed
+    from enumsol import continuation as continuation
+    from enumsol import enumeration as enumeration
+    from enumsol import errors as errors
+    from enumsol import fem as fem
     from enumsol import gallery
+    from enumsol import io as io
+    from enumsol import problem as problem
+    from enumsol import results as results
+    from enumsol import selections as selections
     from enumsol.branches import BranchGraph, branch_graph, link_samples, multiplicity_table
     from enumsol.certification.checker import VerificationReport, verify
     from enumsol.certification.proof import Proof, ProofFormatError
@@ -29,12 +40,16 @@ if TYPE_CHECKING:
         InvalidArgumentError,
         InvalidProblemError,
         MissingDependencyError,
+        OutputError,
         TooLargeError,
+        WorkerError,
     )
     from enumsol.io import read_problem, write_problem
     from enumsol.problem import ContactProblem
     from enumsol.results import Enclosure, Polytope, Root, RootFamily, RootSet, SearchStats, Undecided
     from enumsol.selections import ContactStatus, PiecewiseSmoothEquation, sign_array
+
+    __version__: str
 
 #: Where the public names are at home. A module is loaded when a name of it is first used, so that a program loads what
 #: it works with and no more: sparse matrices come with a problem, networkx and rational arithmetic with a branch graph.
@@ -61,7 +76,9 @@ _HOMES = {
         "InvalidArgumentError",
         "InvalidProblemError",
         "MissingDependencyError",
+        "OutputError",
         "TooLargeError",
+        "WorkerError",
     ),
     "enumsol.io": ("read_problem", "write_problem"),
     "enumsol.problem": ("ContactProblem",),
@@ -100,6 +117,7 @@ __all__ = [
     "InvalidProblemError",
     "MissingDependencyError",
     "NotConverged",
+    "OutputError",
     "Path",
     "PiecewiseSmoothEquation",
     "Polytope",
@@ -114,6 +132,7 @@ __all__ = [
     "TooLargeError",
     "Undecided",
     "VerificationReport",
+    "WorkerError",
     "audit",
     "branch_graph",
     "enumerate_roots",
@@ -131,14 +150,19 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    if name in _MODULES:
-        return import_module(f"{__name__}.{name}")
-    if name not in _HOME_OF:
-        raise AttributeError(f"module 'enumsol' has no attribute {name!r}")
-    value = getattr(import_module(_HOME_OF[name]), name)
-    globals()[name] = value  # found without this detour from now on
-    return value
+if not TYPE_CHECKING:  # or a type checker would take any name for one of ours
+
+    def __getattr__(name: str) -> object:
+        if name in _MODULES:
+            return import_module(f"{__name__}.{name}")
+        if name == "__version__":
+            value = import_module(f"{__name__}._version").find_version()
+        elif name in _HOME_OF:
+            value = getattr(import_module(_HOME_OF[name]), name)
+        else:
+            raise AttributeError(f"module 'enumsol' has no attribute {name!r}")
+        globals()[name] = value  # found without this detour from now on
+        return value
 
 
 def __dir__() -> list[str]:

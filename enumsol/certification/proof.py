@@ -27,6 +27,7 @@ Footer
 from __future__ import annotations
 
 import base64
+import contextlib
 import hashlib
 import io
 import json
@@ -113,10 +114,18 @@ class Recorder(Protocol):
 class ProofWriter:
     """Writes the records of a proof one by one, to a file or to memory.
 
+    A file that cannot be written to the end (a full disk) does not stop the search: the records are dropped from there
+    on, and there is no proof.
+
     Parameters
     ----------
     path : path or None
         Where the proof is streamed to; None keeps the compressed proof in memory.
+
+    Attributes
+    ----------
+    failure : str or None
+        Why the file could not be written to the end.
 
     Raises
     ------
@@ -132,6 +141,7 @@ class ProofWriter:
             raise InvalidArgumentError(
                 f"proof_path {path} cannot be written ({error.strerror}); expected a path for a new file"
             ) from error
+        self.failure: str | None = None
         self._digest = hashlib.sha256()
         self._zip = zlib.compressobj(_LEVEL)
         self._pending: list[str] = []
@@ -144,14 +154,18 @@ class ProofWriter:
             self._flush()
 
     def close(self) -> Proof:
-        """Finish the file and give the proof."""
+        """Finish the file and give the proof; a damaged one when there was a ``failure``."""
         self._flush()
         self._emit(self._zip.flush())
-        self._file.write(self._digest.digest())
-        if self._path is not None:
-            self._file.close()
-            return Proof(self._path)
-        return Proof(self._file.getvalue())  # type: ignore[attr-defined]
+        self._emit(self._digest.digest())
+        if self._path is None:
+            return Proof(self._file.getvalue())  # type: ignore[attr-defined]
+        if self.failure is None:
+            try:
+                self._file.close()
+            except OSError as error:
+                self._give_up(error)
+        return Proof(self._path)
 
     def _flush(self) -> None:
         if self._pending:
@@ -160,7 +174,19 @@ class ProofWriter:
 
     def _emit(self, data: bytes) -> None:
         self._digest.update(data)
-        self._file.write(data)
+        if self.failure is not None:
+            return
+        try:
+            self._file.write(data)
+        except OSError as error:
+            self._give_up(error)
+
+    def _give_up(self, error: OSError) -> None:
+        self.failure = (
+            f"proof_path {self._path} cannot be written to the end ({error.strerror}); expected a place with room"
+        )
+        with contextlib.suppress(OSError):  # the same once more, for what is still in its buffer
+            self._file.close()
 
 
 def _no_number(name: str) -> Any:

@@ -25,7 +25,8 @@ def verify(
     search tree.
 
     Exit status: 0 when the proof holds and nothing is undecided; 3 when it holds and leaves selections undecided;
-    2 when it does not hold or cannot be read.
+    2 when it does not hold or cannot be read; 74 when the report could not be written, 141 when nobody read it any
+    more.
     """
     # numpy and scipy: not for --help
     from enumsol.certification.checker import verify as check
