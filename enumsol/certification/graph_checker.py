@@ -26,9 +26,9 @@ from enumsol.certification.interval_kernel import (
     EnclosedPiece,
     as_computed,
     interval_exclusion_margins,
-    vanishing_alpha,
 )
 from enumsol.certification.proof import unpacked
+from enumsol.certification.unloaded import vanishing_alpha
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -140,7 +140,7 @@ class GraphChecker:
         a, b = self.interval
         everything = [(UNDECIDED,) * self.problem.p]
         enclosure = as_computed(self.problem) if self.data == "condensed" else self._enclosure()
-        origin = vanishing_alpha(self.problem, enclosure)
+        origin = vanishing_alpha(self.problem, self.data)
         ends = [a, origin, b] if origin is not None and a < origin < b else [a, b]
         # pieces in the order in which they are searched: halves come directly after the piece that was cut
         waiting = [(x, y, everything) for x, y in pairwise(ends)]
