@@ -10,6 +10,7 @@ import numpy as np
 
 from enumsol.certification.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.certification.format import EXACT_DOF_LIMIT
+from enumsol.certification.reading import rational_text
 from enumsol.enumeration.float_selections import FloatSelections
 from enumsol.enumeration.judges import FastJudge
 from enumsol.enumeration.verified import VerifiedJudge
@@ -151,7 +152,7 @@ class Workbench:
             "format": "enumsol-proof",
             "version": 1,
             "problem": self.problem.fingerprint,
-            "alpha": str(Fraction(self.alpha)),
+            "alpha": rational_text(Fraction(self.alpha), "alpha"),
             "p": self.problem.p,
             "data": self.data,
             "force": (np.frexp(self.scaled.force)[1] - 1).tolist(),
