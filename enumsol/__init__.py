@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from enumsol import results as results
     from enumsol import selections as selections
     from enumsol.branches import BranchGraph, branch_graph, link_samples, multiplicity_table
-    from enumsol.certification.checker import VerificationReport, verify
+    from enumsol.certification.checker import verify
     from enumsol.certification.proof import Proof, ProofFormatError
+    from enumsol.certification.reports import VerificationReport
     from enumsol.continuation import (
         ContinuationOptions,
         NotConverged,
@@ -55,8 +56,9 @@ if TYPE_CHECKING:
 #: it works with and no more: sparse matrices come with a problem, networkx and rational arithmetic with a branch graph.
 _HOMES = {
     "enumsol.branches": ("BranchGraph", "branch_graph", "link_samples", "multiplicity_table"),
-    "enumsol.certification.checker": ("VerificationReport", "verify"),
+    "enumsol.certification.checker": ("verify",),
     "enumsol.certification.proof": ("Proof", "ProofFormatError"),
+    "enumsol.certification.reports": ("VerificationReport",),
     "enumsol.continuation": (
         "ContinuationOptions",
         "NotConverged",

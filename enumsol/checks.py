@@ -12,6 +12,7 @@ Every refusal is one sentence: which argument, what was found, what was expected
 
 from __future__ import annotations
 
+import errno
 import math
 import numbers
 import operator
@@ -26,7 +27,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from enumsol.errors import InvalidArgumentError
+from enumsol.errors import InvalidArgumentError, OutputError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -400,13 +401,27 @@ def file_path(value: Any, name: str, expected: str = "the name of a file") -> Pa
     return Path(text)
 
 
+#: What the operating system says when a file can be opened and not be written to.
+_NO_ROOM = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EPIPE))
+
+
 @contextmanager
 def writing(place: Path, name: str) -> Iterator[None]:
-    """Turn what the operating system says against writing a file into an error of ours."""
+    """Turn what the operating system says against writing a file into an error of ours.
+
+    Raises
+    ------
+    OutputError
+        There is no room for it, or the device failed.
+    InvalidArgumentError
+        There can be no such file.
+    """
     try:
         yield
     except OSError as error:
         reason = error.strerror or error
+        if error.errno in _NO_ROOM:
+            raise OutputError(f"{name} {place} cannot be written ({reason}); expected a place with room") from error
         raise InvalidArgumentError(
             f"{name} {place} cannot be written ({reason}); expected a path for a new file"
         ) from error

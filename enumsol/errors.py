@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from enumsol.results import RootSet
+from typing import Any
 
 
 class EnumsolError(Exception):
@@ -35,7 +32,7 @@ class MissingDependencyError(EnumsolError, ImportError):
 class _PartialResultError(EnumsolError):
     """Base of the errors that hold what was found before them."""
 
-    def __init__(self, message: str, partial: RootSet | Any) -> None:
+    def __init__(self, message: str, partial: Any) -> None:
         super().__init__(message)
         self.partial = partial
 
@@ -74,5 +71,5 @@ class OutputError(_PartialResultError):
         Of enumerate_roots with a ``proof_path``: the result of the search, which ran on without a proof.
     """
 
-    def __init__(self, message: str, partial: RootSet | None = None) -> None:
+    def __init__(self, message: str, partial: Any = None) -> None:
         super().__init__(message, partial)

@@ -6,7 +6,6 @@ import time
 from fractions import Fraction
 from typing import TYPE_CHECKING, Literal
 
-from enumsol.branches.algebraic import to_fraction
 from enumsol.branches.assembly import make_arcs, make_vertices
 from enumsol.branches.ball_judge import BallLeafJudge
 from enumsol.branches.gluing import Gluing
@@ -95,12 +94,11 @@ def branch_graph(
     exact = arithmetic == "exact"
     path = ExactPath.from_problem(problem, exact=exact or problem.n <= FAST_EXACT_DOF)
     deadline = None if time_limit is None else started + time_limit
-    origin = None if path.origin is None else to_fraction(path.origin)
     judge = _judge(problem, path, arithmetic)
     search = IntervalSearch(
         problem.condensed,
         (a, b),
-        origin,
+        path.zero,
         judge,
         max_nodes=max_nodes,
         deadline=deadline,

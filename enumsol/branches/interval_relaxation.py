@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from enumsol.condensed import CondensedProblem
     from enumsol.enumeration.relaxation import Relaxation
     from enumsol.enumeration.solutions import Codes
+    from enumsol.problem import Alpha
 
 #: Part of the energy's unit (g' S^-1 g lies in [1, 4) at its larger end) that makes the form in (lambda, tau) definite.
 RIDGE = 1e-3
@@ -109,18 +110,18 @@ class IntervalSystem:
     scaled: ScaledSystem = field(repr=False)
 
     @classmethod
-    def from_problem(cls, condensed: CondensedProblem, a: float, b: float, origin: float | None) -> IntervalSystem:
+    def from_problem(cls, condensed: CondensedProblem, a: Alpha, b: Alpha, origin: Alpha | None) -> IntervalSystem:
         """The interval [a, b]; ``origin`` is the alpha at which g vanishes, if it does in [a, b] (then a or b).
 
         With such an origin the solutions are alpha's distance from it times those of the load +-g1, so that this load,
         which does not vary, is searched in place of g(alpha).
         """
-        F = np.stack([condensed.F0 + alpha * condensed.F1 for alpha in (a, b)])
+        F = np.stack([condensed.F0 + float(alpha) * condensed.F1 for alpha in (a, b)])
         F_lo, F_hi = np.maximum(F.min(axis=0), 0.0), np.maximum(F.max(axis=0), 0.0)
         if origin is not None:
             ends = np.stack([condensed.g1 if b > origin else -condensed.g1] * 2)
         else:
-            ends = np.stack([condensed.g0 + alpha * condensed.g1 for alpha in (a, b)])
+            ends = np.stack([condensed.g0 + float(alpha) * condensed.g1 for alpha in (a, b)])
         first = ScaledSystem.from_system(CondensedSystem(condensed.S, ends[0], F_hi))
         with np.errstate(over="ignore", invalid="ignore"):
             energies = [np.linalg.norm(np.linalg.solve(first.cholesky, g / first.length)) for g in ends]

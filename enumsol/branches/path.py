@@ -11,11 +11,15 @@ import numpy as np
 from flint import fmpq, fmpq_mat, fmpz_mat, fmpz_poly
 
 from enumsol.branches.algebraic import integer_polynomial
-from enumsol.enumeration.exact_selections import EXACT_DOF_LIMIT, rational
+from enumsol.certification.format import EXACT_DOF_LIMIT
+from enumsol.certification.unloaded import vanishing_alpha
+from enumsol.enumeration.exact_selections import rational
 from enumsol.errors import TooLargeError
 from enumsol.selections import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from enumsol.enumeration.solutions import Codes
     from enumsol.problem import ContactProblem
 
@@ -35,6 +39,9 @@ class ExactPath:
     F0, F1 : tuples of p fmpq
     condensed_exactly : bool
         S and g follow from A, Bn, Bt, f without rounding; otherwise they are the floats computed in CondensedProblem.
+    zero : Fraction or None
+        The alpha at which g(alpha) = 0, where lambda = 0 is the only solution and every selection holds; found where
+        the checker finds it.
     """
 
     rows: tuple[tuple[Any, ...], ...]
@@ -43,6 +50,7 @@ class ExactPath:
     F0: tuple[Any, ...]
     F1: tuple[Any, ...]
     condensed_exactly: bool
+    zero: Fraction | None
 
     @classmethod
     def from_problem(cls, problem: ContactProblem, *, exact: bool) -> ExactPath:
@@ -58,7 +66,8 @@ class ExactPath:
             c = problem.condensed
             g0, g1 = (tuple(rational(v) for v in part) for part in (c.g0, c.g1))
             rows = tuple(map(tuple, _rational_matrix(c.S).tolist()))
-            return cls(rows, g0, g1, F0, F1, condensed_exactly=False)
+            zero = vanishing_alpha(problem, "condensed")
+            return cls(rows, g0, g1, F0, F1, condensed_exactly=False, zero=zero)
         if problem.n > EXACT_DOF_LIMIT:
             raise TooLargeError(
                 f'arithmetic="exact" condenses at most n = {EXACT_DOF_LIMIT} degrees of freedom in rationals and the '
@@ -73,7 +82,8 @@ class ExactPath:
         offset = [rational(v) for v in (*problem.gap, *problem.slip_offset)]
         g0 = tuple(row[2 * p] - o for row, o in zip(table, offset, strict=True))
         g1 = tuple(row[2 * p + 1] for row in table)
-        return cls(tuple(tuple(row[: 2 * p]) for row in table), g0, g1, F0, F1, condensed_exactly=True)
+        rows = tuple(tuple(row[: 2 * p]) for row in table)
+        return cls(rows, g0, g1, F0, F1, condensed_exactly=True, zero=vanishing_alpha(problem, "problem"))
 
     @property
     def S(self) -> Any:  # noqa: N802 (the field's letter)
@@ -102,17 +112,8 @@ class ExactPath:
 
     @cached_property
     def origin(self) -> Any:
-        """The alpha at which g(alpha) = 0, where lambda = 0 is the only solution and every selection holds; or None."""
-        at = None
-        for a, b in zip(self.g0, self.g1, strict=True):
-            if b == 0:
-                if a != 0:
-                    return None
-            elif at is None:
-                at = -a / b
-            elif at != -a / b:
-                return None
-        return at
+        """``zero`` as fmpq, or None."""
+        return None if self.zero is None else rational(self.zero)
 
     @cached_property
     def integers(self) -> _Integers:

@@ -1,4 +1,4 @@
-"""Certification: rigorous enclosures, proofs, and the checker that imports nothing from the search.
+"""Certification: rigorous enclosures, proofs, and the checkers, which import nothing of the search.
 
 What a verified proof says
     For the problem's own A, Bn, Bt, f, gap, slip offset and friction, read as exact numbers (or, where the report says
@@ -8,6 +8,29 @@ What a verified proof says
     ``enclosure`` and ``kernel``, and on rational arithmetic in ``rational`` and ``selection_hull``. Linear algebra
     kernels may sum in any order and fuse multiplications and additions; fast matrix multiplication of Strassen's kind
     and changed rounding modes are excluded.
+
+What checker and search share
+    ``checker`` and ``graph_checker`` import nothing of the search, neither its trees and relaxations nor its arcs and
+    results, and a test guards that. They are not independent of all that it uses. These serve both, and an error in one
+    of them may write a false proof and accept it:
+
+    - ``format``: the codes, the rows and the branchings that cover, on which writer and reader have to agree;
+    - ``enclosure``: balls for S, g and F, and the proofs that A and S are positive definite;
+    - ``kernel`` and ``interval_kernel``: the exclusion inequality, the verified solve of a selection and the
+      contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled copy of
+      the inequality at one alpha);
+    - ``unloaded``: the alpha at which g vanishes; and of ``rational`` the pivots of a definite matrix;
+    - ``proof`` and of ``reading`` what a fraction in a proof may be: the file;
+    - ``enumsol.problem``, ``enumsol.condensed`` and ``enumsol.errors``: the data and their fingerprint, the
+      factorization of A (no bound assumes that it is accurate), S and g as computed;
+    - numpy, scipy and python-flint.
+
+    They are shared because the two must agree. A leaf is written when its inequality is proven positive, and a second
+    set of bounds, right but not the same, would refuse true proofs near a degeneracy; whether a number is zero has to
+    be decided alike. What is shared knows nothing of a search, and the tests hold it against rational arithmetic that
+    uses none of it. The checker's own are what a search gets wrong: the strict reading of the file, that the leaves
+    cover all selections and the pieces the interval, which leaf proves what, the counts, the joining of root sets, and
+    for degenerate leaves the condensation and the root sets in rationals.
 
 What counts as one root
     A root at which every condition holds strictly solves one selection only, and so two such roots of two leaves are

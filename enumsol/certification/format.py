@@ -11,14 +11,21 @@ Rows of node i, row number kind * p + i, as expressions that are nonnegative (or
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+#: What a proof is about: A, Bn, Bt, f as given, or S and g as computed from them in floats.
+Data = Literal["problem", "condensed"]
+
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
+
+#: Most degrees of freedom of a problem of which A, Bn, Bt and f are condensed in rationals; proofs about larger ones
+#: hold no rational leaves.
+EXACT_DOF_LIMIT = 250
 
 #: What a multiplier of a row may be: the row is not imposed; it holds as an inequality; it holds as an equation.
 FORBIDDEN, NONNEGATIVE, FREE = 0, 1, 2

@@ -1,14 +1,20 @@
-"""The condensed problem in rationals, written for the checker alone: it shares no code with the search."""
+"""The condensed problem in rationals, as the checker computes it; the search condenses by code of its own.
+
+Two functions serve the search too (see enumsol.certification): ``is_positive_definite``, and ``free_displacements`` for
+the alpha at which g vanishes.
+"""
 
 from __future__ import annotations
 
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from flint import fmpq, fmpq_mat
 
 from enumsol.certification.enclosure import NotEnclosedError
 from enumsol.certification.format import (
+    EXACT_DOF_LIMIT,
     FORBIDDEN,
     FRICTIONLESS,
     NONNEGATIVE,
@@ -21,7 +27,6 @@ from enumsol.certification.format import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from enumsol.problem import ContactProblem
@@ -46,25 +51,17 @@ class RationalSystem:
     Raises
     ------
     NotEnclosedError
-        S is not positive definite: the energy bound and all that rests on it need that.
+        S is not positive definite: the energy bound and all that rests on it need that. Or the problem has more than
+        EXACT_DOF_LIMIT degrees of freedom.
     """
 
     def __init__(self, problem: ContactProblem, alpha: Fraction) -> None:
-        self.p = problem.p
-        n, a = problem.n, fmpq_of(alpha)
-        A = _exact_matrix(problem.A.toarray())
-        B = fmpq_mat(_exact_matrix(problem.Bn.toarray()).tolist() + _exact_matrix(problem.Bt.toarray()).tolist())
-        slope = [0.0] * n if problem.load_slope is None else problem.load_slope.tolist()
-        load = fmpq_mat([[fmpq_of(x) + a * fmpq_of(y)] for x, y in zip(problem.f.tolist(), slope, strict=True)])
-        try:
-            self.S = B * A.solve(B.transpose())
-        except ZeroDivisionError:
-            raise NotEnclosedError("A is singular in rational arithmetic") from None
+        self.p, a = problem.p, fmpq_of(alpha)
+        A, B = _matrices(problem)
+        self.S = B * _solved(A, B.transpose())
         if not is_positive_definite(self.S):
             raise NotEnclosedError("the condensed compliance S is not positive definite in rational arithmetic")
-        free = (B * A.solve(load)).entries()
-        offset = problem.gap.tolist() + problem.slip_offset.tolist()
-        self.g: Vector = [x - fmpq_of(y) for x, y in zip(free, offset, strict=True)]
+        self.g: Vector = [x + a * y for x, y in zip(*free_displacements(problem), strict=True)]
         F0, F1 = problem.friction
         self.F: Vector = [fmpq_of(x) + a * fmpq_of(y) for x, y in zip(F0.tolist(), F1.tolist(), strict=True)]
         self._inverse: Any = None
@@ -145,6 +142,22 @@ class RationalSystem:
         return bool(4 * total > (column.transpose() * (self._inverse * column))[0, 0])
 
 
+def free_displacements(problem: ContactProblem) -> tuple[Vector, Vector]:
+    """g0 = B A^-1 f - (gap, slip_offset) and g1 = B A^-1 load_slope, 2p fmpq each.
+
+    Raises
+    ------
+    NotEnclosedError
+        A is singular, or has more than EXACT_DOF_LIMIT degrees of freedom.
+    """
+    A, B = _matrices(problem)
+    slope = [0.0] * problem.n if problem.load_slope is None else problem.load_slope.tolist()
+    loads = fmpq_mat([[fmpq_of(x), fmpq_of(y)] for x, y in zip(problem.f.tolist(), slope, strict=True)])
+    moved = (B * _solved(A, loads)).tolist()
+    offset = problem.gap.tolist() + problem.slip_offset.tolist()
+    return [row[0] - fmpq_of(o) for row, o in zip(moved, offset, strict=True)], [row[1] for row in moved]
+
+
 def is_positive_definite(matrix: Any) -> bool:
     """Whether all pivots of a symmetric rational matrix, eliminated in order, are positive."""
     rows = matrix.tolist()
@@ -170,6 +183,23 @@ def _holds(code: int, n: Any, t: Any, w_n: Any, w_t: Any, F: Any) -> bool:
     if code == SLIP_MINUS:
         return bool(t == -F * n and w_t <= 0)
     return bool(code == FRICTIONLESS and F == 0 and t == 0)
+
+
+def _matrices(problem: ContactProblem) -> tuple[Any, Any]:
+    """A and B = [Bn; Bt]."""
+    if problem.n > EXACT_DOF_LIMIT:
+        raise NotEnclosedError(
+            f"the problem has n = {problem.n} degrees of freedom; expected at most {EXACT_DOF_LIMIT} for rational "
+            "arithmetic"
+        )
+    return _exact_matrix(problem.A.toarray()), _exact_matrix(np.vstack([problem.Bn.toarray(), problem.Bt.toarray()]))
+
+
+def _solved(A: Any, rhs: Any) -> Any:
+    try:
+        return A.solve(rhs)
+    except ZeroDivisionError:
+        raise NotEnclosedError("A is singular in rational arithmetic") from None
 
 
 def _exact_matrix(array: NDArray[np.float64]) -> Any:

@@ -152,8 +152,9 @@ def _as_text(frame: pd.DataFrame, asked: int, ended: EnumsolError | None) -> str
         shown = shown.drop(columns="undecided")
     known = shown["index sum"].notna()
     shown["index sum"] = shown["index sum"].map("{:+d}".format, na_action="ignore").astype(object).where(known, "?")
-    for name in _COUNTS:
-        shown[name] = shown[name].astype(str).where(~_gaps(frame), ">=" + shown[name].astype(str))
+    if _gaps(frame).any():
+        for name in _COUNTS:
+            shown[name] = shown[name].astype(str).where(~_gaps(frame), ">=" + shown[name].astype(str))
     shown["complete"] = ["yes" if value else "no" for value in shown["complete"]]
     captions = [_CAPTION]
     if len(shown) > _ROWS:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import fmpq, fmpq_mat
 
+from enumsol.certification.format import EXACT_DOF_LIMIT
 from enumsol.enumeration.polytopes import polytope_vertices, value
 from enumsol.enumeration.solutions import ActiveSets, Codes, SelectionSolution
 from enumsol.errors import TooLargeError
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
 
     from enumsol.enumeration.polytopes import Form, Point, Table
     from enumsol.problem import Alpha, ContactProblem
-
-#: Most degrees of freedom for which A, Bn, Bt and f themselves are condensed in rationals.
-EXACT_DOF_LIMIT = 250
 
 
 def rational(value: Alpha) -> Any:

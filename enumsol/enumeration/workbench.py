@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from enumsol.certification.enclosure import EnclosedSystem, NotEnclosedError
+from enumsol.certification.format import EXACT_DOF_LIMIT
+from enumsol.certification.reading import rational_text
 from enumsol.enumeration.float_selections import FloatSelections
 from enumsol.enumeration.judges import FastJudge
 from enumsol.enumeration.verified import VerifiedJudge
@@ -67,7 +69,7 @@ class Workbench:
             S is not positive definite, exactly: no bound on the energy would hold.
         """
         from enumsol.certification.rational import is_positive_definite
-        from enumsol.enumeration.exact_selections import EXACT_DOF_LIMIT, ExactSelections, ExactSystem  # python-flint
+        from enumsol.enumeration.exact_selections import ExactSelections, ExactSystem  # python-flint
 
         if self.arithmetic != "exact" and self.problem.n > EXACT_DOF_LIMIT:
             return None
@@ -94,7 +96,7 @@ class Workbench:
                 return enclosed, "problem"
         except NotEnclosedError:
             pass
-        if self.problem.n <= _exact_limit():
+        if self.problem.n <= EXACT_DOF_LIMIT:
             return None, "problem"
         zero = np.zeros_like
         F_rad = 4 * np.spacing(system.F)
@@ -139,23 +141,23 @@ class Workbench:
         return self.problem.is_unloaded(self.alpha)
 
     def proof_header(self) -> dict[str, Any]:
-        """First record of a proof (see enumsol.certification.proof)."""
+        """First record of a proof (see enumsol.certification.proof).
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is a fraction of more digits than a proof may hold.
+        """
         return {
             "format": "enumsol-proof",
             "version": 1,
             "problem": self.problem.fingerprint,
-            "alpha": str(Fraction(self.alpha)),
+            "alpha": rational_text(Fraction(self.alpha), "alpha"),
             "p": self.problem.p,
             "data": self.data,
             "force": (np.frexp(self.scaled.force)[1] - 1).tolist(),
             "length": (np.frexp(self.scaled.length)[1] - 1).tolist(),
         }
-
-
-def _exact_limit() -> int:
-    from enumsol.enumeration.exact_selections import EXACT_DOF_LIMIT  # python-flint, not needed by fast arithmetic
-
-    return EXACT_DOF_LIMIT
 
 
 def _positive(system: EnclosedSystem) -> bool:

@@ -23,7 +23,7 @@ from enumsol import (
 from enumsol.certification import enclosure
 from enumsol.certification.kernel import exclusion_margin
 from enumsol.continuation import NotConverged, start_tangents
-from enumsol.enumeration import exact_selections
+from enumsol.enumeration import workbench
 from enumsol.enumeration.workbench import Workbench
 from enumsol.selections import PiecewiseSmoothEquation
 
@@ -188,7 +188,7 @@ def test_loads_of_all_sizes():
 
 def test_nothing_can_be_proven_about_a_body_on_the_verge(monkeypatch):
     # S definite only within rounding and too large for rationals: one undecided entry, and not 4^p of them
-    monkeypatch.setattr(exact_selections, "EXACT_DOF_LIMIT", 0)
+    monkeypatch.setattr(workbench, "EXACT_DOF_LIMIT", 0)
     monkeypatch.setattr(enclosure, "dense_eigenvalue_bound", lambda S: 0.0)
     problem = gallery.clamped_block(16, 8)
     found = enumerate_roots(problem, 1.0)
