@@ -47,7 +47,6 @@ class SlipSigns:
     @cached_property
     def _exact(self) -> tuple[int, ...] | None:
         """All signs in rationals; None when the problem is too large for them."""
-
         if self.problem.n > EXACT_DOF_LIMIT:
             return None
         from enumsol.enumeration.exact_selections import ExactSelections, ExactSystem  # python-flint
