@@ -121,7 +121,7 @@ class Checker:
             self._read_header(next(records, None))
             footer = self._survey(records)
             records = proof.records()
-            next(records)
+            next(records, None)
             self._walk(records)
             isolated, families = self._count()
             claim = {
@@ -216,7 +216,7 @@ class Checker:
             try:
                 problem = self._leaf(codes, record)
             except ValueError as error:
-                problem = f"the record cannot be read ({error})"
+                problem = f"its record cannot be followed ({error})"
             if problem is not None:
                 self.fail(f"leaf {self.leaves}: {problem}")
             if len(self._waiting) >= _BATCH:
