@@ -21,8 +21,9 @@ What checker and search share
       the inequality at one alpha);
     - ``unloaded``: the alpha at which g vanishes; and of ``rational`` the pivots of a definite matrix;
     - ``proof`` and of ``reading`` what a fraction in a proof may be: the file;
-    - ``enumsol.problem``, ``enumsol.condensed`` and ``enumsol.errors``: the data and their fingerprint, the
-      factorization of A (no bound assumes that it is accurate), S and g as computed;
+    - ``enumsol.problem``, ``enumsol.condensed``, ``enumsol.sealed``, ``enumsol.checks``, ``enumsol.array_checks`` and
+      ``enumsol.errors``: the data, their checks and their fingerprint, the factorization of A (no bound assumes that it
+      is accurate), S and g as computed;
     - numpy, scipy and python-flint.
 
     They are shared because the two must agree. A leaf is written when its inequality is proven positive, and a second
@@ -42,11 +43,10 @@ Cross-checks
     the degree of the problem without friction: ``RootSet.index_sum``. Where all roots are regular, their number is odd.
 
     - Complete and +1: what has to be.
-    - Incomplete and another sum: what was left undecided, or was not reached, holds roots whose indices make up the
-      difference; at least as many as the difference is large, if all of them are regular.
-    - Incomplete and +1: says nothing; roots may be missing in pairs of opposite indices.
-    - None: the index of a degenerate root or family could not be found within the limits of the local analysis
-      (very many selections hold there). The count of roots does not depend on it.
+    - None and not whole: the sum is not known. What was left undecided, or was not reached, holds roots whose indices
+      make up what those found lack of +1; a lack of nothing says nothing, since roots may be missing in pairs.
+    - None otherwise: the index of a degenerate root or family could not be found within the limits of the local
+      analysis (very many selections hold there). The count of roots does not depend on it.
     - Complete, and another sum or an even number of regular roots: a contradiction. Either the program or the machine
       is wrong; please report it with the problem and the proof.
 
