@@ -82,7 +82,8 @@ def branch_graph(
     MissingDependencyError
         The compiled solver of the relaxations is not installed.
     Interrupted
-        On Ctrl-C during the search; ``partial`` is the graph of the selections found so far, which is not complete.
+        On Ctrl-C during the search, or while arcs are worked out; ``partial`` is the graph of what was found so far,
+        which is not complete.
     """
     instance_of(problem, ContactProblem, "problem")
     a, b = (Fraction(end) for end in alpha_interval(interval))
@@ -104,6 +105,7 @@ def branch_graph(
         deadline=deadline,
         progress=_stage(progress, "search"),
     )
+    interrupted = False
     if path.unloaded:
         # nothing but lambda = 0 for every alpha; every selection holds there, and one of them tells it all
         candidates = {(0,) * path.p}
@@ -111,6 +113,7 @@ def branch_graph(
         try:
             search.run()
         except KeyboardInterrupt:
+            interrupted = True
             search.stopped = f"interrupted after {search.nodes} nodes"
         candidates = search.selections
     searched = time.perf_counter()
@@ -124,14 +127,15 @@ def branch_graph(
         seconds=time.perf_counter() - started,
     )
     arcs = make_arcs(gluing)
-    reasons = ([search.stopped] if search.stopped is not None else []) + gluing.reasons
+    cut = [reason for reason in (search.stopped, gluing.interrupted) if reason is not None]
     vertices = make_vertices(gluing, arcs)
     proof = None
     if isinstance(judge, BallLeafJudge) and search.pieces and search.stopped is None and not judge.used_rationals:
         data = "problem" if path.condensed_exactly else "condensed"
         proof = write_graph_proof(problem, (a, b), data, search.pieces)
+    reasons = cut + gluing.reasons
     graph = BranchGraph(problem, path, (a, b), arithmetic, vertices, arcs, reasons, stats, search.pieces, proof)
-    if search.stopped is not None and search.stopped.startswith("interrupted"):
+    if interrupted or gluing.interrupted is not None:
         raise Interrupted("branch_graph was interrupted; its arcs so far are kept", graph)
     return graph
 
