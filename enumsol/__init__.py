@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from enumsol import gallery
     from enumsol.branches import BranchGraph, branch_graph, link_samples, multiplicity_table
-    from enumsol.certification.checker import VerificationReport, verify
-    from enumsol.certification.proof import Proof, ProofFormatError
+    from enumsol.checker.verify import VerificationReport, verify
     from enumsol.continuation import (
         ContinuationOptions,
         NotConverged,
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
         local_branch_test,
         newton,
     )
-    from enumsol.enumeration import SearchProgress, enumerate_roots
     from enumsol.errors import (
         EnumsolError,
         Interrupted,
@@ -32,15 +30,18 @@ if TYPE_CHECKING:
     )
     from enumsol.io import read_problem, write_problem
     from enumsol.problem import ContactProblem
-    from enumsol.results import Enclosure, Polytope, Root, RootFamily, RootSet, SearchStats, Undecided
-    from enumsol.selections import ContactStatus, PiecewiseSmoothEquation, sign_array
+    from enumsol.proof.proof_file import Proof, ProofFormatError
+    from enumsol.roots.enumerate import enumerate_roots
+    from enumsol.roots.root_set import Enclosure, Polytope, Root, RootFamily, RootSet, SearchStats, Undecided
+    from enumsol.search.tree import SearchProgress
+    from enumsol.statuses import ContactStatus, PiecewiseSmoothEquation, sign_array
 
 #: Where the public names are at home. A module is loaded when a name of it is first used, so that a program loads what
 #: it works with and no more: sparse matrices come with a problem, networkx and rational arithmetic with a branch graph.
 _HOMES = {
     "enumsol.branches": ("BranchGraph", "branch_graph", "link_samples", "multiplicity_table"),
-    "enumsol.certification.checker": ("VerificationReport", "verify"),
-    "enumsol.certification.proof": ("Proof", "ProofFormatError"),
+    "enumsol.checker.verify": ("VerificationReport", "verify"),
+    "enumsol.proof.proof_file": ("Proof", "ProofFormatError"),
     "enumsol.continuation": (
         "ContinuationOptions",
         "NotConverged",
@@ -52,7 +53,8 @@ _HOMES = {
         "local_branch_test",
         "newton",
     ),
-    "enumsol.enumeration": ("SearchProgress", "enumerate_roots"),
+    "enumsol.roots.enumerate": ("enumerate_roots",),
+    "enumsol.search.tree": ("SearchProgress",),
     "enumsol.errors": (
         "EnumsolError",
         "Interrupted",
@@ -63,25 +65,29 @@ _HOMES = {
     ),
     "enumsol.io": ("read_problem", "write_problem"),
     "enumsol.problem": ("ContactProblem",),
-    "enumsol.results": ("Enclosure", "Polytope", "Root", "RootFamily", "RootSet", "SearchStats", "Undecided"),
-    "enumsol.selections": ("ContactStatus", "PiecewiseSmoothEquation", "sign_array"),
+    "enumsol.roots.root_set": ("Enclosure", "Polytope", "Root", "RootFamily", "RootSet", "SearchStats", "Undecided"),
+    "enumsol.statuses": ("ContactStatus", "PiecewiseSmoothEquation", "sign_array"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 #: Modules that are reached as attributes without an import of their own.
 _MODULES = frozenset(
     (
         "branches",
-        "certification",
-        "condensed",
+        "checker",
+        "condensation",
         "continuation",
-        "enumeration",
         "errors",
         "fem",
         "gallery",
         "io",
+        "kernel",
         "problem",
-        "results",
+        "proof",
+        "relaxation",
+        "roots",
+        "search",
         "selections",
+        "statuses",
     )
 )
 

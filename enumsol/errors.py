@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from enumsol.results import RootSet
+    from enumsol.roots.root_set import RootSet
 
 
 class EnumsolError(Exception):

@@ -18,7 +18,7 @@ import scipy.sparse as sp
 
 from enumsol import fem
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem._arguments import (
+from enumsol.fem.arguments import (
     finite_number,
     lame_coefficients,
     nonnegative_number,

@@ -16,8 +16,8 @@ from enumsol.errors import InvalidArgumentError, InvalidProblemError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.certification.enclosure import CondensedEnclosure
-    from enumsol.condensed import CondensedProblem, Factorization
+    from enumsol.condensation.condensed import CondensedProblem, Factorization
+    from enumsol.condensation.enclosure import CondensedEnclosure
 
 #: An asymmetry of A up to this fraction of max|A| is rounding of the user's assembly and is averaged away.
 ASYMMETRY_TOLERANCE = 1e-12
@@ -123,14 +123,14 @@ class ContactProblem:
     @cached_property
     def factorization(self) -> Factorization:
         """One sparse factorization of A, shared by everything that solves with it."""
-        from enumsol.condensed import Factorization  # condensed imports this module's types
+        from enumsol.condensation.condensed import Factorization  # condensed imports this module's types
 
         return Factorization(self.A)
 
     @cached_property
     def condensed(self) -> CondensedProblem:
         """The problem condensed to its 2p contact forces (theory, section 4)."""
-        from enumsol.condensed import CondensedProblem  # as above
+        from enumsol.condensation.condensed import CondensedProblem  # as above
 
         return CondensedProblem.from_problem(self)
 
@@ -143,7 +143,7 @@ class ContactProblem:
         NotEnclosedError
             A is positive definite only within rounding.
         """
-        from enumsol.certification.enclosure import CondensedEnclosure  # as above
+        from enumsol.condensation.enclosure import CondensedEnclosure  # as above
 
         return CondensedEnclosure.from_problem(self)
 

@@ -11,7 +11,7 @@ import numpy as np
 from _extremes_judge import Case, backwards, rescaled
 
 from enumsol import ContactProblem, branch_graph, fem, gallery
-from enumsol.certification.rational import fmpq_of
+from enumsol.checker.rational import fmpq_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -242,7 +242,7 @@ def _critical(name: str, seed: int) -> tuple[ContactProblem, tuple[tuple[str, fl
 
 def _around(exact: object, alpha: float) -> tuple[Fraction, Fraction]:
     """Rationals below and above an algebraic alpha, at most 1e-25 apart; equal where it is rational."""
-    from enumsol.branches.algebraic import CriticalAlpha
+    from enumsol.arithmetic.algebraic import CriticalAlpha
 
     def order(value: Fraction) -> int:
         return exact.compare(CriticalAlpha.rational(fmpq_of(value)))

@@ -24,7 +24,7 @@ from enumsol import (
     verify,
 )
 from enumsol.continuation import NotConverged
-from enumsol.selections import PiecewiseSmoothEquation
+from enumsol.statuses import PiecewiseSmoothEquation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

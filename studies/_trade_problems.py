@@ -19,9 +19,9 @@ import scipy.sparse as sp
 from _random_paths import integer_path, random_path
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery
-from enumsol.branches.algebraic import merge
-from enumsol.condensed import CondensedProblem
-from enumsol.enumeration.exact_selections import rational
+from enumsol.arithmetic.algebraic import merge
+from enumsol.condensation.condensed import CondensedProblem
+from enumsol.selections.rationals import rational
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -34,9 +34,8 @@ from _output import RESULTS, report
 
 import enumsol
 from enumsol import gallery
-from enumsol.enumeration import relaxation as relaxations
-from enumsol.enumeration import tree
-from enumsol.enumeration.relaxation import (
+from enumsol.relaxation import rows as relaxations
+from enumsol.relaxation.rows import (
     BRANCHING_CANDIDATES,
     CONTACT,
     PRUNE_MARGIN,
@@ -44,7 +43,8 @@ from enumsol.enumeration.relaxation import (
     ActiveSetEngine,
     status_rows,
 )
-from enumsol.selections import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.search import tree
+from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 MAX_NODES = 30_000
 #: Searches shorter than this are repeated.

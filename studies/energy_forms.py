@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 
 from enumsol import gallery
-from enumsol.enumeration import _active_set
-from enumsol.enumeration.float_selections import FloatSelections
-from enumsol.enumeration.judges import FastJudge
-from enumsol.enumeration.relaxation import ActiveSetEngine, row_terms
-from enumsol.enumeration.tree import SearchLimits, TreeSearch
+from enumsol.relaxation import _active_set
+from enumsol.relaxation.rows import ActiveSetEngine, row_terms
+from enumsol.search.certifiers.floats import FastJudge
+from enumsol.search.tree import SearchLimits, TreeSearch
+from enumsol.selections.floats import FloatSelections
 
 RESULTS = Path(__file__).parent / "results"
 TRACTIONS = ((0.3, -1.0), (1.0, -0.3), (0.0, -1.0))

@@ -18,11 +18,11 @@ import numpy as np
 from _output import report
 
 from enumsol import gallery
-from enumsol.enumeration.fallback import InteriorPointEngine
-from enumsol.enumeration.float_selections import FloatSelections
-from enumsol.enumeration.judges import FastJudge
-from enumsol.enumeration.relaxation import EQUALITY, PRUNE_MARGIN, status_rows
-from enumsol.enumeration.tree import SearchLimits, TreeSearch
+from enumsol.relaxation.interior_point import InteriorPointEngine
+from enumsol.relaxation.rows import EQUALITY, PRUNE_MARGIN, status_rows
+from enumsol.search.certifiers.floats import FastJudge
+from enumsol.search.tree import SearchLimits, TreeSearch
+from enumsol.selections.floats import FloatSelections
 
 SIZES = (8, 14, 16, 32, 64)
 EFFORT = 4800  # relaxations a problem times p (clarabel is slow on large ones)

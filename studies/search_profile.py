@@ -76,9 +76,12 @@ def problems():
 
 def places():
     """(owner, attribute, part) of what is wrapped; older and newer versions of the package may lack some."""
-    from enumsol.certification import proof
-    from enumsol.enumeration import enumerate as driver
-    from enumsol.enumeration import relaxation, tree, verified, workbench
+    from enumsol.proof import proof_file as proof
+    from enumsol.relaxation import rows as relaxation
+    from enumsol.roots import enumerate as driver
+    from enumsol.search import solvers as workbench
+    from enumsol.search import tree
+    from enumsol.search.certifiers import verified
 
     yield relaxation._ActiveSetRelaxation, "__init__", "QPs"
     yield relaxation._ActiveSetRelaxation, "child", "copies"

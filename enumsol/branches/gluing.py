@@ -12,20 +12,20 @@ from itertools import product
 from math import prod
 from typing import TYPE_CHECKING, Any
 
-from enumsol.branches.algebraic import CriticalAlpha, merge
-from enumsol.branches.arcs import SelectionArcs, active_sets, selection_arcs
-from enumsol.branches.fibers import FiberSelections
-from enumsol.branches.number_field import exact_value
+from enumsol.arithmetic.algebraic import CriticalAlpha, merge
+from enumsol.arithmetic.number_field import exact_value
+from enumsol.branches.selection_arcs import SelectionArcs, active_sets, selection_arcs
 from enumsol.branches.sheets import sheet_arcs
-from enumsol.enumeration.components import connected_components
-from enumsol.enumeration.solutions import SelectionSolution, VertexLimitError
+from enumsol.roots.components import connected_components
+from enumsol.selections.ordered_field import FiberSelections
+from enumsol.selections.solution import SelectionSolution, VertexLimitError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from enumsol.branches.path import ExactPath
-    from enumsol.enumeration.components import Component
-    from enumsol.enumeration.solutions import ActiveSets, Codes
+    from enumsol.roots.components import Component
+    from enumsol.selections.functions import ExactPath
+    from enumsol.selections.solution import ActiveSets, Codes
 
 Place = tuple["Codes", int]
 

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.algebraic import CriticalAlpha
-from enumsol.branches.assembly import make_branches, make_components, multigraph
-from enumsol.branches.fiber_roots import roots_of
-from enumsol.enumeration.exact_selections import rational
+from enumsol.arithmetic.algebraic import CriticalAlpha
+from enumsol.branches.make_elements import make_branches, make_components, multigraph
+from enumsol.branches.roots_at import roots_of
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import finite_alpha
+from enumsol.selections.rationals import rational
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from enumsol.branches.interval_search import SearchedPiece
-    from enumsol.branches.parts import Arc, Branch, Component, Vertex
-    from enumsol.branches.path import ExactPath
-    from enumsol.certification.proof import Proof
+    from enumsol.branches.elements import Arc, Branch, Component, Vertex
     from enumsol.problem import Alpha, ContactProblem
-    from enumsol.results import Root, RootFamily, RootSet
+    from enumsol.proof.proof_file import Proof
+    from enumsol.roots.root_set import Root, RootFamily, RootSet
+    from enumsol.search.interval import SearchedPiece
+    from enumsol.selections.functions import ExactPath
 
 
 @dataclass(frozen=True)

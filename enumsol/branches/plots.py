@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
-from enumsol.selections import ContactStatus
+from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from enumsol.branches.elements import Arc, Branch, Vertex
     from enumsol.branches.graph import BranchGraph
-    from enumsol.branches.parts import Arc, Branch, Vertex
 
 QUANTITIES = {
     "lambda_n": "normal force",

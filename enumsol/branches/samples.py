@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import networkx as nx
 
-from enumsol.enumeration import enumerate_roots
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem, finite_alpha
-from enumsol.selections import ContactStatus
+from enumsol.roots.enumerate import enumerate_roots
+from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from enumsol.branches.graph import BranchGraph
-    from enumsol.condensed import CondensedProblem
+    from enumsol.condensation.condensed import CondensedProblem
     from enumsol.problem import Alpha
-    from enumsol.results import Root, RootSet
+    from enumsol.roots.root_set import Root, RootSet
 
 
 @dataclass(frozen=True)

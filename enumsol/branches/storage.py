@@ -13,14 +13,14 @@ import numpy as np
 import scipy.sparse as sp
 from flint import fmpq, fmpz, fmpz_poly
 
-from enumsol.branches.algebraic import CriticalAlpha
+from enumsol.arithmetic.algebraic import CriticalAlpha
+from enumsol.branches.elements import Arc, Vertex
 from enumsol.branches.graph import BranchGraph, GraphStats
-from enumsol.branches.parts import Arc, Vertex
-from enumsol.branches.path import ExactPath
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
-from enumsol.results import Polytope, RootFamily
-from enumsol.selections import ContactStatus
+from enumsol.roots.root_set import Polytope, RootFamily
+from enumsol.selections.functions import ExactPath
+from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

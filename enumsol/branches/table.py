@@ -7,10 +7,10 @@ from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from enumsol.enumeration import enumerate_roots
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem, finite_alpha
-from enumsol.selections import STATUSES, ContactStatus
+from enumsol.roots.enumerate import enumerate_roots
+from enumsol.statuses import STATUSES, ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from enumsol.problem import Alpha
-    from enumsol.results import RootSet
+    from enumsol.roots.root_set import RootSet
 
 #: Tasks handed to an executor ahead of the one that is awaited; keeps an interruption from waiting for all of them.
 _AHEAD = 64

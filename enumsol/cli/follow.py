@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
     from enumsol.continuation import ContinuationOptions, Path
     from enumsol.problem import Alpha, ContactProblem
-    from enumsol.results import Root
+    from enumsol.roots.root_set import Root
 
 _STEPS = "Steps"
 #: Ends of a path at which nothing is left to follow.
@@ -192,7 +192,7 @@ def _starts(
     if not interval[0] <= alpha <= interval[1]:
         low, high = (float(end) for end in interval)
         raise InvalidArgumentError(f"--start is {float(alpha):g}; expected an alpha between {low:g} and {high:g}")
-    from enumsol.enumeration import enumerate_roots  # numpy and scipy: not for --help
+    from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help
 
     with SearchDisplay() as display:
         found = enumerate_roots(problem, alpha, arithmetic, progress=display)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from enumsol.results import Root, RootFamily, RootSet
+    from enumsol.roots.root_set import Root, RootFamily, RootSet
 
 #: The table over contact nodes is printed when it has at most so many rows.
 _ROWS = 24

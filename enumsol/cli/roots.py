@@ -24,7 +24,7 @@ from enumsol.errors import Interrupted, InvalidArgumentError
 
 if TYPE_CHECKING:
     from enumsol.problem import Alpha, ContactProblem
-    from enumsol.results import RootSet
+    from enumsol.roots.root_set import RootSet
 
 Method = Literal["tree", "exhaustive"]
 
@@ -109,7 +109,7 @@ def _search(
     jobs: int,
     proof_file: str | None,
 ) -> RootSet:
-    from enumsol.enumeration import enumerate_roots  # numpy and scipy: not for --help
+    from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help
 
     with workers(jobs) as executor, SearchDisplay() as display:
         return enumerate_roots(

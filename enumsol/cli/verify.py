@@ -28,8 +28,8 @@ def verify(
     2 when it does not hold or cannot be read.
     """
     # numpy and scipy: not for --help
-    from enumsol.certification.checker import verify as check
-    from enumsol.certification.proof import Proof
+    from enumsol.checker.verify import verify as check
+    from enumsol.proof.proof_file import Proof
 
     report = check(load_problem(problem), Proof.load(proof), _show_progress if sys.stderr.isatty() else None)
     if sys.stderr.isatty():

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.continuation.graph_map import GraphLike, GraphMap, Place
 from enumsol.continuation.path import Path
-from enumsol.continuation.places import GraphLike, GraphMap, Place
 from enumsol.errors import InvalidArgumentError
-from enumsol.results import summary
+from enumsol.roots.root_set import summary
 
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from enumsol.continuation.equation import Vector
-    from enumsol.selections import ContactStatus
+    from enumsol.continuation.condensed_equation import Vector
+    from enumsol.statuses import ContactStatus
 
 #: A point further than this from every arc and vertex lies off the graph: ten times the tolerance of the corrections.
 POINT_TOLERANCE = 1e-5

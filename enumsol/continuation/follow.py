@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.continuation.equation import CondensedEquation
+from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follower import Follower
-from enumsol.continuation.kinks import ACTIVE_TOLERANCE, CurvePoint
 from enumsol.continuation.options import ContinuationOptions
 from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
 from enumsol.continuation.path import Path
 from enumsol.continuation.tangents import Tangent, admissible_tangents, curve_tangent
+from enumsol.continuation.transitions import ACTIVE_TOLERANCE, CurvePoint
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem, finite_alpha
 
 if TYPE_CHECKING:
-    from enumsol.continuation.equation import Vector
+    from enumsol.continuation.condensed_equation import Vector
     from enumsol.continuation.parameter_path import ParameterPath
 
 #: The default alpha scale is this fraction of the interval.

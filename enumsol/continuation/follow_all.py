@@ -10,15 +10,15 @@ import numpy as np
 from enumsol.continuation.audit import DETOUR, POINT_TOLERANCE, AuditReport, audit_on
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follow import follow, start_tangents
+from enumsol.continuation.graph_map import GraphMap
 from enumsol.continuation.path import Path, PathStats
-from enumsol.continuation.places import GraphMap
 from enumsol.errors import InvalidArgumentError, TooLargeError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from enumsol.continuation.graph_map import GraphLike
     from enumsol.continuation.options import ContinuationOptions
-    from enumsol.continuation.places import GraphLike
     from enumsol.problem import ContactProblem
 
 #: Where on a missed arc it is started anew, as fractions of its interval; its ends are transition points.

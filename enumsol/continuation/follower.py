@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
-from enumsol.continuation.equation import STATUS_TOLERANCE
-from enumsol.continuation.kinks import (
+from enumsol.continuation.recorder import Recorder
+from enumsol.continuation.tangents import curve_tangent, orientation
+from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
     CurvePoint,
     Kink,
@@ -20,14 +22,12 @@ from enumsol.continuation.kinks import (
     passed_kink,
     same_curve,
 )
-from enumsol.continuation.recorder import Recorder
-from enumsol.continuation.tangents import curve_tangent, orientation
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from enumsol.continuation.equation import Codes, CondensedEquation, Vector
+    from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
     from enumsol.continuation.options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.continuation.path import Path

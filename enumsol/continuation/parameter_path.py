@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.condensed import RHS_BLOCK
+from enumsol.condensation.condensed import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.results import summary
+from enumsol.roots.root_set import summary
 
 if TYPE_CHECKING:
     import os
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from enumsol.continuation.local_test import LocalBranchTest
     from enumsol.continuation.options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.continuation.tangents import Tangent
     from enumsol.problem import ContactProblem
-    from enumsol.selections import ContactStatus
+    from enumsol.roots.local_branch import LocalBranchTest
+    from enumsol.statuses import ContactStatus
 
 #: |d alpha / ds| below this is a vertical piece of the path: at a regular point it is well above rounding.
 VERTICAL_TOLERANCE = 1e-9
@@ -276,13 +276,13 @@ class Path(Sequence[PathPoint]):
         InvalidArgumentError
             An argument is not one of those above.
         """
-        from enumsol.continuation.drawing import draw_path
+        from enumsol.continuation.plots import draw_path
 
         return draw_path(self, graph, node, quantity, ax, graph_options)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the path to a .npz file; the problem and the callables of a smooth path are not in it."""
-        from enumsol.continuation.path_file import save_path
+        from enumsol.continuation.storage import save_path
 
         save_path(self, path)
 
@@ -295,7 +295,7 @@ class Path(Sequence[PathPoint]):
         InvalidArgumentError
             The file does not hold a path.
         """
-        from enumsol.continuation.path_file import load_path
+        from enumsol.continuation.storage import load_path
 
         return load_path(path)
 

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.continuation.local_test import coherent_orientation
 from enumsol.continuation.path import Path, PathStats, Transition
 from enumsol.errors import TooLargeError
+from enumsol.roots.local_branch import coherent_orientation
 
 if TYPE_CHECKING:
-    from enumsol.continuation.equation import CondensedEquation, Vector
-    from enumsol.continuation.kinks import CurvePoint, Kink
-    from enumsol.continuation.local_test import LocalBranchTest
+    from enumsol.continuation.condensed_equation import CondensedEquation, Vector
     from enumsol.continuation.options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
+    from enumsol.continuation.transitions import CurvePoint, Kink
+    from enumsol.roots.local_branch import LocalBranchTest
 
 #: Slip along a tangent, for the name of a frictionless node that starts to slip: any small step serves.
 _AHEAD = 1e-6

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.continuation.equation import STATUS_TOLERANCE
+from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.errors import TooLargeError
 
 if TYPE_CHECKING:
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.continuation.equation import Codes, CondensedEquation, Vector
-    from enumsol.selections import ContactStatus
+    from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
+    from enumsol.statuses import ContactStatus
 
 #: Selections examined at one point (Remark 5.1); six nodes in a corner of three statuses have 729.
 MAX_SELECTIONS = 4096

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem._arguments import lame_coefficients, vector_2d
+from enumsol.fem.arguments import lame_coefficients, vector_2d
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:

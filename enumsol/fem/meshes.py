@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.fem._arguments import positive_integer, positive_number
+from enumsol.fem.arguments import positive_integer, positive_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -161,7 +161,7 @@ class TestBranchGraph:
 
     @pytest.fixture
     def branch_graph(self):
-        return pytest.importorskip("enumsol.branches.build").branch_graph
+        return pytest.importorskip("enumsol.branches.construction").branch_graph
 
     @pytest.mark.parametrize("loading", [False, True])
     @pytest.mark.parametrize("seed", range(15))

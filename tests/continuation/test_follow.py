@@ -274,7 +274,7 @@ def test_point_where_four_selections_meet():
 
 
 def test_large_sparse_problem_is_factorised_once(monkeypatch):
-    from enumsol import condensed
+    from enumsol.condensation import condensed
 
     calls = []
     splu = condensed.splu

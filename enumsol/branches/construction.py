@@ -1,0 +1,172 @@
+"""branch_graph: every solution for every alpha in an interval, as a graph of arcs (theory, section 7)."""
+
+from __future__ import annotations
+
+import time
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, Literal
+
+from enumsol.arithmetic.algebraic import to_fraction
+from enumsol.branches.gluing import Gluing
+from enumsol.branches.graph import BranchGraph, GraphStats
+from enumsol.branches.make_elements import make_arcs, make_vertices
+from enumsol.branches.proof_records import write_graph_proof
+from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.search.certifiers.interval_balls import BallLeafJudge
+from enumsol.search.certifiers.interval_rationals import ExactLeafJudge
+from enumsol.search.interval import BelievingJudge, IntervalSearch
+from enumsol.selections.functions import FAST_EXACT_DOF, ExactPath
+from enumsol.selections.rationals import rational
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from enumsol.problem import Alpha
+    from enumsol.search.interval import LeafJudge
+
+Arithmetic = Literal["fast", "verified", "exact"]
+
+
+def branch_graph(
+    problem: ContactProblem,
+    interval: tuple[Alpha, Alpha],
+    arithmetic: Arithmetic = "verified",
+    *,
+    progress: Callable[[str, float], object] | None = None,
+    max_nodes: int | None = None,
+    time_limit: float | None = None,
+) -> BranchGraph:
+    """All solutions over an interval of alpha, as arcs glued at vertices (theory, section 7).
+
+    A tree search over the interval gives the selections that may hold somewhere in it. For each of them all alpha at
+    which a condition or the determinant vanishes are isolated as roots of integer polynomials; where it holds between
+    them is an arc. Arcs are glued by the statuses that hold at their ends, decided without rounding.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    interval : (float or Fraction, float or Fraction)
+        First and last alpha, the first less than the last.
+    arithmetic : {"verified", "fast", "exact"}
+        "verified": every leaf of the search is proven empty over its whole piece of the interval by rigorous error
+        bounds, and what follows is exact. Up to 24 degrees of freedom this is about the problem's own matrices, beyond
+        about S and g as computed in floats (``graph.certified_data`` says which). "fast": the same, but the search
+        believes floats; never claimed to be complete. "exact": everything in rationals, about the problem's own
+        matrices up to 250 degrees of freedom, and slow beyond some ten contact nodes.
+    progress : callable, optional
+        Called with the name of the stage ("search", "arcs") and the share of it that is done.
+    max_nodes : int, optional
+        Stop the search after so many nodes; the graph then is not complete and says so.
+    time_limit : float, optional
+        Stop the search after so many seconds.
+
+    Returns
+    -------
+    BranchGraph
+
+    Raises
+    ------
+    InvalidArgumentError
+        The interval or another argument is out of range, or friction is negative somewhere in the interval (the node
+        and the alpha are named).
+    TooLargeError
+        Exact arithmetic was asked for and the problem is too large for it.
+    MissingDependencyError
+        The compiled solver of the relaxations is not installed.
+    Interrupted
+        On Ctrl-C during the search; ``partial`` is the graph of the selections found so far, which is not complete.
+    """
+    a, b = _check(problem, interval, arithmetic, max_nodes, time_limit)
+    started = time.perf_counter()
+    exact = arithmetic == "exact"
+    path = ExactPath.from_problem(problem, exact=exact or problem.n <= FAST_EXACT_DOF)
+    deadline = None if time_limit is None else started + time_limit
+    origin = None if path.origin is None else to_fraction(path.origin)
+    judge = _judge(problem, path, arithmetic)
+    search = IntervalSearch(
+        problem.condensed,
+        (a, b),
+        origin,
+        judge,
+        max_nodes=max_nodes,
+        deadline=deadline,
+        progress=_stage(progress, "search"),
+    )
+    if path.unloaded:
+        # nothing but lambda = 0 for every alpha; every selection holds there, and one of them tells it all
+        candidates = {(0,) * path.p}
+    else:
+        try:
+            search.run()
+        except KeyboardInterrupt:
+            search.stopped = f"interrupted after {search.nodes} nodes"
+        candidates = search.selections
+    searched = time.perf_counter()
+    tick = _stage(progress, "arcs")
+    gluing = Gluing(path, candidates, rational(a), rational(b), tick, cut_short=search.stopped is not None)
+    stats = GraphStats(
+        pieces=len(search.pieces),
+        nodes=search.nodes,
+        selections=len(candidates),
+        search_seconds=searched - started,
+        seconds=time.perf_counter() - started,
+    )
+    arcs = make_arcs(gluing)
+    reasons = ([search.stopped] if search.stopped is not None else []) + gluing.reasons
+    vertices = make_vertices(gluing, arcs)
+    proof = None
+    if isinstance(judge, BallLeafJudge) and search.pieces and search.stopped is None and not judge.used_rationals:
+        data = "problem" if path.condensed_exactly else "condensed"
+        proof = write_graph_proof(problem, (a, b), data, search.pieces)
+    graph = BranchGraph(problem, path, (a, b), arithmetic, vertices, arcs, reasons, stats, search.pieces, proof)
+    if search.stopped is not None and search.stopped.startswith("interrupted"):
+        raise Interrupted("branch_graph was interrupted; its arcs so far are kept", graph)
+    return graph
+
+
+def _judge(problem: ContactProblem, path: ExactPath, arithmetic: Arithmetic) -> LeafJudge:
+    if arithmetic == "exact":
+        return ExactLeafJudge(path)
+    return BallLeafJudge(problem, path) if arithmetic == "verified" else BelievingJudge()
+
+
+def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callable[[float], object] | None:
+    return None if progress is None else lambda share: progress(name, share)
+
+
+def _check(
+    problem: object, interval: Any, arithmetic: str, max_nodes: int | None, time_limit: float | None
+) -> tuple[Fraction, Fraction]:
+    if not isinstance(problem, ContactProblem):
+        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
+    if arithmetic not in ("fast", "verified", "exact"):
+        raise InvalidArgumentError(f"arithmetic is {arithmetic!r}; expected 'verified', 'fast' or 'exact'")
+    if max_nodes is not None and (not isinstance(max_nodes, int) or max_nodes < 1):
+        raise InvalidArgumentError(f"max_nodes is {max_nodes!r}; expected a positive integer or None")
+    if time_limit is not None and not time_limit > 0:
+        raise InvalidArgumentError(f"time_limit is {time_limit!r}; expected a positive number of seconds or None")
+    if not isinstance(interval, tuple | list) or len(interval) != 2:
+        raise InvalidArgumentError(f"interval is {interval!r}; expected a pair of numbers (first alpha, last alpha)")
+    for end in interval:
+        finite_alpha(end)
+    a, b = (Fraction(end) for end in interval)
+    if not a < b:
+        raise InvalidArgumentError(f"interval is ({float(a):g}, {float(b):g}); expected its first alpha below its last")
+    _check_friction(problem, a, b)
+    return a, b
+
+
+def _check_friction(problem: ContactProblem, a: Fraction, b: Fraction) -> None:
+    """Refuse negative and huge friction inside the interval; F is affine, so that both ends tell."""
+    for node, F0, F1 in zip(problem.node_ids, *(part.tolist() for part in problem.friction), strict=True):
+        for end in (a, b):
+            value = Fraction(F0) + end * Fraction(F1)
+            if value < 0:
+                zero = -Fraction(F0) / Fraction(F1) if F1 else end
+                raise InvalidArgumentError(
+                    f"friction at contact node {node} is negative in the interval: {float(value):g} at "
+                    f"alpha = {float(end):g} (it is zero at alpha = {float(zero):.17g}); expected F >= 0"
+                )
+    for end in (a, b):
+        problem.friction_at(end)

@@ -1,0 +1,410 @@
+"""Rigorous enclosures of the condensed problem, from the user's own A, Bn, Bt, f (theory, sections 4 and 6).
+
+All bounds are a-priori rounding-error bounds of IEEE double arithmetic with rounding to nearest; they hold for any
+order of summation and for fused multiply-adds, so ordinary dense kernels may be used. A ball is a pair of arrays
+(midpoint, radius).
+
+With X an approximation of A^{-1} K, K = [B', f, load_slope], and R = K - A X its residual,
+
+    B A^{-1} K  =  B X  +  X_B' R  +  R_B' A^{-1} R,      |R_i' A^{-1} R_j|  <=  ||R_i|| ||R_j|| / lambda_min(A),
+
+so the error is quadratic in the residual, which is computed in more than the working precision.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from enumsol.errors import EnumsolError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from enumsol.problem import Alpha, ContactProblem
+
+    Array = NDArray[np.float64]
+
+#: Unit roundoff of double arithmetic.
+UNIT = 2.0**-53
+#: Covers the rounding of bounds themselves: sums of up to 2^12 nonnegative terms and some operations more.
+SAFE = 1.0 + 2.0**-40
+#: Covers underflow in the products of scaled data (even where subnormal numbers are flushed to zero).
+TINY = 2.0**-960
+#: The same for the norms of such data.
+ROOT_TINY = 2.0**-480
+_COLUMNS = 32
+
+
+class NotEnclosedError(EnumsolError):
+    """The data could not be enclosed: A or S is positive definite only within rounding, or float64 overflows."""
+
+
+def gamma(k: int) -> float:
+    """Bound k u / (1 - k u) on the relative error of k operations."""
+    return k * UNIT / (1.0 - k * UNIT) * SAFE
+
+
+def upper_sum(values: Array, axis: int | None = None) -> Any:
+    """Upper bound of a sum of nonnegative floats."""
+    count = values.size if axis is None else values.shape[axis]
+    return np.sum(values, axis=axis) * (1.0 + gamma(count + 2)) * SAFE + TINY
+
+
+def upper_norm(values: Array, axis: int | None = None) -> Any:
+    """Upper bound of the Euclidean norm."""
+    return np.sqrt(upper_sum(values * values, axis=axis)) * SAFE
+
+
+def residual(A: sp.csr_array, X: Array, K: Array) -> tuple[Array, Array]:
+    """K - A X as a ball, in about half as much again as the working precision.
+
+    The leading bits of A and X, multiples of one unit in every row of A and column of X and few enough that A1 X1 is
+    summed without any rounding, are split off (Ozaki and others 2012); what is left is small.
+    """
+    longest = int(np.max(np.diff(A.indptr), initial=0))
+    bits = (52 - longest.bit_length()) // 2
+    rows = np.repeat(np.arange(A.shape[0]), np.diff(A.indptr))
+    data = sp.csr_array((np.abs(A.data), A.indices, A.indptr), shape=A.shape)
+    largest = data.max(axis=1).toarray().ravel()
+    high_data = _leading(A.data, largest[rows], bits)
+    high = sp.csr_array((high_data, A.indices, A.indptr), shape=A.shape)
+    low = sp.csr_array((A.data - high_data, A.indices, A.indptr), shape=A.shape)
+    X_size = np.max(np.abs(X), axis=0, initial=0.0)
+    X_high = _leading(X, X_size, bits)
+    X_low = X - X_high
+    exact = high @ X_high
+    summed, lost = _two_sum(K, -exact)
+    rest = high @ X_low + low @ X
+    correction = lost - rest
+    value = summed + correction
+    k = gamma(longest + 3)
+    size = np.outer(upper_sum_of_rows(high), np.max(np.abs(X_low), axis=0, initial=0.0))
+    size += np.outer(upper_sum_of_rows(low), X_size)
+    radius = 2.0 * UNIT * (np.abs(value) + np.abs(correction)) + k * size * (1.0 + k) + (4 * longest + 4) * TINY
+    return value, radius * SAFE
+
+
+def _leading(values: Array, size: Array, bits: int) -> Array:
+    """Values rounded to multiples of unit, a power of two with size <= 2^bits unit; the difference is exact."""
+    unit = np.ldexp(1.0, np.maximum(np.frexp(size)[1] - bits, -1020))
+    return np.asarray(np.rint(values / unit) * unit)
+
+
+def upper_sum_of_rows(matrix: sp.csr_array) -> Array:
+    """Upper bounds of the sums of the absolute values of the rows."""
+    sums = np.asarray(abs(matrix).sum(axis=1)).ravel()
+    return np.asarray(sums * (1.0 + gamma(matrix.shape[1] + 2)) * SAFE + TINY)
+
+
+def _two_sum(a: Array, b: Array) -> tuple[Array, Array]:
+    s = a + b
+    z = s - a
+    return s, (a - (s - z)) + (b - z)
+
+
+def dense_eigenvalue_bound(S: Array) -> float:
+    """Lower bound on the smallest eigenvalue of a symmetric dense matrix; at most 0 when none positive was proven.
+
+    A Cholesky factorization of S - mu I that runs to its end proves S - mu I >= -gamma trace (Rump 2006).
+    """
+    n = len(S)
+    estimate = float(np.linalg.eigvalsh(S)[0])
+    slack = gamma(n + 2) / (1 - gamma(n + 2)) * float(np.trace(np.abs(S))) * SAFE + TINY
+    shift = 0.9 * estimate
+    for _ in range(4):
+        if not shift > slack:
+            break
+        shifted = S - shift * np.eye(n)
+        try:
+            np.linalg.cholesky(shifted)
+        except np.linalg.LinAlgError:
+            shift *= 0.5
+            continue
+        # forming the shifted diagonal rounds once, and so do the two differences here
+        return (shift - slack - 4 * UNIT * (float(np.max(np.abs(np.diagonal(S)))) + shift)) / SAFE
+    return 0.0
+
+
+def sparse_eigenvalue_bound(A: sp.csc_array, estimate: float) -> float:
+    """Lower bound on the smallest eigenvalue of a sparse symmetric matrix, from one factorization of A - mu I.
+
+    With A - mu I = L U + E and U = D L' up to rounding, positive pivots D prove A - mu I >= -||E||; the bound
+    |E| <= gamma_k |L| |U| (Higham, Theorem 9.3) is summed by rows and columns.
+    """
+    n = A.shape[0]
+    largest = float(np.max(np.abs(A.diagonal())))
+    shift = 0.5 * estimate
+    for _ in range(6):
+        shifted = sp.csc_array(A - shift * sp.eye_array(n, format="csc"))
+        error = _factor_error(shifted)
+        if error is not None:
+            bound = (shift - error - 4 * UNIT * (largest + shift)) / SAFE
+            if bound > 0:
+                return float(bound)
+        shift *= 0.25
+    return 0.0
+
+
+def _factor_error(A: sp.csc_array) -> float | None:
+    """Bound on ||A - L D L'|| with D > 0, or None when no such factors came out."""
+    options = {"SymmetricMode": True, "Equil": False}
+    try:
+        lu = spla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    except RuntimeError:  # exactly singular
+        return None
+    L, U = sp.csc_array(lu.L), sp.csc_array(lu.U)
+    d = U.diagonal()
+    if not np.array_equal(lu.perm_r, lu.perm_c) or not np.all(d > 0) or not np.all(np.isfinite(U.data)):
+        return None
+    del lu  # its own copy of the factors would stand beside L and U
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        k = int(np.max(np.bincount(L.indices))) + 2
+        # U' D^{-1} should be L; the columns of U are the rows of U'
+        mirrored = sp.csr_array((U.data * (1.0 / d)[U.indices], U.indices, U.indptr), shape=U.shape)
+        difference = sp.csr_array(mirrored - L.tocsr())
+        del mirrored
+        for matrix in (difference, L, U):
+            np.abs(matrix.data, out=matrix.data)
+        product = _product_norm(L, U)
+        # and the rounding of the quotients and of the difference, whose sizes are those of U' D^{-1} and of the result
+        rest = _product_norm(L, sp.csc_array(sp.diags_array(d) @ difference.T)) * (1.0 + 8 * UNIT) + 8 * UNIT * product
+        error = float((gamma(k) * product + rest) * (1.0 + gamma(k + 4)) * SAFE)
+    return error if np.isfinite(error) else None
+
+
+def _product_norm(left: sp.csc_array, right: sp.csc_array) -> float:
+    """Upper bound of ||left right|| for nonnegative matrices, by ||M||^2 <= ||M||_1 ||M||_inf.
+
+    The sums of the rows and columns of the product need no product. For the factors of a finite-element matrix they do
+    not grow with its size, as the Frobenius norms of the factors do.
+    """
+    ones = np.ones(left.shape[0])
+    rows = float(np.max(left @ (right @ ones)))
+    columns = float(np.max((ones @ left) @ right))
+    # two products of nonnegative numbers, each off by at most gamma(n + 1) of itself
+    return float(np.sqrt(rows * columns) * (1.0 + 2 * gamma(left.shape[0] + 2)) * SAFE + ROOT_TINY)
+
+
+@dataclass(frozen=True)
+class CondensedEnclosure:
+    """Balls that hold S, g0 and g1 of a problem for its exact data (theory, section 4).
+
+    Attributes
+    ----------
+    S, S_rad : (2p, 2p) arrays [length / force]
+    g0, g0_rad, g1, g1_rad : (2p,) arrays [length]
+    stiffness_bound : float
+        Proven lower bound on the smallest eigenvalue of A after scaling to a diagonal near one.
+    """
+
+    S: Array
+    S_rad: Array
+    g0: Array
+    g0_rad: Array
+    g1: Array
+    g1_rad: Array
+    stiffness_bound: float
+    problem: ContactProblem = field(repr=False)
+
+    @classmethod
+    def from_problem(cls, problem: ContactProblem) -> CondensedEnclosure:
+        """Enclose S and g from the problem's own matrices.
+
+        Raises
+        ------
+        NotEnclosedError
+            A is positive definite only within rounding.
+        """
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            enclosed = cls._from_problem(problem)
+        balls = (enclosed.S, enclosed.S_rad, enclosed.g0, enclosed.g0_rad, enclosed.g1, enclosed.g1_rad)
+        if not all(np.all(np.isfinite(array)) for array in balls):
+            raise NotEnclosedError(_OVERFLOW)
+        return enclosed
+
+    @classmethod
+    def _from_problem(cls, problem: ContactProblem) -> CondensedEnclosure:
+        p, n = problem.p, problem.n
+        # np.ldexp, and not a power function, gives powers of two by definition
+        scale = np.ldexp(1.0, -np.round(0.5 * np.log2(problem.A.diagonal())).astype(int))
+        A = _scaled(sp.csr_array(problem.A), scale, scale)
+        rows = sp.vstack([problem.Bn, problem.Bt], format="csr")
+        B = _scaled(sp.csr_array(rows), np.ones(2 * p), scale)
+        slope = np.zeros(n) if problem.load_slope is None else problem.load_slope
+        loads = np.column_stack([_exact_product(array, scale) for array in (problem.f, slope)])
+        # loads of size one, so that norms of their residuals neither overflow nor underflow
+        lift = np.ldexp(1.0, np.clip(np.frexp(np.max(np.abs(loads), axis=0))[1], -1000, 1000))
+        K = sp.hstack([B.T, sp.csc_array(_exact_product(loads, 1.0 / lift))], format="csc")
+        # before there are dense columns: the factors of A - mu I are what takes most memory
+        bound = sparse_eigenvalue_bound(sp.csc_array(A), _smallest_eigenvalue(problem, scale))
+        if not bound > 0:
+            raise NotEnclosedError(
+                "A is positive definite only within rounding: its smallest eigenvalue, after scaling to a unit "
+                "diagonal, could not be proven positive"
+            )
+        X = np.empty(K.shape)
+        for part in _column_blocks(K):
+            # not refined: the products below correct X by its residual
+            columns = problem.factorization.solve(K[:, part].toarray() / scale[:, None], refined=False)
+            X[:, part] = columns / scale[:, None]
+        mid, rad = _products(A, B, K, X, bound)
+        S, S_rad = mid[:, : 2 * p], rad[:, : 2 * p]
+        # the exact S is symmetric and lies in both triangles' balls
+        sym = 0.5 * (S + S.T)
+        S_rad = (np.maximum(S_rad, S_rad.T) + np.abs(S - S.T) + 2 * UNIT * np.abs(sym)) * SAFE
+        offset = np.concatenate([problem.gap, problem.slip_offset])
+        free, free_rad = mid[:, 2 * p :] * lift, rad[:, 2 * p :] * lift + TINY
+        # no load moves nothing, exactly: what covers underflow in a norm would be huge beside a tiny load
+        still = ~np.any(loads, axis=0)
+        free[:, still] = free_rad[:, still] = 0.0
+        g0 = free[:, 0] - offset
+        g0_rad = (free_rad[:, 0] + 2 * UNIT * np.abs(g0)) * SAFE + TINY
+        return cls(sym, S_rad, g0, g0_rad, free[:, 1], free_rad[:, 1], bound, problem)
+
+    def at(self, alpha: Alpha, force: Array, length: Array) -> EnclosedSystem:
+        """The enclosed system at one alpha, in units given by powers of two (see ScaledSystem)."""
+        a = Fraction(alpha)
+        F0, F1 = self.problem.friction
+        exact = [Fraction(float(x)) + a * Fraction(float(y)) for x, y in zip(F0, F1, strict=True)]
+        try:
+            value = float(a)
+            F = np.array([float(x) for x in exact])
+        except OverflowError:
+            raise NotEnclosedError(_OVERFLOW) from None
+        inexact = np.array([Fraction(x) != y for x, y in zip(F.tolist(), exact, strict=True)])
+        if np.any(inexact & (F == 0)):
+            raise NotEnclosedError("a friction coefficient underflows float64")
+        F_rad = np.where(inexact, 2 * UNIT * F + TINY, 0.0)
+        if np.any(np.frexp(np.concatenate([force, length]))[0] != 0.5):
+            raise AssertionError("units of force and length must be powers of two")
+        slack = 0.0 if Fraction(value) == a else 2 * UNIT * abs(value) + TINY
+        with np.errstate(over="ignore", invalid="ignore"):
+            g = self.g0 + value * self.g1
+            size = np.abs(value * self.g1)
+            g_rad = (self.g0_rad + (abs(value) + slack) * self.g1_rad + slack * np.abs(self.g1)) * SAFE
+            g_rad = (g_rad + 4 * UNIT * (size + np.abs(g))) * SAFE + TINY
+            # scaling rounds nothing but what underflows
+            pair = force[:, None] / length[None, :]
+            arrays = (self.S * pair, self.S_rad * pair + TINY, g / length, g_rad / length + TINY, F, F_rad)
+        if not all(np.all(np.isfinite(array)) for array in arrays):
+            raise NotEnclosedError(_OVERFLOW)
+        return EnclosedSystem(*arrays)
+
+
+_OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"
+
+
+def _exact_product(values: Array, factor: Array) -> Array:
+    """Values times powers of two; refused where that is not exact."""
+    product = values * factor
+    if not (np.all(np.isfinite(product)) and np.array_equal(product / factor, values)):
+        raise NotEnclosedError(_OVERFLOW)
+    return np.asarray(product)
+
+
+def _scaled(matrix: sp.csr_array, left: Array, right: Array) -> sp.csr_array:
+    """diag(left) matrix diag(right), exactly, for powers of two."""
+    rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    data = _exact_product(matrix.data, left[rows] * right[matrix.indices])
+    return sp.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+def _smallest_eigenvalue(problem: ContactProblem, scale: Array) -> float:
+    """Estimate of the smallest eigenvalue of the scaled A by inverse iteration."""
+    vector = np.random.default_rng(1).normal(size=problem.n)
+    value = 1.0
+    for _ in range(4):
+        vector /= np.linalg.norm(vector)
+        image = problem.factorization.solve(vector / scale, refined=False) / scale
+        value = 1.0 / float(np.linalg.norm(image))
+        vector = image
+    return value
+
+
+def _column_blocks(K: sp.csc_array) -> Iterator[slice]:
+    """Columns of K, as many at a time as are made dense."""
+    for start in range(0, K.shape[1], _COLUMNS):
+        yield slice(start, min(start + _COLUMNS, K.shape[1]))
+
+
+def _products(A: sp.csr_array, B: sp.csr_array, K: sp.csc_array, X: Array, bound: float) -> tuple[Array, Array]:
+    """B A^{-1} K as a ball; of what is n long only X and a block of columns are dense."""
+    n, rows = A.shape[0], B.shape[0]
+    first = B @ X
+    k = int(np.max(np.diff(B.indptr))) + 1
+    size = np.abs(X)
+    first_rad = gamma(k) * (abs(B) @ size) * (1 + gamma(k)) * SAFE
+    second, second_rad, norms = np.empty_like(first), np.empty_like(first), np.empty(K.shape[1])
+    for part in _column_blocks(K):
+        R, R_rad = residual(A, X[:, part], K[:, part].toarray())
+        second[:, part] = X[:, :rows].T @ R
+        np.abs(R, out=R)
+        norms[part] = upper_norm(R + R_rad, axis=0) * SAFE
+        R *= gamma(n + 1)
+        R += R_rad
+        second_rad[:, part] = (size[:, :rows].T @ R) * (1 + gamma(n + 2)) * SAFE
+    third = norms[:rows, None] * norms[None, :] / bound * SAFE
+    mid = first + second
+    return mid, (first_rad + second_rad + third + 2 * UNIT * np.abs(mid)) * SAFE + (n + 2) * TINY
+
+
+@dataclass(frozen=True)
+class EnclosedSystem:
+    """The condensed problem at one alpha as balls, in scaled units: w = g - S lambda.
+
+    Attributes
+    ----------
+    S, S_rad : (2p, 2p) arrays
+    g, g_rad : (2p,) arrays
+    F, F_rad : (p,) arrays
+    """
+
+    S: Array
+    S_rad: Array
+    g: Array
+    g_rad: Array
+    F: Array
+    F_rad: Array
+
+    @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+        return len(self.F)
+
+    @cached_property
+    def smallest_eigenvalue(self) -> float:
+        """Proven lower bound on the smallest eigenvalue of every S in the enclosure.
+
+        Raises
+        ------
+        NotEnclosedError
+            S is not proven positive definite.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            bound = (dense_eigenvalue_bound(self.S) - float(upper_norm(self.S_rad))) / SAFE
+        if not bound > 0:
+            raise NotEnclosedError("the condensed compliance S is positive definite only within rounding")
+        return bound
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Approximate inverse of S; no claim rests on its accuracy."""
+        return np.asarray(np.linalg.inv(self.S))
+
+    @cached_property
+    def form_error(self) -> float:
+        """kappa with |fl(x'S x) - x'S x| <= kappa ||x||^2 for every S in the enclosure.
+
+        Two roundings of inner products of 2p terms would ask for gamma(4p + 2); what is more covers underflow in them.
+        """
+        size = 4 * len(self.g) + 4
+        return float((upper_norm(self.S_rad) + gamma(size) * upper_norm(self.S)) * SAFE)

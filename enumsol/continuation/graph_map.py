@@ -1,0 +1,250 @@
+"""Where points lie on a branch graph: distances to arcs and vertices, and ways along the graph from one to another."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from enumsol.continuation.condensed_equation import CondensedEquation
+from enumsol.continuation.follow import ALPHA_FRACTION
+from enumsol.continuation.parameter_path import AffinePath
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.continuation.condensed_equation import Vector
+    from enumsol.problem import ContactProblem
+    from enumsol.statuses import ContactStatus
+
+#: Points at which the length of an arc is measured.
+_SAMPLES = 9
+#: Gauss-Newton iterations towards the nearest point of an arc, and the step of their difference quotient.
+_NEAREST_ITERATIONS = 8
+_DIFFERENCE = 1e-6
+#: A distance below this fraction of the tolerance need not be made smaller.
+_EXACT = 1e-4
+
+
+class ArcLike(Protocol):
+    """An arc of a branch graph between the vertices ``tail`` and ``head``; a sheet has a positive dimension."""
+
+    number: int
+    statuses: tuple[ContactStatus, ...]
+    lo: float
+    hi: float
+    tail: int
+    head: int
+    dimension: int
+
+    def values(self, alpha: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(lambda_n, lambda_t) at an alpha of the arc."""
+
+
+class VertexLike(Protocol):
+    """A vertex of a branch graph; ``family`` is a RootFamily or None."""
+
+    number: int
+    alpha: float
+    lambda_n: NDArray[np.float64]
+    lambda_t: NDArray[np.float64]
+    family: Any
+
+
+class GraphLike(Protocol):
+    """What an audit asks of a BranchGraph: ``arcs`` are ArcLike and ``vertices`` VertexLike."""
+
+    problem: ContactProblem
+    interval: tuple[float, float]
+    arcs: tuple[Any, ...]
+    vertices: tuple[Any, ...]
+
+    @property
+    def branches(self) -> Sequence[Any]:
+        """Arcs in a row: ``branch.arcs``, with a ``branch.number``."""
+
+    def starting_points(self) -> Iterable[Any]:
+        """Regular roots, one or more on every branch."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a point lies.
+
+    Attributes
+    ----------
+    kind : {"arc", "vertex"}
+    number : int
+        Of the arc or vertex.
+    distance : float
+        From it, in the lengths of ContinuationOptions [-].
+    """
+
+    kind: str
+    number: int
+    distance: float
+
+
+class GraphMap:
+    """A branch graph in the metric of the continuation.
+
+    Parameters
+    ----------
+    graph : GraphLike
+    tolerance : float
+        Points within this of an arc or vertex lie on it.
+    """
+
+    def __init__(self, graph: GraphLike, tolerance: float) -> None:
+        self.graph, self.tolerance = graph, tolerance
+        low, high = (float(end) for end in graph.interval)
+        scale = ALPHA_FRACTION * (high - low)
+        self.equation = CondensedEquation(AffinePath(graph.problem), (low, high), low, alpha_scale=scale)
+        self.arcs: dict[int, ArcLike] = {arc.number: arc for arc in graph.arcs}
+        self.vertices: dict[int, VertexLike] = {vertex.number: vertex for vertex in graph.vertices}
+        self.curves = [arc for arc in self.arcs.values() if not arc.dimension]
+        self._corners = {number: self._corner_points(vertex) for number, vertex in self.vertices.items()}
+
+    def point(self, alpha: float, lambda_n: Vector, lambda_t: Vector) -> Vector:
+        """Scaled point of the condensed equation."""
+        return self.equation.point(alpha, np.concatenate([lambda_n, lambda_t]))
+
+    # -- distances ---------------------------------------------------------------------------------------------------
+
+    def place(self, x: Vector, near: Place | None = None) -> Place:
+        """Nearest vertex or arc; the arc of the point before is tried first, until one is close enough."""
+        best = min(
+            (Place("vertex", number, self.vertex_distance(x, number)) for number in self.vertices),
+            key=lambda place: place.distance,
+            default=Place("vertex", -1, math.inf),
+        )
+        if best.distance <= self.tolerance:
+            return self._at_vertex(x, best)
+        for arc in self._in_order(near):
+            if arc.lo - self._reach <= self.equation.alpha(x) <= arc.hi + self._reach:
+                distance = self.arc_distance(x, arc)
+                if distance < best.distance:
+                    best = Place("arc", arc.number, distance)
+                if distance <= self.tolerance:
+                    break
+        return best
+
+    def _at_vertex(self, x: Vector, place: Place) -> Place:
+        """A place at a vertex with the distance from it or from an arc that ends there."""
+        ends = [arc for arc in self.curves if place.number in (arc.tail, arc.head)]
+        distance = min((self.arc_distance(x, arc) for arc in ends), default=math.inf)
+        return Place("vertex", place.number, min(place.distance, distance))
+
+    @property
+    def _reach(self) -> float:
+        # a point off the graph is compared with what is near in alpha
+        return self.equation.alpha_scale
+
+    def _in_order(self, near: Place | None) -> Iterable[ArcLike]:
+        if near is None:
+            return self.curves
+        if near.kind == "arc" and near.number in self.arcs:
+            arc = self.arcs[near.number]
+            ends, first = {arc.tail, arc.head}, arc.number
+        else:
+            ends, first = {near.number}, -1
+        return sorted(self.curves, key=lambda a: (a.number != first, not ends & {a.tail, a.head}, a.number))
+
+    def arc_distance(self, x: Vector, arc: ArcLike) -> float:
+        """Distance of a point from an arc."""
+        low, high = arc.lo, arc.hi
+        alpha = min(max(self.equation.alpha(x), low), high)
+        best = math.inf
+        for _ in range(_NEAREST_ITERATIONS):
+            y = self.on_arc(arc, alpha)
+            distance = self.equation.norm(x - y)
+            if distance >= 0.999 * best:
+                break
+            best = distance
+            step = _DIFFERENCE * (high - low)
+            if best <= _EXACT * self.tolerance or step == 0:
+                break
+            other = alpha + step if alpha + step <= high else alpha - step
+            if other == alpha:  # an arc of a few floats' length
+                break
+            slope = (self.on_arc(arc, other) - y) / (other - alpha)
+            alpha = min(max(alpha + self.equation.dot(x - y, slope) / self.equation.dot(slope, slope), low), high)
+        return best
+
+    def on_arc(self, arc: ArcLike, alpha: float) -> Vector:
+        """Scaled point of an arc."""
+        return self.point(alpha, *arc.values(alpha))
+
+    def vertex_distance(self, x: Vector, number: int) -> float:
+        """Distance of a point from a vertex, or from the nearest polytope of a family."""
+        return min(self._hull_distance(x, corners) for corners in self._corners[number])
+
+    def _corner_points(self, vertex: VertexLike) -> list[Vector]:
+        if vertex.family is None:
+            return [self.point(vertex.alpha, vertex.lambda_n, vertex.lambda_t)[None, :]]
+        return [
+            np.array([self.point(vertex.alpha, corner[:, 0], corner[:, 1]) for corner in part.vertices])
+            for part in vertex.family.polytopes
+        ]
+
+    def _hull_distance(self, x: Vector, corners: Vector) -> float:
+        if len(corners) == 1:
+            return self.equation.norm(x - corners[0])
+        from scipy.optimize import nnls  # only families need it
+
+        root = np.linalg.cholesky(self.equation.metric).T
+        weight = 1e4  # of the condition that the shares sum to one; its error is the square of the distance over this
+        matrix = np.vstack([root @ corners.T, weight * np.ones(len(corners))])
+        shares, _ = nnls(matrix, np.append(root @ x, weight))
+        return self.equation.norm(x - shares / np.sum(shares) @ corners)
+
+    # -- ways along the graph ----------------------------------------------------------------------------------------
+
+    @cached_property
+    def _roads(self) -> Any:
+        """Vertices joined by arcs, weighted by their lengths."""
+        import networkx as nx  # audits only
+
+        roads = nx.MultiGraph()
+        roads.add_nodes_from(self.vertices)
+        for arc in self.curves:
+            points = [self.on_arc(arc, alpha) for alpha in np.linspace(arc.lo, arc.hi, _SAMPLES)]
+            length = sum(self.equation.norm(b - a) for a, b in pairwise(points))
+            roads.add_edge(arc.tail, arc.head, key=arc.number, weight=length)
+        return roads
+
+    def way(self, x: Vector, start: Place, y: Vector, end: Place) -> tuple[float, tuple[int, ...]]:
+        """Length of the shortest way along the graph between two points, and the arcs that it passes whole.
+
+        The length is infinite when no way leads from one to the other.
+        """
+        import networkx as nx  # audits only
+
+        if start.kind == end.kind and start.number == end.number:
+            return 0.0, ()
+        best: tuple[float, tuple[int, ...]] = (math.inf, ())
+        leave, arrive = self._exits(x, start), self._exits(y, end)
+        for first, head in leave.items():
+            lengths, routes = nx.single_source_dijkstra(self._roads, first)
+            for last, tail in arrive.items():
+                if last in lengths and head + lengths[last] + tail < best[0]:
+                    best = (head + lengths[last] + tail, self._passed(routes[last]))
+        return best
+
+    def _exits(self, x: Vector, place: Place) -> dict[int, float]:
+        """Vertices next to a point with their distances."""
+        if place.kind == "vertex":
+            return {place.number: 0.0}
+        arc = self.arcs[place.number]
+        return {number: self.vertex_distance(x, number) for number in (arc.tail, arc.head)}
+
+    def _passed(self, route: Sequence[int]) -> tuple[int, ...]:
+        return tuple(
+            min(self._roads[a][b], key=lambda number: self._roads[a][b][number]["weight"]) for a, b in pairwise(route)
+        )

@@ -1,0 +1,168 @@
+"""Roots and families in the user's terms, built from components of the root set."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.relaxation.rows import CONTACT, UNDECIDED
+from enumsol.roots.linearisation import SelectionTangent
+from enumsol.roots.root_set import Enclosure, Polytope, Root, RootFamily, Undecided
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.kernel.point import VerifiedSelection
+    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.roots.components import Component
+    from enumsol.search.tree import Open
+    from enumsol.selections.floats import FloatSelections
+    from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
+
+_IN_CONTACT = frozenset((ContactStatus.STICK, ContactStatus.SLIP_PLUS, ContactStatus.SLIP_MINUS))
+
+
+class RootBuilder:
+    """Builds Root and RootFamily objects at one alpha.
+
+    Parameters
+    ----------
+    problem, alpha : what was enumerated
+    solver : the solver whose points the components hold
+    floats : the float solver of the same system, for scaled margins and derivatives
+    verified : balls of the verified regular roots by their codes
+    """
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        alpha: Alpha,
+        solver: SelectionSolver,
+        floats: FloatSelections,
+        verified: Mapping[Codes, VerifiedSelection],
+    ) -> None:
+        self._problem = problem
+        self._alpha = alpha
+        self._solver = solver
+        self._floats = floats
+        self._verified = verified
+
+    def root(self, component: Component) -> Root:
+        """The isolated root of a component."""
+        p = self._problem.p
+        solution = component.solutions[0]
+        active_codes = [set(codes) for codes in component.active]
+        canonical = tuple(min(codes) for codes in active_codes)
+        force, w = self._values(canonical, solution)
+        statuses, active = [], []
+        for i, codes in enumerate(active_codes):
+            names = {s for code in codes for s in self._names(code, w[p + i], i)}
+            statuses.append(next(s for s in STATUSES if s in names))
+            active.append(frozenset(names))
+        regular = component.regular
+        scaled = force / self._floats.system.force
+        slack = self._floats.slacks(canonical, scaled, w / self._floats.system.length)
+        return Root(
+            alpha=self._alpha,
+            statuses=tuple(statuses),
+            active=tuple(active),
+            lambda_n=force[:p],
+            lambda_t=force[p:],
+            u_n=w[:p],
+            u_t=w[p:],
+            index=component.index,
+            regular=regular,
+            margin=max(float(np.min(slack)), 0.0) if regular else 0.0,
+            enclosure=self._enclosure(solution),
+            _condensed=self._problem.condensed,
+            _tangent=SelectionTangent(self._floats, self._problem.condensed, canonical, force, w) if regular else None,
+        )
+
+    def _enclosure(self, solution: SelectionSolution) -> Enclosure | None:
+        """Bounds of forces and displacements: from the balls, or one rounding around a rational root."""
+        p, system = self._problem.p, self._floats.system
+        ball = self._verified.get(solution.codes)
+        point = solution.vertices[0]
+        if ball is not None:
+            mid = (ball.force * system.force, ball.w * system.length)
+            rad = (ball.force_rad * system.force, ball.w_rad * system.length)
+        elif isinstance(point, tuple):
+            mid = (self._solver.forces(point), self._solver.displacements(point))
+            rad = (np.spacing(np.abs(mid[0])) * (mid[0] != 0), np.spacing(np.abs(mid[1])) * (mid[1] != 0))
+        elif not np.any(point) and self._problem.is_unloaded(self._alpha):
+            # nothing but lambda = 0, w = 0 solves, exactly
+            mid = rad = (np.zeros(2 * p), np.zeros(2 * p))
+        else:
+            return None
+        low = [np.where(r > 0, np.nextafter(m - r, -np.inf), m) for m, r in zip(mid, rad, strict=True)]
+        high = [np.where(r > 0, np.nextafter(m + r, np.inf), m) for m, r in zip(mid, rad, strict=True)]
+        columns = [np.stack([a, b], axis=1) for a, b in zip(low, high, strict=True)]
+        return Enclosure(columns[0][:p], columns[0][p:], columns[1][:p], columns[1][p:])
+
+    def family(self, component: Component, *, proven: bool) -> RootFamily:
+        """The family of a component of positive dimension."""
+        p = self._problem.p
+        parts = []
+        known: list[Any] = []
+        for solution in component.solutions:
+            # polytopes that meet share their corners to the last bit
+            corners = [self._representative(v, known) for v in solution.vertices]
+            points = np.array([self._solver.forces(v) for v in corners])
+            moves = np.array([self._solver.displacements(v)[p:] for v in solution.vertices])
+            statuses = tuple(self._polytope_status(code, moves[:, i], i) for i, code in enumerate(solution.codes))
+            order = np.lexsort(points.T[::-1])
+            vertices = np.stack([points[order, :p], points[order, p:]], axis=2)
+            parts.append(Polytope(statuses, vertices, solution.dimension))
+        return RootFamily(self._alpha, tuple(parts), component.index, vertices_proven=proven)
+
+    def _representative(self, vertex: Any, known: list[Any]) -> Any:
+        for other in known:
+            if self._solver.equal(vertex, other):
+                return other
+        known.append(vertex)
+        return vertex
+
+    def undecided(self, item: Open) -> Undecided:
+        """An undecided part in the user's terms."""
+        named: list[ContactStatus | str | None] = []
+        for code in item.codes:
+            if code == UNDECIDED:
+                named.append(None)
+            else:
+                named.append("contact" if code in (CONTACT, FRICTIONLESS) else STATUSES[code])
+        return Undecided(tuple(named), item.reason, item.hint)
+
+    def _values(self, codes: Codes, solution: SelectionSolution) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Forces and displacements with the zeros that the statuses impose set exactly."""
+        p, point, ball = self._problem.p, solution.vertices[0], self._verified.get(solution.codes)
+        if ball is None:
+            force, w = self._solver.forces(point), self._solver.displacements(point)
+        else:
+            # the floats' own S and g may be off by more than the ball's radius
+            force, w = ball.force * self._floats.system.force, ball.w * self._floats.system.length
+        for i, code in enumerate(codes):
+            if code == OPEN:
+                force[[i, p + i]] = 0.0
+            else:
+                w[i] = 0.0
+                if code == STICK:
+                    w[p + i] = 0.0
+        # -0.0 prints badly
+        return force + 0.0, w + 0.0
+
+    def _names(self, code: int, w_t: float, node: int) -> Sequence[ContactStatus]:
+        if code != FRICTIONLESS:
+            return (STATUSES[code],)
+        size = w_t / float(self._floats.system.length[self._problem.p + node])
+        if abs(size) <= self._floats.tolerance:
+            return tuple(_IN_CONTACT)
+        return (STATUSES[SLIP_PLUS if size > 0 else SLIP_MINUS],)
+
+    def _polytope_status(self, code: int, w_t: NDArray[np.float64], node: int) -> ContactStatus:
+        """A frictionless node's slip may change sign within a polytope; its mean names it."""
+        names = self._names(code, float(np.mean(w_t)), node)
+        return next(s for s in STATUSES if s in names)

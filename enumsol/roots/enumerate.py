@@ -1,0 +1,313 @@
+"""enumerate_roots: every solution at one alpha (theory, sections 2-5)."""
+
+from __future__ import annotations
+
+import math
+import time
+from fractions import Fraction
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.proof.proof_file import Proof, ProofWriter
+from enumsol.roots.builder import RootBuilder
+from enumsol.roots.components import Component, connected_components
+from enumsol.roots.local_degree import perturbed_degree
+from enumsol.roots.root_set import RootSet, SearchStats
+from enumsol.search.certifiers.verified import VerifiedJudge
+from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
+from enumsol.search.parallel import run_parallel
+from enumsol.search.solvers import Arithmetic, Workbench
+from enumsol.search.tree import Open, SearchLimits, SearchOutcome, SearchProgress, TreeSearch
+from enumsol.selections.floats import SIGN_TOLERANCE, FloatSelections
+from enumsol.selections.solution import SelectionSolution
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from concurrent.futures import Executor
+    from pathlib import Path
+
+    from enumsol.problem import Alpha
+    from enumsol.selections.solution import ActiveSets, SelectionSolver
+
+Method = Literal["tree", "exhaustive"]
+#: The exhaustive method reports progress this often [seconds].
+_REPORT_SECONDS = 0.1
+
+
+def enumerate_roots(
+    problem: ContactProblem,
+    alpha: Alpha,
+    arithmetic: Arithmetic = "verified",
+    method: Method = "tree",
+    executor: Executor | None = None,
+    progress: Callable[[SearchProgress], object] | None = None,
+    stop_after: int | None = None,
+    max_nodes: int | None = None,
+    time_limit: float | None = None,
+    proof_path: str | Path | None = None,
+    *,
+    tolerance: float = SIGN_TOLERANCE,
+    engine: str | None = None,
+) -> RootSet:
+    """All solutions of the problem at one alpha.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    alpha : float or Fraction
+        The parameter; a float is read as the exact rational number that it is.
+    arithmetic : {"verified", "fast", "exact"}
+        "verified": every root is enclosed and every excluded selection proven by rigorous error bounds for the data as
+        given, in rationals where a sign cannot be decided otherwise; what stays open is listed. "fast": float64 and a
+        tolerance, never claimed to be complete. "exact": the data are read as exact rationals and everything is
+        decided without rounding (small problems).
+    method : {"tree", "exhaustive"}
+        "tree": pruned search (theory, section 5). "exhaustive": all 4^p selections, the oracle for small p.
+    executor : concurrent.futures.Executor, optional
+        Runs subtrees in parallel (method "tree").
+    progress : callable, optional
+        Called now and then with a SearchProgress.
+    stop_after : int, optional
+        Stop when this many roots and families are found; 2 answers "is it unique?".
+    max_nodes : int, optional
+        Stop after so many nodes of the tree (selections, for the exhaustive method).
+    time_limit : float, optional
+        Stop after so many seconds.
+    proof_path : path, optional
+        Stream the proof to this file (arithmetic "verified"); by default it is kept, compressed, in memory.
+    tolerance : float
+        For arithmetic "fast": see enumsol.selections.floats.SIGN_TOLERANCE.
+    engine : {"active-set", "clarabel"}, optional
+        Solver of the relaxations; by default the compiled active-set method with clarabel as its fallback.
+
+    Returns
+    -------
+    RootSet
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is out of range.
+    TooLargeError
+        The exhaustive method or exact arithmetic would take too long; the message says how long.
+    Interrupted
+        On Ctrl-C; ``partial`` holds what was found.
+    """
+    _check(problem, alpha, arithmetic, method, stop_after, max_nodes, time_limit, tolerance, engine)
+    _check_proof(arithmetic, method, proof_path)
+    bench = Workbench(problem, alpha, arithmetic, tolerance)
+    return _Enumeration(bench, method, progress, engine, proof_path).run(executor, stop_after, max_nodes, time_limit)
+
+
+class _Enumeration:
+    """One call of enumerate_roots."""
+
+    def __init__(
+        self,
+        bench: Workbench,
+        method: Method,
+        progress: Callable[[SearchProgress], object] | None,
+        engine: str | None,
+        proof_path: str | Path | None,
+    ) -> None:
+        self.bench, self.method, self.progress, self.engine = bench, method, progress, engine
+        self.started = time.perf_counter()
+        self.outcome = SearchOutcome()
+        self.solver: SelectionSolver = bench.floats
+        if bench.arithmetic == "exact" and bench.exact is not None:
+            self.solver = bench.exact
+        self.writer: ProofWriter | None = None
+        if bench.arithmetic == "verified":
+            self.writer = ProofWriter(proof_path)
+            self.writer.write(bench.proof_header())
+        self.judge = bench.judge(self.writer)
+
+    def run(
+        self, executor: Executor | None, stop_after: int | None, max_nodes: int | None, time_limit: float | None
+    ) -> RootSet:
+        """Search, then build the result; an interruption keeps what was found."""
+        deadline = None if time_limit is None else self.started + time_limit
+        limits = SearchLimits(self._enough(stop_after), max_nodes, deadline)
+        try:
+            if self.method == "exhaustive":
+                self._exhaustive(limits)
+            else:
+                self._tree(limits, executor)
+        except KeyboardInterrupt as interruption:
+            self.outcome.stopped = f"interrupted after {self.outcome.nodes + self.outcome.selections} nodes"
+            partial = self._result()
+            message = f"enumerate_roots was interrupted; {len(partial)} roots so far"
+            raise Interrupted(message, partial) from interruption
+        return self._result()
+
+    def _enough(self, stop_after: int | None) -> Callable[[list[SelectionSolution]], bool] | None:
+        if stop_after is None:
+            return None
+        counted = [0, 0]
+
+        def enough(solutions: list[SelectionSolution]) -> bool:
+            # several selections may hold at one root: count roots, and only when something was added
+            if len(solutions) >= stop_after and len(solutions) != counted[0]:
+                counted[:] = [len(solutions), sum(len(part) for part, _ in self._components())]
+            return counted[1] >= stop_after
+
+        return enough
+
+    def _tree(self, limits: SearchLimits, executor: Executor | None) -> None:
+        bench = self.bench
+        search = TreeSearch(bench.scaled, self.judge, engine=self.engine, limits=limits, progress=self.progress)
+        self.outcome = search.outcome
+        if bench.unloaded():
+            # the energy bound is then lambda' S lambda <= 0: lambda = 0 and nothing else
+            self.outcome.solutions.append(self._unloaded())
+        elif (reason := bench.undecidable) is not None:
+            # without any means of proof the tree would only grow
+            codes = search.first().codes
+            self.judge.skipped(codes, reason)
+            self.outcome.undecided.append(Open(codes, reason, "hold the body better, or scale the data"))
+        elif executor is not None:
+            run_parallel(executor, bench, search, self.engine, bench.floats.tolerance)
+        else:
+            search.run()
+
+    def _unloaded(self) -> SelectionSolution:
+        if isinstance(self.judge, VerifiedJudge):
+            self.judge.unloaded()
+        p = self.bench.problem.p
+        solver = self.solver
+        if solver is self.bench.floats:
+            return SelectionSolution((0,) * p, (np.zeros(2 * p),), 0, 1, strict=False)
+        solution = solver.solve((0,) * p)
+        if solution is None:
+            raise AssertionError("the unloaded body must rest open")
+        return solution
+
+    def _exhaustive(self, limits: SearchLimits) -> None:
+        outcome, reported = self.outcome, self.started
+        if isinstance(self.solver, FloatSelections):
+            stream = exhaustive_float(self.bench.scaled, self.solver)
+        else:
+            stream = exhaustive_exact(self.solver)
+        total = math.prod(4 if positive else 2 for positive in self.solver.F_positive)
+        for outcome.selections, solution in stream:
+            if solution is not None:
+                outcome.solutions.append(solution)
+            now = time.perf_counter()
+            due = now - reported > _REPORT_SECONDS or (solution is None and outcome.selections % BLOCK == 0)
+            if self.progress is not None and (due or outcome.selections == total):
+                reported = now
+                share = outcome.selections / total
+                state = SearchProgress(outcome.selections, share, len(outcome.solutions), now - self.started)
+                self.progress(state)
+            if solution is not None and limits.enough is not None and limits.enough(outcome.solutions):
+                outcome.stopped = "stopped after enough roots"
+            elif limits.max_nodes is not None and limits.max_nodes <= outcome.selections < total:
+                outcome.stopped = f"stopped after max_nodes = {limits.max_nodes} selections"
+            elif limits.deadline is not None and now > limits.deadline and outcome.selections < total:
+                outcome.stopped = "stopped by the time limit"
+            if outcome.stopped is not None:
+                return
+
+    def _components(self) -> list[tuple[list[Component], SelectionSolver]]:
+        """Components of the root set with the solver whose points they hold."""
+        solutions = self.outcome.solutions
+        exact = [s for s in solutions if isinstance(s.vertices[0], tuple)]
+        floats = [s for s in solutions if not isinstance(s.vertices[0], tuple)]
+        parts: list[tuple[list[Component], SelectionSolver]] = []
+        if floats:
+            parts.append((connected_components(floats, self.bench.floats, self._degree), self.bench.floats))
+        if exact and self.bench.exact is not None:
+            parts.append((connected_components(exact, self.bench.exact, self._degree), self.bench.exact))
+        return parts
+
+    def _degree(self, active: ActiveSets) -> int | None:
+        return perturbed_degree(self.bench.floats, active)
+
+    def _result(self) -> RootSet:
+        outcome, bench = self.outcome, self.bench
+        roots, families = [], []
+        verified = self.judge.verified if isinstance(self.judge, VerifiedJudge) else {}
+        for components, solver in self._components():
+            builder = RootBuilder(bench.problem, bench.alpha, solver, bench.floats, verified)
+            roots += [builder.root(c) for c in components if c.dimension == 0]
+            proven = solver is not bench.floats
+            families += [builder.family(c, proven=proven) for c in components if c.dimension > 0]
+        roots.sort(key=lambda root: ([s.value for s in root.statuses], root.lambda_n.tolist(), root.lambda_t.tolist()))
+        families.sort(key=lambda family: family.vertices.tolist())
+        builder = RootBuilder(bench.problem, bench.alpha, self.solver, bench.floats, verified)
+        counts = (outcome.nodes, outcome.pruned, outcome.selections, outcome.qps, outcome.fallback_qps)
+        return RootSet(
+            alpha=bench.alpha,
+            roots=roots,
+            families=families,
+            undecided=[builder.undecided(item) for item in outcome.undecided],
+            arithmetic=bench.arithmetic,
+            method=self.method,
+            stopped=outcome.stopped,
+            stats=SearchStats(
+                *counts,
+                time.perf_counter() - self.started,
+                self.judge.escalations if isinstance(self.judge, VerifiedJudge) else None,
+                outcome.presolved,
+            ),
+            node_ids=bench.problem.node_ids,
+            certified_data=bench.data,
+            proof=self._proof(len(roots), len(families)),
+        )
+
+    def _proof(self, roots: int, families: int) -> Proof | None:
+        """Close the proof. One that was interrupted stays without its end, and is none."""
+        if self.writer is None or not isinstance(self.judge, VerifiedJudge):
+            return None
+        whole = self.outcome.stopped is None or "not examined" in self.outcome.stopped
+        if whole:
+            undecided = len(self.outcome.undecided)
+            footer = {"roots": roots, "families": families, "undecided": undecided, "leaves": self.judge.leaves}
+            self.writer.write(footer)
+        proof = self.writer.close()
+        return proof if whole else None
+
+
+def _check(
+    problem: object,
+    alpha: Alpha,
+    arithmetic: str,
+    method: str,
+    stop_after: int | None,
+    max_nodes: int | None,
+    time_limit: float | None,
+    tolerance: float,
+    engine: str | None,
+) -> None:
+    if not isinstance(problem, ContactProblem):
+        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
+    if not isinstance(alpha, Fraction):
+        finite_alpha(alpha)
+    for name, value, known in (
+        ("arithmetic", arithmetic, ("fast", "verified", "exact")),
+        ("method", method, ("tree", "exhaustive")),
+        ("engine", engine, (None, "active-set", "clarabel")),
+    ):
+        if value not in known:
+            raise InvalidArgumentError(f"{name} is {value!r}; expected one of {', '.join(map(repr, known))}")
+    for name, count in (("stop_after", stop_after), ("max_nodes", max_nodes)):
+        if count is not None and (not isinstance(count, int) or count < 1):
+            raise InvalidArgumentError(f"{name} is {count!r}; expected a positive integer or None")
+    if time_limit is not None and not time_limit > 0:
+        raise InvalidArgumentError(f"time_limit is {time_limit!r}; expected a positive number of seconds or None")
+    if not 0 <= tolerance < 1:
+        raise InvalidArgumentError(f"tolerance is {tolerance!r}; expected a number in [0, 1)")
+
+
+def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None) -> None:
+    if method == "exhaustive" and arithmetic == "verified":
+        raise InvalidArgumentError(
+            'method is "exhaustive" with arithmetic "verified"; expected "fast" or "exact" arithmetic for the oracle'
+        )
+    if proof_path is not None and arithmetic != "verified":
+        raise InvalidArgumentError(
+            f'proof_path is given with arithmetic {arithmetic!r}; expected "verified", which alone writes proofs'
+        )

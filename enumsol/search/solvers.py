@@ -1,0 +1,171 @@
+"""One problem at one alpha in one arithmetic: the solvers and the judge that a search needs."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.search.certifiers.floats import FastJudge
+from enumsol.search.certifiers.verified import VerifiedJudge
+from enumsol.selections.floats import FloatSelections
+
+if TYPE_CHECKING:
+    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.proof.proof_file import Recorder
+    from enumsol.search.certifiers.rationals import ExactJudge
+    from enumsol.search.tree import Judge
+    from enumsol.selections.rationals import ExactSelections
+
+Arithmetic = Literal["fast", "verified", "exact"]
+
+
+class Workbench:
+    """Solvers and judge for one problem at one alpha.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    alpha : float or Fraction
+    arithmetic : {"fast", "verified", "exact"}
+    tolerance : float
+        Sign tolerance of fast arithmetic.
+
+    Raises
+    ------
+    InvalidArgumentError
+        A friction coefficient is positive and underflows to zero: its node would be taken for one without friction.
+    """
+
+    def __init__(self, problem: ContactProblem, alpha: Alpha, arithmetic: Arithmetic, tolerance: float) -> None:
+        self.problem, self.alpha, self.arithmetic = problem, alpha, arithmetic
+        self.scaled = problem.condensed.at(alpha).scaled
+        self.floats = FloatSelections(self.scaled, tolerance)
+        pairs = zip(*(part.tolist() for part in problem.friction), strict=True)
+        lost = [
+            not F and Fraction(x) + Fraction(alpha) * Fraction(y) != 0
+            for F, (x, y) in zip(self.scaled.F, pairs, strict=True)
+        ]
+        if any(lost):
+            node = problem.node_ids[lost.index(True)]
+            raise InvalidArgumentError(
+                f"friction at contact node {node} is positive at this alpha and too small for float64; "
+                "expected 0 or more than 1e-307"
+            )
+
+    @cached_property
+    def exact(self) -> ExactSelections | None:
+        """Selections in rationals; None when the problem is too large for them.
+
+        Raises
+        ------
+        InvalidProblemError
+            S is not positive definite, exactly: no bound on the energy would hold.
+        """
+        from enumsol.checker.rational import is_positive_definite
+        from enumsol.selections.rationals import EXACT_DOF_LIMIT, ExactSelections, ExactSystem  # python-flint
+
+        if self.arithmetic != "exact" and self.problem.n > EXACT_DOF_LIMIT:
+            return None
+        system = ExactSystem.from_problem(self.problem, self.alpha)
+        if not is_positive_definite(system.S):
+            raise InvalidProblemError("A is not positive definite (S = B A^-1 B' is not, in rational arithmetic)")
+        return ExactSelections(system)
+
+    @cached_property
+    def exact_judge(self) -> ExactJudge | None:
+        """The judge in rationals; None when the problem is too large for them or only condensed data are certified."""
+        if self.data == "condensed" or self.exact is None:
+            return None
+        from enumsol.search.certifiers.rationals import ExactJudge  # python-flint
+
+        return ExactJudge(self.exact, self.scaled)
+
+    @cached_property
+    def _enclosed(self) -> tuple[EnclosedSystem | None, str]:
+        system = self.scaled
+        try:
+            enclosed = self.problem.enclosure.at(self.alpha, system.force, system.length)
+            if _positive(enclosed):
+                return enclosed, "problem"
+        except NotEnclosedError:
+            pass
+        if self.problem.n <= _exact_limit():
+            return None, "problem"
+        zero = np.zeros_like
+        F_rad = 4 * np.spacing(system.F)
+        enclosed = EnclosedSystem(system.S, zero(system.S), system.g, zero(system.g), system.F, F_rad)
+        return (enclosed if _positive(enclosed) else None), "condensed"
+
+    @property
+    def enclosed(self) -> EnclosedSystem | None:
+        """Balls for the scaled system; None when S is not proven positive definite by them."""
+        return self._enclosed[0]
+
+    @property
+    def data(self) -> str:
+        """What a proof is about: "problem" (the matrices as given) or "condensed" (S and g as computed)."""
+        return self._enclosed[1] if self.arithmetic == "verified" else "problem"
+
+    @property
+    def undecidable(self) -> str | None:
+        """Why verified arithmetic cannot prove anything about this problem, or None."""
+        if self.arithmetic != "verified" or self.enclosed is not None or self.exact_judge is not None:
+            return None
+        return "the condensed compliance S is positive definite only within rounding"
+
+    def judge(self, recorder: Recorder | None) -> Judge:
+        """The judge of this arithmetic."""
+        if self.arithmetic == "fast":
+            return FastJudge(self.floats)
+        if self.arithmetic == "exact":
+            from enumsol.search.certifiers.rationals import ExactJudge  # python-flint
+
+            return ExactJudge(_present(self.exact), self.scaled)
+        return VerifiedJudge(
+            self.scaled, self.enclosed, lambda: self.exact_judge, _present(recorder), self.problem.node_ids
+        )
+
+    def unloaded(self) -> bool:
+        """Whether g = 0, so that only lambda = 0 solves: in the data (verified, exact) or as computed (fast)."""
+        if self.arithmetic == "fast":
+            return not np.any(self.scaled.g)
+        if self.arithmetic == "exact":
+            return not any(_present(self.exact).system.g)
+        return self.problem.is_unloaded(self.alpha)
+
+    def proof_header(self) -> dict[str, Any]:
+        """First record of a proof (see enumsol.proof.proof_file)."""
+        return {
+            "format": "enumsol-proof",
+            "version": 1,
+            "problem": self.problem.fingerprint,
+            "alpha": str(Fraction(self.alpha)),
+            "p": self.problem.p,
+            "data": self.data,
+            "force": (np.frexp(self.scaled.force)[1] - 1).tolist(),
+            "length": (np.frexp(self.scaled.length)[1] - 1).tolist(),
+        }
+
+
+def _exact_limit() -> int:
+    from enumsol.selections.rationals import EXACT_DOF_LIMIT  # python-flint, not needed by fast arithmetic
+
+    return EXACT_DOF_LIMIT
+
+
+def _positive(system: EnclosedSystem) -> bool:
+    try:
+        return system.smallest_eigenvalue > 0
+    except NotEnclosedError:
+        return False
+
+
+def _present(value: Any) -> Any:
+    if value is None:
+        raise AssertionError("an arithmetic was asked for what it does not have")
+    return value

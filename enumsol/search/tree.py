@@ -1,0 +1,332 @@
+"""The tree search: partial assignments, pruned by the energy-bounded relaxation (theory, section 5).
+
+Every node of the tree is a partial assignment of statuses. Its relaxation is solved, warm-started from its parent; it
+is pruned when the judge accepts the multipliers as a proof that it holds no solution, branched on otherwise, and handed
+to the judge as a complete selection when every contact node is decided. The leaves cover all selections by
+construction: an engine that fails is replaced by the fallback, and where that fails too the node is branched on.
+
+Presolve comes first: contact nodes that one dual step proves open or in contact are branched on before all others, so
+that everything below knows them.
+"""
+
+from __future__ import annotations
+
+import time
+import warnings
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from enumsol.relaxation.interior_point import InteriorPointEngine
+from enumsol.relaxation.rows import CONTACT, UNDECIDED, ActiveSetEngine, Engine, Relaxation, status_rows
+from enumsol.selections.solution import Codes, SelectionSolution
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from enumsol.condensation.condensed import ScaledSystem
+
+#: Progress is reported and limits on time are looked at after this many nodes.
+_REPORT_EVERY = 64
+_NO_COMPILED_ENGINE = (
+    "the compiled active-set solver is not available in this installation; the much slower interior-point solver is "
+    "used (install a C compiler and reinstall enumsol to get it)"
+)
+
+
+@dataclass(frozen=True)
+class SearchProgress:
+    """State of a running search, as handed to the ``progress`` callback.
+
+    Attributes
+    ----------
+    nodes : int
+        Partial assignments examined so far.
+    covered : float
+        Share of all selections accounted for, between 0 and 1.
+    solutions : int
+        Selections found so far that hold a root.
+    seconds : float
+        Wall time so far.
+    """
+
+    nodes: int
+    covered: float
+    solutions: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Open:
+    """A part of the selections that the search left undecided."""
+
+    codes: Codes
+    reason: str
+    hint: str
+
+
+class Judge(Protocol):
+    """Decides in one arithmetic what the tree may conclude."""
+
+    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+        """Whether the relaxation's multipliers prove that the partial assignment holds no solution."""
+
+    def selection(self, codes: Codes) -> SelectionSolution | Open | None:
+        """All roots in a complete selection, None when it holds none, or why that is open."""
+
+    def branching(self, node: int, children: Sequence[int]) -> None:
+        """Take note that a partial assignment is split at ``node`` (called in preorder, for the proof)."""
+
+    def skipped(self, codes: Codes, reason: str) -> None:
+        """Take note that a subtree was not examined because the search was stopped."""
+
+
+@dataclass
+class SearchLimits:
+    """When to stop early."""
+
+    enough: Callable[[list[SelectionSolution]], bool] | None = None
+    max_nodes: int | None = None
+    deadline: float | None = None
+
+    @staticmethod
+    def deadline_in(seconds: float | None) -> float | None:
+        """The clock's value after so many seconds from now."""
+        return None if seconds is None else time.perf_counter() + seconds
+
+    def remaining(self) -> float | None:
+        """Seconds until the deadline."""
+        return None if self.deadline is None else self.deadline - time.perf_counter()
+
+
+@dataclass
+class SearchOutcome:
+    """What a search found; filled while it runs, so that an interruption loses nothing."""
+
+    solutions: list[SelectionSolution] = field(default_factory=list)
+    undecided: list[Open] = field(default_factory=list)
+    stopped: str | None = None
+    nodes: int = 0
+    pruned: int = 0
+    selections: int = 0
+    qps: int = 0
+    fallback_qps: int = 0
+    presolved: int = 0
+
+
+@dataclass(slots=True)
+class Branch:
+    """A node of the tree that waits to be examined: its parent's relaxation and what it adds."""
+
+    parent: Relaxation | None
+    codes: Codes
+    changed: int  # the contact node decided last, or -1
+    last: bool  # the last of its siblings: may take over the parent's state
+    weight: float
+    #: Presolve: nodes with one child that is not excluded, to be branched on first; None once there were no more.
+    forced: tuple[int, ...] | None = None
+
+
+def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
+    """The relaxation engine of that name; by default the compiled one, or the fallback with a warning."""
+    if name == InteriorPointEngine.name:
+        return InteriorPointEngine(system)
+    try:
+        return ActiveSetEngine(system)
+    except ImportError:
+        if name is not None:
+            raise
+        warnings.warn(_NO_COMPILED_ENGINE, RuntimeWarning, stacklevel=2)
+        return InteriorPointEngine(system)
+
+
+class TreeSearch:
+    """Depth-first search over the statuses of the contact nodes.
+
+    Parameters
+    ----------
+    system : ScaledSystem
+    judge : Judge
+    engine : str, Engine or None
+        "active-set", "clarabel", an engine ready for use, or None for the best available.
+    allowed : per node the final codes to be examined; default all
+    limits : SearchLimits
+    progress : called with a SearchProgress now and then
+    """
+
+    def __init__(
+        self,
+        system: ScaledSystem,
+        judge: Judge,
+        *,
+        engine: str | Engine | None = None,
+        allowed: Sequence[frozenset[int]] | None = None,
+        limits: SearchLimits | None = None,
+        progress: Callable[[SearchProgress], object] | None = None,
+    ) -> None:
+        self.system = system
+        self.judge = judge
+        self.engine = make_engine(system, engine) if engine is None or isinstance(engine, str) else engine
+        self.limits = limits or SearchLimits()
+        self.progress = progress
+        self.outcome = SearchOutcome()
+        self._fallback: InteriorPointEngine | None = None
+        self._friction = [bool(f > 0) for f in system.F]
+        every = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS))
+        self._allowed = list(allowed) if allowed is not None else [every] * system.p
+        self._known_rows: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
+        self._covered = 0.0
+        self._start = time.perf_counter()
+
+    # -- the loop --------------------------------------------------------------------------------------------------
+
+    def first(self) -> Branch:
+        """The root of the tree: nothing decided."""
+        return Branch(None, (UNDECIDED,) * self.system.p, -1, last=False, weight=1.0, forced=())
+
+    def run(self, roots: Sequence[Codes] | None = None) -> SearchOutcome:
+        """Examine the subtrees of the given partial assignments (default: the whole tree)."""
+        stack = [self.first()]
+        if roots is not None:
+            stack = [Branch(None, codes, -1, last=False, weight=1.0 / len(roots)) for codes in reversed(roots)]
+        outcome = self.outcome
+        while stack:
+            if self.must_stop(len(stack)):
+                for branch in reversed(stack):
+                    self.judge.skipped(branch.codes, str(outcome.stopped))
+                    outcome.undecided.append(
+                        Open(branch.codes, "the search was stopped before it came here", "raise the limit")
+                    )
+                break
+            stack.extend(reversed(list(self.examine(stack.pop()))))
+        return outcome
+
+    def examine(self, branch: Branch) -> Iterator[Branch]:
+        """Settle one node of the tree, or give its children in the order in which they are to be examined."""
+        outcome = self.outcome
+        outcome.nodes += 1
+        relaxation = self._relax(branch)
+        codes = branch.codes
+        if relaxation is not None and relaxation.pruned and self.judge.excluded(codes, relaxation):
+            outcome.pruned += 1
+            self._covered += branch.weight
+            return
+        node, forced = self._choose(branch, relaxation)
+        if node < 0:
+            self._settle(codes)
+            self._covered += branch.weight
+            return
+        children = self._children(codes, node, relaxation)
+        outcome.presolved += forced is not None
+        self.judge.branching(node, children)
+        usable = relaxation if relaxation is not None and not relaxation.pruned else None
+        for k, code in enumerate(children):
+            child = (*codes[:node], code, *codes[node + 1 :])
+            last = k + 1 == len(children)
+            yield Branch(usable, child, node, last, branch.weight / len(children), forced)
+
+    def _settle(self, codes: Codes) -> None:
+        """Have the judge decide a complete selection."""
+        outcome = self.outcome
+        outcome.selections += 1
+        answer = self.judge.selection(codes)
+        if isinstance(answer, Open):
+            outcome.undecided.append(answer)
+        elif answer is not None:
+            outcome.solutions.append(answer)
+
+    def must_stop(self, waiting: int) -> bool:
+        """Look at the limits and report progress."""
+        outcome, limits = self.outcome, self.limits
+        if limits.max_nodes is not None and outcome.nodes >= limits.max_nodes:
+            outcome.stopped = f"stopped after max_nodes = {limits.max_nodes} nodes, {waiting} subtrees not examined"
+        elif limits.enough is not None and limits.enough(outcome.solutions):
+            outcome.stopped = f"stopped after enough roots, {waiting} subtrees not examined"
+        elif limits.deadline is not None and time.perf_counter() > limits.deadline:
+            outcome.stopped = f"stopped by the time limit, {waiting} subtrees not examined"
+        elif outcome.nodes % _REPORT_EVERY == 0:
+            self.report(self._covered)
+        return outcome.stopped is not None
+
+    def report(self, covered: float) -> None:
+        """Call the progress callback."""
+        if self.progress is not None:
+            outcome, seconds = self.outcome, time.perf_counter() - self._start
+            self.progress(SearchProgress(outcome.nodes, covered, len(outcome.solutions), seconds))
+
+    # -- relaxations -----------------------------------------------------------------------------------------------
+
+    def node_rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
+        """(kind, mode) of the rows that a contact node imposes in a status."""
+        return status_rows(code, friction=self._friction[node])
+
+    def _rows_of(self, node: int, code: int) -> tuple[list[int], list[int]]:
+        rows = self._known_rows.get((node, code))
+        if rows is None:
+            pairs = self.node_rows(node, code)
+            rows = [kind * self.system.p + node for kind, _ in pairs], [mode for _, mode in pairs]
+            self._known_rows[node, code] = rows
+        return rows
+
+    def _all_rows(self, codes: Codes) -> tuple[list[int], list[int]]:
+        parts = [self._rows_of(i, code) for i, code in enumerate(codes)]
+        return [row for rows, _ in parts for row in rows], [mode for _, modes in parts for mode in modes]
+
+    def _relax(self, branch: Branch) -> Relaxation | None:
+        """The solved relaxation; None when no engine has an answer."""
+        codes = branch.codes
+        self.outcome.qps += 1
+        if branch.parent is not None:
+            relaxation = branch.parent.child(*self._rows_of(branch.changed, codes[branch.changed]), last=branch.last)
+        else:
+            relaxation = self.engine.root(*self._all_rows(codes))
+        return self._fall_back(codes) if relaxation.stalled else relaxation
+
+    def _fall_back(self, codes: Codes) -> Relaxation | None:
+        """The relaxation by the slower engine; None when that gives no answer either."""
+        self.outcome.fallback_qps += 1
+        if self._fallback is None:
+            self._fallback = InteriorPointEngine(self.system)
+        relaxation = self._fallback.root(*self._all_rows(codes))
+        return None if relaxation.stalled else relaxation
+
+    # -- branching -------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def _choose(branch: Branch, relaxation: Relaxation | None) -> tuple[int, tuple[int, ...] | None]:
+        """The contact node to branch on, -1 when all are decided; and the forced ones that the children begin with."""
+        if relaxation is None or relaxation.pruned:
+            return next((i for i, code in enumerate(branch.codes) if code >= CONTACT), -1), branch.forced
+        if branch.forced is not None:
+            forced = branch.forced or relaxation.forced(branch.codes)
+            if forced:
+                return forced[0], forced[1:]
+        return relaxation.choose(branch.codes), None
+
+    def _children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
+        """Codes of the children, the one nearest to the minimiser first."""
+        allowed = self._allowed[node]
+        contact = [c for c in (STICK, SLIP_PLUS, SLIP_MINUS) if c in allowed]
+        p = self.system.p
+        if relaxation is not None:
+            force, w = relaxation.forces, relaxation.displacements
+        if codes[node] == UNDECIDED:
+            touching = FRICTIONLESS if not self._friction[node] else (contact[0] if len(contact) == 1 else CONTACT)
+            children = [OPEN] if OPEN in allowed else []
+            if (FRICTIONLESS in allowed) if touching == FRICTIONLESS else contact:
+                children.append(touching)
+            if relaxation is not None and force[node] > -w[node]:
+                children.reverse()
+            return children
+        if relaxation is not None:
+            w_t = w[p + node]
+            slack = self.system.F[node] * force[node] - abs(force[p + node])
+            order = {
+                STICK: 0.0 if slack > abs(w_t) else 2.0,
+                SLIP_PLUS: 1.0 - np.sign(w_t),
+                SLIP_MINUS: 1.0 + np.sign(w_t),
+            }
+            contact.sort(key=lambda c: order[c])
+        return contact
