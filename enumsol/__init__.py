@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         local_branch_test,
         newton,
     )
+    from enumsol.equation import PiecewiseSmoothEquation
     from enumsol.errors import (
         EnumsolError,
         Interrupted,
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from enumsol.roots.enumerate import enumerate_roots
     from enumsol.roots.root_set import Enclosure, Polytope, Root, RootFamily, RootSet, SearchStats, Undecided
     from enumsol.search.tree import SearchProgress
-    from enumsol.statuses import ContactStatus, PiecewiseSmoothEquation, sign_array
+    from enumsol.statuses import ContactStatus, sign_array
 
 #: Where the public names are at home. A module is loaded when a name of it is first used, so that a program loads what
 #: it works with and no more: sparse matrices come with a problem, networkx and rational arithmetic with a branch graph.
@@ -66,7 +67,8 @@ _HOMES = {
     "enumsol.io": ("read_problem", "write_problem"),
     "enumsol.problem": ("ContactProblem",),
     "enumsol.roots.root_set": ("Enclosure", "Polytope", "Root", "RootFamily", "RootSet", "SearchStats", "Undecided"),
-    "enumsol.statuses": ("ContactStatus", "PiecewiseSmoothEquation", "sign_array"),
+    "enumsol.equation": ("PiecewiseSmoothEquation",),
+    "enumsol.statuses": ("ContactStatus", "sign_array"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 #: Modules that are reached as attributes without an import of their own.

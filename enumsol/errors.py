@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from enumsol.roots.root_set import RootSet
+from typing import Any
 
 
 class EnumsolError(Exception):
@@ -33,10 +30,10 @@ class Interrupted(EnumsolError, KeyboardInterrupt):  # noqa: N818 (the name is p
 
     Attributes
     ----------
-    partial : RootSet
-        The roots found before the interruption, with ``complete`` False.
+    partial : RootSet, BranchGraph, Path or DataFrame
+        What the interrupted call would have returned, as far as it came; ``complete`` is False where there is one.
     """
 
-    def __init__(self, message: str, partial: RootSet | Any) -> None:
+    def __init__(self, message: str, partial: Any) -> None:
         super().__init__(message)
         self.partial = partial

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,20 +10,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.checks import Alpha, finite_alpha
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.condensation.condensed import CondensedProblem, Factorization
+    from enumsol.condensation.condensed import CondensedProblem
     from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.condensation.factorization import Factorization
 
 #: An asymmetry of A up to this fraction of max|A| is rounding of the user's assembly and is averaged away.
 ASYMMETRY_TOLERANCE = 1e-12
 #: Singular values of the row-normalised [Bn; Bt] below this fraction of the largest mean dependent rows.
 ROW_RANK_TOLERANCE = 1e-12
-
-Alpha = float | Fraction
 
 
 class ContactProblem:
@@ -123,7 +122,7 @@ class ContactProblem:
     @cached_property
     def factorization(self) -> Factorization:
         """One sparse factorization of A, shared by everything that solves with it."""
-        from enumsol.condensation.condensed import Factorization  # condensed imports this module's types
+        from enumsol.condensation.factorization import Factorization  # condensed imports this module's types
 
         return Factorization(self.A)
 
@@ -228,23 +227,6 @@ class ContactProblem:
             f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"
             f"  gap                 {_span(self.gap)}"
         )
-
-
-def finite_alpha(alpha: Alpha) -> float:
-    """Value of alpha as a float.
-
-    Raises
-    ------
-    InvalidArgumentError
-        alpha is not a finite real number.
-    """
-    try:
-        value = float(alpha)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidArgumentError(f"alpha is {alpha!r}; expected a finite real number") from None
-    if not math.isfinite(value):
-        raise InvalidArgumentError(f"alpha is {value}; expected a finite real number")
-    return value
 
 
 def _span(values: NDArray[np.float64]) -> str:

@@ -24,7 +24,7 @@ from enumsol import (
     verify,
 )
 from enumsol.continuation import NotConverged
-from enumsol.statuses import PiecewiseSmoothEquation
+from enumsol.equation import PiecewiseSmoothEquation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

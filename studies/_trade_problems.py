@@ -20,8 +20,8 @@ from _random_paths import integer_path, random_path
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery
 from enumsol.arithmetic.algebraic import merge
+from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.condensed import CondensedProblem
-from enumsol.selections.rationals import rational
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -35,16 +35,9 @@ from _output import RESULTS, report
 import enumsol
 from enumsol import gallery
 from enumsol.relaxation import rows as relaxations
-from enumsol.relaxation.rows import (
-    BRANCHING_CANDIDATES,
-    CONTACT,
-    PRUNE_MARGIN,
-    UNDECIDED,
-    ActiveSetEngine,
-    status_rows,
-)
+from enumsol.relaxation.rows import BRANCHING_CANDIDATES, PRUNE_MARGIN, ActiveSetEngine, status_rows
 from enumsol.search import tree
-from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 MAX_NODES = 30_000
 #: Searches shorter than this are repeated.

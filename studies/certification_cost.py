@@ -18,7 +18,7 @@ from _output import report
 
 import enumsol
 from enumsol import gallery
-from enumsol.selections.rationals import EXACT_DOF_LIMIT
+from enumsol.condensation.exact import EXACT_DOF_LIMIT
 
 EXACT_SECONDS = 60.0
 #: Searches shorter than this are repeated.

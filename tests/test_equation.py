@@ -12,7 +12,8 @@ from enumsol import (
     gallery,
     sign_array,
 )
-from enumsol.statuses import STATUSES, selection_systems
+from enumsol.selections.floats import selection_systems
+from enumsol.statuses import STATUSES
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS = STATUSES
 NAMES = {OPEN: (-1, -1, -1), STICK: (1, -1, 1), SLIP_PLUS: (1, 1, 1), SLIP_MINUS: (1, -1, -1)}

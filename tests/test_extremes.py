@@ -20,12 +20,13 @@ from enumsol import (
     newton,
     verify,
 )
+from enumsol.arithmetic import balls
 from enumsol.condensation import enclosure
+from enumsol.condensation import exact as rational_condensation
 from enumsol.continuation import NotConverged, start_tangents
+from enumsol.equation import PiecewiseSmoothEquation
 from enumsol.kernel.point import exclusion_margin
 from enumsol.search.solvers import Workbench
-from enumsol.selections import rationals as exact_selections
-from enumsol.statuses import PiecewiseSmoothEquation
 
 
 def check(problem, alpha, *, exact=True, roots=None):
@@ -186,7 +187,7 @@ def test_loads_of_all_sizes():
 
 def test_nothing_can_be_proven_about_a_body_on_the_verge(monkeypatch):
     # S definite only within rounding and too large for rationals: one undecided entry, and not 4^p of them
-    monkeypatch.setattr(exact_selections, "EXACT_DOF_LIMIT", 0)
+    monkeypatch.setattr(rational_condensation, "EXACT_DOF_LIMIT", 0)
     monkeypatch.setattr(enclosure, "dense_eigenvalue_bound", lambda S: 0.0)
     problem = gallery.clamped_block(16, 8)
     found = enumerate_roots(problem, 1.0)
@@ -291,7 +292,7 @@ def test_the_checker_finds_better_bounds_than_the_search():
 def test_large_bodies_are_certified_as_given():
     # ||L|| ||U|| in the Frobenius norm grows with n; sums of rows and columns of |L| |U| do not
     problem = gallery.clamped_block(60, 60, contact=4)
-    assert enclosure._factor_error(problem.A) < 1e-11
+    assert balls._factor_error(problem.A) < 1e-11
     found = enumerate_roots(problem, 1.0)
     assert found.complete
     assert found.certified_data == "problem"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import enumsol
-from enumsol.condensation.condensed import Factorization
+from enumsol.condensation.factorization import Factorization
 
 #: Libraries that only some problems, results or commands need.
 RARE = {"flint", "networkx", "pandas", "matplotlib", "cvxpy", "skfem", "typer", "rich", "scipy.optimize", "h5py"}

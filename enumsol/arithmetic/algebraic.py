@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq, fmpq_poly, fmpz_poly
 
+from enumsol.arithmetic.rationals import to_fraction
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -20,11 +22,6 @@ if TYPE_CHECKING:
 _NARROW = fmpq(1, 2**64)
 #: Steps of bisection between two attempts to tell numbers apart.
 _STEPS = 16
-
-
-def to_fraction(value: Any) -> Fraction:
-    """An fmpq as a Fraction."""
-    return Fraction(int(value.p), int(value.q))
 
 
 def sign(value: Any) -> int:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq, fmpq_poly
 
-from enumsol.arithmetic.algebraic import integer_polynomial, to_fraction
+from enumsol.arithmetic.algebraic import integer_polynomial
+from enumsol.arithmetic.rationals import to_fraction
 
 if TYPE_CHECKING:
     from enumsol.arithmetic.algebraic import CriticalAlpha

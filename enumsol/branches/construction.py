@@ -6,23 +6,23 @@ import time
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Literal
 
-from enumsol.arithmetic.algebraic import to_fraction
+from enumsol.arithmetic.rationals import rational, to_fraction
 from enumsol.branches.gluing import Gluing
 from enumsol.branches.graph import BranchGraph, GraphStats
 from enumsol.branches.make_elements import make_arcs, make_vertices
 from enumsol.branches.proof_records import write_graph_proof
+from enumsol.checks import finite_alpha
+from enumsol.condensation.exact import FAST_EXACT_DOF, ExactPath
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.problem import ContactProblem
 from enumsol.search.certifiers.interval_balls import BallLeafJudge
 from enumsol.search.certifiers.interval_rationals import ExactLeafJudge
 from enumsol.search.interval import BelievingJudge, IntervalSearch
-from enumsol.selections.functions import FAST_EXACT_DOF, ExactPath
-from enumsol.selections.rationals import rational
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from enumsol.problem import Alpha
+    from enumsol.checks import Alpha
     from enumsol.search.interval import LeafJudge
 
 Arithmetic = Literal["fast", "verified", "exact"]
@@ -79,8 +79,8 @@ def branch_graph(
     """
     a, b = _check(problem, interval, arithmetic, max_nodes, time_limit)
     started = time.perf_counter()
-    exact = arithmetic == "exact"
-    path = ExactPath.from_problem(problem, exact=exact or problem.n <= FAST_EXACT_DOF)
+    exactly = arithmetic == "exact" or problem.n <= FAST_EXACT_DOF
+    path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem.condensed)
     deadline = None if time_limit is None else started + time_limit
     origin = None if path.origin is None else to_fraction(path.origin)
     judge = _judge(problem, path, arithmetic)

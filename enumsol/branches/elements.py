@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.arithmetic.rationals import rational
+from enumsol.checks import Alpha, finite_alpha
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import Alpha, finite_alpha
 from enumsol.selections.functions import SelectionFunctions
-from enumsol.selections.rationals import rational
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.arithmetic.algebraic import CriticalAlpha
+    from enumsol.condensation.exact import ExactPath
     from enumsol.roots.root_set import RootFamily
-    from enumsol.selections.functions import ExactPath
     from enumsol.selections.solution import Codes
     from enumsol.statuses import ContactStatus
 

@@ -23,8 +23,8 @@ from enumsol.selections.solution import SelectionSolution, VertexLimitError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+    from enumsol.condensation.exact import ExactPath
     from enumsol.roots.components import Component
-    from enumsol.selections.functions import ExactPath
     from enumsol.selections.solution import ActiveSets, Codes
 
 Place = tuple["Codes", int]

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.algebraic import CriticalAlpha
+from enumsol.arithmetic.rationals import rational
 from enumsol.branches.make_elements import make_branches, make_components, multigraph
 from enumsol.branches.roots_at import roots_of
+from enumsol.checks import finite_alpha
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import finite_alpha
-from enumsol.selections.rationals import rational
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,11 +24,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from enumsol.branches.elements import Arc, Branch, Component, Vertex
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.checks import Alpha
+    from enumsol.condensation.exact import ExactPath
+    from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.root_set import Root, RootFamily, RootSet
     from enumsol.search.interval import SearchedPiece
-    from enumsol.selections.functions import ExactPath
 
 
 @dataclass(frozen=True)

@@ -8,26 +8,19 @@ import networkx as nx
 import numpy as np
 from flint import fmpq
 
-from enumsol.arithmetic.algebraic import to_fraction
+from enumsol.arithmetic.rationals import to_fraction
 from enumsol.branches.elements import CUTS, Arc, Branch, Component, Vertex
 from enumsol.roots.root_set import Polytope, RootFamily
 from enumsol.selections.ordered_field import FiberSelections, as_float
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus, contact_status
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.branches.gluing import GluedArc, GluedVertex, Gluing
-    from enumsol.selections.functions import ExactPath
+    from enumsol.condensation.exact import ExactPath
 
 _IN_CONTACT = frozenset((ContactStatus.STICK, ContactStatus.SLIP_PLUS, ContactStatus.SLIP_MINUS))
-
-
-def contact_status(code: int, u_t: float) -> ContactStatus:
-    """The status of a code; the sign of u_t names the slip of a node without friction."""
-    if code == FRICTIONLESS:
-        return STATUSES[STICK if u_t == 0 else SLIP_PLUS if u_t > 0 else SLIP_MINUS]
-    return STATUSES[code]
 
 
 def make_arcs(gluing: Gluing) -> list[Arc]:

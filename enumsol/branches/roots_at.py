@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from enumsol.arithmetic.rationals import rational
 from enumsol.roots.builder import RootBuilder
 from enumsol.roots.components import connected_components
 from enumsol.roots.local_degree import perturbed_degree
 from enumsol.roots.root_set import RootSet, SearchStats
 from enumsol.selections.floats import FloatSelections
-from enumsol.selections.rationals import ExactSelections, ExactSystem, rational
+from enumsol.selections.rationals import ExactSelections
 from enumsol.statuses import FRICTIONLESS, OPEN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.branches.graph import BranchGraph
-    from enumsol.problem import Alpha
+    from enumsol.checks import Alpha
     from enumsol.selections.solution import Codes, SelectionSolution
 
 
@@ -31,7 +32,7 @@ def roots_of(graph: BranchGraph, alpha: Alpha, selections: Sequence[Codes]) -> R
         solutions = [solver.solve(codes) for codes in _codes_at(selections, floats.F_positive)]
         exact = any(solution is None for solution in solutions)
     if exact:
-        solver = ExactSelections(ExactSystem(graph.path.S, *graph.path.at(rational(alpha))))
+        solver = ExactSelections(graph.path.system(rational(alpha)))
         solutions = [solver.solve(codes) for codes in _codes_at(selections, solver.F_positive)]
     components = connected_components(
         [solution for solution in solutions if solution is not None],

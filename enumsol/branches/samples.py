@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import networkx as nx
 
+from enumsol.checks import finite_alpha
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.problem import ContactProblem
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.statuses import ContactStatus
 
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from enumsol.branches.graph import BranchGraph
+    from enumsol.checks import Alpha
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.problem import Alpha
     from enumsol.roots.root_set import Root, RootSet
 
 

@@ -17,7 +17,7 @@ from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.selections.functions import ExactPath
+    from enumsol.condensation.exact import ExactPath
     from enumsol.selections.solution import ActiveSets, Codes
 
 

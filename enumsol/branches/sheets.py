@@ -16,7 +16,7 @@ from enumsol.selections.ordered_field import FiberSelections, row_reduce
 from enumsol.selections.solution import MAX_BASES, VertexLimitError
 
 if TYPE_CHECKING:
-    from enumsol.selections.functions import ExactPath
+    from enumsol.condensation.exact import ExactPath
     from enumsol.selections.solution import Codes
 
 #: Bases whose vertex functions are followed over alpha; a sheet that needs more is refused.

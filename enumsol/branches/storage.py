@@ -16,10 +16,10 @@ from flint import fmpq, fmpz, fmpz_poly
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.branches.elements import Arc, Vertex
 from enumsol.branches.graph import BranchGraph, GraphStats
+from enumsol.condensation.exact import ExactPath
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.roots.root_set import Polytope, RootFamily
-from enumsol.selections.functions import ExactPath
 from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
@@ -69,7 +69,8 @@ def load_graph(file: str | Path) -> BranchGraph:
 
 def _from_record(record: dict[str, Any]) -> BranchGraph:
     problem = _problem(record["problem"])
-    path = ExactPath.from_problem(problem, exact=record["condensed_exactly"])
+    exactly = record["condensed_exactly"]
+    path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem.condensed)
     first, last = (Fraction(end) for end in record["interval"])
     vertices = [_vertex(k, item) for k, item in enumerate(record["vertices"])]
     arcs = [_arc(k, item, vertices, path) for k, item in enumerate(record["arcs"])]

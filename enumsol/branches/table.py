@@ -7,8 +7,9 @@ from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from enumsol.checks import finite_alpha
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.problem import ContactProblem
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.statuses import STATUSES, ContactStatus
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from enumsol.problem import Alpha
+    from enumsol.checks import Alpha
     from enumsol.roots.root_set import RootSet
 
 #: Tasks handed to an executor ahead of the one that is awaited; keeps an interruption from waiting for all of them.

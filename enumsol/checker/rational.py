@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq, fmpq_mat
 
+from enumsol.arithmetic.rationals import is_positive_definite
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.kernel.rows import (
     FORBIDDEN,
@@ -143,19 +144,6 @@ class RationalSystem:
             self._inverse = self.S.inv()
         column = fmpq_mat([[x] for x in v])
         return bool(4 * total > (column.transpose() * (self._inverse * column))[0, 0])
-
-
-def is_positive_definite(matrix: Any) -> bool:
-    """Whether all pivots of a symmetric rational matrix, eliminated in order, are positive."""
-    rows = matrix.tolist()
-    for k, row in enumerate(rows):
-        if not row[k] > 0:
-            return False
-        for other in rows[k + 1 :]:
-            factor = other[k] / row[k]
-            if factor != 0:
-                other[k:] = [x - factor * y for x, y in zip(other[k:], row[k:], strict=True)]
-    return True
 
 
 def _holds(code: int, n: Any, t: Any, w_n: Any, w_t: Any, F: Any) -> bool:

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.verify import Checker, verify
-from enumsol.condensation.enclosure import SAFE, EnclosedSystem, NotEnclosedError
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.kernel.point import exclusion_margins, solve_selection
 
 if TYPE_CHECKING:

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.graph import GraphChecker, GraphVerificationReport
-from enumsol.condensation.enclosure import SAFE, CondensedEnclosure, EnclosedSystem, NotEnclosedError
+from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
 from enumsol.kernel.rows import FRICTIONLESS, UNDECIDED, children_of, row_signs

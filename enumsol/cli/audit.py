@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from enumsol.branches import BranchGraph
+    from enumsol.checks import Alpha
     from enumsol.continuation import AuditReport
-    from enumsol.problem import Alpha
 
 
 def audit(

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from concurrent.futures import Executor
 
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.checks import Alpha
+    from enumsol.problem import ContactProblem
 
 _GALLERY = "gallery:"
 
@@ -91,7 +92,7 @@ def parse_alpha(text: str) -> Alpha:
     InvalidArgumentError
         It is neither, or not finite.
     """
-    from enumsol.problem import finite_alpha  # as above
+    from enumsol.checks import finite_alpha  # as above
 
     try:
         value = Fraction(text) if "/" in text else float(text)

@@ -34,8 +34,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from enumsol.branches import BranchGraph
+    from enumsol.checks import Alpha
     from enumsol.continuation import ContinuationOptions, Path
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.problem import ContactProblem
     from enumsol.roots.root_set import Root
 
 _STEPS = "Steps"

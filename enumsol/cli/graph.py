@@ -28,7 +28,8 @@ from enumsol.errors import Interrupted, InvalidArgumentError
 
 if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.checks import Alpha
+    from enumsol.problem import ContactProblem
 
 
 def graph(

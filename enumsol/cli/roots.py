@@ -23,7 +23,8 @@ from enumsol.cli.progress import SearchDisplay
 from enumsol.errors import Interrupted, InvalidArgumentError
 
 if TYPE_CHECKING:
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.checks import Alpha
+    from enumsol.problem import ContactProblem
     from enumsol.roots.root_set import RootSet
 
 Method = Literal["tree", "exhaustive"]

@@ -26,7 +26,8 @@ from enumsol.errors import Interrupted, InvalidArgumentError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.checks import Alpha
+    from enumsol.problem import ContactProblem
 
 #: Names of the columns on the terminal.
 _NAMES = {

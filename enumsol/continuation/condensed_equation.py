@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, contact_status
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,11 +83,8 @@ class CondensedEquation:
         self.problem: ContactProblem = path.problem
         self.p = p = self.problem.p
         self.alpha_scale = alpha_scale
-        S = self.problem.condensed.S
-        diagonal = np.diagonal(S)
-        node = (diagonal[:p] * diagonal[p:]) ** 0.25
-        sigma = np.concatenate([node, node])
-        self.S = S / sigma[:, None] / sigma[None, :]
+        condensed = self.problem.condensed
+        sigma, self.S = condensed.node_scale, condensed.balanced
         self.frictionless = path.frictionless
         load = self._load_energy(interval, start, sigma)
         self.force, self.length = load / sigma, load * sigma
@@ -322,11 +319,7 @@ class CondensedEquation:
 
     def statuses(self, codes: Sequence[int], slip: Vector) -> tuple[ContactStatus, ...]:
         """Names of the statuses; a frictionless node in contact is named by the sign of its u_t."""
-        named = [
-            code if code != FRICTIONLESS else SLIP_PLUS if u > 0 else SLIP_MINUS if u < 0 else STICK
-            for code, u in zip(codes, slip, strict=True)
-        ]
-        return tuple(STATUSES[code] for code in named)
+        return tuple(contact_status(code, float(u)) for code, u in zip(codes, slip, strict=True))
 
 
 def _pieces(rows: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Vector, Vector]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.checks import finite_alpha
 from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follower import Follower
@@ -17,7 +18,7 @@ from enumsol.continuation.path import Path
 from enumsol.continuation.tangents import Tangent, admissible_tangents, curve_tangent
 from enumsol.continuation.transitions import ACTIVE_TOLERANCE, CurvePoint
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from enumsol.continuation.condensed_equation import Vector

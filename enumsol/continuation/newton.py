@@ -6,20 +6,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.checks import finite_alpha
 from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.errors import NewtonIteration, NotConverged
 from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.problem import ContactProblem
 from enumsol.roots.root_set import Root
 from enumsol.statuses import FRICTIONLESS, STATUSES, STICK
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from enumsol.checks import Alpha
     from enumsol.continuation.condensed_equation import Vector
     from enumsol.continuation.parameter_path import ParameterPath
-    from enumsol.problem import Alpha
 
 #: Norm of H, relative to the load, at which an iterate is a root: well above rounding for any conditioning seen.
 RESIDUAL_TOLERANCE = 1e-10

@@ -115,7 +115,9 @@ class Recorder:
         return self.equation.w(point.x + step * point.tangent)[self.equation.p :]
 
     def _local_test(self, x: Vector) -> LocalBranchTest | None:
+        equation = self.equation
+        F, slip = equation.at(x).F, equation.w(x)[equation.p :]
         try:
-            return coherent_orientation(self.equation, x)
+            return coherent_orientation(equation.S, F, equation.active(x), slip, equation.alpha(x))
         except TooLargeError:
             return None

@@ -11,6 +11,7 @@ import numpy as np
 
 from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.errors import TooLargeError
+from enumsol.roots.local_branch import MAX_SELECTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
     from enumsol.statuses import ContactStatus
 
-#: Selections examined at one point (Remark 5.1); six nodes in a corner of three statuses have 729.
-MAX_SELECTIONS = 4096
 #: A singular value of a selection's balanced gradient below this fraction of the largest counts as zero.
 RANK_TOLERANCE = 1e-10
 #: Sweeps that balance rows and columns of a gradient: each takes the root of what is left of their sizes.

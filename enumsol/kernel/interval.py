@@ -16,14 +16,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.enclosure import SAFE, CondensedEnclosure, gamma
+from enumsol.arithmetic.balls import SAFE, gamma
+from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.kernel.point import energy_bounds
 from enumsol.kernel.rows import FORBIDDEN, NONNEGATIVE, UNDECIDED, row_table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.condensation.enclosure import Array, EnclosedSystem
+    from enumsol.arithmetic.balls import Array
+    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.problem import ContactProblem
 
 KINDS = 9

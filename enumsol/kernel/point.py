@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dtrtri
 
-from enumsol.condensation.enclosure import ROOT_TINY, SAFE, TINY, UNIT, gamma, upper_norm, upper_sum
+from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma, upper_norm, upper_sum
 from enumsol.kernel.rows import (
     FORBIDDEN,
     FRICTIONLESS,
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.condensation.enclosure import Array, EnclosedSystem
+    from enumsol.arithmetic.balls import Array
+    from enumsol.condensation.enclosure import EnclosedSystem
 
 #: Entries of |I - R M| must sum to less than this in every row for a selection to count as regular.
 _CONTRACTION = 0.5

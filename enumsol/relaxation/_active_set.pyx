@@ -16,7 +16,8 @@ from libc.string cimport memcpy, memset
 
 import numpy as np
 
-from enumsol.relaxation.rows import CONTACT, FEASIBILITY_TOLERANCE, UNDECIDED
+from enumsol.statuses import CONTACT, UNDECIDED
+from enumsol.relaxation.rows import FEASIBILITY_TOLERANCE
 
 OPTIMAL = 0
 BOUND_EXCEEDED = 1

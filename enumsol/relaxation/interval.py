@@ -22,17 +22,15 @@ from enumsol.condensation.condensed import CondensedSystem, ScaledSystem
 from enumsol.errors import InvalidProblemError, MissingDependencyError
 from enumsol.relaxation.rows import (
     BRANCHING_CANDIDATES,
-    CONTACT,
     EQUALITY,
     FEASIBILITY_TOLERANCE,
     INEQUALITY,
     PRUNE_MARGIN,
-    UNDECIDED,
     RowKind,
     row_terms,
     status_rows,
 )
-from enumsol.statuses import FRICTIONLESS, SLIP_MINUS, SLIP_PLUS
+from enumsol.statuses import CONTACT, FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, UNDECIDED
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from enumsol.relaxation._active_set import QPState
     from enumsol.selections.solution import Codes
 
-#: Codes of nodes whose status is not final yet; final codes are those of enumsol.statuses.
-CONTACT, UNDECIDED = 5, 6
 #: Largest violation of a row (rows of unit length in the norm of S^{-1}) that the QP takes for none.
 FEASIBILITY_TOLERANCE = 1e-11
 #: A leaf is pruned when its energy bound exceeds this; g' S^{-1} g lies in [1, 4), so it is relative to the data.

@@ -6,18 +6,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.relaxation.rows import CONTACT, UNDECIDED
 from enumsol.roots.linearisation import SelectionTangent
 from enumsol.roots.root_set import Enclosure, Polytope, Root, RootFamily, Undecided
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
+from enumsol.statuses import (
+    CONTACT,
+    FRICTIONLESS,
+    OPEN,
+    SLIP_MINUS,
+    SLIP_PLUS,
+    STATUSES,
+    STICK,
+    UNDECIDED,
+    ContactStatus,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    from enumsol.checks import Alpha
     from enumsol.kernel.point import VerifiedSelection
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.problem import ContactProblem
     from enumsol.roots.components import Component
     from enumsol.search.tree import Open
     from enumsol.selections.floats import FloatSelections

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from enumsol.checks import finite_alpha
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.problem import ContactProblem, finite_alpha
+from enumsol.problem import ContactProblem
 from enumsol.proof.proof_file import Proof, ProofWriter
 from enumsol.roots.builder import RootBuilder
 from enumsol.roots.components import Component, connected_components
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from pathlib import Path
 
-    from enumsol.problem import Alpha
+    from enumsol.checks import Alpha
     from enumsol.selections.solution import ActiveSets, SelectionSolver
 
 Method = Literal["tree", "exhaustive"]

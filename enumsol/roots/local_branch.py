@@ -3,30 +3,48 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import islice, product
+from itertools import product
 from math import prod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from enumsol.continuation.condensed_equation import CondensedEquation
-from enumsol.continuation.parameter_path import AffinePath
-from enumsol.continuation.tangents import MAX_SELECTIONS
 from enumsol.errors import InvalidArgumentError, TooLargeError
-from enumsol.roots.root_set import Root
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, STICK
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, STATUSES, STICK, contact_status
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence, Set
+
     from numpy.typing import NDArray
 
-    from enumsol.continuation.condensed_equation import Codes, Vector
+    from enumsol.checks import Alpha
+    from enumsol.condensation.condensed import CondensedProblem
     from enumsol.problem import ContactProblem
+    from enumsol.selections.solution import Codes
     from enumsol.statuses import ContactStatus
 
+#: Selections examined at one point (Remark 5.1); six nodes in a corner of three statuses have 729.
+MAX_SELECTIONS = 4096
 #: A singular value of the normal map's scaled matrix below this counts as zero, as in arithmetic "fast".
 SINGULAR_TOLERANCE = 1e-12
 #: The same at transition points of a path, whose alpha is located to about 1e-10.
 LOCATED_SINGULAR_TOLERANCE = 1e-8
+
+
+class SolutionPoint(Protocol):
+    """What the test asks of a root: its alpha, the statuses that hold at every node, and u_t."""
+
+    @property
+    def alpha(self) -> Alpha:
+        """The parameter."""
+
+    @property
+    def active(self) -> Sequence[Set[ContactStatus]]:
+        """All statuses that hold, node by node."""
+
+    @property
+    def u_t(self) -> NDArray[np.float64]:
+        """Tangential displacements, shape (p,)."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +89,7 @@ class LocalBranchTest:
         return f"{answer} in the load ({detail}){premise}"
 
 
-def local_branch_test(problem: ContactProblem, root: Root) -> LocalBranchTest:
+def local_branch_test(problem: ContactProblem, root: SolutionPoint) -> LocalBranchTest:
     """Whether a local Lipschitz branch of solutions passes through a root (Section 4, Theorem 4.1).
 
     The test looks at the normal map G(z) = w + S lambda, which does not depend on the parameter r of H, over the
@@ -81,6 +99,7 @@ def local_branch_test(problem: ContactProblem, root: Root) -> LocalBranchTest:
     ----------
     problem : ContactProblem
     root : Root
+        Or a vertex of a branch graph.
 
     Returns
     -------
@@ -93,40 +112,53 @@ def local_branch_test(problem: ContactProblem, root: Root) -> LocalBranchTest:
     TooLargeError
         More than MAX_SELECTIONS selections hold at the root.
     """
-    if not isinstance(root, Root) or len(root.statuses) != problem.p:
+    if len(getattr(root, "active", ())) != problem.p:
         raise InvalidArgumentError(f"root is {type(root).__name__}; expected a Root with {problem.p} contact nodes")
+    return branch_test(problem.condensed, root)
+
+
+def branch_test(condensed: CondensedProblem, root: SolutionPoint) -> LocalBranchTest:
+    """The test at a root of the condensed problem; see local_branch_test."""
     alpha = float(root.alpha)
-    equation = CondensedEquation(AffinePath(problem), start=alpha)
-    x = equation.point(alpha, np.concatenate([root.lambda_n, root.lambda_t]))
-    names = {"open": 0, "stick": 1, "slip+": 2, "slip-": 3}
+    frictionless = (condensed.F0 == 0) & (condensed.F1 == 0)
     active = []
-    for i, holds in enumerate(root.active):
-        codes = {names[status.value] for status in holds}
-        if equation.frictionless[i]:
-            codes = {OPEN if code == OPEN else FRICTIONLESS for code in codes}
-        active.append(frozenset(codes))
-    return coherent_orientation(equation, x, tuple(active), SINGULAR_TOLERANCE)
+    for without, holds in zip(frictionless, root.active, strict=True):
+        codes = {STATUSES.index(status) for status in holds}
+        active.append(frozenset(OPEN if code == OPEN else FRICTIONLESS for code in codes) if without else codes)
+    F = condensed.F0 + alpha * condensed.F1
+    return coherent_orientation(condensed.balanced, F, active, root.u_t, alpha, SINGULAR_TOLERANCE)
 
 
 def coherent_orientation(
-    equation: CondensedEquation,
-    x: Vector,
-    active: tuple[frozenset[int], ...] | None = None,
+    S: NDArray[np.float64],
+    F: NDArray[np.float64],
+    active: Sequence[Set[int]],
+    slip: NDArray[np.float64],
+    alpha: float,
     singular: float = LOCATED_SINGULAR_TOLERANCE,
 ) -> LocalBranchTest:
-    """The test at a point x of the condensed equation; ``active`` as found by the equation when None."""
-    holds = equation.active(x) if active is None else active
-    count = prod(len(codes) for codes in holds)
+    """The test for the statuses that hold at a solution.
+
+    Parameters
+    ----------
+    S : (2p, 2p) balanced compliance
+    F : (p,) friction coefficients at alpha
+    active : per node the codes that hold
+    slip : (p,) u_t, whose sign names the slip of nodes without friction
+    alpha : for messages
+    singular : singular values below this count as zero
+    """
+    count = prod(len(codes) for codes in active)
     if count > MAX_SELECTIONS:
         raise TooLargeError(
-            f"{count} selections hold at alpha = {equation.alpha(x):g}; the local branch test examines at most "
-            f"{MAX_SELECTIONS}"
+            f"{count} selections hold at alpha = {alpha:g}; the local branch test examines at most {MAX_SELECTIONS}"
         )
-    F = equation.at(x).F
-    slip = equation.w(x)[equation.p :]
     signs = tuple(
-        (equation.statuses(codes, slip), normal_map_sign(equation.S, F, codes, singular))
-        for codes in islice(product(*(sorted(codes) for codes in holds)), MAX_SELECTIONS)
+        (
+            tuple(contact_status(code, float(u)) for code, u in zip(codes, slip, strict=True)),
+            normal_map_sign(S, F, codes, singular),
+        )
+        for codes in product(*(sorted(codes) for codes in active))
     )
     return LocalBranchTest.from_signs(signs, premise=bool(np.all(F > 0)))
 

@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from enumsol.roots.local_branch import branch_test
 from enumsol.statuses import ContactStatus, sign_array
 
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
+    from enumsol.checks import Alpha
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.continuation import LocalBranchTest
-    from enumsol.problem import Alpha
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.linearisation import SelectionTangent
+    from enumsol.roots.local_branch import LocalBranchTest
     from enumsol.search.certifiers.verified import Escalations
 
 _PRINTED_ROOTS = 20
@@ -113,9 +114,7 @@ class Root:
         TooLargeError
             Too many selections hold at the root to examine each of them.
         """
-        from enumsol.roots.local_branch import local_branch_test  # it imports this module
-
-        return local_branch_test(self._condensed.problem, self)
+        return branch_test(self._condensed, self)
 
     @property
     def signs(self) -> NDArray[np.int8]:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.errors import TooLargeError
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_PLUS, STICK, selection_systems
+from enumsol.selections.floats import selection_systems
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

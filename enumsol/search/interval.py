@@ -15,8 +15,8 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Protocol
 
 from enumsol.relaxation.interval import IntervalEngine, IntervalSystem, interval_rows
-from enumsol.relaxation.rows import UNDECIDED
 from enumsol.search.tree import SearchLimits, TreeSearch
+from enumsol.statuses import UNDECIDED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

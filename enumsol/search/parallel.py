@@ -13,8 +13,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from concurrent.futures import Executor, Future
 
+    from enumsol.checks import Alpha
     from enumsol.kernel.point import VerifiedSelection
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Recorder
     from enumsol.search.certifiers.verified import Escalations
     from enumsol.search.solvers import Arithmetic

@@ -15,7 +15,8 @@ from enumsol.search.certifiers.verified import VerifiedJudge
 from enumsol.selections.floats import FloatSelections
 
 if TYPE_CHECKING:
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.checks import Alpha
+    from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Recorder
     from enumsol.search.certifiers.rationals import ExactJudge
     from enumsol.search.tree import Judge
@@ -66,8 +67,9 @@ class Workbench:
         InvalidProblemError
             S is not positive definite, exactly: no bound on the energy would hold.
         """
-        from enumsol.checker.rational import is_positive_definite
-        from enumsol.selections.rationals import EXACT_DOF_LIMIT, ExactSelections, ExactSystem  # python-flint
+        from enumsol.arithmetic.rationals import is_positive_definite
+        from enumsol.condensation.exact import EXACT_DOF_LIMIT, ExactSystem  # python-flint
+        from enumsol.selections.rationals import ExactSelections  # python-flint
 
         if self.arithmetic != "exact" and self.problem.n > EXACT_DOF_LIMIT:
             return None
@@ -153,7 +155,7 @@ class Workbench:
 
 
 def _exact_limit() -> int:
-    from enumsol.selections.rationals import EXACT_DOF_LIMIT  # python-flint, not needed by fast arithmetic
+    from enumsol.condensation.exact import EXACT_DOF_LIMIT  # python-flint, not needed by fast arithmetic
 
     return EXACT_DOF_LIMIT
 

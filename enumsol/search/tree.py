@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from enumsol.relaxation.interior_point import InteriorPointEngine
-from enumsol.relaxation.rows import CONTACT, UNDECIDED, ActiveSetEngine, Engine, Relaxation, status_rows
+from enumsol.relaxation.rows import ActiveSetEngine, Engine, Relaxation, status_rows
 from enumsol.selections.solution import Codes, SelectionSolution
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -1,156 +1,18 @@
-"""The condensed problem for all alpha in rationals, and selections as rational functions of it (theory, 4 and 7)."""
+"""Forces and displacements of one selection as rational functions of alpha (theory, 4 and 7)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from math import lcm
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from flint import fmpq, fmpq_mat, fmpz_mat, fmpz_poly
 
 from enumsol.arithmetic.algebraic import integer_polynomial
-from enumsol.errors import TooLargeError
-from enumsol.selections.rationals import EXACT_DOF_LIMIT, rational
 from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
-    from enumsol.problem import ContactProblem
+    from enumsol.condensation.exact import ExactPath
     from enumsol.selections.solution import Codes
-
-#: Most degrees of freedom for which "fast" condenses without rounding; beyond, S and g as computed in floats are used.
-FAST_EXACT_DOF = 24
-
-
-@dataclass(frozen=True)
-class ExactPath:
-    """The condensed problem in rationals: w = g0 + alpha g1 - S lambda, F = F0 + alpha F1.
-
-    Attributes
-    ----------
-    S : fmpq_mat (2p, 2p)
-    g0, g1 : tuples of 2p fmpq
-    F0, F1 : tuples of p fmpq
-    condensed_exactly : bool
-        S and g follow from A, Bn, Bt, f without rounding; otherwise they are the floats computed in CondensedProblem.
-    """
-
-    S: Any
-    g0: tuple[Any, ...]
-    g1: tuple[Any, ...]
-    F0: tuple[Any, ...]
-    F1: tuple[Any, ...]
-    condensed_exactly: bool
-
-    @classmethod
-    def from_problem(cls, problem: ContactProblem, *, exact: bool) -> ExactPath:
-        """Condense in rationals (``exact``), or read the condensed floats as rationals.
-
-        Raises
-        ------
-        TooLargeError
-            Exact condensation of more than EXACT_DOF_LIMIT degrees of freedom.
-        """
-        F0, F1 = (tuple(rational(v) for v in part) for part in problem.friction)
-        if not exact:
-            c = problem.condensed
-            g0, g1 = (tuple(rational(v) for v in part) for part in (c.g0, c.g1))
-            return cls(_rational_matrix(c.S), g0, g1, F0, F1, condensed_exactly=False)
-        if problem.n > EXACT_DOF_LIMIT:
-            raise TooLargeError(
-                f'arithmetic="exact" condenses at most n = {EXACT_DOF_LIMIT} degrees of freedom in rationals and the '
-                f"problem has n = {problem.n}; use another arithmetic, or condense the body to its contact nodes first"
-            )
-        p = problem.p
-        B = _rational_matrix(np.vstack([problem.Bn.toarray(), problem.Bt.toarray()]))
-        slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
-        loads = _rational_matrix(np.column_stack([problem.f, slope]))
-        rhs = [[*row, *load] for row, load in zip(B.transpose().tolist(), loads.tolist(), strict=True)]
-        table = (B * _rational_matrix(problem.A.toarray()).solve(fmpq_mat(rhs))).tolist()
-        offset = [rational(v) for v in (*problem.gap, *problem.slip_offset)]
-        g0 = tuple(row[2 * p] - o for row, o in zip(table, offset, strict=True))
-        g1 = tuple(row[2 * p + 1] for row in table)
-        return cls(fmpq_mat([row[: 2 * p] for row in table]), g0, g1, F0, F1, condensed_exactly=True)
-
-    @property
-    def p(self) -> int:
-        """Number of contact nodes."""
-        return len(self.F0)
-
-    @cached_property
-    def loaded(self) -> bool:
-        """Whether g depends on alpha."""
-        return any(v != 0 for v in self.g1)
-
-    @cached_property
-    def unloaded(self) -> bool:
-        """Whether g = 0 for every alpha."""
-        return not self.loaded and all(v == 0 for v in self.g0)
-
-    @cached_property
-    def frictionless(self) -> tuple[bool, ...]:
-        """Nodes with F = 0 for every alpha."""
-        return tuple(a == 0 and b == 0 for a, b in zip(self.F0, self.F1, strict=True))
-
-    @cached_property
-    def origin(self) -> Any:
-        """The alpha at which g(alpha) = 0, where lambda = 0 is the only solution and every selection holds; or None."""
-        at = None
-        for a, b in zip(self.g0, self.g1, strict=True):
-            if b == 0:
-                if a != 0:
-                    return None
-            elif at is None:
-                at = -a / b
-            elif at != -a / b:
-                return None
-        return at
-
-    @cached_property
-    def integers(self) -> _Integers:
-        """The same data as integers over common denominators."""
-        S = self.S.tolist()
-        dS = lcm(*(int(v.q) for row in S for v in row))
-        dg = lcm(*(int(v.q) for v in (*self.g0, *self.g1)))
-        dF = lcm(*(int(v.q) for v in (*self.F0, *self.F1)))
-        return _Integers(
-            [[_times(v, dS) for v in row] for row in S],
-            [_times(v, dg) for v in self.g0],
-            [_times(v, dg) for v in self.g1],
-            [_times(v, dF) for v in self.F0],
-            [_times(v, dF) for v in self.F1],
-            dF,
-            fmpq(dS, dg),
-        )
-
-    def at(self, alpha: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        """g and F at an alpha of any exact field."""
-        g = tuple(a + b * alpha for a, b in zip(self.g0, self.g1, strict=True))
-        F = tuple(a + b * alpha for a, b in zip(self.F0, self.F1, strict=True))
-        return g, F
-
-
-@dataclass(frozen=True)
-class _Integers:
-    """Integer data: S = S_int / dS, g = g_int / dg, F = F_int / dF."""
-
-    S: list[list[Any]]
-    g0: list[Any]
-    g1: list[Any]
-    F0: list[Any]
-    F1: list[Any]
-    friction_unit: int  # dF
-    force: Any  # dS / dg
-
-
-def _times(value: Any, factor: int) -> Any:
-    return value.p * (factor // value.q)
-
-
-def _rational_matrix(array: np.ndarray[Any, Any]) -> Any:
-    rows, columns = array.shape
-    return fmpq_mat(rows, columns, [fmpq(*float(v).as_integer_ratio()) for v in array.ravel()])
 
 
 @lru_cache(maxsize=64)

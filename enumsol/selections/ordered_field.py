@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq
 
-from enumsol.arithmetic.algebraic import to_fraction
+from enumsol.arithmetic.rationals import to_fraction
+from enumsol.condensation.exact import ExactSystem
 from enumsol.selections.polytopes import dot
-from enumsol.selections.rationals import ExactSelections, ExactSystem
+from enumsol.selections.rationals import ExactSelections
 from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
-    from enumsol.selections.functions import ExactPath
+    from enumsol.condensation.exact import ExactPath
     from enumsol.selections.polytopes import Form, Point, Table
     from enumsol.selections.solution import ActiveSets, Codes
 

@@ -2,95 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
 
-from enumsol.errors import TooLargeError
+from enumsol.condensation.exact import ExactSystem
 from enumsol.selections.polytopes import polytope_vertices, value
 from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
 from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from numpy.typing import NDArray
 
-    from enumsol.problem import Alpha, ContactProblem
     from enumsol.selections.polytopes import Form, Point, Table
-
-#: Most degrees of freedom for which A, Bn, Bt and f themselves are condensed in rationals.
-EXACT_DOF_LIMIT = 250
-
-
-def rational(value: Alpha) -> Any:
-    """The exact value of a float or Fraction as fmpq."""
-    return fmpq(*Fraction(value).as_integer_ratio())
-
-
-@dataclass(frozen=True)
-class ExactSystem:
-    """The condensed problem at one alpha in rationals: w = g - S lambda.
-
-    Attributes
-    ----------
-    S : fmpq_mat (2p, 2p)
-    g, F : tuples of fmpq
-    """
-
-    S: Any
-    g: tuple[Any, ...]
-    F: tuple[Any, ...]
-
-    @property
-    def p(self) -> int:
-        """Number of contact nodes."""
-        return len(self.F)
-
-    @classmethod
-    def from_problem(cls, problem: ContactProblem, alpha: Alpha) -> ExactSystem:
-        """Condense A, Bn, Bt, f, gap, slip_offset and the paths at alpha without any rounding.
-
-        Raises
-        ------
-        TooLargeError
-            The problem has more than EXACT_DOF_LIMIT degrees of freedom.
-        """
-        n = problem.n
-        if n > EXACT_DOF_LIMIT:
-            raise TooLargeError(
-                f'arithmetic="exact" condenses at most n = {EXACT_DOF_LIMIT} degrees of freedom in rationals and the '
-                f"problem has n = {n}; use another arithmetic, or condense the body to its contact nodes first"
-            )
-        problem.friction_at(alpha)
-        a = rational(alpha)
-        B = _dense(np.vstack([problem.Bn.toarray(), problem.Bt.toarray()]))
-        load = [rational(v) for v in problem.f]
-        if problem.load_slope is not None:
-            load = [v + a * rational(s) for v, s in zip(load, problem.load_slope, strict=True)]
-        rhs = B.transpose().tolist()
-        X = _dense(problem.A.toarray()).solve(fmpq_mat([[*row, v] for row, v in zip(rhs, load, strict=True)]))
-        SG = (B * X).tolist()
-        offset = [rational(v) for v in (*problem.gap, *problem.slip_offset)]
-        F0, F1 = problem.friction
-        return cls(
-            fmpq_mat([row[:-1] for row in SG]),
-            tuple(row[-1] - o for row, o in zip(SG, offset, strict=True)),
-            tuple(rational(x) + a * rational(y) for x, y in zip(F0, F1, strict=True)),
-        )
-
-    @classmethod
-    def from_floats(cls, S: NDArray[np.float64], g: NDArray[np.float64], F: Iterable[Alpha]) -> ExactSystem:
-        """The exact values of condensed floating-point data."""
-        return cls(_dense(S), tuple(rational(v) for v in g), tuple(rational(v) for v in F))
-
-
-def _dense(array: NDArray[np.float64]) -> Any:
-    rows, columns = array.shape
-    return fmpq_mat(rows, columns, [fmpq(*float(v).as_integer_ratio()) for v in array.ravel()])
 
 
 class ExactSelections:

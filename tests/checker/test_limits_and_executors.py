@@ -11,8 +11,8 @@ from proof_tools import bytes_of, records_of
 
 import enumsol
 from enumsol import ContactProblem, Interrupted, Proof, ProofFormatError, enumerate_roots, gallery, verify
+from enumsol.condensation.exact import ExactSystem
 from enumsol.proof.proof_file import fraction_from, fraction_text
-from enumsol.selections.rationals import ExactSystem
 
 
 @pytest.fixture(scope="module")

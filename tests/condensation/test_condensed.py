@@ -5,7 +5,8 @@ import pytest
 import scipy.sparse as sp
 
 from enumsol import ContactProblem, InvalidArgumentError, InvalidProblemError, enumerate_roots, gallery
-from enumsol.condensation.condensed import RHS_BLOCK, Factorization
+from enumsol.condensation.condensed import RHS_BLOCK
+from enumsol.condensation.factorization import Factorization
 
 
 def random_problem(seed, n=30, p=4, **options):

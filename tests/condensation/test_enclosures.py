@@ -9,7 +9,7 @@ from generators import dense_compliance, fe_compliance, from_condensed
 from oracles import exact_condense
 
 from enumsol import ContactProblem, gallery
-from enumsol.condensation import enclosure
+from enumsol.arithmetic import balls
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 
 
@@ -127,8 +127,8 @@ def test_eigenvalue_bounds_are_below_the_eigenvalue():
             A = 0.5 * (A + A.T)
             least = float(np.linalg.eigvalsh(A)[0])
             for bound in (
-                enclosure.dense_eigenvalue_bound(A),
-                enclosure.sparse_eigenvalue_bound(sp.csc_array(A), least),
+                balls.dense_eigenvalue_bound(A),
+                balls.sparse_eigenvalue_bound(sp.csc_array(A), least),
             ):
                 # eigvalsh itself is off by a few ulps of the largest
                 assert bound <= least + 1e-13
@@ -144,9 +144,9 @@ def test_indefinite_matrices_get_no_positive_bound():
             values[0] = least
             A = (Q * values) @ Q.T
             A = 0.5 * (A + A.T)
-            assert enclosure.dense_eigenvalue_bound(A) <= 1e-15
+            assert balls.dense_eigenvalue_bound(A) <= 1e-15
             for estimate in (1e-3, 1e-9, 1e-14):
-                assert enclosure.sparse_eigenvalue_bound(sp.csc_array(A), estimate) <= 1e-15
+                assert balls.sparse_eigenvalue_bound(sp.csc_array(A), estimate) <= 1e-15
 
 
 def test_residual_is_enclosed():
@@ -156,7 +156,7 @@ def test_residual_is_enclosed():
         A = rng.normal(size=(n, n)) * 10 ** rng.uniform(-8, 8, size=(n, 1)) * (rng.random((n, n)) < 0.7)
         X = rng.normal(size=(n, m)) * 10 ** rng.uniform(-12, 12, size=(1, m))
         K = A @ X * (1 + 2.0**-50 * rng.normal(size=(n, m)))
-        value, radius = enclosure.residual(sp.csr_array(A), X, K)
+        value, radius = balls.residual(sp.csr_array(A), X, K)
         for i in range(n):
             for j in range(m):
                 products = (Fraction(float(a)) * Fraction(float(x)) for a, x in zip(A[i], X[:, j], strict=True))

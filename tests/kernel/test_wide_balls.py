@@ -11,8 +11,8 @@ from oracles import _affine, _at, _conditions, exact_condense
 from proof_tools import Judge, det_sign
 
 from enumsol import ContactProblem, gallery
-from enumsol.condensation.condensed import Factorization
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
+from enumsol.condensation.factorization import Factorization
 from enumsol.kernel.point import exclusion_margin, solve_selection
 from enumsol.kernel.rows import row_signs
 from enumsol.search.certifiers._margin import Margins

@@ -9,17 +9,15 @@ from oracles import brute_force
 from enumsol.condensation.condensed import CondensedSystem
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.relaxation.rows import (
-    CONTACT,
     EQUALITY,
     FEASIBILITY_TOLERANCE,
     INEQUALITY,
     PRUNE_MARGIN,
-    UNDECIDED,
     ActiveSetEngine,
     imposed_rows,
     status_rows,
 )
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 
 def random_system(rng, p):

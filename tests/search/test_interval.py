@@ -11,13 +11,12 @@ from flint import fmpq
 from enumsol import gallery
 from enumsol.branches import branch_graph
 from enumsol.branches.gluing import Gluing
+from enumsol.condensation.exact import ExactPath
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
 from enumsol.relaxation.interval import IntervalEngine, IntervalSystem
-from enumsol.relaxation.rows import CONTACT, UNDECIDED
 from enumsol.search.certifiers.interval_rationals import ExactLeafJudge
 from enumsol.search.interval import BelievingJudge, EmptyLeaf, IntervalSearch, Piece
-from enumsol.selections.functions import ExactPath
-from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 BELOW = {UNDECIDED: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), CONTACT: (STICK, SLIP_PLUS, SLIP_MINUS)}
 
@@ -48,7 +47,7 @@ def test_every_leaf_the_engine_prunes_is_proven_in_rationals(kind):
     rng = np.random.default_rng(11)
     for _ in range(5):
         problem = generic_problem(rng, 3, kind)
-        judge = ExactLeafJudge(ExactPath.from_problem(problem, exact=True))
+        judge = ExactLeafJudge(ExactPath.from_problem(problem))
         search = IntervalSearch(problem.condensed, (Fraction(0), Fraction(6)), None, BelievingJudge())
         search.run()
         for part in search.pieces:
@@ -58,7 +57,7 @@ def test_every_leaf_the_engine_prunes_is_proven_in_rationals(kind):
 
 def test_a_leaf_that_holds_a_solution_cannot_be_excluded(rng):
     problem = one_node((1.5, -4.0))
-    path = ExactPath.from_problem(problem, exact=True)
+    path = ExactPath.from_problem(problem)
     judge = ExactLeafJudge(path)
     piece = Piece(Fraction(2), Fraction(4))
     system = IntervalSystem.from_problem(problem.condensed, 2.0, 4.0, None)

@@ -12,7 +12,7 @@ cdef extern from "_dense.h" nogil:
 
 import numpy as np
 
-from enumsol.condensation.enclosure import ROOT_TINY, SAFE, TINY, UNIT, gamma
+from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma
 from enumsol.kernel.rows import FORBIDDEN, NONNEGATIVE, row_table
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.algebraic import to_fraction
+from enumsol.arithmetic.rationals import to_fraction
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.kernel.interval import (
     EnclosedPiece,
@@ -17,10 +17,10 @@ from enumsol.kernel.interval import (
 from enumsol.search.certifiers.interval_rationals import ExactLeafJudge
 
 if TYPE_CHECKING:
+    from enumsol.condensation.exact import ExactPath
     from enumsol.problem import ContactProblem
     from enumsol.relaxation.interval import IntervalSystem
     from enumsol.search.interval import EmptyLeaf, Piece
-    from enumsol.selections.functions import ExactPath
 
 
 #: Bounds must be this large [energy unit of the piece], so that a checker that adds up in another order agrees.

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq, fmpq_mat
 
+from enumsol.arithmetic.rationals import rational
 from enumsol.relaxation.interval import IntervalRowKind, imposed_interval_rows
 from enumsol.relaxation.rows import INEQUALITY, RowKind
-from enumsol.selections.rationals import rational
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
+    from enumsol.condensation.exact import ExactPath
     from enumsol.relaxation.interval import IntervalSystem
     from enumsol.search.interval import EmptyLeaf, Piece
-    from enumsol.selections.functions import ExactPath
 
 _FORCE_ROWS = (
     RowKind.NORMAL_FORCE,

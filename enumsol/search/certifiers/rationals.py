@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq, fmpq_mat
 
+from enumsol.arithmetic.rationals import rational
 from enumsol.relaxation.rows import INEQUALITY, RowKind, imposed_rows
 from enumsol.search.certifiers.floats import Silent, solve_or_open
-from enumsol.selections.rationals import ExactSelections, rational
+from enumsol.selections.rationals import ExactSelections
 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem

@@ -1,0 +1,56 @@
+"""What condensing asks of a contact problem; ``enumsol.problem.ContactProblem`` is one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+    import scipy.sparse as sp
+    from numpy.typing import NDArray
+
+    from enumsol.checks import Alpha
+    from enumsol.condensation.factorization import Factorization
+
+    Vector = NDArray[np.float64]
+
+
+class ProblemData(Protocol):
+    """Matrices and vectors of a contact problem, and the paths of friction and load over alpha.
+
+    Attributes
+    ----------
+    A : (n, n) csc_array, symmetric positive definite [force / length]
+    Bn, Bt : (p, n) csr_arrays
+    f : (n,) array, load at alpha = 0 [force]
+    load_slope : (n,) array or None
+    gap, slip_offset : (p,) arrays [length]
+    friction : pair of (p,) arrays, F(alpha) = F0 + alpha F1
+    """
+
+    A: sp.csc_array
+    Bn: sp.csr_array
+    Bt: sp.csr_array
+    f: Vector
+    load_slope: Vector | None
+    gap: Vector
+    slip_offset: Vector
+    friction: tuple[Vector, Vector]
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+
+    @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+
+    @property
+    def factorization(self) -> Factorization:
+        """Factors of A."""
+
+    def friction_at(self, alpha: Alpha) -> Vector:
+        """F(alpha), shape (p,)."""
+
+    def load_at(self, alpha: Alpha) -> Vector:
+        """f(alpha), shape (n,)."""
