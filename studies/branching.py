@@ -34,8 +34,10 @@ from _output import RESULTS, report
 
 import enumsol
 from enumsol import gallery
-from enumsol.relaxation import rows as relaxations
-from enumsol.relaxation.rows import BRANCHING_CANDIDATES, PRUNE_MARGIN, ActiveSetEngine, status_rows
+from enumsol.relaxation import active_set
+from enumsol.relaxation.active_set import ActiveSetEngine
+from enumsol.relaxation.engine import BRANCHING_CANDIDATES, PRUNE_MARGIN
+from enumsol.relaxation.rows import status_rows
 from enumsol.search import tree
 from enumsol.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
@@ -134,7 +136,7 @@ class _Looking:
     def _candidates(self, codes):
         F, force, w, p = self._engine.F, self.forces, self.displacements, len(codes)
         slip = F * force[:p] * np.abs(w[p:]) - force[p:] * w[p:]
-        # as relaxation.largest_violation
+        # as engine.largest_violation
         violation = np.where(codes == UNDECIDED, slip - force[:p] * w[:p], 0.0) + slip
         nodes = np.flatnonzero(codes >= CONTACT)
         nodes = nodes[np.argsort(-violation[nodes], kind="stable")][: self._engine.candidates]
@@ -171,7 +173,7 @@ def measure(shares):
 
 def one_step(candidates):
     def make(system):
-        with patch.object(relaxations, "BRANCHING_CANDIDATES", min(candidates, system.p)):
+        with patch.object(active_set, "BRANCHING_CANDIDATES", min(candidates, system.p)):
             return ActiveSetEngine(system)
 
     return make

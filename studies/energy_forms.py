@@ -18,7 +18,8 @@ import numpy as np
 
 from enumsol import gallery
 from enumsol.relaxation import _active_set
-from enumsol.relaxation.rows import ActiveSetEngine, row_terms
+from enumsol.relaxation.active_set import ActiveSetEngine
+from enumsol.relaxation.rows import row_terms
 from enumsol.search.certifiers.floats import FastJudge
 from enumsol.search.tree import SearchLimits, TreeSearch
 from enumsol.selections.floats import FloatSelections

@@ -18,8 +18,9 @@ import numpy as np
 from _output import report
 
 from enumsol import gallery
+from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.interior_point import InteriorPointEngine
-from enumsol.relaxation.rows import EQUALITY, PRUNE_MARGIN, status_rows
+from enumsol.relaxation.rows import EQUALITY, status_rows
 from enumsol.search.certifiers.floats import FastJudge
 from enumsol.search.tree import SearchLimits, TreeSearch
 from enumsol.selections.floats import FloatSelections

@@ -77,14 +77,14 @@ def problems():
 def places():
     """(owner, attribute, part) of what is wrapped; older and newer versions of the package may lack some."""
     from enumsol.proof import proof_file as proof
-    from enumsol.relaxation import rows as relaxation
+    from enumsol.relaxation import active_set
     from enumsol.roots import enumerate as driver
     from enumsol.search import solvers as workbench
     from enumsol.search import tree
     from enumsol.search.certifiers import verified
 
-    yield relaxation._ActiveSetRelaxation, "__init__", "QPs"
-    yield relaxation._ActiveSetRelaxation, "child", "copies"
+    yield active_set.ActiveSetRelaxation, "__init__", "QPs"
+    yield active_set.ActiveSetRelaxation, "child", "copies"
     yield tree.TreeSearch, "_choose", "choice"
     yield tree.TreeSearch, "_children", "choice"
     yield verified.VerifiedJudge, "excluded", "exclusion"
@@ -96,7 +96,7 @@ def places():
     yield verified.VerifiedJudge, "branching", "proof"
     yield proof.ProofWriter, "close", "proof"
     yield workbench.Workbench, "__init__", "ends"
-    yield relaxation.ActiveSetEngine, "__init__", "ends"
+    yield active_set.ActiveSetEngine, "__init__", "ends"
     yield driver._Enumeration, "_result", "ends"
 
 

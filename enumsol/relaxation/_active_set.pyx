@@ -17,7 +17,7 @@ from libc.string cimport memcpy, memset
 import numpy as np
 
 from enumsol.statuses import CONTACT, UNDECIDED
-from enumsol.relaxation.rows import FEASIBILITY_TOLERANCE
+from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE
 
 OPTIMAL = 0
 BOUND_EXCEEDED = 1

@@ -8,7 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import solve_triangular
 
-from enumsol.relaxation.rows import EQUALITY, PRUNE_MARGIN, Relaxation, largest_violation, row_terms
+from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation, largest_violation
+from enumsol.relaxation.rows import EQUALITY, row_terms
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -20,24 +20,15 @@ import numpy as np
 
 from enumsol.condensation.condensed import CondensedSystem, ScaledSystem
 from enumsol.errors import InvalidProblemError, MissingDependencyError
-from enumsol.relaxation.rows import (
-    BRANCHING_CANDIDATES,
-    EQUALITY,
-    FEASIBILITY_TOLERANCE,
-    INEQUALITY,
-    PRUNE_MARGIN,
-    RowKind,
-    row_terms,
-    status_rows,
-)
+from enumsol.relaxation.active_set import CompiledEngine
+from enumsol.relaxation.engine import BRANCHING_CANDIDATES
+from enumsol.relaxation.rows import EQUALITY, INEQUALITY, RowKind, row_terms, status_rows
 from enumsol.statuses import CONTACT, FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, UNDECIDED
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.relaxation.rows import Relaxation
-    from enumsol.selections.solution import Codes
 
 #: Part of the energy's unit (g' S^-1 g lies in [1, 4) at its larger end) that makes the form in (lambda, tau) definite.
 RIDGE = 1e-3
@@ -137,16 +128,14 @@ class IntervalSystem:
         return bool(np.any(self.half))
 
 
-class IntervalEngine:
-    """The compiled dual active-set method on relaxations over an interval.
+class IntervalEngine(CompiledEngine):
+    """Relaxations over an interval.
 
     Raises
     ------
     MissingDependencyError
         The compiled solver is not available.
     """
-
-    name = "active-set"
 
     def __init__(self, system: IntervalSystem) -> None:
         try:
@@ -157,23 +146,18 @@ class IntervalEngine:
                 "installed with a C compiler"
             ) from error
         p = system.p
-        self.size = 2 * p
-        self._module = _active_set
-        self.limit = 200 + 20 * p
-        self.rule = _active_set.BranchingRule(system.F, *_slip_rows(system), BRANCHING_CANDIDATES)
+        rule = _active_set.BranchingRule(system.F, *_slip_rows(system), BRANCHING_CANDIDATES)
         start, index, value = _all_rows(system)
         if not system.loaded:
-            self.offset = 0.0
             rhs = np.zeros(len(start) - 1)
-            self._data = _active_set.QPData(system.S, system.g, -system.S, system.g, start, index, value, rhs)
-            self._always: list[int] = []
+            data = _active_set.QPData(system.S, system.g, -system.S, system.g, start, index, value, rhs)
+            super().__init__(data, rule, 2 * p)
             return
         # half' S^-1 half by the factor that is known to exist
         curvature = 0.25 * float(np.linalg.norm(np.linalg.solve(system.scaled.cholesky, system.half))) ** 2 + RIDGE
         form = np.block(
             [[system.S, -0.5 * system.half[:, None]], [-0.5 * system.half[None, :], np.array([[curvature]])]]
         )
-        self.offset = curvature
         # the last unknown is tau; w follows the 2p + 1 unknowns
         index = np.where(index >= 2 * p, index + 1, index)
         rows = len(start) - 1
@@ -184,18 +168,13 @@ class IntervalEngine:
         W = np.column_stack([-system.S, system.half])
         load = np.append(system.g, 0.0)
         try:
-            self._data = _active_set.QPData(form, load, W, system.g, start, index, value, rhs)
+            data = _active_set.QPData(form, load, W, system.g, start, index, value, rhs)
         except np.linalg.LinAlgError as error:
             raise InvalidProblemError(
                 "the energy over an interval of alpha is not convex to working precision; expected contact rows "
                 "[Bn; Bt] that are independent beyond rounding (are two contact nodes almost the same point?)"
             ) from error
-        self._always = [rows, rows + 1]
-
-    def root(self, rows: list[int], modes: list[int]) -> Relaxation:
-        """The relaxation with the given rows on."""
-        state = self._module.QPState(self._data)
-        return _IntervalRelaxation(self, state, rows + self._always, modes + [INEQUALITY] * len(self._always))
+        super().__init__(data, rule, 2 * p, offset=curvature, always=(rows, rows + 1))
 
 
 def _all_rows(system: IntervalSystem) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
@@ -219,52 +198,6 @@ def _slip_rows(system: IntervalSystem) -> tuple[NDArray[np.intp], NDArray[np.int
     rows = np.where(constant, equal, least) * p + np.arange(p)
     modes = np.broadcast_to(np.where(constant, EQUALITY, INEQUALITY), (2, p))
     return rows, modes.astype(np.int8)
-
-
-class _IntervalRelaxation:
-    """A solved relaxation; ``bound`` is the energy bound itself, the secant's constant subtracted."""
-
-    __slots__ = ("_engine", "_state", "bound", "pruned", "stalled")
-
-    def __init__(self, engine: IntervalEngine, state: object, rows: list[int], modes: list[int]) -> None:
-        self._engine, self._state = engine, state
-        state.switch(rows, modes)  # type: ignore[attr-defined]
-        target = PRUNE_MARGIN + engine.offset
-        status = state.solve(target, FEASIBILITY_TOLERANCE, engine.limit)  # type: ignore[attr-defined]
-        self.bound: float = state.bound - engine.offset  # type: ignore[attr-defined]
-        self.pruned = status == 1
-        self.stalled = status == 2
-
-    @property
-    def forces(self) -> NDArray[np.float64]:
-        """lambda at the minimiser, shape (2p,), scaled."""
-        return self._state.x_array[: self._engine.size]  # type: ignore[attr-defined, no-any-return]
-
-    @property
-    def displacements(self) -> NDArray[np.float64]:
-        """w at the minimiser, shape (2p,), scaled."""
-        return self._state.w_array  # type: ignore[attr-defined, no-any-return]
-
-    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Rows of RowKind and IntervalRowKind and their multipliers (those of the bounds on tau are not needed)."""
-        rows, values = self._state.multipliers()  # type: ignore[attr-defined]
-        keep = rows < len(RowKind) * (self._engine.size // 2) + len(IntervalRowKind) * (self._engine.size // 2)
-        return rows[keep], values[keep]
-
-    def choose(self, codes: Codes) -> int:
-        """The contact node that the partial assignment is to be branched on, -1 when all are decided."""
-        target = PRUNE_MARGIN + self._engine.offset
-        return self._state.choose(np.array(codes, dtype=np.int8), self._engine.rule, target)  # type: ignore[attr-defined, no-any-return]
-
-    def forced(self, codes: Codes) -> tuple[int, ...]:
-        """Undecided contact nodes of which one child at most is not excluded by a bound that is at hand."""
-        target = PRUNE_MARGIN + self._engine.offset
-        return self._state.forced(np.array(codes, dtype=np.int8), self._engine.rule, target)  # type: ignore[attr-defined, no-any-return]
-
-    def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
-        """The relaxation with further rows switched on; ``last``: this object is not used again."""
-        state = self._state if last else self._state.copy()  # type: ignore[attr-defined]
-        return _IntervalRelaxation(self._engine, state, rows, modes)
 
 
 def imposed_interval_rows(code: int, *, friction: bool, constant: bool) -> dict[int, int]:

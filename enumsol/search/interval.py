@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.relaxation.rows import Relaxation
+    from enumsol.relaxation.engine import Relaxation
     from enumsol.search.tree import Judge
     from enumsol.selections.solution import Codes
 

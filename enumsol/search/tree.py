@@ -18,8 +18,10 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from enumsol.relaxation.active_set import ActiveSetEngine
+from enumsol.relaxation.engine import Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
-from enumsol.relaxation.rows import ActiveSetEngine, Engine, Relaxation, status_rows
+from enumsol.relaxation.rows import status_rows
 from enumsol.selections.solution import Codes, SelectionSolution
 from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 

@@ -10,8 +10,8 @@ from generators import random_problem, singular_problem
 
 import enumsol
 from enumsol import gallery
+from enumsol.relaxation import active_set
 from enumsol.relaxation import interior_point as fallback
-from enumsol.relaxation import rows as relaxation
 
 
 def problems():
@@ -56,7 +56,7 @@ class Failing:
 @pytest.mark.parametrize(("problem", "alpha"), PROBLEMS)
 def test_a_stalling_engine_is_replaced(monkeypatch, problem, alpha, share):
     want = enumsol.enumerate_roots(problem, alpha, "fast")
-    failing = Failing(monkeypatch, relaxation._ActiveSetRelaxation, share, 1)
+    failing = Failing(monkeypatch, active_set.ActiveSetRelaxation, share, 1)
     roots = enumsol.enumerate_roots(problem, alpha, "fast")
     assert failing.count > 0
     assert roots.stats.fallback_qps == failing.count
@@ -67,7 +67,7 @@ def test_a_stalling_engine_is_replaced(monkeypatch, problem, alpha, share):
 @pytest.mark.parametrize("share", [0.2, 0.5])
 def test_where_both_fail_the_search_branches_on(monkeypatch, share, seed):
     expected = [enumsol.enumerate_roots(*item, "fast") for item in PROBLEMS]
-    Failing(monkeypatch, relaxation._ActiveSetRelaxation, share, seed)
+    Failing(monkeypatch, active_set.ActiveSetRelaxation, share, seed)
     failing = Failing(monkeypatch, fallback._InteriorPointRelaxation, share, seed + 100)
     for item, want in zip(PROBLEMS, expected, strict=True):
         roots = enumsol.enumerate_roots(*item, "fast")
@@ -79,7 +79,7 @@ def test_where_both_fail_the_search_branches_on(monkeypatch, share, seed):
 def test_without_any_working_engine_it_is_an_exhaustive_search(monkeypatch):
     problem, alpha = gallery.get("two-node-5").build(), 5.0
     want = enumsol.enumerate_roots(problem, alpha, "fast", "exhaustive")
-    for cls in (relaxation._ActiveSetRelaxation, fallback._InteriorPointRelaxation):
+    for cls in (active_set.ActiveSetRelaxation, fallback._InteriorPointRelaxation):
         Failing(monkeypatch, cls, 1.0, 0)
     roots = enumsol.enumerate_roots(problem, alpha, "fast")
     assert not differences(roots, want)
@@ -110,7 +110,7 @@ def test_exact_arithmetic_does_not_believe_a_wrong_pruning(monkeypatch, method):
     # an engine that claims every second node to be empty: the multipliers do not prove it
     problem, alpha = gallery.get("two-node-5").build(), 5.0
     want = enumsol.enumerate_roots(problem, alpha, "exact", "exhaustive")
-    rng, original = np.random.default_rng(0), relaxation._ActiveSetRelaxation.__init__
+    rng, original = np.random.default_rng(0), active_set.ActiveSetRelaxation.__init__
     claims = []
 
     def init(relaxed, *args, **kwargs):
@@ -119,7 +119,7 @@ def test_exact_arithmetic_does_not_believe_a_wrong_pruning(monkeypatch, method):
             relaxed.pruned = True
             claims.append(relaxed)
 
-    monkeypatch.setattr(relaxation._ActiveSetRelaxation, "__init__", init)
+    monkeypatch.setattr(active_set.ActiveSetRelaxation, "__init__", init)
     roots = enumsol.enumerate_roots(problem, alpha, "exact", method)
     assert not differences(roots, want)
     assert roots.complete

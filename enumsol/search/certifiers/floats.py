@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.relaxation.rows import PRUNE_MARGIN
+from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.tree import Open
 from enumsol.selections.solution import VertexLimitError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.relaxation.rows import Relaxation
+    from enumsol.relaxation.engine import Relaxation
     from enumsol.selections.floats import FloatSelections
     from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
 

@@ -13,7 +13,7 @@ from enumsol.selections.rationals import ExactSelections
 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
-    from enumsol.relaxation.rows import Relaxation
+    from enumsol.relaxation.engine import Relaxation
     from enumsol.search.tree import Open
     from enumsol.selections.polytopes import Form
     from enumsol.selections.solution import Codes, SelectionSolution

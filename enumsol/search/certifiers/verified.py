@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.proof_file import Recorder
-    from enumsol.relaxation.rows import Relaxation
+    from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.rationals import ExactJudge
     from enumsol.selections.solution import Codes
 
