@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from enumsol.arithmetic.rationals import rational, to_fraction
 from enumsol.branches.gluing import Gluing
-from enumsol.branches.graph import BranchGraph, GraphStats
+from enumsol.branches.graph import BranchGraph
+from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.branches.make_elements import make_arcs, make_vertices
 from enumsol.branches.proof_records import write_graph_proof
 from enumsol.checks import finite_alpha
@@ -119,7 +120,10 @@ def branch_graph(
     if isinstance(judge, BallLeafJudge) and search.pieces and search.stopped is None and not judge.used_rationals:
         data = "problem" if path.condensed_exactly else "condensed"
         proof = write_graph_proof(problem, (a, b), data, search.pieces)
-    graph = BranchGraph(problem, path, (a, b), arithmetic, vertices, arcs, reasons, stats, search.pieces, proof)
+    pieces = tuple(search.pieces)
+    graph = BranchGraph(
+        GraphData(problem, path, (a, b), arithmetic, tuple(vertices), tuple(arcs), tuple(reasons), stats, pieces, proof)
+    )
     if search.stopped is not None and search.stopped.startswith("interrupted"):
         raise Interrupted("branch_graph was interrupted; its arcs so far are kept", graph)
     return graph

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -24,39 +24,18 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from enumsol.branches.elements import Arc, Branch, Component, Vertex
+    from enumsol.branches.graph_data import GraphData
     from enumsol.checks import Alpha
-    from enumsol.condensation.exact import ExactPath
-    from enumsol.problem import ContactProblem
-    from enumsol.proof.proof_file import Proof
     from enumsol.roots.root_set import Root, RootFamily, RootSet
-    from enumsol.search.interval import SearchedPiece
-
-
-@dataclass(frozen=True)
-class GraphStats:
-    """What the construction did.
-
-    Attributes
-    ----------
-    pieces : int
-        Parts of the interval, each searched by a tree of its own.
-    nodes : int
-        Nodes of all trees.
-    selections : int
-        Complete selections whose arcs were computed.
-    search_seconds, seconds : float
-        Wall time of the search, and of all.
-    """
-
-    pieces: int = 0
-    nodes: int = 0
-    selections: int = 0
-    search_seconds: float = 0.0
-    seconds: float = 0.0
+    from enumsol.selections.solution import Codes
 
 
 class BranchGraph:
     """All solutions over an interval of alpha: arcs of single selections, glued at vertices (made by ``branch_graph``).
+
+    Parameters
+    ----------
+    data : GraphData
 
     Attributes
     ----------
@@ -79,48 +58,20 @@ class BranchGraph:
         cut short, and where rationals had to decide about leaves).
     """
 
-    def __init__(
-        self,
-        problem: ContactProblem,
-        path: ExactPath,
-        interval: tuple[Fraction, Fraction],
-        arithmetic: str,
-        vertices: Sequence[Vertex],
-        arcs: Sequence[Arc],
-        reasons: Sequence[str],
-        stats: GraphStats,
-        pieces: Sequence[SearchedPiece] = (),
-        proof: Proof | None = None,
-    ) -> None:
-        self.problem = problem
-        self.path = path
-        self.exact_interval = interval
-        self.interval = (float(interval[0]), float(interval[1]))
-        self.arithmetic = arithmetic
-        self.vertices = tuple(vertices)
-        self.arcs = tuple(arcs)
-        self.stats = stats
-        self.pieces = tuple(pieces)
-        self.proof = proof
+    def __init__(self, data: GraphData) -> None:
+        self.data = data
+        self.problem = data.problem
+        self.path = data.path
+        self.exact_interval = data.interval
+        self.interval = (float(data.interval[0]), float(data.interval[1]))
+        self.arithmetic = data.arithmetic
+        self.vertices = data.vertices
+        self.arcs = data.arcs
+        self.stats = data.stats
+        self.pieces = data.pieces
+        self.proof = data.proof
         self.graph = multigraph(self.vertices, self.arcs)
-        self.search_reasons = tuple(reasons)
-        self.reasons = (*reasons, *self._imbalances())
-
-    def _imbalances(self) -> list[str]:
-        """Violations of the balance of degrees (theory, section 7); each proves that something is missing."""
-        found = []
-        for v in self.vertices:
-            if v.index_left is None or v.index_right is None:
-                found.append(f"vertex {v.number} at alpha = {v.alpha:.17g}: the degree of an arc is not known")
-            elif not v.border and v.index_left != v.index_right:
-                found.append(
-                    f"vertex {v.number} at alpha = {v.alpha:.17g} ({v.kind}): degrees {v.index_left:+d} from the left "
-                    f"and {v.index_right:+d} to the right do not balance"
-                )
-        start = [v.index_right for v in self.vertices if v.border and v.alpha == self.interval[0]]
-        if None not in start and (total := sum(k for k in start if k is not None)) != 1:
-            found.append(f"the degrees of all arcs at alpha = {self.interval[0]:g} sum to {total:+d} and not to +1")
-        return found
+        self.reasons = (*data.reasons, *data.imbalances)
 
     @property
     def complete(self) -> bool:
@@ -219,7 +170,11 @@ class BranchGraph:
         """
         arcs, vertices = self._located(alpha)
         codes = {c for arc in arcs for c in arc.selections} | {c for v in vertices for c in v.selections}
-        return roots_of(self, alpha, sorted(codes))
+        return self._roots(alpha, sorted(codes))
+
+    def _roots(self, alpha: Alpha, selections: Sequence[Codes]) -> RootSet:
+        stopped = None if not self.reasons else "the branch graph is not complete"
+        return roots_of(self.data, alpha, selections, stopped)
 
     def multiplicity_at(self, alpha: Alpha) -> int:
         """Number of isolated roots and of families at one alpha, together.
@@ -292,7 +247,7 @@ class BranchGraph:
             alpha = 0.5 * (arc.lo + arc.hi)
             if arc.grazing or not arc.lo < alpha < arc.hi:
                 continue
-            roots = roots_of(self, alpha, arc.selections)
+            roots = self._roots(alpha, arc.selections)
             if len(roots) and roots[0].regular:
                 return roots[0]
         return None
@@ -306,57 +261,21 @@ class BranchGraph:
 
     def to_frame(self) -> pd.DataFrame:
         """One row an arc: its branch, component, ends and their kinds, index, dimension and statuses (node by node)."""
-        import pandas as pd
+        from enumsol.branches.frames import arcs_frame  # pandas, slow to import
 
-        place = {arc.number: c.number for c in self.components for arc in c.arcs}
-        rows = [
-            {
-                "arc": arc.number,
-                "branch": self.branch_of[arc.number],
-                "component": place[arc.number],
-                "alpha_from": arc.lo,
-                "alpha_to": arc.hi,
-                "vertex_from": arc.tail,
-                "vertex_to": arc.head,
-                "kind_from": self.vertices[arc.tail].kind,
-                "kind_to": self.vertices[arc.head].kind,
-                "index": arc.index,
-                "dimension": arc.dimension,
-                "grazing": arc.grazing,
-                "statuses": " ".join(s.value for s in arc.statuses),
-            }
-            for arc in self.arcs
-        ]
-        return pd.DataFrame(rows)
+        return arcs_frame(self.data, self.components, self.branch_of)
 
     def vertices_frame(self) -> pd.DataFrame:
         """One row a vertex and contact node: alpha, kind, statuses that hold, and values."""
-        import pandas as pd
+        from enumsol.branches.frames import vertices_frame  # as above
 
-        rows = [
-            {
-                "vertex": v.number,
-                "alpha": v.alpha,
-                "kind": v.kind,
-                "node": node,
-                "active": " ".join(sorted(s.value for s in v.active[i])),
-                "lambda_n": v.lambda_n[i],
-                "lambda_t": v.lambda_t[i],
-                "u_n": v.u_n[i],
-                "u_t": v.u_t[i],
-                "index_left": v.index_left,
-                "index_right": v.index_right,
-            }
-            for v in self.vertices
-            for i, node in enumerate(self.problem.node_ids)
-        ]
-        return pd.DataFrame(rows)
+        return vertices_frame(self.data)
 
     def save(self, file: str | Path) -> None:
         """Write the graph with its problem to a JSON file, all numbers to the last bit; ``load`` reads it."""
         from enumsol.branches.storage import save_graph
 
-        save_graph(self, file)
+        save_graph(self.data, file)
 
     @classmethod
     def load(cls, file: str | Path) -> BranchGraph:
@@ -369,13 +288,13 @@ class BranchGraph:
         """
         from enumsol.branches.storage import load_graph
 
-        return load_graph(file)
+        return cls(load_graph(file))
 
     def write_graphml(self, file: str | Path) -> None:
         """Write vertices and arcs as GraphML for other graph programs (values at the vertices, no functions)."""
         from enumsol.branches.storage import write_graphml
 
-        write_graphml(self, file)
+        write_graphml(self.data, self.branch_of, file)
 
     def plot(self, quantity: str = "lambda_n", nodes: Sequence[Any] | None = None, **options: Any) -> Any:
         """A figure of alpha against lambda_n, lambda_t, u_n or u_t of chosen nodes; see enumsol.branches.plots."""

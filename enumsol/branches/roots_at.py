@@ -16,23 +16,26 @@ from enumsol.statuses import FRICTIONLESS, OPEN
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.branches.graph import BranchGraph
+    from enumsol.branches.graph_data import GraphData
     from enumsol.checks import Alpha
     from enumsol.selections.solution import Codes, SelectionSolution
 
 
-def roots_of(graph: BranchGraph, alpha: Alpha, selections: Sequence[Codes]) -> RootSet:
-    """Roots and families that the selections have at ``alpha``; in floats where these find all of them."""
-    problem = graph.problem
+def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes], stopped: str | None) -> RootSet:
+    """Roots and families that the selections have at ``alpha``; in floats where these find all of them.
+
+    ``stopped`` says why the list may lack some, None that it does not.
+    """
+    problem = data.problem
     floats = FloatSelections(problem.condensed.at(alpha).scaled)
     solver: Any = floats
-    exact = graph.arithmetic != "fast"
+    exact = data.arithmetic != "fast"
     solutions: list[SelectionSolution | None] = []
     if not exact:
         solutions = [solver.solve(codes) for codes in _codes_at(selections, floats.F_positive)]
         exact = any(solution is None for solution in solutions)
     if exact:
-        solver = ExactSelections(graph.path.system(rational(alpha)))
+        solver = ExactSelections(data.path.system(rational(alpha)))
         solutions = [solver.solve(codes) for codes in _codes_at(selections, solver.F_positive)]
     components = connected_components(
         [solution for solution in solutions if solution is not None],
@@ -49,9 +52,9 @@ def roots_of(graph: BranchGraph, alpha: Alpha, selections: Sequence[Codes]) -> R
         roots=roots,
         families=families,
         undecided=(),
-        arithmetic=graph.arithmetic,
+        arithmetic=data.arithmetic,
         method="graph",
-        stopped=None if not graph.reasons else "the branch graph is not complete",
+        stopped=stopped,
         stats=SearchStats(selections=len(selections)),
         node_ids=problem.node_ids,
     )

@@ -7,7 +7,8 @@ from enumsol.continuation.follow_all import FollowAllResult, follow_all, follow_
 from enumsol.continuation.newton import newton
 from enumsol.continuation.options import ContinuationOptions
 from enumsol.continuation.parameter_path import SmoothPath
-from enumsol.continuation.path import Path, PathPoint, PathStats, Transition
+from enumsol.continuation.path import Path
+from enumsol.continuation.path_data import PathPoint, PathStats, Transition
 from enumsol.continuation.tangents import Tangent
 from enumsol.roots.local_branch import LocalBranchTest, local_branch_test
 

@@ -11,7 +11,8 @@ from enumsol.continuation.audit import DETOUR, POINT_TOLERANCE, AuditReport, aud
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follow import follow, start_tangents
 from enumsol.continuation.graph_map import GraphMap
-from enumsol.continuation.path import Path, PathStats
+from enumsol.continuation.path import Path
+from enumsol.continuation.path_data import PathStats
 from enumsol.errors import InvalidArgumentError, TooLargeError
 
 if TYPE_CHECKING:

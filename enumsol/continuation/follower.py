@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
     from enumsol.continuation.options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
-    from enumsol.continuation.path import Path
+    from enumsol.continuation.path_data import PathData
     from enumsol.continuation.tangents import Tangent
 
 #: Conditions may be negative by this much at a point that is converged to rounding.
@@ -74,7 +74,7 @@ class Follower:
     options : ContinuationOptions
     smooth_path : SmoothPath or None
         Carried into the Path.
-    visited : sequence of Path
+    visited : sequence of PathData
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Follower:
         interval: tuple[float, float],
         options: ContinuationOptions,
         smooth_path: SmoothPath | None,
-        visited: Sequence[Path],
+        visited: Sequence[PathData],
     ) -> None:
         self.equation, self.options, self.interval = equation, options, interval
         self.current, self.sign = first, sign
@@ -101,7 +101,7 @@ class Follower:
         self.record = Recorder(equation)
         self.record.add(first, "start")
 
-    def run(self) -> Path:
+    def run(self) -> PathData:
         """Follow until a stop condition is met."""
         try:
             stop = None
@@ -113,7 +113,7 @@ class Follower:
             raise Interrupted(f"follow was {message}", partial) from interruption
         return self._path(stop)
 
-    def _path(self, stop: _Stop) -> Path:
+    def _path(self, stop: _Stop) -> PathData:
         return self.record.path(
             stop.status,
             stop.message,
@@ -371,7 +371,7 @@ class Follower:
         )
 
 
-def _landmarks(equation: CondensedEquation, visited: Sequence[Path]) -> Iterator[tuple[Vector, Codes, bool]]:
+def _landmarks(equation: CondensedEquation, visited: Sequence[PathData]) -> Iterator[tuple[Vector, Codes, bool]]:
     """Starts, transition points and ends of other paths, with the statuses on both sides."""
     for path in visited:
         for k, kind in enumerate(path.kinds):

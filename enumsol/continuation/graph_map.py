@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from enumsol.continuation.condensed_equation import CondensedEquation
-from enumsol.continuation.follow import ALPHA_FRACTION
 from enumsol.continuation.parameter_path import AffinePath
+from enumsol.continuation.start import ALPHA_FRACTION
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

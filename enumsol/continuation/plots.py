@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 
 if TYPE_CHECKING:
-    from enumsol.continuation.path import Path
+    from enumsol.continuation.path_data import PathData
 
 _QUANTITIES = ("lambda_n", "lambda_t", "u_n", "u_t")
 
 
-def draw_path(path: Path, graph: Any, node: int, quantity: str, ax: Any, graph_options: dict[str, Any]) -> Any:
+def draw_path(path: PathData, graph: Any, node: int, quantity: str, ax: Any, graph_options: dict[str, Any]) -> Any:
     """See Path.plot."""
     if quantity not in _QUANTITIES:
         raise InvalidArgumentError(f"quantity is {quantity!r}; expected one of {', '.join(map(repr, _QUANTITIES))}")

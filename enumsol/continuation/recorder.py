@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.continuation.path import Path, PathStats, Transition
+from enumsol.continuation.path_data import PathData, PathStats, Transition
 from enumsol.errors import TooLargeError
 from enumsol.roots.local_branch import coherent_orientation
 
@@ -79,12 +79,12 @@ class Recorder:
         options: ContinuationOptions,
         next_step: float,
         smooth_path: SmoothPath | None,
-    ) -> Path:
+    ) -> PathData:
         """The path so far."""
         equation, p = self.equation, self.equation.p
         forces = np.array([equation.forces(point.x) for point in self.points])
         w = np.array([equation.displacements(point.x) for point in self.points])
-        return Path(
+        return PathData(
             alpha=np.array([equation.alpha(point.x) for point in self.points]),
             lambda_n=forces[:, :p],
             lambda_t=forces[:, p:],

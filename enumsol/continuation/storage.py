@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.continuation.options import ContinuationOptions
-from enumsol.continuation.path import ARRAYS, Path, PathStats, Transition
+from enumsol.continuation.path_data import ARRAYS, PathData, PathStats, Transition
 from enumsol.errors import InvalidArgumentError
 from enumsol.roots.local_branch import LocalBranchTest
 from enumsol.statuses import ContactStatus
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _FORMAT = 1
 
 
-def save_path(path: Path, file: str | os.PathLike[str]) -> None:
+def save_path(path: PathData, file: str | os.PathLike[str]) -> None:
     """Write a path; see Path.save."""
     meta = {
         "format": _FORMAT,
@@ -41,7 +41,7 @@ def save_path(path: Path, file: str | os.PathLike[str]) -> None:
         np.savez_compressed(stream, allow_pickle=False, meta=np.array(json.dumps(meta)), **arrays)
 
 
-def load_path(file: str | os.PathLike[str]) -> Path:
+def load_path(file: str | os.PathLike[str]) -> PathData:
     """Read a path; see Path.load."""
     try:
         with np.load(FilePath(file), allow_pickle=False) as data:
@@ -52,7 +52,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
     if meta.get("format") != _FORMAT:
         raise InvalidArgumentError(f"{file} has format {meta.get('format')!r}; this version reads format {_FORMAT}")
     low, high = meta["interval"]
-    return Path(
+    return PathData(
         **arrays,
         kinds=tuple(meta["kinds"]),
         transitions=tuple(_unpack(item) for item in meta["transitions"]),
