@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
 #: Most rooms of one circle among which the order with the fewest arrows up is searched for (2^k sets of rooms).
@@ -186,3 +186,49 @@ def floors(rooms: Iterable[str], arrows: Iterable[tuple[str, str]]) -> dict[str,
             if room not in height and all(target in height for target in targets):
                 height[room] = 1 + max((height[target] for target in targets), default=0)
     return height
+
+
+def direct_arrows(arrows: Iterable[tuple[str, str]]) -> set[tuple[str, str]]:
+    """The arrows of a graph without circles that do not follow from a way over other nodes."""
+    pairs = set(arrows)
+    targets: dict[str, set[str]] = {}
+    for a, b in pairs:
+        targets.setdefault(a, set()).add(b)
+    reach: dict[str, set[str]] = {}
+
+    def reached(node: str) -> set[str]:
+        if node not in reach:
+            below = targets.get(node, set())
+            reach[node] = below.union(*(reached(target) for target in below))
+        return reach[node]
+
+    return {(a, b) for a, b in pairs if not any(b in reached(other) for other in targets[a])}
+
+
+def broken_layers(
+    imports: Iterable[Import], layers: Sequence[Collection[str]], strangers: Mapping[str, Collection[str]]
+) -> list[str]:
+    """Imports that a table of layers does not allow, one sentence each.
+
+    Parameters
+    ----------
+    imports : imports between modules
+    layers : the rooms of every layer, from the ground up; a room may import rooms of lower layers only
+    strangers : for a room those lower ones that it may not import all the same
+    """
+    layer = {room: number for number, rooms in enumerate(layers) for room in rooms}
+    found = []
+    for item in imports:
+        above, below = room_of(item.importer), room_of(item.imported)
+        if above == below:
+            continue
+        if layer[below] > layer[above]:
+            why = "runs up"
+        elif layer[below] == layer[above]:
+            why = "runs sideways"
+        elif below in strangers.get(above, ()):
+            why = f"is not for {above} to make"
+        else:
+            continue
+        found.append(f"{item.importer} line {item.line}: the import of {item.imported} {why}")
+    return found

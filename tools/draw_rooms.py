@@ -1,6 +1,6 @@
 """The layers of the package: which room imports which, which arrows run up, which modules form circles.
 
-    python studies/architecture/run.py [--tree DIR] [--name NAME] [--picture]
+    python tools/draw_rooms.py [--tree DIR] [--name NAME] [--picture]
 
 ``--tree`` is a checkout (default: this one); ``--name`` writes ``results/NAME.txt``, with ``--picture`` also
 ``results/NAME.png``. Without a name the text is printed.
@@ -12,7 +12,7 @@ import argparse
 from collections import defaultdict
 from pathlib import Path
 
-from import_graph import circles, floors, read_imports, room_arrows, room_of, upward_arrows
+from import_graph import circles, direct_arrows, floors, read_imports, room_arrows, room_of, upward_arrows
 
 HERE = Path(__file__).resolve().parent
 PACKAGE = "enumsol"
@@ -56,7 +56,7 @@ class Architecture:
         return "\n".join(out) + "\n"
 
     def draw(self, file: Path) -> None:
-        """Rooms as boxes, one row a floor; imports down in grey, up in red."""
+        """Rooms as boxes, one row a floor; arrows up in red, those that follow from longer ways in light grey."""
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
@@ -70,12 +70,14 @@ class Architecture:
             for floor, row in rows.items()
             for k, room in enumerate(row)
         }
+        needed = direct_arrows(set(self.arrows) - set(self.up))
         for pair in self.arrows:
             start, end = (place[room] for room in pair)
-            up = pair in self.up
-            style = {"arrowstyle": "-|>", "color": "#c23b4b" if up else "#b8b8b8", "lw": 1.8 if up else 0.7}
-            style |= {"shrinkA": 9, "shrinkB": 11, "connectionstyle": "arc3,rad=0.08"}
-            axis.annotate("", end, start, arrowprops=style, zorder=3 if up else 1)
+            colour, width, order = ("#c23b4b", 1.8, 3) if pair in self.up else ("#dedede", 0.6, 1)
+            if pair in needed:
+                colour, width, order = "#555555", 0.9, 2
+            style = {"arrowstyle": "-|>", "color": colour, "lw": width, "shrinkA": 9, "shrinkB": 11}
+            axis.annotate("", end, start, arrowprops=style | {"connectionstyle": "arc3,rad=0.08"}, zorder=order)
         for room, (x, y) in place.items():
             size = sum(self.lines[module] for module in self.modules[room])
             box = {"boxstyle": "round,pad=0.35", "facecolor": "#eef3fa", "edgecolor": "#1f5fa8", "linewidth": 0.9}
@@ -89,12 +91,12 @@ class Architecture:
             f"{len(self.circles)} circle{'s' if len(self.circles) != 1 else ''} of modules",
             fontsize=10,
         )
-        figure.savefig(file, dpi=130)
+        figure.savefig(file, dpi=100)
 
 
 def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--tree", type=Path, default=HERE.parents[1], help="a checkout of the project")
+    parser.add_argument("--tree", type=Path, default=HERE.parent, help="a checkout of the project")
     parser.add_argument("--name", help="write results/NAME.txt and do not print")
     parser.add_argument("--picture", action="store_true", help="draw results/NAME.png too (needs matplotlib)")
     chosen = parser.parse_args(arguments)
