@@ -80,13 +80,13 @@ def places():
     from enumsol.relaxation import active_set
     from enumsol.roots import enumerate as driver
     from enumsol.search import solvers as workbench
-    from enumsol.search import tree
+    from enumsol.search import splitting, tree
     from enumsol.search.certifiers import verified
 
     yield active_set.ActiveSetRelaxation, "__init__", "QPs"
     yield active_set.ActiveSetRelaxation, "child", "copies"
     yield tree.TreeSearch, "_choose", "choice"
-    yield tree.TreeSearch, "_children", "choice"
+    yield splitting.PlaneSplitting, "children", "choice"
     yield verified.VerifiedJudge, "excluded", "exclusion"
     yield verified.VerifiedJudge, "selection", "selections"
     yield workbench.Workbench, "_enclosed", ENCLOSURE

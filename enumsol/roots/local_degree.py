@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.search.certifiers.floats import FastJudge
+from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import SearchLimits, TreeSearch
 from enumsol.selections.floats import FloatSelections
 
@@ -31,7 +32,8 @@ def perturbed_degree(solver: FloatSelections, active: ActiveSets) -> int | None:
         loaded = bool(np.any(solver.system.g))
         system = replace(solver.system, g=solver.system.g + (step if loaded else 1.0) * push)
         moved = FloatSelections(system, solver.tolerance)
-        search = TreeSearch(system, FastJudge(moved), allowed=active, limits=SearchLimits(max_nodes=_MAX_NODES))
+        splitting, limits = PlaneSplitting(system.F, active), SearchLimits(max_nodes=_MAX_NODES)
+        search = TreeSearch(system, FastJudge(moved), splitting=splitting, limits=limits)
         outcome = search.run()
         if outcome.stopped is not None or any(not s.strict or s.det_sign == 0 for s in outcome.solutions):
             return None

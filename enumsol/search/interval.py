@@ -15,6 +15,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Protocol
 
 from enumsol.relaxation.interval import IntervalEngine, IntervalSystem, interval_rows
+from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import SearchLimits, TreeSearch
 from enumsol.statuses import UNDECIDED
 
@@ -143,6 +144,23 @@ class _Uncounted(_Collector):
         return True
 
 
+class IntervalSplitting(PlaneSplitting):
+    """Two dimensions over an interval of alpha.
+
+    Parameters
+    ----------
+    system : IntervalSystem
+    """
+
+    def __init__(self, system: IntervalSystem) -> None:
+        super().__init__(system.F)
+        self._constant = [bool(v) for v in system.F_lo == system.F]
+
+    def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
+        """(kind, mode) of the rows that a contact node imposes in a status over the interval."""
+        return interval_rows(code, friction=self.friction[node], constant=self._constant[node])
+
+
 class IntervalTreeSearch(TreeSearch):
     """The tree search with the rows of an interval; a relaxation that stalls is branched on.
 
@@ -154,12 +172,8 @@ class IntervalTreeSearch(TreeSearch):
     """
 
     def __init__(self, system: IntervalSystem, judge: Judge, limits: SearchLimits) -> None:
-        super().__init__(system.scaled, judge, engine=IntervalEngine(system), limits=limits)
-        self._constant = [bool(v) for v in system.F_lo == system.F]
-
-    def node_rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
-        """(kind, mode) of the rows that a contact node imposes in a status over the interval."""
-        return interval_rows(code, friction=self._friction[node], constant=self._constant[node])
+        splitting = IntervalSplitting(system)
+        super().__init__(system.scaled, judge, engine=IntervalEngine(system), splitting=splitting, limits=limits)
 
     def _fall_back(self, codes: Codes) -> None:
         """No other engine knows intervals: the partial assignment is branched on."""

@@ -16,14 +16,12 @@ import warnings
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
-
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
-from enumsol.relaxation.rows import status_rows
+from enumsol.search.splitting import PlaneSplitting, Splitting
 from enumsol.selections.solution import Codes, SelectionSolution
-from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.statuses import CONTACT, UNDECIDED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -153,7 +151,8 @@ class TreeSearch:
     judge : Judge
     engine : str, Engine or None
         "active-set", "clarabel", an engine ready for use, or None for the best available.
-    allowed : per node the final codes to be examined; default all
+    splitting : Splitting, optional
+        How a status splits and which rows it imposes; by default those of the plane at one alpha.
     limits : SearchLimits
     progress : called with a SearchProgress now and then
     """
@@ -164,7 +163,7 @@ class TreeSearch:
         judge: Judge,
         *,
         engine: str | Engine | None = None,
-        allowed: Sequence[frozenset[int]] | None = None,
+        splitting: Splitting | None = None,
         limits: SearchLimits | None = None,
         progress: Callable[[SearchProgress], object] | None = None,
     ) -> None:
@@ -175,9 +174,7 @@ class TreeSearch:
         self.progress = progress
         self.outcome = SearchOutcome()
         self._fallback: InteriorPointEngine | None = None
-        self._friction = [bool(f > 0) for f in system.F]
-        every = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS))
-        self._allowed = list(allowed) if allowed is not None else [every] * system.p
+        self.splitting = splitting or PlaneSplitting(system.F)
         self._known_rows: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
         self._covered = 0.0
         self._start = time.perf_counter()
@@ -220,7 +217,7 @@ class TreeSearch:
             self._settle(codes)
             self._covered += branch.weight
             return
-        children = self._children(codes, node, relaxation)
+        children = self.splitting.children(codes, node, relaxation)
         outcome.presolved += forced is not None
         self.judge.branching(node, children)
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
@@ -260,14 +257,10 @@ class TreeSearch:
 
     # -- relaxations -----------------------------------------------------------------------------------------------
 
-    def node_rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
-        """(kind, mode) of the rows that a contact node imposes in a status."""
-        return status_rows(code, friction=self._friction[node])
-
     def _rows_of(self, node: int, code: int) -> tuple[list[int], list[int]]:
         rows = self._known_rows.get((node, code))
         if rows is None:
-            pairs = self.node_rows(node, code)
+            pairs = self.splitting.rows(node, code)
             rows = [kind * self.system.p + node for kind, _ in pairs], [mode for _, mode in pairs]
             self._known_rows[node, code] = rows
         return rows
@@ -306,29 +299,3 @@ class TreeSearch:
             if forced:
                 return forced[0], forced[1:]
         return relaxation.choose(branch.codes), None
-
-    def _children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
-        """Codes of the children, the one nearest to the minimiser first."""
-        allowed = self._allowed[node]
-        contact = [c for c in (STICK, SLIP_PLUS, SLIP_MINUS) if c in allowed]
-        p = self.system.p
-        if relaxation is not None:
-            force, w = relaxation.forces, relaxation.displacements
-        if codes[node] == UNDECIDED:
-            touching = FRICTIONLESS if not self._friction[node] else (contact[0] if len(contact) == 1 else CONTACT)
-            children = [OPEN] if OPEN in allowed else []
-            if (FRICTIONLESS in allowed) if touching == FRICTIONLESS else contact:
-                children.append(touching)
-            if relaxation is not None and force[node] > -w[node]:
-                children.reverse()
-            return children
-        if relaxation is not None:
-            w_t = w[p + node]
-            slack = self.system.F[node] * force[node] - abs(force[p + node])
-            order = {
-                STICK: 0.0 if slack > abs(w_t) else 2.0,
-                SLIP_PLUS: 1.0 - np.sign(w_t),
-                SLIP_MINUS: 1.0 + np.sign(w_t),
-            }
-            contact.sort(key=lambda c: order[c])
-        return contact
