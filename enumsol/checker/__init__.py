@@ -1,13 +1,13 @@
-"""Certification: rigorous enclosures, proofs, and the checker that imports nothing from the search.
+"""The checker of proofs, which imports nothing of the search; what both rest on is `enumsol.kernel` and below.
 
 What a verified proof says
     For the problem's own A, Bn, Bt, f, gap, slip offset and friction, read as exact numbers (or, where the report says
     "S and g as computed", for the condensed data), and for alpha as an exact fraction: the listed roots and families
     solve the problem, and nothing else does. It rests on the energy bound (theory, section 5), on branchings that cover
-    (``format.children_of``), on the a-priori error bounds of IEEE double arithmetic with rounding to nearest in
-    ``enclosure`` and ``kernel``, and on rational arithmetic in ``rational`` and ``selection_hull``. Linear algebra
-    kernels may sum in any order and fuse multiplications and additions; fast matrix multiplication of Strassen's kind
-    and changed rounding modes are excluded.
+    (``kernel.rows.children_of``), on the a-priori error bounds of IEEE double arithmetic with rounding to nearest in
+    ``arithmetic.balls``, ``condensation.enclosure`` and ``kernel``, and on rational arithmetic in ``checker.rational``
+    and ``checker.hull``. Linear algebra kernels may sum in any order and fuse multiplications and additions; fast
+    matrix multiplication of Strassen's kind and changed rounding modes are excluded.
 
 What counts as one root
     A root at which every condition holds strictly solves one selection only, and so two such roots of two leaves are
@@ -27,5 +27,5 @@ Cross-checks
     - Complete, and another sum or an even number of regular roots: a contradiction. Either the program or the machine
       is wrong; please report it with the problem and the proof.
 
-How far the data may change before the list of roots does: ``stability.stability_radius``.
+How far the data may change before the list of roots does: ``checker.stability.stability_radius``.
 """

@@ -1,8 +1,8 @@
 """The independent checker: does a proof show that its list of roots is complete? It imports nothing from the search.
 
-What it takes on faith: IEEE double arithmetic, the error bounds of ``enclosure`` and ``kernel``, and rational
-arithmetic. It recomputes S, g and F (or their enclosures) from the problem, proves S positive definite, walks the tree
-from its root, so that the leaves cover all selections by construction, and checks every leaf.
+What it takes on faith: IEEE double arithmetic, the error bounds of ``condensation.enclosure`` and ``kernel``, and
+rational arithmetic. It recomputes S, g and F (or their enclosures) from the problem, proves S positive definite, walks
+the tree from its root, so that the leaves cover all selections by construction, and checks every leaf.
 """
 
 from __future__ import annotations

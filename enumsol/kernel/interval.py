@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from enumsol.problem import ContactProblem
 
 KINDS = 9
-#: Table of format.row_table with kinds 7 and 8; then slip+ and slip- at a node whose friction varies.
+#: Table of rows.row_table with kinds 7 and 8; then slip+ and slip- at a node whose friction varies.
 _CONSTANT = np.hstack([row_table(), np.zeros((8, 2), dtype=np.int8)])
 _VARYING = _CONSTANT.copy()
 _VARYING[2] = [1, 0, 1, 1, 2, 1, 0, 1, 0]

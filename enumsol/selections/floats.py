@@ -55,7 +55,7 @@ class FloatSelections:
         self._slip_scale = size * np.sqrt(np.maximum(one**2 * snn + f**2 * stt + 2 * f * one * snt * turn, 0.0))
 
     def row_norms(self) -> NDArray[np.float64]:
-        """Norms by which the rows of relaxation.RowKind are measured, in the order of their numbers kind * p + node."""
+        """Norms by which the rows of relaxations are measured, in the order of their numbers kind * p + node."""
         p, length = self.p, self._length_scale
         return np.concatenate([self._force_scale, *self._cone_scale, length[:p], length[p:], length[p:]])
 

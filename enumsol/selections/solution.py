@@ -1,4 +1,4 @@
-"""The solution set of one selection, and what a selection solver offers to the rest of the enumeration."""
+"""The solution set of one selection, and what a selection solver offers to search and roots."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, initializedcheck=False
 """The exclusion inequality of enumsol.kernel.point in compiled loops, for the search.
 
-Formula and error bounds are those of ``kernel.exclusion_margin``, which the checker uses; tests compare the two. Sums in
+Formula and error bounds are those of ``exclusion_margin`` there, which the checker uses; tests compare the two. Sums in
 double arithmetic: the a-priori bounds hold for any order of summation and for fused multiply-adds.
 """
 
