@@ -1,4 +1,4 @@
-"""The residual H of a contact problem with its test functions and selections (theory, 1-2)."""
+"""The residual H of a contact problem with its test functions and selections (theory, sections 1 and 2)."""
 
 from __future__ import annotations
 

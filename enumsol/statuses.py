@@ -1,4 +1,4 @@
-"""Statuses of a contact node: their names, their integer codes, and the signs that name a selection (theory, 2)."""
+"""Statuses of a contact node: names, integer codes, and the signs that name a selection (theory, section 2)."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ Every import counts, those for types only and those inside functions too. docs/a
 ``python tools/draw_rooms.py`` prints what the code has.
 """
 
+import re
 from pathlib import Path
 
 import pytest
@@ -125,3 +126,20 @@ def test_a_circle_inside_a_room_is_found(tmp_path):
     assert broken_layers(imports, TABLE, {}) == []
     found = circles((item.importer, item.imported) for item in imports)
     assert found == [["house.high.other", "house.high.third", "house.high.use"]]
+
+
+def test_the_architecture_names_the_rooms_in_this_order():
+    text = (Path(__file__).parent.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = re.findall(r"^    (\w+)  ", text, re.MULTILINE)
+    layer = {room: number for number, rooms in enumerate(LAYERS) for room in rooms}
+    assert sorted(named) == sorted(layer.keys() - {".", "__main__"})
+    assert [layer[room] for room in named] == sorted(layer[room] for room in named)
+
+
+def test_the_files_that_the_architecture_names_are_there():
+    root = Path(__file__).parent.parent
+    text = (root / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`((?:enumsol/|tests/)?[\w/]+(?:\.pyx?|/))`", text))
+    assert len(named) > 30
+    homes = (root, root / "enumsol", root / "enumsol" / "continuation")
+    assert [name for name in named if not any((home / name).exists() for home in homes)] == []

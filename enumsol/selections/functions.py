@@ -1,4 +1,4 @@
-"""Forces and displacements of one selection as rational functions of alpha (theory, 4 and 7)."""
+"""Forces and displacements of one selection as rational functions of alpha (theory, sections 4 and 7)."""
 
 from __future__ import annotations
 
