@@ -20,7 +20,7 @@ from enumsol import gallery
 from enumsol.relaxation import _active_set
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.rows import row_terms
-from enumsol.search.certifiers.floats import FastJudge
+from enumsol.search.certifiers.floats import FastCertifier
 from enumsol.search.tree import SearchLimits, TreeSearch
 from enumsol.selections.floats import FloatSelections
 
@@ -48,7 +48,7 @@ def weighted_form(system, kappa):
 
 def nodes(system, form=None):
     """Nodes of the tree with the energy, or with another form."""
-    search = TreeSearch(system, FastJudge(FloatSelections(system)), limits=SearchLimits(max_nodes=MAX_NODES))
+    search = TreeSearch(system, FastCertifier(FloatSelections(system)), limits=SearchLimits(max_nodes=MAX_NODES))
     if form is not None:
         engine = ActiveSetEngine(system)
         start, index, value = row_terms(system.p, system.F)

@@ -21,7 +21,7 @@ from enumsol import gallery
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.relaxation.rows import EQUALITY, status_rows
-from enumsol.search.certifiers.floats import FastJudge
+from enumsol.search.certifiers.floats import FastCertifier
 from enumsol.search.tree import SearchLimits, TreeSearch
 from enumsol.selections.floats import FloatSelections
 
@@ -53,7 +53,7 @@ def problems(p):
 
 def search(problem, alpha):
     system = problem.condensed.at(alpha).scaled
-    tree = Recorder(system, FastJudge(FloatSelections(system)), limits=SearchLimits(max_nodes=EFFORT // system.p))
+    tree = Recorder(system, FastCertifier(FloatSelections(system)), limits=SearchLimits(max_nodes=EFFORT // system.p))
     tree.run()
     return system, tree
 

@@ -87,15 +87,15 @@ def places():
     yield active_set.ActiveSetRelaxation, "child", "copies"
     yield tree.TreeSearch, "_choose", "choice"
     yield splitting.PlaneSplitting, "children", "choice"
-    yield verified.VerifiedJudge, "excluded", "exclusion"
-    yield verified.VerifiedJudge, "selection", "selections"
-    yield workbench.Workbench, "_enclosed", ENCLOSURE
+    yield verified.VerifiedCertifier, "excluded", "exclusion"
+    yield verified.VerifiedCertifier, "selection", "selections"
+    yield workbench.Solvers, "_enclosed", ENCLOSURE
     yield verified, "_margins", ENCLOSURE
     yield verified, "packed", "proof"
-    yield verified.VerifiedJudge, "_leaf", "proof"
-    yield verified.VerifiedJudge, "branching", "proof"
+    yield verified.VerifiedCertifier, "_leaf", "proof"
+    yield verified.VerifiedCertifier, "branching", "proof"
     yield proof.ProofWriter, "close", "proof"
-    yield workbench.Workbench, "__init__", "ends"
+    yield workbench.Solvers, "__init__", "ends"
     yield active_set.ActiveSetEngine, "__init__", "ends"
     yield driver._Enumeration, "_result", "ends"
 

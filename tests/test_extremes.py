@@ -26,7 +26,7 @@ from enumsol.condensation import exact as rational_condensation
 from enumsol.continuation import NotConverged, start_tangents
 from enumsol.equation import PiecewiseSmoothEquation
 from enumsol.kernel.point import exclusion_margin
-from enumsol.search.solvers import Workbench
+from enumsol.search.solvers import Solvers
 
 
 def check(problem, alpha, *, exact=True, roots=None):
@@ -274,7 +274,7 @@ def test_the_checker_finds_better_bounds_than_the_search():
     # a body almost free to move: an approximate inverse of S has a small residual on one of its sides only
     problem = gallery.wedge(2, 2, springs=(1e-8, 1e-8))
     margins = pytest.importorskip("enumsol.search.certifiers._margin").Margins
-    bench = Workbench(problem, 1.0, "verified", 1e-9)
+    bench = Solvers(problem, 1.0, "verified", 1e-9)
     system, rng = bench.enclosed, np.random.default_rng(1)
     search = margins(system)
     p, compared = problem.p, 0

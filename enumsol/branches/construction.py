@@ -16,15 +16,15 @@ from enumsol.checks import finite_alpha
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactPath
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
-from enumsol.search.certifiers.interval_balls import BallLeafJudge
-from enumsol.search.certifiers.interval_rationals import ExactLeafJudge
-from enumsol.search.interval import BelievingJudge, IntervalSearch
+from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
+from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
+from enumsol.search.interval import FastIntervalCertifier, IntervalSearch
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.checks import Alpha
-    from enumsol.search.interval import LeafJudge
+    from enumsol.search.interval import IntervalCertifier
 
 Arithmetic = Literal["fast", "verified", "exact"]
 
@@ -84,12 +84,12 @@ def branch_graph(
     path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem.condensed)
     deadline = None if time_limit is None else started + time_limit
     origin = None if path.origin is None else to_fraction(path.origin)
-    judge = _judge(problem, path, arithmetic)
+    certifier = _certifier(problem, path, arithmetic)
     search = IntervalSearch(
         problem.condensed,
         (a, b),
         origin,
-        judge,
+        certifier,
         max_nodes=max_nodes,
         deadline=deadline,
         progress=_stage(progress, "search"),
@@ -117,7 +117,12 @@ def branch_graph(
     reasons = ([search.stopped] if search.stopped is not None else []) + gluing.reasons
     vertices = make_vertices(gluing, arcs)
     proof = None
-    if isinstance(judge, BallLeafJudge) and search.pieces and search.stopped is None and not judge.used_rationals:
+    if (
+        isinstance(certifier, VerifiedIntervalCertifier)
+        and search.pieces
+        and search.stopped is None
+        and not certifier.used_rationals
+    ):
         data = "problem" if path.condensed_exactly else "condensed"
         proof = write_graph_proof(problem, (a, b), data, search.pieces)
     pieces = tuple(search.pieces)
@@ -129,10 +134,10 @@ def branch_graph(
     return graph
 
 
-def _judge(problem: ContactProblem, path: ExactPath, arithmetic: Arithmetic) -> LeafJudge:
+def _certifier(problem: ContactProblem, path: ExactPath, arithmetic: Arithmetic) -> IntervalCertifier:
     if arithmetic == "exact":
-        return ExactLeafJudge(path)
-    return BallLeafJudge(problem, path) if arithmetic == "verified" else BelievingJudge()
+        return ExactIntervalCertifier(path)
+    return VerifiedIntervalCertifier(problem, path) if arithmetic == "verified" else FastIntervalCertifier()
 
 
 def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callable[[float], object] | None:

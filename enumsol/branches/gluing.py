@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from enumsol.condensation.exact import ExactPath
-    from enumsol.roots.components import Component
+    from enumsol.roots.components import RootComponent
     from enumsol.selections.solution import ActiveSets, Codes
 
 Place = tuple["Codes", int]
@@ -354,7 +354,7 @@ class Gluing:
                     )
         self.edges = sorted(found, key=lambda e: (e.tail, e.head, e.codes))
 
-    def _component(self, codes: Codes, sample: Any) -> Component | None:
+    def _component(self, codes: Codes, sample: Any) -> RootComponent | None:
         """The connected set of solutions that a degenerate selection belongs to at a point of its cell."""
         solver = FiberSelections(self.path, sample)
         solution = solver.solve(codes)

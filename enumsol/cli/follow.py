@@ -143,24 +143,24 @@ def follow(
     body = load_problem(problem)
     row = node_row(body, node)
     over = None if graph_file is None else read_graph(graph_file, body)
-    tour = _Tour(body, (float(interval[0]), float(interval[1])), options, tangent)
+    followed = _Followed(body, (float(interval[0]), float(interval[1])), options, tangent)
     interrupted = False
     try:
-        tour.run(_starts(body, interval, alpha, arithmetic, root), signs, alone=root is not None)
+        followed.run(_starts(body, interval, alpha, arithmetic, root), signs, alone=root is not None)
     except KeyboardInterrupt:
         # wherever it came: the paths so far are kept
         interrupted = True
     if "-" not in (json_file, csv_file):
-        typer.echo(tour.as_text() + (" (interrupted)" if interrupted else ""))
+        typer.echo(followed.as_text() + (" (interrupted)" if interrupted else ""))
     if json_file is not None:
-        write_text(json_file, as_json({"problem": problem, "start": alpha, "interval": interval, **tour.content()}))
+        write_text(json_file, as_json({"problem": problem, "start": alpha, "interval": interval, **followed.content()}))
     if csv_file is not None:
-        write_text(csv_file, tour.frame().to_csv(index=False))
-    if plot_file is not None and tour.paths:
-        write_figure(plot_file, _draw(tour.paths, over, row, quantity))
+        write_text(csv_file, followed.frame().to_csv(index=False))
+    if plot_file is not None and followed.paths:
+        write_figure(plot_file, _draw(followed.paths, over, row, quantity))
     if interrupted:
         raise typer.Exit(ExitStatus.INTERRUPTED)
-    raise typer.Exit(ExitStatus.DONE if tour.arrived else ExitStatus.INCOMPLETE)
+    raise typer.Exit(ExitStatus.DONE if followed.arrived else ExitStatus.INCOMPLETE)
 
 
 def _options(
@@ -212,7 +212,7 @@ def _starts(
 
 
 @dataclass
-class _Tour:
+class _Followed:
     """Paths from one root after the other."""
 
     problem: ContactProblem

@@ -107,17 +107,17 @@ def follow_all(
         graph = branch_graph(problem, interval)
     if graph.problem is not problem and graph.problem.p != problem.p:
         raise InvalidArgumentError(f"graph has {graph.problem.p} contact nodes; expected the problem's {problem.p}")
-    crew = _Crew(problem, interval, options, graph, progress)
+    coverage = _Coverage(problem, interval, options, graph, progress)
     for start in graph.starting_points():
-        crew.start(start)
-    seeded = len(crew.paths)
-    for seed in crew.missed_seeds():
-        crew.start(seed)
-    report = audit_on(crew.chart, crew.paths, DETOUR)
-    return FollowAllResult(tuple(crew.paths), report, tuple(crew.failures), len(crew.paths) - seeded, graph)
+        coverage.start(start)
+    seeded = len(coverage.paths)
+    for seed in coverage.missed_seeds():
+        coverage.start(seed)
+    report = audit_on(coverage.chart, coverage.paths, DETOUR)
+    return FollowAllResult(tuple(coverage.paths), report, tuple(coverage.failures), len(coverage.paths) - seeded, graph)
 
 
-class _Crew:
+class _Coverage:
     """Paths so far, and the arcs that they passed."""
 
     def __init__(

@@ -10,7 +10,7 @@ import numpy as np
 
 from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
-from enumsol.continuation.recorder import Recorder
+from enumsol.continuation.recorder import PathRecorder
 from enumsol.continuation.tangents import curve_tangent, orientation
 from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
@@ -98,7 +98,7 @@ class Follower:
         margin = options.overshoot
         self._low, self._high = (low - margin) / equation.alpha_scale, (high + margin) / equation.alpha_scale
         self._landmarks = list(_landmarks(equation, visited))
-        self.record = Recorder(equation)
+        self.record = PathRecorder(equation)
         self.record.add(first, "start")
 
     def run(self) -> PathData:

@@ -207,17 +207,17 @@ class GraphMap:
     # -- ways along the graph ----------------------------------------------------------------------------------------
 
     @cached_property
-    def _roads(self) -> Any:
+    def _network(self) -> Any:
         """Vertices joined by arcs, weighted by their lengths."""
         import networkx as nx  # audits only
 
-        roads = nx.MultiGraph()
-        roads.add_nodes_from(self.vertices)
+        network = nx.MultiGraph()
+        network.add_nodes_from(self.vertices)
         for arc in self.curves:
             points = [self.on_arc(arc, alpha) for alpha in np.linspace(arc.lo, arc.hi, _SAMPLES)]
             length = sum(self.equation.norm(b - a) for a, b in pairwise(points))
-            roads.add_edge(arc.tail, arc.head, key=arc.number, weight=length)
-        return roads
+            network.add_edge(arc.tail, arc.head, key=arc.number, weight=length)
+        return network
 
     def way(self, x: Vector, start: Place, y: Vector, end: Place) -> tuple[float, tuple[int, ...]]:
         """Length of the shortest way along the graph between two points, and the arcs that it passes whole.
@@ -231,7 +231,7 @@ class GraphMap:
         best: tuple[float, tuple[int, ...]] = (math.inf, ())
         leave, arrive = self._exits(x, start), self._exits(y, end)
         for first, head in leave.items():
-            lengths, routes = nx.single_source_dijkstra(self._roads, first)
+            lengths, routes = nx.single_source_dijkstra(self._network, first)
             for last, tail in arrive.items():
                 if last in lengths and head + lengths[last] + tail < best[0]:
                     best = (head + lengths[last] + tail, self._passed(routes[last]))
@@ -246,5 +246,6 @@ class GraphMap:
 
     def _passed(self, route: Sequence[int]) -> tuple[int, ...]:
         return tuple(
-            min(self._roads[a][b], key=lambda number: self._roads[a][b][number]["weight"]) for a, b in pairwise(route)
+            min(self._network[a][b], key=lambda number: self._network[a][b][number]["weight"])
+            for a, b in pairwise(route)
         )

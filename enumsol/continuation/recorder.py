@@ -24,7 +24,7 @@ _AHEAD = 1e-6
 
 
 @dataclass
-class Recorder:
+class PathRecorder:
     """The points and counts of a path while it is followed."""
 
     equation: CondensedEquation

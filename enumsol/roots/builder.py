@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from enumsol.checks import Alpha
     from enumsol.kernel.point import VerifiedSelection
     from enumsol.problem import ContactProblem
-    from enumsol.roots.components import Component
-    from enumsol.search.tree import Open
+    from enumsol.roots.components import RootComponent
+    from enumsol.search.tree import UndecidedPart
     from enumsol.selections.floats import FloatSelections
     from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
 
@@ -61,7 +61,7 @@ class RootBuilder:
         self._floats = floats
         self._verified = verified
 
-    def root(self, component: Component) -> Root:
+    def root(self, component: RootComponent) -> Root:
         """The isolated root of a component."""
         p = self._problem.p
         solution = component.solutions[0]
@@ -113,7 +113,7 @@ class RootBuilder:
         columns = [np.stack([a, b], axis=1) for a, b in zip(low, high, strict=True)]
         return Enclosure(columns[0][:p], columns[0][p:], columns[1][:p], columns[1][p:])
 
-    def family(self, component: Component, *, proven: bool) -> RootFamily:
+    def family(self, component: RootComponent, *, proven: bool) -> RootFamily:
         """The family of a component of positive dimension."""
         p = self._problem.p
         parts = []
@@ -136,7 +136,7 @@ class RootBuilder:
         known.append(vertex)
         return vertex
 
-    def undecided(self, item: Open) -> Undecided:
+    def undecided(self, item: UndecidedPart) -> Undecided:
         """An undecided part in the user's terms."""
         named: list[ContactStatus | str | None] = []
         for code in item.codes:

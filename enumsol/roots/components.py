@@ -29,7 +29,7 @@ _DIRECTION_SEEDS = (20121, 20122, 20123, 20124)
 
 
 @dataclass(frozen=True)
-class Component:
+class RootComponent:
     """A connected set of roots: an isolated root or a family.
 
     Attributes
@@ -67,7 +67,7 @@ def connected_components(
     solutions: Iterable[SelectionSolution],
     solver: SelectionSolver,
     degree: Callable[[ActiveSets], int | None] | None = None,
-) -> list[Component]:
+) -> list[RootComponent]:
     """Roots and families that the given solutions of selections form, every root once.
 
     Parameters
@@ -77,7 +77,7 @@ def connected_components(
     degree : called with the active sets of an isolated root when more than MAX_LOCAL_SELECTIONS hold there
     """
     known: dict[Codes, SelectionSolution] = {}
-    singles: list[Component] = []
+    singles: list[RootComponent] = []
     for solution in solutions:
         if solution.codes in known:
             continue
@@ -86,7 +86,7 @@ def connected_components(
     for solution in known.values():
         if solution.dimension == 0 and solution.strict and solution.det_sign != 0:
             active = tuple(frozenset((code,)) for code in solution.codes)
-            singles.append(Component((solution,), active, 0, solution.det_sign, whole=True))
+            singles.append(RootComponent((solution,), active, 0, solution.det_sign, whole=True))
         else:
             degenerate.append(solution)
     groups = _grow(degenerate, known, solver)
@@ -175,7 +175,7 @@ def _component(
     whole: bool,
     solver: SelectionSolver,
     degree: Callable[[ActiveSets], int | None] | None,
-) -> Component:
+) -> RootComponent:
     group = sorted(group, key=lambda s: (-s.dimension, s.codes))
     dimension = group[0].dimension
     sets = [set() for _ in range(solver.p)]  # type: list[set[int]]
@@ -190,7 +190,7 @@ def _component(
     index = _index(group, solver) if whole else (degree(active) if degree is not None else None)
     if dimension > 0:
         group = _maximal(group, solver)
-    return Component(tuple(group), active, dimension, index, whole)
+    return RootComponent(tuple(group), active, dimension, index, whole)
 
 
 def _maximal(group: list[SelectionSolution], solver: SelectionSolver) -> list[SelectionSolution]:

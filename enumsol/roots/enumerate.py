@@ -14,14 +14,14 @@ from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.proof.proof_file import Proof, ProofWriter
 from enumsol.roots.builder import RootBuilder
-from enumsol.roots.components import Component, connected_components
+from enumsol.roots.components import RootComponent, connected_components
 from enumsol.roots.local_degree import perturbed_degree
 from enumsol.roots.root_set import RootSet, SearchStats
-from enumsol.search.certifiers.verified import VerifiedJudge
+from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
 from enumsol.search.parallel import run_parallel
-from enumsol.search.solvers import Arithmetic, Workbench
-from enumsol.search.tree import Open, SearchLimits, SearchOutcome, SearchProgress, TreeSearch
+from enumsol.search.solvers import Arithmetic, Solvers
+from enumsol.search.tree import SearchLimits, SearchOutcome, SearchProgress, TreeSearch, UndecidedPart
 from enumsol.selections.floats import SIGN_TOLERANCE, FloatSelections
 from enumsol.selections.solution import SelectionSolution
 
@@ -99,8 +99,8 @@ def enumerate_roots(
     """
     _check(problem, alpha, arithmetic, method, stop_after, max_nodes, time_limit, tolerance, engine)
     _check_proof(arithmetic, method, proof_path)
-    bench = Workbench(problem, alpha, arithmetic, tolerance)
-    return _Enumeration(bench, method, progress, engine, proof_path).run(executor, stop_after, max_nodes, time_limit)
+    solvers = Solvers(problem, alpha, arithmetic, tolerance)
+    return _Enumeration(solvers, method, progress, engine, proof_path).run(executor, stop_after, max_nodes, time_limit)
 
 
 class _Enumeration:
@@ -108,23 +108,23 @@ class _Enumeration:
 
     def __init__(
         self,
-        bench: Workbench,
+        solvers: Solvers,
         method: Method,
         progress: Callable[[SearchProgress], object] | None,
         engine: str | None,
         proof_path: str | Path | None,
     ) -> None:
-        self.bench, self.method, self.progress, self.engine = bench, method, progress, engine
+        self.solvers, self.method, self.progress, self.engine = solvers, method, progress, engine
         self.started = time.perf_counter()
         self.outcome = SearchOutcome()
-        self.solver: SelectionSolver = bench.floats
-        if bench.arithmetic == "exact" and bench.exact is not None:
-            self.solver = bench.exact
+        self.solver: SelectionSolver = solvers.floats
+        if solvers.arithmetic == "exact" and solvers.exact is not None:
+            self.solver = solvers.exact
         self.writer: ProofWriter | None = None
-        if bench.arithmetic == "verified":
+        if solvers.arithmetic == "verified":
             self.writer = ProofWriter(proof_path)
-            self.writer.write(bench.proof_header())
-        self.judge = bench.judge(self.writer)
+            self.writer.write(solvers.proof_header())
+        self.certifier = solvers.certifier(self.writer)
 
     def run(
         self, executor: Executor | None, stop_after: int | None, max_nodes: int | None, time_limit: float | None
@@ -158,28 +158,28 @@ class _Enumeration:
         return enough
 
     def _tree(self, limits: SearchLimits, executor: Executor | None) -> None:
-        bench = self.bench
-        search = TreeSearch(bench.scaled, self.judge, engine=self.engine, limits=limits, progress=self.progress)
+        solvers = self.solvers
+        search = TreeSearch(solvers.scaled, self.certifier, engine=self.engine, limits=limits, progress=self.progress)
         self.outcome = search.outcome
-        if bench.unloaded():
+        if solvers.unloaded():
             # the energy bound is then lambda' S lambda <= 0: lambda = 0 and nothing else
             self.outcome.solutions.append(self._unloaded())
-        elif (reason := bench.undecidable) is not None:
+        elif (reason := solvers.undecidable) is not None:
             # without any means of proof the tree would only grow
             codes = search.first().codes
-            self.judge.skipped(codes, reason)
-            self.outcome.undecided.append(Open(codes, reason, "hold the body better, or scale the data"))
+            self.certifier.skipped(codes, reason)
+            self.outcome.undecided.append(UndecidedPart(codes, reason, "hold the body better, or scale the data"))
         elif executor is not None:
-            run_parallel(executor, bench, search, self.engine, bench.floats.tolerance)
+            run_parallel(executor, solvers, search, self.engine, solvers.floats.tolerance)
         else:
             search.run()
 
     def _unloaded(self) -> SelectionSolution:
-        if isinstance(self.judge, VerifiedJudge):
-            self.judge.unloaded()
-        p = self.bench.problem.p
+        if isinstance(self.certifier, VerifiedCertifier):
+            self.certifier.unloaded()
+        p = self.solvers.problem.p
         solver = self.solver
-        if solver is self.bench.floats:
+        if solver is self.solvers.floats:
             return SelectionSolution((0,) * p, (np.zeros(2 * p),), 0, 1, strict=False)
         solution = solver.solve((0,) * p)
         if solution is None:
@@ -189,7 +189,7 @@ class _Enumeration:
     def _exhaustive(self, limits: SearchLimits) -> None:
         outcome, reported = self.outcome, self.started
         if isinstance(self.solver, FloatSelections):
-            stream = exhaustive_float(self.bench.scaled, self.solver)
+            stream = exhaustive_float(self.solvers.scaled, self.solver)
         else:
             stream = exhaustive_exact(self.solver)
         total = math.prod(4 if positive else 2 for positive in self.solver.F_positive)
@@ -212,61 +212,61 @@ class _Enumeration:
             if outcome.stopped is not None:
                 return
 
-    def _components(self) -> list[tuple[list[Component], SelectionSolver]]:
+    def _components(self) -> list[tuple[list[RootComponent], SelectionSolver]]:
         """Components of the root set with the solver whose points they hold."""
         solutions = self.outcome.solutions
         exact = [s for s in solutions if isinstance(s.vertices[0], tuple)]
         floats = [s for s in solutions if not isinstance(s.vertices[0], tuple)]
-        parts: list[tuple[list[Component], SelectionSolver]] = []
+        parts: list[tuple[list[RootComponent], SelectionSolver]] = []
         if floats:
-            parts.append((connected_components(floats, self.bench.floats, self._degree), self.bench.floats))
-        if exact and self.bench.exact is not None:
-            parts.append((connected_components(exact, self.bench.exact, self._degree), self.bench.exact))
+            parts.append((connected_components(floats, self.solvers.floats, self._degree), self.solvers.floats))
+        if exact and self.solvers.exact is not None:
+            parts.append((connected_components(exact, self.solvers.exact, self._degree), self.solvers.exact))
         return parts
 
     def _degree(self, active: ActiveSets) -> int | None:
-        return perturbed_degree(self.bench.floats, active)
+        return perturbed_degree(self.solvers.floats, active)
 
     def _result(self) -> RootSet:
-        outcome, bench = self.outcome, self.bench
+        outcome, solvers = self.outcome, self.solvers
         roots, families = [], []
-        verified = self.judge.verified if isinstance(self.judge, VerifiedJudge) else {}
+        verified = self.certifier.verified if isinstance(self.certifier, VerifiedCertifier) else {}
         for components, solver in self._components():
-            builder = RootBuilder(bench.problem, bench.alpha, solver, bench.floats, verified)
+            builder = RootBuilder(solvers.problem, solvers.alpha, solver, solvers.floats, verified)
             roots += [builder.root(c) for c in components if c.dimension == 0]
-            proven = solver is not bench.floats
+            proven = solver is not solvers.floats
             families += [builder.family(c, proven=proven) for c in components if c.dimension > 0]
         roots.sort(key=lambda root: ([s.value for s in root.statuses], root.lambda_n.tolist(), root.lambda_t.tolist()))
         families.sort(key=lambda family: family.vertices.tolist())
-        builder = RootBuilder(bench.problem, bench.alpha, self.solver, bench.floats, verified)
+        builder = RootBuilder(solvers.problem, solvers.alpha, self.solver, solvers.floats, verified)
         counts = (outcome.nodes, outcome.pruned, outcome.selections, outcome.qps, outcome.fallback_qps)
         return RootSet(
-            alpha=bench.alpha,
+            alpha=solvers.alpha,
             roots=roots,
             families=families,
             undecided=[builder.undecided(item) for item in outcome.undecided],
-            arithmetic=bench.arithmetic,
+            arithmetic=solvers.arithmetic,
             method=self.method,
             stopped=outcome.stopped,
             stats=SearchStats(
                 *counts,
                 time.perf_counter() - self.started,
-                self.judge.escalations if isinstance(self.judge, VerifiedJudge) else None,
+                self.certifier.escalations if isinstance(self.certifier, VerifiedCertifier) else None,
                 outcome.presolved,
             ),
-            node_ids=bench.problem.node_ids,
-            certified_data=bench.data,
+            node_ids=solvers.problem.node_ids,
+            certified_data=solvers.data,
             proof=self._proof(len(roots), len(families)),
         )
 
     def _proof(self, roots: int, families: int) -> Proof | None:
         """Close the proof. One that was interrupted stays without its end, and is none."""
-        if self.writer is None or not isinstance(self.judge, VerifiedJudge):
+        if self.writer is None or not isinstance(self.certifier, VerifiedCertifier):
             return None
         whole = self.outcome.stopped is None or "not examined" in self.outcome.stopped
         if whole:
             undecided = len(self.outcome.undecided)
-            footer = {"roots": roots, "families": families, "undecided": undecided, "leaves": self.judge.leaves}
+            footer = {"roots": roots, "families": families, "undecided": undecided, "leaves": self.certifier.leaves}
             self.writer.write(footer)
         proof = self.writer.close()
         return proof if whole else None

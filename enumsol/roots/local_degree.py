@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.search.certifiers.floats import FastJudge
+from enumsol.search.certifiers.floats import FastCertifier
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import SearchLimits, TreeSearch
 from enumsol.selections.floats import FloatSelections
@@ -33,7 +33,7 @@ def perturbed_degree(solver: FloatSelections, active: ActiveSets) -> int | None:
         system = replace(solver.system, g=solver.system.g + (step if loaded else 1.0) * push)
         moved = FloatSelections(system, solver.tolerance)
         splitting, limits = PlaneSplitting(system.F, active), SearchLimits(max_nodes=_MAX_NODES)
-        search = TreeSearch(system, FastJudge(moved), splitting=splitting, limits=limits)
+        search = TreeSearch(system, FastCertifier(moved), splitting=splitting, limits=limits)
         outcome = search.run()
         if outcome.stopped is not None or any(not s.strict or s.det_sign == 0 for s in outcome.solutions):
             return None

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.tree import Judge
+    from enumsol.search.tree import Certifier
     from enumsol.selections.solution import Codes
 
 #: Nodes of a piece's tree, per contact node, that are spent before the tree at its middle is looked at.
@@ -95,14 +95,14 @@ class SearchedPiece:
     cut: list[Codes] = field(default_factory=list)
 
 
-class LeafJudge(Protocol):
+class IntervalCertifier(Protocol):
     """Decides in one arithmetic whether multipliers prove a leaf empty on the whole piece."""
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
 
 
-class BelievingJudge:
+class FastIntervalCertifier:
     """Floats: what the engine computed is believed."""
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
@@ -112,9 +112,9 @@ class BelievingJudge:
 
 
 class _Collector:
-    """The judge of one piece's tree: keeps the leaves, and counts the selections not known before."""
+    """The certifier of one piece's tree: keeps the leaves, and counts the selections not known before."""
 
-    def __init__(self, found: SearchedPiece, leaves: LeafJudge, known: set[Codes]) -> None:
+    def __init__(self, found: SearchedPiece, leaves: IntervalCertifier, known: set[Codes]) -> None:
         self._found, self._leaves, self._known = found, leaves, known
         self.new = 0
 
@@ -137,7 +137,7 @@ class _Collector:
 
 
 class _Uncounted(_Collector):
-    """The judge of a tree whose size only is asked for."""
+    """The certifier of a tree whose size only is asked for."""
 
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         del codes, relaxation
@@ -167,13 +167,13 @@ class IntervalTreeSearch(TreeSearch):
     Parameters
     ----------
     system : IntervalSystem
-    judge : Judge
+    certifier : Certifier
     limits : SearchLimits
     """
 
-    def __init__(self, system: IntervalSystem, judge: Judge, limits: SearchLimits) -> None:
+    def __init__(self, system: IntervalSystem, certifier: Certifier, limits: SearchLimits) -> None:
         splitting = IntervalSplitting(system)
-        super().__init__(system.scaled, judge, engine=IntervalEngine(system), splitting=splitting, limits=limits)
+        super().__init__(system.scaled, certifier, engine=IntervalEngine(system), splitting=splitting, limits=limits)
 
     def _fall_back(self, codes: Codes) -> None:
         """No other engine knows intervals: the partial assignment is branched on."""
@@ -189,7 +189,7 @@ class IntervalSearch:
     interval : (Fraction, Fraction)
     origin : Fraction or None
         The alpha at which g vanishes.
-    leaves : LeafJudge
+    leaves : IntervalCertifier
     max_nodes : int or None
         Stop after so many nodes of all trees.
     deadline : time.perf_counter() value or None
@@ -211,7 +211,7 @@ class IntervalSearch:
         condensed: CondensedProblem,
         interval: tuple[Fraction, Fraction],
         origin: Fraction | None,
-        leaves: LeafJudge,
+        leaves: IntervalCertifier,
         *,
         max_nodes: int | None = None,
         deadline: float | None = None,
@@ -252,7 +252,7 @@ class IntervalSearch:
         """The trees over a piece; what is left over when cutting it is better, or a limit is reached, is in ``cut``."""
         system = self._system(piece)
         found = SearchedPiece(piece, system, roots)
-        judge = _Collector(found, self._leaves, self.selections)
+        certifier = _Collector(found, self._leaves, self.selections)
         whole = float(piece.b - piece.a) <= SMALLEST_PIECE * float(self._interval[1] - self._interval[0])
         limit: int | None = None if whole else NODES_PER_CONTACT * (system.p + 2)
         spent, left = 0, roots
@@ -261,8 +261,8 @@ class IntervalSearch:
             if self._max_nodes is not None:
                 rest = max(self._max_nodes - self.nodes, 1)
                 allowed = rest if allowed is None else min(allowed, rest)
-            enough = None if whole else (lambda _: judge.new > NEW_SELECTIONS)
-            outcome = IntervalTreeSearch(system, judge, SearchLimits(enough, allowed, self._deadline)).run(left)
+            enough = None if whole else (lambda _: certifier.new > NEW_SELECTIONS)
+            outcome = IntervalTreeSearch(system, certifier, SearchLimits(enough, allowed, self._deadline)).run(left)
             self.nodes += outcome.nodes
             spent += outcome.nodes
             if outcome.stopped is None:
@@ -271,7 +271,7 @@ class IntervalSearch:
             if self._must_stop():
                 found.cut = left
                 return found
-            if judge.new > NEW_SELECTIONS:
+            if certifier.new > NEW_SELECTIONS:
                 found.cut = left + [codes for codes in found.selections if codes not in self.selections]
                 found.selections = [codes for codes in found.selections if codes in self.selections]
                 return found
@@ -297,8 +297,8 @@ class IntervalSearch:
         """Nodes of the tree at one alpha."""
         piece = Piece(alpha, alpha)
         system = self._system(piece)
-        judge = _Uncounted(SearchedPiece(piece, system, []), self._leaves, set())
+        certifier = _Uncounted(SearchedPiece(piece, system, []), self._leaves, set())
         limits = SearchLimits(max_nodes=self._max_nodes, deadline=self._deadline)
-        outcome = IntervalTreeSearch(system, judge, limits).run()
+        outcome = IntervalTreeSearch(system, certifier, limits).run()
         self.nodes += outcome.nodes
         return outcome.nodes

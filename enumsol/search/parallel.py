@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from enumsol.search.certifiers.verified import VerifiedJudge
-from enumsol.search.solvers import Workbench
-from enumsol.search.tree import Branch, Open, SearchLimits, SearchOutcome, TreeSearch
+from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.search.solvers import Solvers
+from enumsol.search.tree import SearchLimits, SearchOutcome, TreeNode, TreeSearch, UndecidedPart
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -50,20 +50,20 @@ class _Answer:
 
 
 def run_parallel(
-    executor: Executor, bench: Workbench, search: TreeSearch, engine: str | None, tolerance: float
+    executor: Executor, solvers: Solvers, search: TreeSearch, engine: str | None, tolerance: float
 ) -> None:
     """Search the tree with the help of an executor; ``search`` collects the outcome, which does not depend on timing.
 
     Its outcome is filled as the subtrees come in, so that an interruption keeps those that did.
     """
     limits, outcome = search.limits, search.outcome
-    plan = _Plan(executor, bench, limits, engine, tolerance)
-    judge = search.judge if isinstance(search.judge, VerifiedJudge) else None
+    plan = _Plan(executor, solvers, limits, engine, tolerance)
+    certifier = search.certifier if isinstance(search.certifier, VerifiedCertifier) else None
     recorder = None
-    if judge is not None:
-        recorder, judge.recorder = judge.recorder, plan
+    if certifier is not None:
+        recorder, certifier.recorder = certifier.recorder, plan
     try:
-        stack: list[tuple[Branch, int]] = [(search.first(), 0)]
+        stack: list[tuple[TreeNode, int]] = [(search.first(), 0)]
         while stack:
             branch, level = stack.pop()
             if level >= LEVELS:
@@ -88,8 +88,8 @@ def run_parallel(
                 outcome.stopped = outcome.stopped or f"stopped after enough roots, {total - done} subtrees not examined"
                 enough = True
     finally:
-        if judge is not None and recorder is not None:
-            judge.recorder = recorder
+        if certifier is not None and recorder is not None:
+            certifier.recorder = recorder
         for future in plan.futures:
             future.cancel()
 
@@ -106,21 +106,28 @@ class _Plan:
     """Records written while the top of the tree is examined, with places left for the subtrees handed out."""
 
     def __init__(
-        self, executor: Executor, bench: Workbench, limits: SearchLimits, engine: str | None, tolerance: float
+        self, executor: Executor, solvers: Solvers, limits: SearchLimits, engine: str | None, tolerance: float
     ) -> None:
         self.items: list[Any] = []
         self.futures: list[Future[_Answer]] = []
         self._executor = executor
         self._limits = limits
         self._make: Callable[[Codes], _Task] = lambda codes: _Task(
-            bench.problem, bench.alpha, bench.arithmetic, tolerance, engine, codes, limits.max_nodes, limits.remaining()
+            solvers.problem,
+            solvers.alpha,
+            solvers.arithmetic,
+            tolerance,
+            engine,
+            codes,
+            limits.max_nodes,
+            limits.remaining(),
         )
 
     def write(self, record: Any) -> None:
         """Keep a record of the top of the tree."""
         self.items.append(record)
 
-    def submit(self, branch: Branch) -> None:
+    def submit(self, branch: TreeNode) -> None:
         """Hand out a subtree."""
         future = self._executor.submit(_subtree, self._make(branch.codes))
         self.futures.append(future)
@@ -138,23 +145,25 @@ class _Records:
 
 
 def _subtree(task: _Task) -> _Answer:
-    bench = Workbench(task.problem, task.alpha, task.arithmetic, task.tolerance)
+    solvers = Solvers(task.problem, task.alpha, task.arithmetic, task.tolerance)
     records = _Records()
-    judge = bench.judge(records)
+    certifier = solvers.certifier(records)
     limits = SearchLimits(max_nodes=task.max_nodes, deadline=SearchLimits.deadline_in(task.seconds))
-    outcome = TreeSearch(bench.scaled, judge, engine=task.engine, limits=limits).run([task.codes])
-    if isinstance(judge, VerifiedJudge):
-        return _Answer(outcome, records.records, judge.verified, judge.escalations, judge.leaves)
+    outcome = TreeSearch(solvers.scaled, certifier, engine=task.engine, limits=limits).run([task.codes])
+    if isinstance(certifier, VerifiedCertifier):
+        return _Answer(outcome, records.records, certifier.verified, certifier.escalations, certifier.leaves)
     return _Answer(outcome, [], {}, None, 0)
 
 
 def _skip(search: TreeSearch, codes: Codes, recorder: Recorder | None) -> None:
     """Leave a subtree undecided because enough was found."""
     reason = str(search.outcome.stopped)
-    if isinstance(search.judge, VerifiedJudge) and recorder is not None:
+    if isinstance(search.certifier, VerifiedCertifier) and recorder is not None:
         recorder.write(["u", reason])
-        search.judge.leaves += 1
-    search.outcome.undecided.append(Open(codes, "the search was stopped before it came here", "raise the limit"))
+        search.certifier.leaves += 1
+    search.outcome.undecided.append(
+        UndecidedPart(codes, "the search was stopped before it came here", "raise the limit")
+    )
 
 
 def _add(search: TreeSearch, part: _Answer, recorder: Recorder | None) -> None:
@@ -164,10 +173,10 @@ def _add(search: TreeSearch, part: _Answer, recorder: Recorder | None) -> None:
     total.stopped = total.stopped or part.outcome.stopped
     for name in ("nodes", "pruned", "selections", "qps", "fallback_qps"):
         setattr(total, name, getattr(total, name) + getattr(part.outcome, name))
-    if isinstance(search.judge, VerifiedJudge) and part.escalations is not None:
-        search.judge.verified |= part.verified
-        search.judge.leaves += part.leaves
-        search.judge.escalations.add(part.escalations)
+    if isinstance(search.certifier, VerifiedCertifier) and part.escalations is not None:
+        search.certifier.verified |= part.verified
+        search.certifier.leaves += part.leaves
+        search.certifier.escalations.add(part.escalations)
         for record in part.records:
             if recorder is not None:
                 recorder.write(record)

@@ -1,4 +1,4 @@
-"""One problem at one alpha in one arithmetic: the solvers and the judge that a search needs."""
+"""One problem at one alpha in one arithmetic: the solvers and the certifier that a search needs."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ import numpy as np
 
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.search.certifiers.floats import FastJudge
-from enumsol.search.certifiers.verified import VerifiedJudge
+from enumsol.search.certifiers.floats import FastCertifier
+from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.selections.floats import FloatSelections
 
 if TYPE_CHECKING:
     from enumsol.checks import Alpha
     from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Recorder
-    from enumsol.search.certifiers.rationals import ExactJudge
-    from enumsol.search.tree import Judge
+    from enumsol.search.certifiers.rationals import ExactCertifier
+    from enumsol.search.tree import Certifier
     from enumsol.selections.rationals import ExactSelections
 
 Arithmetic = Literal["fast", "verified", "exact"]
 
 
-class Workbench:
-    """Solvers and judge for one problem at one alpha.
+class Solvers:
+    """Solvers and certifier for one problem at one alpha.
 
     Parameters
     ----------
@@ -79,13 +79,13 @@ class Workbench:
         return ExactSelections(system)
 
     @cached_property
-    def exact_judge(self) -> ExactJudge | None:
-        """The judge in rationals; None when the problem is too large for them or only condensed data are certified."""
+    def exact_certifier(self) -> ExactCertifier | None:
+        """The certifier in rationals; None when the problem is too large, or only condensed data are certified."""
         if self.data == "condensed" or self.exact is None:
             return None
-        from enumsol.search.certifiers.rationals import ExactJudge  # python-flint
+        from enumsol.search.certifiers.rationals import ExactCertifier  # python-flint
 
-        return ExactJudge(self.exact, self.scaled)
+        return ExactCertifier(self.exact, self.scaled)
 
     @cached_property
     def _enclosed(self) -> tuple[EnclosedSystem | None, str]:
@@ -116,20 +116,20 @@ class Workbench:
     @property
     def undecidable(self) -> str | None:
         """Why verified arithmetic cannot prove anything about this problem, or None."""
-        if self.arithmetic != "verified" or self.enclosed is not None or self.exact_judge is not None:
+        if self.arithmetic != "verified" or self.enclosed is not None or self.exact_certifier is not None:
             return None
         return "the condensed compliance S is positive definite only within rounding"
 
-    def judge(self, recorder: Recorder | None) -> Judge:
-        """The judge of this arithmetic."""
+    def certifier(self, recorder: Recorder | None) -> Certifier:
+        """The certifier of this arithmetic."""
         if self.arithmetic == "fast":
-            return FastJudge(self.floats)
+            return FastCertifier(self.floats)
         if self.arithmetic == "exact":
-            from enumsol.search.certifiers.rationals import ExactJudge  # python-flint
+            from enumsol.search.certifiers.rationals import ExactCertifier  # python-flint
 
-            return ExactJudge(_present(self.exact), self.scaled)
-        return VerifiedJudge(
-            self.scaled, self.enclosed, lambda: self.exact_judge, _present(recorder), self.problem.node_ids
+            return ExactCertifier(_present(self.exact), self.scaled)
+        return VerifiedCertifier(
+            self.scaled, self.enclosed, lambda: self.exact_certifier, _present(recorder), self.problem.node_ids
         )
 
     def unloaded(self) -> bool:

@@ -1,6 +1,6 @@
 """What the tree knows of a contact node: how its status splits into others, and which rows a status imposes.
 
-The tree itself asks no more of a dimension than this, a judge for its leaves and an engine for its relaxations.
+The tree itself asks no more of a dimension than this, a certifier for its leaves and an engine for its relaxations.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The tree search: partial assignments, pruned by the energy-bounded relaxation (theory, section 5).
 
 Every node of the tree is a partial assignment of statuses. Its relaxation is solved, warm-started from its parent; it
-is pruned when the judge accepts the multipliers as a proof that it holds no solution, branched on otherwise, and handed
-to the judge as a complete selection when every contact node is decided. The leaves cover all selections by
+is pruned when the certifier accepts the multipliers as a proof that it holds no solution, branched on otherwise, and
+handed to the certifier as a complete selection when every contact node is decided. The leaves cover all selections by
 construction: an engine that fails is replaced by the fallback, and where that fails too the node is branched on.
 
 Presolve comes first: contact nodes that one dual step proves open or in contact are branched on before all others, so
@@ -59,7 +59,7 @@ class SearchProgress:
 
 
 @dataclass(frozen=True)
-class Open:
+class UndecidedPart:
     """A part of the selections that the search left undecided."""
 
     codes: Codes
@@ -67,13 +67,13 @@ class Open:
     hint: str
 
 
-class Judge(Protocol):
+class Certifier(Protocol):
     """Decides in one arithmetic what the tree may conclude."""
 
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         """Whether the relaxation's multipliers prove that the partial assignment holds no solution."""
 
-    def selection(self, codes: Codes) -> SelectionSolution | Open | None:
+    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in a complete selection, None when it holds none, or why that is open."""
 
     def branching(self, node: int, children: Sequence[int]) -> None:
@@ -106,7 +106,7 @@ class SearchOutcome:
     """What a search found; filled while it runs, so that an interruption loses nothing."""
 
     solutions: list[SelectionSolution] = field(default_factory=list)
-    undecided: list[Open] = field(default_factory=list)
+    undecided: list[UndecidedPart] = field(default_factory=list)
     stopped: str | None = None
     nodes: int = 0
     pruned: int = 0
@@ -117,7 +117,7 @@ class SearchOutcome:
 
 
 @dataclass(slots=True)
-class Branch:
+class TreeNode:
     """A node of the tree that waits to be examined: its parent's relaxation and what it adds."""
 
     parent: Relaxation | None
@@ -148,7 +148,7 @@ class TreeSearch:
     Parameters
     ----------
     system : ScaledSystem
-    judge : Judge
+    certifier : Certifier
     engine : str, Engine or None
         "active-set", "clarabel", an engine ready for use, or None for the best available.
     splitting : Splitting, optional
@@ -160,7 +160,7 @@ class TreeSearch:
     def __init__(
         self,
         system: ScaledSystem,
-        judge: Judge,
+        certifier: Certifier,
         *,
         engine: str | Engine | None = None,
         splitting: Splitting | None = None,
@@ -168,7 +168,7 @@ class TreeSearch:
         progress: Callable[[SearchProgress], object] | None = None,
     ) -> None:
         self.system = system
-        self.judge = judge
+        self.certifier = certifier
         self.engine = make_engine(system, engine) if engine is None or isinstance(engine, str) else engine
         self.limits = limits or SearchLimits()
         self.progress = progress
@@ -181,34 +181,34 @@ class TreeSearch:
 
     # -- the loop --------------------------------------------------------------------------------------------------
 
-    def first(self) -> Branch:
+    def first(self) -> TreeNode:
         """The root of the tree: nothing decided."""
-        return Branch(None, (UNDECIDED,) * self.system.p, -1, last=False, weight=1.0, forced=())
+        return TreeNode(None, (UNDECIDED,) * self.system.p, -1, last=False, weight=1.0, forced=())
 
     def run(self, roots: Sequence[Codes] | None = None) -> SearchOutcome:
         """Examine the subtrees of the given partial assignments (default: the whole tree)."""
         stack = [self.first()]
         if roots is not None:
-            stack = [Branch(None, codes, -1, last=False, weight=1.0 / len(roots)) for codes in reversed(roots)]
+            stack = [TreeNode(None, codes, -1, last=False, weight=1.0 / len(roots)) for codes in reversed(roots)]
         outcome = self.outcome
         while stack:
             if self.must_stop(len(stack)):
                 for branch in reversed(stack):
-                    self.judge.skipped(branch.codes, str(outcome.stopped))
+                    self.certifier.skipped(branch.codes, str(outcome.stopped))
                     outcome.undecided.append(
-                        Open(branch.codes, "the search was stopped before it came here", "raise the limit")
+                        UndecidedPart(branch.codes, "the search was stopped before it came here", "raise the limit")
                     )
                 break
             stack.extend(reversed(list(self.examine(stack.pop()))))
         return outcome
 
-    def examine(self, branch: Branch) -> Iterator[Branch]:
+    def examine(self, branch: TreeNode) -> Iterator[TreeNode]:
         """Settle one node of the tree, or give its children in the order in which they are to be examined."""
         outcome = self.outcome
         outcome.nodes += 1
         relaxation = self._relax(branch)
         codes = branch.codes
-        if relaxation is not None and relaxation.pruned and self.judge.excluded(codes, relaxation):
+        if relaxation is not None and relaxation.pruned and self.certifier.excluded(codes, relaxation):
             outcome.pruned += 1
             self._covered += branch.weight
             return
@@ -219,19 +219,19 @@ class TreeSearch:
             return
         children = self.splitting.children(codes, node, relaxation)
         outcome.presolved += forced is not None
-        self.judge.branching(node, children)
+        self.certifier.branching(node, children)
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
         for k, code in enumerate(children):
             child = (*codes[:node], code, *codes[node + 1 :])
             last = k + 1 == len(children)
-            yield Branch(usable, child, node, last, branch.weight / len(children), forced)
+            yield TreeNode(usable, child, node, last, branch.weight / len(children), forced)
 
     def _settle(self, codes: Codes) -> None:
-        """Have the judge decide a complete selection."""
+        """Have the certifier decide a complete selection."""
         outcome = self.outcome
         outcome.selections += 1
-        answer = self.judge.selection(codes)
-        if isinstance(answer, Open):
+        answer = self.certifier.selection(codes)
+        if isinstance(answer, UndecidedPart):
             outcome.undecided.append(answer)
         elif answer is not None:
             outcome.solutions.append(answer)
@@ -269,7 +269,7 @@ class TreeSearch:
         parts = [self._rows_of(i, code) for i, code in enumerate(codes)]
         return [row for rows, _ in parts for row in rows], [mode for _, modes in parts for mode in modes]
 
-    def _relax(self, branch: Branch) -> Relaxation | None:
+    def _relax(self, branch: TreeNode) -> Relaxation | None:
         """The solved relaxation; None when no engine has an answer."""
         codes = branch.codes
         self.outcome.qps += 1
@@ -290,7 +290,7 @@ class TreeSearch:
     # -- branching -------------------------------------------------------------------------------------------------
 
     @staticmethod
-    def _choose(branch: Branch, relaxation: Relaxation | None) -> tuple[int, tuple[int, ...] | None]:
+    def _choose(branch: TreeNode, relaxation: Relaxation | None) -> tuple[int, tuple[int, ...] | None]:
         """The contact node to branch on, -1 when all are decided; and the forced ones that the children begin with."""
         if relaxation is None or relaxation.pruned:
             return next((i for i, code in enumerate(branch.codes) if code >= CONTACT), -1), branch.forced

@@ -13,7 +13,7 @@ from enumsol import enumerate_roots, gallery
 from enumsol.kernel.point import exclusion_margin, exclusion_margins, solve_selection
 from enumsol.kernel.rows import row_signs
 from enumsol.search.certifiers._margin import Margins
-from enumsol.search.solvers import Workbench
+from enumsol.search.solvers import Solvers
 
 CODES = (0, 1, 2, 3, 5, 6)
 
@@ -123,7 +123,7 @@ def test_sign_of_the_margin_where_the_bound_is_next_to_zero():
     for name in ("two-node-5", "chain-2", "two-node-6.4"):
         entry = gallery.get(name)
         problem = entry.build()
-        bench = Workbench(problem, entry.alpha, "verified", 1e-9)
+        bench = Solvers(problem, entry.alpha, "verified", 1e-9)
         system, judge = bench.enclosed, judge_of(problem, entry.alpha)
         records = records_of(enumerate_roots(problem, entry.alpha).proof)
         judge.force, judge.length = ([Fraction(float(x)) for x in v] for v in (bench.scaled.force, bench.scaled.length))
@@ -260,7 +260,7 @@ def test_singular_integer_selections_are_never_called_regular():
 
 def test_scaled_units_change_nothing():
     entry = gallery.get("wedge-8-3")
-    bench = Workbench(entry.build(), entry.alpha, "verified", 1e-9)
+    bench = Solvers(entry.build(), entry.alpha, "verified", 1e-9)
     assert bench.enclosed is not None
     assert bench.data == "problem"
     assert bench.enclosed.smallest_eigenvalue <= np.linalg.eigvalsh(bench.scaled.S)[0]

@@ -14,8 +14,8 @@ from enumsol.branches.gluing import Gluing
 from enumsol.condensation.exact import ExactPath
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
 from enumsol.relaxation.interval import IntervalEngine, IntervalSystem
-from enumsol.search.certifiers.interval_rationals import ExactLeafJudge
-from enumsol.search.interval import BelievingJudge, EmptyLeaf, IntervalSearch, Piece
+from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
+from enumsol.search.interval import EmptyLeaf, FastIntervalCertifier, IntervalSearch, Piece
 from enumsol.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 BELOW = {UNDECIDED: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), CONTACT: (STICK, SLIP_PLUS, SLIP_MINUS)}
@@ -32,7 +32,7 @@ def test_leaves_cover_all_selections_over_the_whole_interval(kind):
     for _ in range(6):
         problem = generic_problem(rng, 3, kind)
         interval = (Fraction(0), Fraction(6))
-        search = IntervalSearch(problem.condensed, interval, None, BelievingJudge())
+        search = IntervalSearch(problem.condensed, interval, None, FastIntervalCertifier())
         search.run()
         everything = set(product(range(4), repeat=3))
         for alpha in map(Fraction, rng.uniform(0.0, 6.0, size=20)):
@@ -47,25 +47,25 @@ def test_every_leaf_the_engine_prunes_is_proven_in_rationals(kind):
     rng = np.random.default_rng(11)
     for _ in range(5):
         problem = generic_problem(rng, 3, kind)
-        judge = ExactLeafJudge(ExactPath.from_problem(problem))
-        search = IntervalSearch(problem.condensed, (Fraction(0), Fraction(6)), None, BelievingJudge())
+        certifier = ExactIntervalCertifier(ExactPath.from_problem(problem))
+        search = IntervalSearch(problem.condensed, (Fraction(0), Fraction(6)), None, FastIntervalCertifier())
         search.run()
         for part in search.pieces:
             for leaf in part.empty:
-                assert judge.excluded(part.piece, part.system, leaf)
+                assert certifier.excluded(part.piece, part.system, leaf)
 
 
 def test_a_leaf_that_holds_a_solution_cannot_be_excluded(rng):
     problem = one_node((1.5, -4.0))
     path = ExactPath.from_problem(problem)
-    judge = ExactLeafJudge(path)
+    certifier = ExactIntervalCertifier(path)
     piece = Piece(Fraction(2), Fraction(4))
     system = IntervalSystem.from_problem(problem.condensed, 2.0, 4.0, None)
     for codes in ((OPEN,), (STICK,), (SLIP_MINUS,), (CONTACT,), (UNDECIDED,)):
         for _ in range(200):
             rows = np.arange(9)
             values = rng.normal(size=9) * 10.0 ** rng.uniform(-3, 2)
-            assert not judge.excluded(piece, system, EmptyLeaf(codes, rows, values))
+            assert not certifier.excluded(piece, system, EmptyLeaf(codes, rows, values))
 
 
 def test_the_relaxation_on_a_loading_path_bounds_the_energy_from_below(rng):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.tree import Open
+from enumsol.search.tree import UndecidedPart
 from enumsol.selections.solution import VertexLimitError
 
 if TYPE_CHECKING:
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
 
 
-def solve_or_open(solver: SelectionSolver, codes: Codes) -> SelectionSolution | Open | None:
+def solve_or_open(solver: SelectionSolver, codes: Codes) -> SelectionSolution | UndecidedPart | None:
     """The solver's answer; a polytope with too many candidate vertices leaves the selection open."""
     try:
         return solver.solve(codes)
     except VertexLimitError as error:
-        return Open(codes, str(error), "perturb the load or the friction coefficient")
+        return UndecidedPart(codes, str(error), "perturb the load or the friction coefficient")
 
 
 class Silent:
-    """A judge that writes no proof."""
+    """A certifier that writes no proof."""
 
     def branching(self, node: int, children: Sequence[int]) -> None:
         """Nothing to write."""
@@ -36,7 +36,7 @@ class Silent:
         """Nothing to write."""
 
 
-class FastJudge(Silent):
+class FastCertifier(Silent):
     """Floats and tolerances: what the engine computed is believed, unless the tolerance could overturn it.
 
     A condition within the tolerance of zero counts as satisfied. Shifting every row of a certificate by twice that
@@ -54,6 +54,6 @@ class FastJudge(Silent):
         shift = float(np.abs(values) @ self._norms[rows])
         return relaxation.bound > PRUNE_MARGIN + 2.0 * self._selections.tolerance * shift
 
-    def selection(self, codes: Codes) -> SelectionSolution | Open | None:
+    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in the selection within the tolerance."""
         return solve_or_open(self._selections, codes)

@@ -14,7 +14,7 @@ from enumsol.kernel.interval import (
     interval_exclusion_margins,
     vanishing_alpha,
 )
-from enumsol.search.certifiers.interval_rationals import ExactLeafJudge
+from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 
 if TYPE_CHECKING:
     from enumsol.condensation.exact import ExactPath
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _MARGIN = 1e-12
 
 
-class BallLeafJudge:
+class VerifiedIntervalCertifier:
     """Accepts a leaf when the dual bounds of its multipliers are proven positive at both ends of the piece.
 
     A leaf that the balls cannot exclude is branched on. Only where there are no balls at all (S positive definite
@@ -44,7 +44,7 @@ class BallLeafJudge:
     def __init__(self, problem: ContactProblem, path: ExactPath) -> None:
         self._path = path
         self._enclosure = certified_enclosure(problem, exactly=path.condensed_exactly)
-        self._exact = ExactLeafJudge(path) if path.condensed_exactly else None
+        self._exact = ExactIntervalCertifier(path) if path.condensed_exactly else None
         origin = None if path.origin is None else to_fraction(path.origin)
         self._origin = origin
         # the enclosure may not know the origin that rationals know; pieces that end there then go to rationals

@@ -27,7 +27,7 @@ _FORCE_ROWS = (
 )
 
 
-class ExactLeafJudge:
+class ExactIntervalCertifier:
     """Accepts a leaf when the dual bound of its multipliers is positive at both ends of the piece, exactly.
 
     With fixed multipliers the bound is concave in alpha, so that it is positive between the ends too.

@@ -1,4 +1,4 @@
-"""The judge of arithmetic "exact": every conclusion in rationals (theory, section 6)."""
+"""The certifier of arithmetic "exact": every conclusion in rationals (theory, section 6)."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from enumsol.selections.rationals import ExactSelections
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.tree import Open
+    from enumsol.search.tree import UndecidedPart
     from enumsol.selections.polytopes import Form
     from enumsol.selections.solution import Codes, SelectionSolution
 
 _FORCE_ROWS = (RowKind.NORMAL_FORCE, RowKind.TANGENTIAL_FORCE, RowKind.CONE_PLUS, RowKind.CONE_MINUS)
 
 
-class ExactJudge(Silent):
+class ExactCertifier(Silent):
     """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, section 6)."""
 
     def __init__(self, selections: ExactSelections, scaled: ScaledSystem) -> None:
@@ -29,7 +29,7 @@ class ExactJudge(Silent):
         self._scaled = scaled
         self._inverse: Any = None
 
-    def selection(self, codes: Codes) -> SelectionSolution | Open | None:
+    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in the selection."""
         return solve_or_open(self._selections, codes)
 

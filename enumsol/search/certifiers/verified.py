@@ -1,4 +1,4 @@
-"""The judge of arithmetic "verified" (and the one that writes proofs): nothing is concluded that is not proven.
+"""The certifier of arithmetic "verified" (and the one that writes proofs): nothing is concluded that is not proven.
 
 Escalation only where needed: balls in double arithmetic first, rationals where a sign cannot be decided and the
 problem is small enough, otherwise the selection is left undecided with the reason.
@@ -15,7 +15,7 @@ import numpy as np
 from enumsol.kernel.point import VerifiedSelection, exclusion_margin, holds_no_root, solve_selection
 from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
 from enumsol.proof.proof_file import fraction_text, packed
-from enumsol.search.tree import Open
+from enumsol.search.tree import UndecidedPart
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import FRICTIONLESS, OPEN, STICK
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.certifiers.rationals import ExactJudge
+    from enumsol.search.certifiers.rationals import ExactCertifier
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ class Escalations:
         self.undecided += other.undecided
 
 
-class VerifiedJudge:
+class VerifiedCertifier:
     """Proves prunings and complete selections, and writes the proof.
 
     Parameters
@@ -74,7 +74,7 @@ class VerifiedJudge:
         The system that the search works on; it gives the units of the multipliers.
     enclosed : EnclosedSystem or None
         Balls for the same system; None sends everything to rationals.
-    exact : callable giving an ExactJudge, or None when the problem is too large for rationals
+    exact : callable giving an ExactCertifier, or None when the problem is too large for rationals
     recorder : Recorder
         Where the records of the proof go.
     node_ids : labels of the contact nodes, for messages
@@ -84,7 +84,7 @@ class VerifiedJudge:
         self,
         scaled: ScaledSystem,
         enclosed: EnclosedSystem | None,
-        exact: Callable[[], ExactJudge | None],
+        exact: Callable[[], ExactCertifier | None],
         recorder: Recorder,
         node_ids: Sequence[Any],
     ) -> None:
@@ -106,10 +106,10 @@ class VerifiedJudge:
                 self.escalations.balls += 1
                 self._leaf("x", *packed(rows, values))
                 return True
-        elif (judge := self._exact()) is not None and judge.excluded(codes, relaxation):
+        elif (certifier := self._exact()) is not None and certifier.excluded(codes, relaxation):
             # no balls for an S that is positive definite only within rounding
             self.escalations.rationals += 1
-            # the judge passes over multipliers that prove nothing, a checker refuses them
+            # the certifier passes over multipliers that prove nothing, a checker refuses them
             kind, node = np.divmod(rows, self._scaled.p)
             signs = row_signs(np.array(codes), self._scaled.F)[node, kind]
             keep = (signs == FREE) | ((signs == NONNEGATIVE) & (values > 0))
@@ -127,7 +127,7 @@ class VerifiedJudge:
         del codes
         self._leaf("u", reason)
 
-    def selection(self, codes: Codes) -> SelectionSolution | Open | None:
+    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in a complete selection."""
         ball = None if self._enclosed is None else solve_selection(self._enclosed, codes)
         if ball is not None and ball.is_root:
@@ -137,11 +137,11 @@ class VerifiedJudge:
             self.escalations.balls += 1
             self._leaf("n")
             return None
-        judge = self._exact()
-        if judge is None:
+        certifier = self._exact()
+        if certifier is None:
             return self._undecided(codes, *_reason(codes, ball, self._node_ids))
-        solution = judge.selection(codes)
-        if isinstance(solution, Open):
+        solution = certifier.selection(codes)
+        if isinstance(solution, UndecidedPart):
             return self._undecided(codes, solution.reason, solution.hint)
         self.escalations.rationals += 1
         if solution is None:
@@ -162,10 +162,10 @@ class VerifiedJudge:
         self._leaf("r", force.tolist(), radius.tolist(), ball.det_sign)
         return SelectionSolution(codes, (ball.force,), 0, ball.det_sign, strict=True)
 
-    def _undecided(self, codes: Codes, reason: str, hint: str) -> Open:
+    def _undecided(self, codes: Codes, reason: str, hint: str) -> UndecidedPart:
         self.escalations.undecided += 1
         self._leaf("u", reason)
-        return Open(codes, reason, hint)
+        return UndecidedPart(codes, reason, hint)
 
     def _leaf(self, *record: Any) -> None:
         self.leaves += 1
