@@ -74,10 +74,13 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 #: Modules that are reached as attributes without an import of their own.
 _MODULES = frozenset(
     (
+        "arithmetic",
         "branches",
         "checker",
+        "checks",
         "condensation",
         "continuation",
+        "equation",
         "errors",
         "fem",
         "gallery",
