@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from enumsol.equation import PiecewiseSmoothEquation
     from enumsol.errors import (
         EnumsolError,
+        IncompleteGraphError,
         Interrupted,
         InvalidArgumentError,
         InvalidProblemError,
@@ -58,6 +59,7 @@ _HOMES = {
     "enumsol.search.tree": ("SearchProgress",),
     "enumsol.errors": (
         "EnumsolError",
+        "IncompleteGraphError",
         "Interrupted",
         "InvalidArgumentError",
         "InvalidProblemError",
@@ -103,6 +105,7 @@ __all__ = [
     "ContinuationOptions",
     "Enclosure",
     "EnumsolError",
+    "IncompleteGraphError",
     "Interrupted",
     "InvalidArgumentError",
     "InvalidProblemError",

@@ -1,27 +1,498 @@
-"""Arguments of calls: alpha."""
+"""Arguments of calls: one parser for alpha, one for intervals of it, and checks of counts, numbers and options.
+
+Everything that takes alpha reads it here, in Python and on the command line, so that a value means the same everywhere:
+
+- a real number of any type (int, float, Fraction, Decimal, NumPy scalar, array without dimensions) is the exact number
+  that it is: ``numpy.float32(0.1)`` is that float32, an integer above 2^53 is not rounded;
+- a text is an integer or a fraction such as ``"8/3"``, taken exactly, or a decimal number, read as float64;
+- bool, complex, nan, infinities, and what float64 can only round to zero or to infinity are refused.
+
+Every refusal is one sentence: which argument, what was found, what was expected.
+"""
 
 from __future__ import annotations
 
 import math
+import numbers
+import operator
+import os
+import re
+from contextlib import contextmanager
+from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
+from reprlib import Repr
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+
+    from numpy.typing import NDArray
+
+
+#: What a value of alpha is kept as.
 Alpha = float | Fraction
+#: What is taken for alpha.
+AlphaLike = float | Fraction | Decimal | str | np.number[Any] | np.ndarray[Any, Any]
+#: Most binary digits of a numerator or denominator: four times those of any float64, so that nothing takes for ever.
+MAX_BITS = 4096
+#: Most characters of a text: enough for every fraction within MAX_BITS.
+MAX_TEXT = 2600
+_DECIMAL = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_FRACTION = re.compile(r"([+-]?\d+)(?:\s*/\s*(\d+))?", re.ASCII)
+_EXPECTED = "expected a finite real number such as 2.5 or a fraction such as 8/3"
+_RANGE = "expected a finite real number in the range of float64: 0, or 5e-324 to 1.8e308 in size"
+_SHOWN = 60
+
+T = TypeVar("T")
 
 
-def finite_alpha(alpha: Alpha) -> float:
-    """Value of alpha as a float.
+# -- what was found ------------------------------------------------------------------------------------------------
+
+
+class _Short(Repr):
+    """Short texts of values, of huge ones too."""
+
+    def repr_int(self, x: int, level: int) -> str:
+        """Digits, or how many binary ones there are: Python refuses to write a very long integer."""
+        del level
+        return repr(x) if x.bit_length() <= 200 else f"<integer of {x.bit_length()} bits>"
+
+    def repr_Fraction(self, x: Fraction, level: int) -> str:  # noqa: N802 (reprlib looks for the type's name)
+        """As a/b."""
+        return f"{self.repr_int(x.numerator, level)}/{self.repr_int(x.denominator, level)}"
+
+    def repr_ndarray(self, x: NDArray[Any], level: int) -> str:
+        """Shape and type; the number itself of an array without dimensions."""
+        del level
+        number = x.ndim == 0 and x.dtype.kind in "biufc"
+        return str(x[()]) if number else f"<array of shape {x.shape} and type {x.dtype}>"
+
+
+_SHORT = _Short()
+_SHORT.maxstring = _SHORT.maxother = _SHOWN
+_SHORT.maxlist = _SHORT.maxtuple = 4
+
+
+def shown(value: object) -> str:
+    """A value as a short text in one line, for messages."""
+    try:
+        text = str(value) if isinstance(value, (np.number, np.bool_)) else _SHORT.repr(value)
+    except (ValueError, TypeError, OverflowError, RecursionError):  # an integer too long to write, a faulty repr
+        text = f"<{type(value).__name__}>"
+    text = " ".join(text.split())
+    return text if len(text) <= 2 * _SHOWN else text[: 2 * _SHOWN - 3] + "..."
+
+
+# -- alpha -----------------------------------------------------------------------------------------------------------
+
+
+def alpha_value(value: Any, name: str = "alpha") -> Alpha:
+    """The exact value of alpha: a float where it is one, otherwise (and for fractions that were given) a Fraction.
+
+    Parameters
+    ----------
+    value : AlphaLike
+        A real number of any type, or a text (see the module).
+    name : str
+        What the argument is called in messages.
 
     Raises
     ------
     InvalidArgumentError
-        alpha is not a finite real number.
+        It is no finite real number, or float64 can only round it to zero or to infinity.
+    """
+    if type(value) is float and math.isfinite(value):
+        return value
+    value = _without_array(value)
+    number = _from_text(value, name) if isinstance(value, str) else exact_number(value)
+    if number is None or (isinstance(number, float) and not math.isfinite(number)):
+        raise InvalidArgumentError(f"{name} is {shown(value)}; {_EXPECTED}")
+    if isinstance(number, float):
+        return number
+    if max(number.numerator.bit_length(), number.denominator.bit_length()) > MAX_BITS:
+        raise InvalidArgumentError(
+            f"{name} is a fraction of more than {MAX_BITS} binary digits; expected a finite real number with fewer"
+        )
+    if not _in_range(number):
+        raise InvalidArgumentError(f"{name} is {shown(value)}; {_RANGE}")
+    kept = isinstance(value, Fraction) or (isinstance(value, str) and "/" in value)
+    return number if kept or Fraction(float(number)) != number else float(number)
+
+
+def _in_range(number: Fraction) -> bool:
+    """Whether float64 neither rounds a fraction to zero nor to infinity."""
+    try:
+        return number == 0 or float(number) != 0
+    except OverflowError:
+        return False
+
+
+def exact_number(value: Any) -> float | Fraction | None:
+    """The exact value of a real number of any type; None for what is none.
+
+    A float is given for floats, which may be nan or infinite, and a Fraction for everything else. A Decimal whose
+    exact value would take for ever is replaced by a number that is refused for the same reason.
+    """
+    value = _without_array(value)
+    if isinstance(value, (bool, np.bool_)):
+        return None
+    if isinstance(value, float):  # numpy.float64 too
+        return float(value)
+    if isinstance(value, np.floating):
+        return Fraction(*map(int, value.as_integer_ratio())) if np.isfinite(value) else float(value)
+    if isinstance(value, Decimal):
+        return _from_decimal(value)
+    if isinstance(value, numbers.Rational):  # int, Fraction, numpy integers and those of other packages
+        return Fraction(int(value.numerator), int(value.denominator))
+    return None
+
+
+def _without_array(value: Any) -> Any:
+    """What an array without dimensions holds; anything else as it is (a masked value too)."""
+    if isinstance(value, np.ndarray) and value.ndim == 0 and not np.ma.is_masked(value):
+        return np.asarray(value)[()]
+    return value
+
+
+def _from_decimal(value: Decimal) -> float | Fraction:
+    if not value.is_finite():
+        return math.nan if value.is_nan() else math.copysign(math.inf, value)
+    if value and abs(value.adjusted()) > 400:
+        return (-1 if value < 0 else 1) * Fraction(2) ** (1100 if value.adjusted() > 0 else -1100)
+    if len(value.as_tuple().digits) > MAX_BITS:
+        return Fraction(1, 2**MAX_BITS)
+    return Fraction(value)
+
+
+def _from_text(text: str, name: str) -> float | Fraction | None:
+    stripped = text.strip() if len(text) <= MAX_TEXT else ""
+    fraction = _FRACTION.fullmatch(stripped)
+    if fraction is not None:
+        denominator = int(fraction[2] or 1)
+        return Fraction(int(fraction[1]), denominator) if denominator else None
+    if _DECIMAL.fullmatch(stripped) is None:
+        return None
+    number = float(stripped)
+    mantissa = re.split("[eE]", stripped)[0]
+    if math.isinf(number) or (number == 0 and re.search("[1-9]", mantissa)):
+        raise InvalidArgumentError(f"{name} is {shown(text)}; {_RANGE}")
+    return number
+
+
+def alpha_list(values: Any, name: str = "alphas") -> list[Alpha]:
+    """The exact values of several alphas, in their order.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is one number or a text instead of several, or one of them is no alpha.
+    """
+    several = None
+    if not isinstance(values, (str, bytes, bytearray)):
+        try:
+            several = iter(values)
+        except TypeError:
+            several = None
+    if several is None:
+        raise InvalidArgumentError(f"{name} is {shown(values)}; expected several numbers, such as [1.0, 2.5]")
+    return [alpha_value(value, f"{name}[{k}]") for k, value in enumerate(several)]
+
+
+def alpha_interval(value: Any, name: str = "interval") -> tuple[Alpha, Alpha]:
+    """Both ends of an interval of alpha, exactly.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is no pair of alphas of which the first is below the second.
+    """
+    low, high = (alpha_value(end, f"{name}[{k}]") for k, end in enumerate(_pair(value, name)))
+    if not low < high:
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected its first alpha below its last")
+    return low, high
+
+
+def unbounded_interval(value: Any, name: str = "interval") -> tuple[float, float]:
+    """Both ends of an interval that may reach to infinity, as floats.
+
+    Raises
+    ------
+    InvalidArgumentError
+        As for alpha_interval.
+    """
+    ends = []
+    for k, end in enumerate(_pair(value, name)):
+        number = exact_number(end)
+        infinite = isinstance(number, float) and math.isinf(number)
+        ends.append(float(end) if infinite else float(alpha_value(end, f"{name}[{k}]")))
+    low, high = ends
+    if not low < high:
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected its first alpha below its last")
+    return low, high
+
+
+def _pair(value: Any, name: str) -> list[Any]:
+    ends: list[Any] = []
+    if not isinstance(value, (str, bytes, bytearray, set, frozenset, dict)):
+        try:
+            ends = list(value) if len(value) == 2 else []
+        except TypeError:
+            ends = []
+    if len(ends) != 2:
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a pair of numbers (first alpha, last alpha)")
+    return ends
+
+
+# -- counts and numbers ----------------------------------------------------------------------------------------------
+
+
+def positive_integer(value: Any, name: str, least: int = 1, most: int | None = None) -> int:
+    """Value as an int of at least ``least`` and, where that is given, at most ``most``.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The value is not an integer, or not within these bounds.
+    """
+    number = _integer(value)
+    if number is None or number < least:
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected an integer of at least {least}")
+    if most is not None and number > most:
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected an integer of at most {most}")
+    return number
+
+
+def optional_count(value: Any, name: str) -> int | None:
+    """Value as a positive int, or None for no limit.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The value is neither.
+    """
+    if value is None:
+        return None
+    number = _integer(value)
+    if number is None or number < 1:
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a positive integer or None")
+    return number
+
+
+def row_number(value: Any, name: str, count: int, expected: str = "") -> int:
+    """Value as an int in 0 .. count - 1; ``expected`` says in messages what it counts.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The value is no such number.
+    """
+    number = _integer(value)
+    if number is None or not 0 <= number < count:
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected {expected or f'a row number below {count}'}")
+    return number
+
+
+def optional_seconds(value: Any, name: str = "time_limit") -> float | None:
+    """Value as a positive number of seconds, or None for no limit.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The value is neither.
+    """
+    if value is None:
+        return None
+    number = real_or_nan(value)
+    if not number > 0:
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a positive number of seconds or None")
+    return number
+
+
+def share(value: Any, name: str = "tolerance") -> float:
+    """Value as a float of at least zero and below one.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The value is no such number.
+    """
+    number = real_or_nan(value)
+    if not 0 <= number < 1:
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a number in [0, 1)")
+    return number
+
+
+def finite_number(value: Any, name: str) -> float:
+    """Value as a finite float, which it is exactly.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The value is no such number.
+    """
+    number = real_or_nan(value)
+    if not math.isfinite(number):
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number")
+    if number != exact_number(value):
+        raise InvalidArgumentError(f"{name} is {shown(value)}, which float64 would round; expected a finite number")
+    return number
+
+
+def direction_value(value: Any) -> int:
+    """Value as +1 or -1.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The value is neither.
+    """
+    number = exact_number(value)
+    if number not in (1, -1):
+        raise InvalidArgumentError(f"direction is {shown(value)}; expected +1 or -1")
+    return 1 if number == 1 else -1
+
+
+def positive_number(value: Any, name: str) -> float:
+    """Value as a finite float above zero, rounded if need be.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The value is no such number.
+    """
+    number = real_or_nan(value)
+    if not (math.isfinite(number) and number > 0):
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number > 0")
+    return number
+
+
+def nonnegative_number(value: Any, name: str) -> float:
+    """Value as a finite float of at least zero, rounded if need be.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The value is no such number.
+    """
+    number = real_or_nan(value)
+    if not (math.isfinite(number) and number >= 0):
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number >= 0")
+    return number
+
+
+def _integer(value: Any) -> int | None:
+    if isinstance(value, (bool, np.bool_)):
+        return None
+    try:
+        return operator.index(value)
+    except TypeError:
+        return None
+
+
+def real_or_nan(value: Any) -> float:
+    """A real number of any type as a float, rounded if need be; nan for what is none."""
+    number = exact_number(value)
+    try:
+        return math.nan if number is None else float(number)
+    except OverflowError:
+        return math.inf if number is not None and number > 0 else -math.inf
+
+
+# -- options, objects and files --------------------------------------------------------------------------------------
+
+
+def one_of(value: Any, name: str, known: Collection[str | None]) -> Any:
+    """Value, which is one of the known texts (or None, where that is one of them).
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is not.
+    """
+    if not (value is None or isinstance(value, str)) or value not in known:
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected one of {', '.join(map(repr, known))}")
+    return value
+
+
+def instance_of(value: Any, kind: type[T], name: str) -> T:
+    """Value, which is of a type.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is of another type.
+    """
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise InvalidArgumentError(f"{name} is a {type(value).__name__}; expected {article} {kind.__name__}")
+    return value
+
+
+def optional_callable(value: Any, name: str) -> Any:
+    """Value, which can be called, or None.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is neither.
+    """
+    if value is not None and not callable(value):
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a function or None")
+    return value
+
+
+def optional_executor(value: Any, name: str = "executor") -> Any:
+    """Value, which is like a concurrent.futures.Executor, or None.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is neither.
+    """
+    if value is not None and not callable(getattr(value, "submit", None)):
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a concurrent.futures.Executor or None")
+    return value
+
+
+def file_path(value: Any, name: str, expected: str = "the name of a file") -> Path:
+    """Value as a path.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is no name that a file can have.
     """
     try:
-        value = float(alpha)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidArgumentError(f"alpha is {alpha!r}; expected a finite real number") from None
-    if not math.isfinite(value):
-        raise InvalidArgumentError(f"alpha is {value}; expected a finite real number")
-    return value
+        text = os.fspath(value)
+    except TypeError:
+        text = None
+    if not isinstance(text, str):
+        raise InvalidArgumentError(f"{name} is a {type(value).__name__}; expected {expected}")
+    if not text:
+        raise InvalidArgumentError(f"{name} is an empty text; expected {expected}")
+    if "\0" in text:
+        raise InvalidArgumentError(f"{name} is {shown(text)}, with a null character in it; expected {expected}")
+    return Path(text)
+
+
+@contextmanager
+def writing(place: Path, name: str) -> Iterator[None]:
+    """Turn what the operating system says against writing a file into an error of ours.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file cannot be written.
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or error
+        raise InvalidArgumentError(
+            f"{name} {place} cannot be written ({reason}); expected a path for a new file"
+        ) from error

@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.array_checks import plain_array, real_array
+from enumsol.checks import instance_of, positive_number
 from enumsol.errors import InvalidArgumentError
+from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.checks import Alpha
-    from enumsol.problem import ContactProblem
+    from enumsol.checks import AlphaLike
 
 
 @dataclass(frozen=True)
 class PiecewiseSmoothEquation:
-    """The equation H(x) = 0 of a contact problem, x = (u, lambda_n, lambda_t) at a parameter alpha (theory, section 1).
+    """The equation H(x) = 0 of a contact problem, x = (u, lambda_n, lambda_t) at a parameter alpha (theory, (1.5)).
 
     The third block uses P(x) = min(b, x) + max(a, x) - x with a = -F lambda_n and b = F lambda_n, which stays piecewise
     linear and continuous where lambda_n < 0 and the interval turns around.
@@ -40,8 +42,8 @@ class PiecewiseSmoothEquation:
     r: float = 1.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.r) and self.r > 0):
-            raise InvalidArgumentError(f"r is {self.r}; expected a positive finite number")
+        instance_of(self.problem, ContactProblem, "problem")
+        object.__setattr__(self, "r", positive_number(self.r, "r"))
 
     @property
     def size(self) -> int:
@@ -51,12 +53,12 @@ class PiecewiseSmoothEquation:
     def split(self, x: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """u (n,), lambda_n (p,) and lambda_t (p,) as parts of x (n + 2p,)."""
         n, p = self.problem.n, self.problem.p
-        array = np.asarray(x, dtype=np.float64)
+        array = real_array(x, "x", error=InvalidArgumentError, finite=False)
         if array.shape != (n + 2 * p,):
             raise InvalidArgumentError(f"x has shape {array.shape}; expected (n + 2p,) = ({n + 2 * p},)")
         return array[:n], array[n : n + p], array[n + p :]
 
-    def test_functions(self, x: ArrayLike, alpha: Alpha) -> NDArray[np.float64]:
+    def test_functions(self, x: ArrayLike, alpha: AlphaLike) -> NDArray[np.float64]:
         """theta1 = lambda_n + r u_n and theta2, theta3 = lambda_t + r u_t -+ F lambda_n, shape (p, 3)."""
         u, lambda_n, lambda_t = self.split(x)
         problem = self.problem
@@ -64,11 +66,11 @@ class PiecewiseSmoothEquation:
         trial = lambda_t + self.r * (problem.Bt @ u - problem.slip_offset)
         return np.column_stack([lambda_n + self.r * (problem.Bn @ u - problem.gap), trial - bound, trial + bound])
 
-    def signs(self, x: ArrayLike, alpha: Alpha) -> NDArray[np.int8]:
+    def signs(self, x: ArrayLike, alpha: AlphaLike) -> NDArray[np.int8]:
         """Signs in {-1, 0, 1} of the test functions, shape (p, 3)."""
         return np.sign(self.test_functions(x, alpha)).astype(np.int8)
 
-    def residual(self, x: ArrayLike, alpha: Alpha) -> NDArray[np.float64]:
+    def residual(self, x: ArrayLike, alpha: AlphaLike) -> NDArray[np.float64]:
         """H(x, alpha), shape (n + 2p,), evaluated from the projections themselves."""
         u, lambda_n, lambda_t = self.split(x)
         problem, r = self.problem, self.r
@@ -85,7 +87,7 @@ class PiecewiseSmoothEquation:
             ]
         )
 
-    def selection_residual(self, signs: ArrayLike, x: ArrayLike, alpha: Alpha) -> NDArray[np.float64]:
+    def selection_residual(self, signs: ArrayLike, x: ArrayLike, alpha: AlphaLike) -> NDArray[np.float64]:
         """The selection function of H that ``signs`` (p, 3) names, at x; equals H where the test functions agree."""
         u, lambda_n, lambda_t = self.split(x)
         problem, r = self.problem, self.r
@@ -103,7 +105,7 @@ class PiecewiseSmoothEquation:
             ]
         )
 
-    def selection_jacobian(self, signs: ArrayLike, x: ArrayLike, alpha: Alpha) -> sp.csc_array:
+    def selection_jacobian(self, signs: ArrayLike, x: ArrayLike, alpha: AlphaLike) -> sp.csc_array:
         """Jacobian of the named selection with respect to (x, alpha), sparse (n + 2p, n + 2p + 1)."""
         _, lambda_n, _ = self.split(x)
         problem, r = self.problem, self.r
@@ -124,7 +126,7 @@ class PiecewiseSmoothEquation:
         )
 
     def _pieces(self, signs: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
-        array = np.asarray(signs)
+        array = plain_array(signs, "signs", error=InvalidArgumentError)
         if array.shape != (self.problem.p, 3) or not np.all(np.isin(array, (-1, 1))):
             raise InvalidArgumentError(
                 f"signs has shape {array.shape}; expected (p, 3) = ({self.problem.p}, 3) with entries -1 or 1"
@@ -132,7 +134,7 @@ class PiecewiseSmoothEquation:
         return array[:, 0] > 0, array[:, 1] > 0, array[:, 2] > 0
 
     def _equilibrium(
-        self, u: NDArray[np.float64], lambda_n: NDArray[np.float64], lambda_t: NDArray[np.float64], alpha: Alpha
+        self, u: NDArray[np.float64], lambda_n: NDArray[np.float64], lambda_t: NDArray[np.float64], alpha: AlphaLike
     ) -> NDArray[np.float64]:
         problem = self.problem
         return np.asarray(

@@ -21,6 +21,10 @@ class TooLargeError(EnumsolError, ValueError):
     """The work asked for is beyond a stated limit; the message gives an estimate of its cost."""
 
 
+class IncompleteGraphError(EnumsolError, ValueError):
+    """A branch graph with gaps was asked for what only a graph without gaps can tell."""
+
+
 class MissingDependencyError(EnumsolError, ImportError):
     """An optional package is needed for this call and is not installed."""
 

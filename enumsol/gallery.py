@@ -17,15 +17,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol import fem
+from enumsol.array_checks import vector_2d
+from enumsol.checks import finite_number, nonnegative_number, positive_integer, positive_number, shown
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.arguments import (
-    finite_number,
-    lame_coefficients,
-    nonnegative_number,
-    positive_integer,
-    positive_number,
-    vector_2d,
-)
+from enumsol.fem.assembly import lame_coefficients
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
@@ -36,6 +31,8 @@ if TYPE_CHECKING:
     Friction = float | tuple[ArrayLike, ArrayLike]
 
 Pair = tuple[float, float]
+#: Most triangles of a chain.
+_MOST_TRIANGLES = 1_000_000
 
 
 def one_node_triangle(f: Pair = (1.5, -4.0), lame: Pair = (1.0, 1.0)) -> ContactProblem:
@@ -85,10 +82,10 @@ def two_node_square(
 
     With l = m = 1 it shows
 
-    - f1 = (1, -3), f2 = (1, -1) (Example 6.4): 1 root for alpha < 3, 5 for 3 < alpha < 3.828, then 3;
+    - f1 = (1, -3), f2 = (1, -1) (paper, Example 6.4): 1 root for alpha < 3, 5 for 3 < alpha < 3.828, then 3;
     - f1 = (1, -4), f2 = (1.5, -3.5): 5 well separated roots at alpha = 5;
     - f1 = (0.4, 0.2), f2 = (1.8, -0.1), friction = 4, load_slope = ((0.1, -1.1), (0.2, -0.8)), the loading path of
-      Example 6.7: 3 roots for alpha between 1.2 and 2.6, else one. The other reading of its signs,
+      paper, Example 6.7: 3 roots for alpha between 1.2 and 2.6, else one. The other reading of its signs,
       load_slope = ((0.1, 1.1), (0.2, 0.8)), has 3 roots between -1.2 and -0.75.
 
     Parameters
@@ -117,7 +114,9 @@ def two_node_square(
     slope = None
     if load_slope is not None:
         if not isinstance(load_slope, (tuple, list)) or len(load_slope) != 2:
-            raise InvalidArgumentError(f"load_slope is {load_slope!r}; expected two pairs, the slopes of f1 and f2")
+            raise InvalidArgumentError(
+                f"load_slope is {shown(load_slope)}; expected two pairs, the slopes of f1 and f2"
+            )
         slope = np.concatenate([vector_2d(pair, f"load_slope[{k}]") for k, pair in enumerate(load_slope)])
     return ContactProblem(
         turn @ K[:4, :4] @ turn.T,
@@ -176,7 +175,7 @@ def clamped_block(
     cells = len(mesh.bottom) - 1
     count = cells if contact is None else positive_integer(contact, "contact")
     if cells % count:
-        raise InvalidArgumentError(f"contact is {count}; expected a divisor of nx = {cells}")
+        raise InvalidArgumentError(f"contact is {shown(count)}; expected a divisor of nx = {cells}")
     return fem.contact_problem(
         mesh.points,
         mesh.triangles,
@@ -246,7 +245,7 @@ def wedge(
     """
     angle = math.radians(positive_number(half_angle, "half_angle"))
     if angle > math.radians(80.0):
-        raise InvalidArgumentError(f"half_angle is {half_angle!r}; expected degrees between 0 and 80")
+        raise InvalidArgumentError(f"half_angle is {shown(half_angle)}; expected degrees between 0 and 80")
     width, height = positive_number(width, "width"), positive_number(height, "height")
     mesh = fem.trapezoid(nx, ny, width, width + 2.0 * height * math.tan(angle), height)
     # the top row stands in the mouth of the notch, out of contact, and carries springs and pull
@@ -277,7 +276,7 @@ def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.
     Parameters
     ----------
     p : int
-        Number of triangles, at least 1.
+        Number of triangles, 1 to a million.
     coupling : float
         Stiffness of each connecting spring, at least 0 [force / length].
     f : (float, float)
@@ -290,7 +289,7 @@ def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.
     InvalidArgumentError
         An argument is not of the stated form.
     """
-    count = positive_integer(p, "p")
+    count = positive_integer(p, "p", most=_MOST_TRIANGLES)
     spring = nonnegative_number(coupling, "coupling")
     # the graph Laplacian of the row: a spring pulls on both of its ends
     link = np.arange(count - 1)
@@ -340,11 +339,13 @@ def get(name: str) -> GalleryEntry:
     InvalidArgumentError
         There is none; the message lists the names most like it, or all.
     """
+    if not isinstance(name, str):
+        raise InvalidArgumentError(f"name is {shown(name)}; expected a name of the gallery, such as one-node-6.1")
     if name in GALLERY:
         return GALLERY[name]
-    close = difflib.get_close_matches(str(name), GALLERY, n=5, cutoff=0.5)
+    close = difflib.get_close_matches(name, GALLERY, n=5, cutoff=0.5)
     known = f"did you mean {', '.join(close)}?" if close else f"expected one of {', '.join(GALLERY)}"
-    raise InvalidArgumentError(f"the gallery has no problem named {name!r}; {known}")
+    raise InvalidArgumentError(f"the gallery has no problem named {shown(name)}; {known}")
 
 
 def _small() -> Iterator[GalleryEntry]:
@@ -403,7 +404,9 @@ def _one_node_stiffness(lame: Pair) -> NDArray[np.float64]:
 def _top_springs(mesh: fem.Mesh, springs: Pair) -> NDArray[np.float64]:
     total = vector_2d(springs, "springs")
     if np.min(total) <= 0:
-        raise InvalidArgumentError(f"springs is {springs!r}; expected two stiffnesses > 0, or the wedge is not held")
+        raise InvalidArgumentError(
+            f"springs is {shown(springs)}; expected two stiffnesses > 0, or the wedge is not held"
+        )
     share = np.full(len(mesh.top), 1.0 / (len(mesh.top) - 1))
     share[[0, -1]] *= 0.5
     values = np.zeros_like(mesh.points)

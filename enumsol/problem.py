@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import numbers
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -10,12 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.checks import Alpha, finite_alpha
+from enumsol.array_checks import real_array, real_matrix
+from enumsol.checks import alpha_value, exact_number, shown
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.sealed import Immutable, SealedMatrix, sealed
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from enumsol.checks import AlphaLike
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.condensation.factorization import Factorization
@@ -26,8 +30,8 @@ ASYMMETRY_TOLERANCE = 1e-12
 ROW_RANK_TOLERANCE = 1e-12
 
 
-class ContactProblem:
-    """A linear elastic body on a rigid foundation with Coulomb friction (theory: equilibrium, Signorini, Coulomb).
+class ContactProblem(Immutable):
+    """A linear elastic body on a rigid foundation with Coulomb friction (theory, section 1.1).
 
     Find u, lambda_n, lambda_t with::
 
@@ -36,7 +40,11 @@ class ContactProblem:
         |lambda_t| <= F lambda_n,  u_t = Bt u - slip_offset
         u_t > 0 => lambda_t = F lambda_n;  u_t < 0 => lambda_t = -F lambda_n
 
-    with F(alpha) = F0 + alpha F1 and f(alpha) = f + alpha load_slope. The object is immutable.
+    with F(alpha) = F0 + alpha F1 and f(alpha) = f + alpha load_slope. The object is immutable: its arrays are
+    read-only, and A, Bn, Bt are given as a new sparse matrix at every access, made in O(1) on read-only parts.
+
+    Data are taken exactly as given: what float64 cannot hold (an integer above 2^53, digits of a longdouble) is
+    refused. Sparse matrices may have any format of scipy.sparse; arrays of bool count as 0 and 1.
 
     Parameters
     ----------
@@ -78,22 +86,21 @@ class ContactProblem:
         node_ids: Any = None,
         coordinates: ArrayLike | None = None,
     ) -> None:
-        stiffness = _matrix(A, "A")
+        stiffness = real_matrix(A, "A")
         n = stiffness.shape[0]
         if stiffness.shape != (n, n) or n == 0:
             raise InvalidProblemError(f"A has shape {stiffness.shape}; expected a square matrix (n, n) with n >= 1")
-        normal, tangent = _matrix(Bn, "Bn"), _matrix(Bt, "Bt")
+        normal, tangent = real_matrix(Bn, "Bn"), real_matrix(Bt, "Bt")
         p = normal.shape[0]
         if p == 0:
             raise InvalidProblemError("Bn has no rows (p = 0 contact nodes); expected at least one contact node")
         for name, rows in (("Bn", normal), ("Bt", tangent)):
             if rows.shape != (p, n):
                 raise InvalidProblemError(f"{name} has shape {rows.shape}; expected (p, n) = ({p}, {n})")
-        self.A = _symmetric(stiffness)
-        self.Bn = sp.csr_array(normal)
-        self.Bt = sp.csr_array(tangent)
+        self._A = SealedMatrix.of(_symmetric(stiffness))
+        self._Bn = SealedMatrix.of(sp.csr_array(normal))
+        self._Bt = SealedMatrix.of(sp.csr_array(tangent))
         _check_row_rank(self.Bn, self.Bt)
-        _lock((self.A, self.Bn, self.Bt))
         self.f = _vector(f, "f", n)
         self.gap = _vector(gap, "gap", p, broadcast=True)
         self.friction = _friction(friction, p)
@@ -101,23 +108,35 @@ class ContactProblem:
         self.slip_offset = _vector(slip_offset, "slip_offset", p, broadcast=True)
         self.node_ids = _node_ids(node_ids, p)
         self.coordinates = None if coordinates is None else _coordinates(coordinates, p)
-        self._frozen = True
+        self._freeze()
         self.factorization.check_positive_definite()
 
-    def __setattr__(self, name: str, value: object) -> None:
-        if getattr(self, "_frozen", False):
-            raise AttributeError(f"ContactProblem is immutable: {name} cannot be set; build a new problem")
-        super().__setattr__(name, value)
+    _instead = "build a new problem"
+
+    @property
+    def A(self) -> sp.csc_array:  # noqa: N802 (the field's letter)
+        """Stiffness, sparse (n, n); a new object at every access, whose parts are read-only."""
+        return self._A.matrix()
+
+    @property
+    def Bn(self) -> sp.csr_array:  # noqa: N802 (as above)
+        """Normal displacement of the contact nodes, sparse (p, n); a new object as A is."""
+        return self._Bn.matrix()
+
+    @property
+    def Bt(self) -> sp.csr_array:  # noqa: N802 (as above)
+        """Tangential displacement of the contact nodes, sparse (p, n); a new object as A is."""
+        return self._Bt.matrix()
 
     @property
     def n(self) -> int:
         """Number of degrees of freedom."""
-        return int(self.A.shape[0])
+        return self._A.shape[0]
 
     @property
     def p(self) -> int:
         """Number of contact nodes."""
-        return int(self.Bn.shape[0])
+        return self._Bn.shape[0]
 
     @cached_property
     def factorization(self) -> Factorization:
@@ -128,7 +147,7 @@ class ContactProblem:
 
     @cached_property
     def condensed(self) -> CondensedProblem:
-        """The problem condensed to its 2p contact forces (theory, section 4)."""
+        """The problem condensed to its 2p contact forces (theory, section 4.1)."""
         from enumsol.condensation.condensed import CondensedProblem  # as above
 
         return CondensedProblem.from_problem(self)
@@ -146,7 +165,7 @@ class ContactProblem:
 
         return CondensedEnclosure.from_problem(self)
 
-    def friction_at(self, alpha: Alpha) -> NDArray[np.float64]:
+    def friction_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
         """Coefficients F(alpha) = F0 + alpha F1, shape (p,).
 
         Raises
@@ -154,9 +173,9 @@ class ContactProblem:
         InvalidArgumentError
             alpha is not finite, or a coefficient is negative there (the node and its value are named).
         """
-        value = finite_alpha(alpha)
+        a = Fraction(alpha_value(alpha))
+        value = float(a)
         # rounded once from the exact value, so that zero and its sign are decided exactly
-        a = Fraction(alpha)
         try:
             F = np.array(
                 [
@@ -177,13 +196,13 @@ class ContactProblem:
             )
         return np.asarray(F)
 
-    def is_unloaded(self, alpha: Alpha) -> bool:
+    def is_unloaded(self, alpha: AlphaLike) -> bool:
         """Whether load, gap and slip offset are exactly zero at alpha: then only lambda = 0, w = 0 solves."""
+        a = Fraction(alpha_value(alpha))
         if np.any(self.gap) or np.any(self.slip_offset):
             return False
         if self.load_slope is None:
             return not np.any(self.f)
-        a = Fraction(alpha)
         pairs = zip(self.f.tolist(), self.load_slope.tolist(), strict=True)
         return all(Fraction(x) + a * Fraction(y) == 0 for x, y in pairs)
 
@@ -193,28 +212,28 @@ class ContactProblem:
         digest = hashlib.sha256(b"enumsol problem 1")
         slope = np.zeros(self.n) if self.load_slope is None else self.load_slope
         parts: list[Any] = [np.array([self.n, self.p])]
-        for matrix in (self.A, sp.csc_array(self.Bn), sp.csc_array(self.Bt)):
-            ordered = matrix.sorted_indices()
-            parts += [ordered.indptr, ordered.indices, ordered.data]
+        for matrix in (self.A, *(sp.csc_array(rows).sorted_indices() for rows in (self.Bn, self.Bt))):
+            parts += [matrix.indptr, matrix.indices, matrix.data]
         for part in (*parts, self.f, self.gap, *self.friction, slope, self.slip_offset):
             kind = "<f8" if part.dtype.kind == "f" else "<i8"
             digest.update(np.ascontiguousarray(part, dtype=kind).tobytes())
             digest.update(b"|")
         return digest.hexdigest()
 
-    def load_at(self, alpha: Alpha) -> NDArray[np.float64]:
-        """Load f(alpha) = f + alpha load_slope, shape (n,) [force]."""
-        value = finite_alpha(alpha)
+    def load_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
+        """Load f(alpha) = f + alpha load_slope, shape (n,) [force].
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is not finite.
+        """
+        value = float(alpha_value(alpha))
         return self.f.copy() if self.load_slope is None else self.f + value * self.load_slope
 
     def __getstate__(self) -> dict[str, Any]:
         # the factorization (SuperLU) cannot be pickled; workers that need it make it again
         return {key: value for key, value in self.__dict__.items() if key != "factorization"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        # arrays come out of a pickle writable
-        _lock(tuple(state.values()))
 
     def __repr__(self) -> str:
         F0, F1 = self.friction
@@ -234,69 +253,15 @@ def _span(values: NDArray[np.float64]) -> str:
     return f"{low:g}" if low == high else f"[{low:g}, {high:g}]"
 
 
-def _readonly(array: NDArray[Any]) -> NDArray[Any]:
-    array.setflags(write=False)
-    return array
-
-
-def _lock(value: object) -> None:
-    """Make arrays, sparse matrices and tuples of them read-only; leave anything else alone."""
-    if isinstance(value, np.ndarray):
-        value.setflags(write=False)
-    elif isinstance(value, tuple):
-        for item in value:
-            _lock(item)
-    elif isinstance(value, (sp.csc_array, sp.csr_array)):
-        _lock((value.data, value.indices, value.indptr))
-
-
-def _numeric(value: object, name: str) -> NDArray[np.float64]:
-    try:
-        raw = np.asarray(value)
-        array = None if np.iscomplexobj(raw) else np.array(raw, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = None
-    if array is None:
-        raise InvalidProblemError(
-            f"{name} is not an array of real numbers (found {type(value).__name__}); expected float64 values"
-        )
-    if not np.all(np.isfinite(array)):
-        where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
-        raise InvalidProblemError(f"{name} has the value {array[where]} at index {where}; expected finite numbers only")
-    return array
-
-
-def _matrix(value: Any, name: str) -> sp.csc_array:
-    if sp.issparse(value):
-        if np.iscomplexobj(value.data):
-            raise InvalidProblemError(f"{name} has complex entries; expected real numbers")
-        matrix = sp.csc_array(value, dtype=np.float64, copy=True)
-        matrix.sum_duplicates()
-        if not np.all(np.isfinite(matrix.data)):
-            k = int(np.argmax(~np.isfinite(matrix.data)))
-            column = int(np.searchsorted(matrix.indptr, k, side="right")) - 1
-            row = int(matrix.indices[k])
-            raise InvalidProblemError(
-                f"{name} has the value {matrix.data[k]} at index ({row}, {column}); expected finite numbers only"
-            )
-    else:
-        array = _numeric(value, name)
-        if array.ndim != 2:
-            raise InvalidProblemError(f"{name} has {array.ndim} dimension(s), shape {array.shape}; expected a matrix")
-        matrix = sp.csc_array(array)
-    matrix.eliminate_zeros()
-    return matrix
-
-
 def _vector(value: object, name: str, size: int, *, broadcast: bool = False) -> NDArray[np.float64]:
-    array = _numeric(value, name)
+    array = real_array(value, name)
     if array.ndim == 0 and broadcast:
         array = np.full(size, float(array))
     if array.shape != (size,):
         scalar = " or a single number" if broadcast else ""
         raise InvalidProblemError(f"{name} has shape {array.shape}; expected ({size},){scalar}")
     # -0.0 becomes 0.0: not every file format keeps the sign of zero, and equal problems are to have equal fingerprints
-    return _readonly(array + 0.0)
+    return sealed(array + 0.0)
 
 
 def _symmetric(A: sp.csc_array) -> sp.csc_array:
@@ -347,8 +312,10 @@ def _friction(value: Any, p: int) -> tuple[NDArray[np.float64], NDArray[np.float
         if len(value) != 2:
             raise InvalidProblemError(f"friction is a tuple of {len(value)} entries; {hint}")
         first, second = value
-    elif np.isscalar(value) or (isinstance(value, np.ndarray) and value.ndim == 0):
+    elif exact_number(value) is not None:
         first, second = value, 0.0
+    elif isinstance(value, (str, bytes, bool, np.generic, numbers.Number)) or getattr(value, "ndim", 1) == 0:
+        raise InvalidProblemError(f"friction is {shown(value)}; {hint}")
     else:
         raise InvalidProblemError(f"friction is a bare {type(value).__name__}, which is ambiguous; {hint}")
     F0 = _vector(first, "friction F0", p, broadcast=True)
@@ -362,18 +329,21 @@ def _friction(value: Any, p: int) -> tuple[NDArray[np.float64], NDArray[np.float
 def _node_ids(value: Any, p: int) -> tuple[Any, ...]:
     if value is None:
         return tuple(range(p))
+    wanted = f"expected a sequence of {p} distinct labels"
+    if isinstance(value, (str, bytes, bytearray, set, frozenset, dict)):
+        raise InvalidProblemError(f"node_ids is {shown(value)}; {wanted}")
     try:
         ids = tuple(v.item() if isinstance(v, np.generic) else v for v in value)
         distinct = len(set(ids))
     except TypeError:
-        raise InvalidProblemError(f"node_ids is {value!r}; expected a sequence of {p} distinct labels") from None
+        raise InvalidProblemError(f"node_ids is {shown(value)}; {wanted}") from None
     if len(ids) != p or distinct != p:
         raise InvalidProblemError(f"node_ids has {len(ids)} entries, {distinct} distinct; expected {p} distinct labels")
     return ids
 
 
 def _coordinates(value: ArrayLike, p: int) -> NDArray[np.float64]:
-    array = _numeric(value, "coordinates")
+    array = real_array(value, "coordinates")
     if array.shape != (p, 2):
         raise InvalidProblemError(f"coordinates has shape {array.shape}; expected (p, 2) = ({p}, 2)")
-    return _readonly(array)
+    return sealed(array)

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.checks import shown
+from enumsol.errors import InvalidArgumentError
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -31,7 +34,7 @@ class ContactStatus(enum.Enum):
 #: Statuses in the order of their integer codes 0..3; a root at which several hold shows the first.
 STATUSES = (ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP_PLUS, ContactStatus.SLIP_MINUS)
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS = range(4)
-#: Inside the searches a node with F = 0 that is in contact: lambda_t = 0 and u_t free (theory, section 2).
+#: Inside the searches a node with F = 0 that is in contact: lambda_t = 0 and u_t free (theory, section 2.1).
 FRICTIONLESS = 4
 #: Inside the searches a node whose status is not final: in contact and not known how, and nothing known.
 CONTACT, UNDECIDED = 5, 6
@@ -53,8 +56,11 @@ _SIGNS = {
 
 
 def sign_array(statuses: Sequence[ContactStatus]) -> NDArray[np.int8]:
-    """Signs of the test functions that name the selection of ``statuses``, shape (p, 3) (theory, table of section 2).
+    """Signs of the test functions that name the selection of ``statuses``, shape (p, 3) (theory, section 2.1).
 
     At an open node theta2 = theta3 at a root and their sign does not matter; (-, -, -) is returned.
     """
-    return np.array([_SIGNS[status] for status in statuses], dtype=np.int8).reshape(-1, 3)
+    try:
+        return np.array([_SIGNS[status] for status in statuses], dtype=np.int8).reshape(-1, 3)
+    except (KeyError, TypeError):
+        raise InvalidArgumentError(f"statuses is {shown(statuses)}; expected a sequence of ContactStatus") from None

@@ -162,7 +162,7 @@ def test_test_functions_and_split():
 
 @pytest.mark.parametrize("r", [0.0, -1.0, np.nan, np.inf])
 def test_r_must_be_positive(r):
-    with pytest.raises(InvalidArgumentError, match=r"r is .*; expected a positive finite number"):
+    with pytest.raises(InvalidArgumentError, match=r"r is .*; expected a finite number > 0"):
         PiecewiseSmoothEquation(gallery.one_node_triangle(), r)
 
 
@@ -189,7 +189,7 @@ def test_condensed_systems_hold_the_roots_of_their_selections():
         k = int(np.flatnonzero(np.all(codes == [STATUSES.index(s) for s in root.statuses], axis=1))[0])
         forces = np.concatenate([root.lambda_n, root.lambda_t])
         assert np.linalg.solve(M[k], b[k]) == pytest.approx(forces, rel=1e-12)
-        # and the sign of the determinant is the index of a regular root (theory, section 6)
+        # and the sign of the determinant is the index of a regular root (theory, section 6.7)
         assert np.sign(np.linalg.det(M[k])) == root.index
 
 

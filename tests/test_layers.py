@@ -14,8 +14,9 @@ import enumsol
 
 #: Rooms from the ground up ("." is the package's own ``__init__``). A room imports rooms of lower layers only.
 LAYERS = (
-    ("errors", "statuses", "arithmetic"),
-    ("checks", "proof"),
+    ("errors", "sealed", "compiled", "arithmetic"),
+    ("checks",),
+    ("array_checks", "statuses", "proof"),
     ("condensation",),
     ("problem",),
     ("equation", "kernel", "selections"),

@@ -1,4 +1,4 @@
-"""Real algebraic numbers: roots of integer polynomials, isolated and compared exactly (theory, section 7).
+"""Real algebraic numbers: roots of integer polynomials, isolated and compared exactly (theory, section 7.2).
 
 A critical alpha is either a rational number or the only root of a polynomial in an open interval with rational ends.
 Signs of other polynomials there are decided without rounding: a common root is found by the greatest common divisor,

@@ -1,4 +1,4 @@
-"""Exact arithmetic at an irrational critical alpha: the real number field Q(alpha) (theory, section 7)."""
+"""Exact arithmetic at an irrational critical alpha: the real number field Q(alpha) (theory, section 7.4)."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from enumsol.arithmetic.rationals import rational, to_fraction
 from enumsol.branches.gluing import Gluing
@@ -12,7 +12,14 @@ from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.branches.make_elements import make_arcs, make_vertices
 from enumsol.branches.proof_records import write_graph_proof
-from enumsol.checks import finite_alpha
+from enumsol.checks import (
+    alpha_interval,
+    instance_of,
+    one_of,
+    optional_callable,
+    optional_count,
+    optional_seconds,
+)
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactPath
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
@@ -23,7 +30,7 @@ from enumsol.search.interval import FastIntervalCertifier, IntervalSearch
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from enumsol.checks import Alpha
+    from enumsol.checks import AlphaLike
     from enumsol.search.interval import IntervalCertifier
 
 Arithmetic = Literal["fast", "verified", "exact"]
@@ -31,7 +38,7 @@ Arithmetic = Literal["fast", "verified", "exact"]
 
 def branch_graph(
     problem: ContactProblem,
-    interval: tuple[Alpha, Alpha],
+    interval: tuple[AlphaLike, AlphaLike],
     arithmetic: Arithmetic = "verified",
     *,
     progress: Callable[[str, float], object] | None = None,
@@ -47,8 +54,8 @@ def branch_graph(
     Parameters
     ----------
     problem : ContactProblem
-    interval : (float or Fraction, float or Fraction)
-        First and last alpha, the first less than the last.
+    interval : pair of alphas
+        First and last alpha, the first less than the last: float, Fraction or whatever enumerate_roots takes for alpha.
     arithmetic : {"verified", "fast", "exact"}
         "verified": every leaf of the search is proven empty over its whole piece of the interval by rigorous error
         bounds, and what follows is exact. Up to 24 degrees of freedom this is about the problem's own matrices, beyond
@@ -78,7 +85,12 @@ def branch_graph(
     Interrupted
         On Ctrl-C during the search; ``partial`` is the graph of the selections found so far, which is not complete.
     """
-    a, b = _check(problem, interval, arithmetic, max_nodes, time_limit)
+    instance_of(problem, ContactProblem, "problem")
+    a, b = (Fraction(end) for end in alpha_interval(interval))
+    one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
+    optional_callable(progress, "progress")
+    max_nodes, time_limit = optional_count(max_nodes, "max_nodes"), optional_seconds(time_limit)
+    _check_friction(problem, a, b)
     started = time.perf_counter()
     exactly = arithmetic == "exact" or problem.n <= FAST_EXACT_DOF
     path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem.condensed)
@@ -142,28 +154,6 @@ def _certifier(problem: ContactProblem, path: ExactPath, arithmetic: Arithmetic)
 
 def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callable[[float], object] | None:
     return None if progress is None else lambda share: progress(name, share)
-
-
-def _check(
-    problem: object, interval: Any, arithmetic: str, max_nodes: int | None, time_limit: float | None
-) -> tuple[Fraction, Fraction]:
-    if not isinstance(problem, ContactProblem):
-        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
-    if arithmetic not in ("fast", "verified", "exact"):
-        raise InvalidArgumentError(f"arithmetic is {arithmetic!r}; expected 'verified', 'fast' or 'exact'")
-    if max_nodes is not None and (not isinstance(max_nodes, int) or max_nodes < 1):
-        raise InvalidArgumentError(f"max_nodes is {max_nodes!r}; expected a positive integer or None")
-    if time_limit is not None and not time_limit > 0:
-        raise InvalidArgumentError(f"time_limit is {time_limit!r}; expected a positive number of seconds or None")
-    if not isinstance(interval, tuple | list) or len(interval) != 2:
-        raise InvalidArgumentError(f"interval is {interval!r}; expected a pair of numbers (first alpha, last alpha)")
-    for end in interval:
-        finite_alpha(end)
-    a, b = (Fraction(end) for end in interval)
-    if not a < b:
-        raise InvalidArgumentError(f"interval is ({float(a):g}, {float(b):g}); expected its first alpha below its last")
-    _check_friction(problem, a, b)
-    return a, b
 
 
 def _check_friction(problem: ContactProblem, a: Fraction, b: Fraction) -> None:

@@ -1,4 +1,4 @@
-"""What a branch graph is made of: vertices, arcs, components and branches (theory, section 7)."""
+"""What a branch graph is made of: vertices, arcs, components and branches (theory, section 7.11)."""
 
 from __future__ import annotations
 
@@ -10,25 +10,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.checks import Alpha, finite_alpha
+from enumsol.checks import alpha_value
 from enumsol.errors import InvalidArgumentError
+from enumsol.sealed import Sealed
 from enumsol.selections.functions import SelectionFunctions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.arithmetic.algebraic import CriticalAlpha
+    from enumsol.checks import AlphaLike
     from enumsol.condensation.exact import ExactPath
     from enumsol.roots.root_set import RootFamily
     from enumsol.selections.solution import Codes
     from enumsol.statuses import ContactStatus
 
+#: Kind of a vertex at which selections hold that the search did not reach: arcs that were not found may end there.
+UNSETTLED = "unsettled"
 #: Kinds of vertices at which branches are cut.
-CUTS = ("bifurcation", "family", "sheet")
+CUTS = ("bifurcation", "family", "sheet", UNSETTLED)
 
 
 @dataclass(frozen=True, eq=False)
-class Vertex:
+class Vertex(Sealed):
     """A connected set of solutions at one critical alpha, where arcs begin and end.
 
     Attributes
@@ -41,7 +45,9 @@ class Vertex:
         "transition" (one arc from the left goes on as another to the right), "fold" (alpha turns back), "bifurcation"
         (any other number of arcs), "touch" (a status is met and left again), "point" (no arc at all), "family" (a
         continuum of solutions at one alpha: a vertical arc), "sheet" (the border of a sheet), "end" (on the interval's
-        border), or "broken" (an arc ends for no reason: something is missing, and the graph is not complete).
+        border), "unsettled" (selections hold here that were not examined, because the search was cut short or a limit
+        was reached: arcs that were not found may end here, so that nothing is said about its kind), or "broken" (an arc
+        ends for no reason: something is missing, and the graph is not complete).
     border : bool
         It lies at the first or last alpha.
     statuses : tuple of p ContactStatus
@@ -52,7 +58,8 @@ class Vertex:
         Values at the vertex; of a family, at one of its points [force, length].
     family : RootFamily or None
     index_left, index_right : int or None
-        Sums of the indices of the arcs that end and begin here; equal inside the interval (balance of degrees).
+        Sums of the indices of the arcs that end and begin here; equal inside the interval (balance of degrees). None
+        where one is not known, or not all arcs.
     selections : tuple of status codes that hold here
     exact : CriticalAlpha
     """
@@ -130,8 +137,9 @@ class Arc:
     def _functions(self) -> SelectionFunctions:
         return SelectionFunctions(self._path, self.selections[0])
 
-    def _point(self, alpha: Alpha) -> tuple[object, ...]:
-        value = finite_alpha(alpha)
+    def _point(self, alpha: AlphaLike) -> tuple[object, ...]:
+        exact = alpha_value(alpha)
+        value = float(exact)
         if self.dimension:
             raise InvalidArgumentError(
                 f"arc {self.number} is a sheet and has many solutions at one alpha; use roots_at(alpha).families"
@@ -140,12 +148,12 @@ class Arc:
             raise InvalidArgumentError(
                 f"alpha is {value:.17g}; expected a value on the arc, [{self.lo!r}, {self.hi!r}]"
             )
-        point = self._functions.forces_at(rational(Fraction(alpha)))
+        point = self._functions.forces_at(rational(exact))
         if point is None:  # bounded arcs have no poles, but a rounded end may lie beyond the exact one
             point = self._functions.forces_at(rational(self.sample))
         return point if point is not None else ()
 
-    def values(self, alpha: Alpha) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def values(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(lambda_n, lambda_t) at an alpha of the arc, arrays of shape (p,) [force]; exact, then rounded.
 
         Raises
@@ -156,13 +164,13 @@ class Arc:
         forces = np.array([float(Fraction(int(v.p), int(v.q))) for v in self._point(alpha)])  # type: ignore[attr-defined]
         return forces[: self._path.p], forces[self._path.p :]
 
-    def displacements(self, alpha: Alpha) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def displacements(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(u_n, u_t) at an alpha of the arc, two arrays of shape (p,) [length]; errors as ``values``."""
         point = self._point(alpha)
-        g = self._path.at(rational(Fraction(alpha)))[0]
+        g = self._path.at(rational(alpha_value(alpha)))[0]
         w = [
             a - sum((s * v for s, v in zip(row, point, strict=True)), rational(0))
-            for a, row in zip(g, self._path.S.tolist(), strict=True)
+            for a, row in zip(g, self._path.rows, strict=True)
         ]
         moves = np.array([float(Fraction(int(v.p), int(v.q))) for v in w])
         return moves[: self._path.p], moves[self._path.p :]

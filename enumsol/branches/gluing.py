@@ -1,4 +1,4 @@
-"""Ends of arcs glued into vertices by the statuses that hold there, never by distance (theory, section 7).
+"""Ends of arcs glued into vertices by the statuses that hold there, never by distance (theory, section 7.6).
 
 Two selections share a point at a critical alpha when both hold there, which the signs at one of them decide exactly.
 Isolated points need only their selection's own functions; where a selection is singular its polytope of solutions is
@@ -21,7 +21,7 @@ from enumsol.selections.ordered_field import FiberSelections
 from enumsol.selections.solution import SelectionSolution, VertexLimitError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable
 
     from enumsol.condensation.exact import ExactPath
     from enumsol.roots.components import RootComponent
@@ -41,6 +41,7 @@ class GluedVertex:
     active : per node all codes that hold somewhere on it
     solutions : polytopes of the singular selections (empty at an isolated point)
     solver : FiberSelections of those polytopes, or None
+    settled : every selection that holds there is known, and with it every arc that ends there
     """
 
     alpha: CriticalAlpha
@@ -48,6 +49,7 @@ class GluedVertex:
     active: ActiveSets
     solutions: list[SelectionSolution] = field(default_factory=list)
     solver: FiberSelections | None = None
+    settled: bool = True
 
     @property
     def dimension(self) -> int:
@@ -135,6 +137,8 @@ class Gluing:
         self._active: dict[int, ActiveSets] = {}
         self._events: dict[int, tuple[Codes, Any]] = {}
         self._fibers: list[tuple[CriticalAlpha, FiberSelections]] = []
+        self._refused: set[Codes] = set()
+        self._unsettled: set[int] = set()
         todo = sorted(set(candidates))
         for k, codes in enumerate(todo):
             self._add(codes)
@@ -154,7 +158,8 @@ class Gluing:
             if arcs is None:
                 arcs = sheet_arcs(self.path, codes, self.a, self.b)
         except VertexLimitError as error:
-            self.reasons.append(f"selection {codes}: {error}")
+            self._refused.add(codes)
+            self._complain(f"selection {codes}: {error}")
             return
         if not arcs.empty:
             self.arcs[codes] = arcs
@@ -187,6 +192,7 @@ class Gluing:
         try:
             solution = solver.solve(codes)
         except VertexLimitError as error:
+            self._unsettled.add(id(event))
             self._complain(f"alpha = {float(event.alpha):.17g}: {error}")
             return True
         if solution is not None:
@@ -207,9 +213,14 @@ class Gluing:
             self._union.find(id(event))
             if self.path.unloaded or (origin is not None and event.alpha.is_rational and event.alpha.lo == origin):
                 self._active[id(event)] = self._everything()
+                if self._cut_short or self._refused:
+                    self._unsettled.add(id(event))
                 continue
             for active in self._active_at(codes, event):
-                for other in self._members(active):
+                members, whole = self._members(active)
+                if not whole:
+                    self._unsettled.add(id(event))
+                for other in members:
                     partner = self.arcs[other]
                     place, new = partner.place(event.alpha)
                     theirs = partner.events[place]
@@ -217,6 +228,7 @@ class Gluing:
                         self._complain(
                             f"selection {other} should hold at alpha = {float(event.alpha):.17g} and does not"
                         )
+                        self._unsettled.add(id(event))
                         continue
                     if new:
                         waiting.append((other, theirs))
@@ -259,19 +271,28 @@ class Gluing:
     def _det_sign(self, arcs: SelectionArcs, event: Any) -> int:
         return int(event.alpha.sign_of(arcs.functions.det))
 
-    def _members(self, active: ActiveSets) -> Iterator[Codes]:
-        """Known selections among those that hold; if the search is complete, a further one is a contradiction."""
-        if prod(len(a) for a in active) > 2 * len(self.arcs) + 64:
-            yield from [c for c in self.arcs if all(code in a for code, a in zip(c, active, strict=True))]
-            return
-        for codes in product(*(sorted(a) for a in active)):
-            if codes not in self.arcs and (self._cut_short or not self._add_left_out(codes)):
-                continue
-            yield codes
+    def _members(self, active: ActiveSets) -> tuple[list[Codes], bool]:
+        """Known selections among those that hold, and whether these are all of them.
+
+        If the search was not cut short, one that it left out is a contradiction, and is taken in.
+        """
+        count = prod(len(a) for a in active)
+        if count > 2 * len(self.arcs) + 64:
+            known = [c for c in self.arcs if all(code in a for code, a in zip(c, active, strict=True))]
+            return known, not (self._cut_short or self._refused)
+        known = [
+            codes
+            for codes in product(*(sorted(a) for a in active))
+            if codes in self.arcs or (not self._cut_short and self._add_left_out(codes))
+        ]
+        return known, len(known) == count
 
     def _add_left_out(self, codes: Codes) -> bool:
         """Take in a selection that a search without gaps should have given; whether it holds anywhere."""
-        self._add(codes)
+        if codes not in self._refused:
+            self._add(codes)
+        if codes in self._refused:
+            return False
         if codes in self.arcs:
             self._close(codes)
         if codes not in self.arcs:
@@ -319,7 +340,7 @@ class Gluing:
         number = len(self.vertices)
         members = sorted(self._events[key][0] for key in keys)
         active = tuple(frozenset().union(*(self._active[key][i] for key in keys)) for i in range(self.path.p))
-        vertex = GluedVertex(alpha, members, active)
+        vertex = GluedVertex(alpha, members, active, settled=self._unsettled.isdisjoint(keys))
         for key in keys:
             self._events[key][1].vertex = number
             if key in self._solutions:
@@ -342,7 +363,9 @@ class Gluing:
                     found.append(GluedArc(codes, (codes,), cell.sample, tail, head, 1, 0))
                     continue
                 component = self._component(codes, cell.sample)
-                if component is None:
+                # the critical points of selections that coincide here and were not found may cut the arc further
+                if component is None or (self._cut_short and not self._knows(component)):
+                    self.vertices[tail].settled = self.vertices[head].settled = False
                     continue
                 selections = tuple(sorted(s.codes for s in component.solutions))
                 key = (tail, head, frozenset(selections))
@@ -353,6 +376,10 @@ class Gluing:
                         GluedArc(first, selections, cell.sample, tail, head, component.index, component.dimension)
                     )
         self.edges = sorted(found, key=lambda e: (e.tail, e.head, e.codes))
+
+    def _knows(self, component: RootComponent) -> bool:
+        """Whether all selections that hold on a component were found."""
+        return component.whole and all(solution.codes in self.arcs for solution in component.solutions)
 
     def _component(self, codes: Codes, sample: Any) -> RootComponent | None:
         """The connected set of solutions that a degenerate selection belongs to at a point of its cell."""

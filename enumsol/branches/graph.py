@@ -1,4 +1,4 @@
-"""BranchGraph: all solutions over an interval of alpha, and the questions it answers (theory, section 7)."""
+"""BranchGraph: all solutions over an interval of alpha, and the questions it answers (theory, section 7.11)."""
 
 from __future__ import annotations
 
@@ -6,32 +6,41 @@ from collections import Counter
 from dataclasses import asdict
 from fractions import Fraction
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
+from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps
+from enumsol.branches.elements import UNSETTLED
 from enumsol.branches.make_elements import make_branches, make_components, multigraph
 from enumsol.branches.roots_at import roots_of
-from enumsol.checks import finite_alpha
-from enumsol.errors import InvalidArgumentError
+from enumsol.checks import alpha_value
+from enumsol.errors import IncompleteGraphError, InvalidArgumentError
+from enumsol.sealed import Immutable
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     import pandas as pd
 
     from enumsol.branches.elements import Arc, Branch, Component, Vertex
     from enumsol.branches.graph_data import GraphData
-    from enumsol.checks import Alpha
+    from enumsol.checks import AlphaLike
     from enumsol.roots.root_set import Root, RootFamily, RootSet
     from enumsol.selections.solution import Codes
 
 
-class BranchGraph:
+class BranchGraph(Immutable):
     """All solutions over an interval of alpha: arcs of single selections, glued at vertices (made by ``branch_graph``).
+
+    A graph with ``reasons`` is not complete. It shows what was found, and every part of it is true: arcs are solutions,
+    and a vertex has a kind only where everything that meets there is known (it is "unsettled" otherwise). What needs
+    the whole graph (``multiplicity_at``, ``steps``, ``uniqueness_limit``) raises IncompleteGraphError then;
+    ``at_least`` and ``claims`` tell what is known.
 
     Parameters
     ----------
@@ -71,12 +80,23 @@ class BranchGraph:
         self.pieces = data.pieces
         self.proof = data.proof
         self.graph = multigraph(self.vertices, self.arcs)
-        self.reasons = (*data.reasons, *data.imbalances)
+        self.reasons = data.all_reasons
+        self._freeze()
 
     @property
     def complete(self) -> bool:
         """Whether it is proven that no solution is missing: proven leaves, nothing undecided, degrees balanced."""
-        return self.arithmetic != "fast" and not self.reasons
+        return self.data.complete
+
+    @property
+    def claims(self) -> Claims:
+        """What may be said about the number of solutions: numbers of a graph without gaps, lower bounds otherwise."""
+        return self.data.claims
+
+    def _whole(self, name: str, instead: str) -> None:
+        """Refuse a statement about all solutions unless nothing is known to be missing."""
+        if not self.claims.whole:
+            raise IncompleteGraphError(f"{name} is not known: the graph is not complete ({self.reasons[0]}); {instead}")
 
     @property
     def certified_data(self) -> str:
@@ -87,7 +107,7 @@ class BranchGraph:
 
     @cached_property
     def components(self) -> tuple[Component, ...]:
-        """Connected components in the order of their smallest alpha."""
+        """Connected components of what was found, in the order of their smallest alpha."""
         return make_components(self.graph, self.vertices, self.arcs)
 
     @cached_property
@@ -96,9 +116,9 @@ class BranchGraph:
         return make_branches(self.components, self.vertices)
 
     @cached_property
-    def branch_of(self) -> dict[int, int]:
+    def branch_of(self) -> Mapping[int, int]:
         """Number of the branch of every arc, by the arc's number."""
-        return {arc.number: branch.number for branch in self.branches for arc in branch.arcs}
+        return MappingProxyType({arc.number: branch.number for branch in self.branches for arc in branch.arcs})
 
     def _of_kind(self, *kinds: str) -> tuple[Vertex, ...]:
         return tuple(v for v in self.vertices if v.kind in kinds)
@@ -135,17 +155,20 @@ class BranchGraph:
 
     @property
     def jumps(self) -> tuple[Vertex, ...]:
-        """Vertices that no arc leaves to the right: where following a branch with increasing alpha must leave it."""
+        """Settled vertices that no arc leaves to the right: with increasing alpha a branch must be left there."""
         tails = {arc.tail for arc in self.arcs}
         heads = {arc.head for arc in self.arcs}
-        return tuple(v for v in self.vertices if not v.border and v.number in heads and v.number not in tails)
+        return tuple(
+            v
+            for v in self.vertices
+            if not v.border and v.kind != UNSETTLED and v.number in heads and v.number not in tails
+        )
 
     # -- solutions at one alpha ------------------------------------------------------------------------------------
 
-    def _located(self, alpha: Alpha) -> tuple[list[Arc], list[Vertex]]:
+    def _located(self, alpha: AlphaLike) -> tuple[list[Arc], list[Vertex]]:
         """Arcs over an alpha and vertices at it, decided exactly."""
-        finite_alpha(alpha)
-        value = Fraction(alpha)
+        value = Fraction(alpha_value(alpha))
         if not self.exact_interval[0] <= value <= self.exact_interval[1]:
             raise InvalidArgumentError(
                 f"alpha is {float(value):.17g}; expected a value in the graph's interval "
@@ -156,12 +179,12 @@ class BranchGraph:
         arcs = [arc for arc in self.arcs if order[arc.tail] < 0 < order[arc.head]]
         return arcs, [v for v, o in zip(self.vertices, order, strict=True) if o == 0]
 
-    def arcs_at(self, alpha: Alpha) -> tuple[Arc, ...]:
+    def arcs_at(self, alpha: AlphaLike) -> tuple[Arc, ...]:
         """Arcs and sheets that pass over an alpha inside the interval (vertices at it do not count)."""
         return tuple(self._located(alpha)[0])
 
-    def roots_at(self, alpha: Alpha) -> RootSet:
-        """All solutions at one alpha, as enumerate_roots returns them.
+    def roots_at(self, alpha: AlphaLike) -> RootSet:
+        """All solutions at one alpha, as enumerate_roots returns them; of a graph with gaps, those that were found.
 
         Raises
         ------
@@ -172,58 +195,73 @@ class BranchGraph:
         codes = {c for arc in arcs for c in arc.selections} | {c for v in vertices for c in v.selections}
         return self._roots(alpha, sorted(codes))
 
-    def _roots(self, alpha: Alpha, selections: Sequence[Codes]) -> RootSet:
+    def _roots(self, alpha: AlphaLike, selections: Sequence[Codes]) -> RootSet:
         stopped = None if not self.reasons else "the branch graph is not complete"
-        return roots_of(self.data, alpha, selections, stopped)
+        return roots_of(self.data, alpha_value(alpha), selections, stopped)
 
-    def multiplicity_at(self, alpha: Alpha) -> int:
+    def multiplicity_at(self, alpha: AlphaLike) -> int:
         """Number of isolated roots and of families at one alpha, together.
 
         Raises
         ------
         InvalidArgumentError
             alpha is outside the interval.
+        IncompleteGraphError
+            The graph has gaps; ``at_least`` gives a lower bound.
         """
-        arcs, vertices = self._located(alpha)
-        return len(arcs) + len(vertices)
+        found = self._multiplicity(alpha)
+        self._whole("the number of solutions", f"there are {found} at alpha = {float(alpha_value(alpha)):.8g}")
+        return found.count
+
+    def at_least(self, alpha: AlphaLike) -> int:
+        """Lower bound of the number of isolated roots and families at one alpha, for graphs with gaps too.
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is outside the interval.
+        """
+        return self._multiplicity(alpha).count
+
+    def _multiplicity(self, alpha: AlphaLike) -> Multiplicity:
+        return self.claims.multiplicity(*self._located(alpha))
 
     @cached_property
+    def _steps(self) -> MultiplicitySteps:
+        return self.claims.steps()
+
+    @property
     def steps(self) -> tuple[list[Fraction], list[int], list[int]]:
-        """Multiplicity as a step function: critical alphas (rounded), values at them and on the intervals between."""
-        groups: list[list[Vertex]] = []
-        for v in self.vertices:
-            if groups and groups[-1][0].exact.compare(v.exact) == 0:
-                groups[-1].append(v)
-            else:
-                groups.append([v])
-        place = {v.number: k for k, group in enumerate(groups) for v in group}
-        change = np.zeros(len(groups) + 1, dtype=int)
-        through = np.zeros(len(groups) + 1, dtype=int)
-        for arc in self.arcs:
-            tail, head = place[arc.tail], place[arc.head]
-            change[tail] += 1
-            change[head] -= 1
-            through[tail + 1] += 1
-            through[head] -= 1
-        between = np.cumsum(change)[:-2].tolist()
-        at = [len(group) + int(k) for group, k in zip(groups, np.cumsum(through)[:-1], strict=True)]
-        return [Fraction(group[0].alpha) for group in groups], at, between
+        """Multiplicity as a step function: critical alphas (rounded), values at them and on the intervals between.
+
+        Raises
+        ------
+        IncompleteGraphError
+            The graph has gaps; ``claims.steps()`` gives lower bounds.
+        """
+        self._whole("the number of solutions", "claims.steps() gives lower bounds")
+        return list(self._steps.alphas), list(self._steps.at), list(self._steps.between)
 
     # -- answers ---------------------------------------------------------------------------------------------------
 
     @property
     def uniqueness_limit(self) -> float | None:
-        """The critical alpha: the solution is unique from the interval's first alpha up to it; None when throughout."""
-        alphas, at, between = self.steps
-        for k, (alpha, number) in enumerate(zip(alphas, at, strict=True)):
-            several = number != 1 or any(v.family is not None for v in self.vertices if v.alpha == alpha)
-            if several or (k < len(between) and between[k] != 1):
-                return float(alpha)
-        return None
+        """The critical alpha: the solution is unique from the interval's first alpha up to it; None when throughout.
+
+        Raises
+        ------
+        IncompleteGraphError
+            The graph has gaps; ``claims.uniqueness()`` tells what is known.
+        """
+        found = self.claims.uniqueness()
+        several = found.several_by
+        known = "no second solution was found" if several is None else f"it is not beyond alpha = {several:.8g}"
+        self._whole("up to where the solution is unique", known)
+        return found.limit
 
     @property
     def uniqueness_bound(self) -> float | None:
-        """An alpha up to which uniqueness follows without any search (theory, section 5); None when for no alpha.
+        """An alpha up to which uniqueness follows without any search (theory, section 5.6); None when for no alpha.
 
         F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node; evaluated in floats.
         """
@@ -253,7 +291,7 @@ class BranchGraph:
         return None
 
     def starting_points(self) -> tuple[Root, ...]:
-        """One regular root on every branch that has any, as starting points of continuation, in order."""
+        """One regular root on every branch that was found and has any, as starting points of continuation, in order."""
         found = (self.starting_point(branch) for branch in self.branches)
         return tuple(root for root in found if root is not None)
 
@@ -316,18 +354,19 @@ class BranchGraph:
 
     def __repr__(self) -> str:
         kinds = Counter(v.kind for v in self.vertices)
-        order = ("transition", "fold", "bifurcation", "family", "sheet", "touch", "point", "broken", "end")
+        order = ("transition", "fold", "bifurcation", "family", "sheet", "touch", "point", UNSETTLED, "broken", "end")
         numbers = ", ".join(f"{kinds[k]} {k}" for k in order if kinds[k])
         a, b = self.interval
+        found = "" if self.claims.whole else ", not complete; of what was found:"
         lines = [
-            f"BranchGraph for alpha in [{a:g}, {b:g}] ({self.arithmetic})",
+            f"BranchGraph for alpha in [{a:g}, {b:g}] ({self.arithmetic}){found}",
             f"  components {len(self.components)}, branches {len(self.branches)}, arcs {len(self.arcs)}",
-            f"  vertices {len(self.vertices)}: {numbers}",
+            f"  vertices {len(self.vertices)}" + (f": {numbers}" if numbers else ""),
         ]
         for branch in self.branches[:20]:
             lo, hi = branch.interval
             folds = ", ".join(f"{v.alpha:.6g}" for v in branch.folds)
-            shape = "sheet" if branch.sheet else ("closed" if branch.closed else "open")
+            shape = _shape(branch)
             width = f", length {hi - lo:.3g}" if f"{lo:.6g}" == f"{hi:.6g}" else ""
             text = f"  branch {branch.number}: {shape}, {len(branch.arcs)} arcs, alpha in [{lo:.6g}, {hi:.6g}]{width}"
             lines.append(text + (f", folds at {folds}" if folds else ""))
@@ -337,11 +376,13 @@ class BranchGraph:
         return "\n".join(lines)
 
     def summary(self) -> dict[str, Any]:
-        """Counts and answers as plain values, for JSON."""
+        """Counts and answers as plain values, for JSON; what is not known is None."""
+        uniqueness, steps = self.claims.uniqueness(), self._steps
         return {
             "interval": list(self.interval),
             "arithmetic": self.arithmetic,
             "complete": self.complete,
+            "standing": self.claims.standing.value,
             "reasons": list(self.reasons),
             "components": len(self.components),
             "branches": len(self.branches),
@@ -350,7 +391,23 @@ class BranchGraph:
             "folds": [v.alpha for v in self.folds],
             "bifurcations": [v.alpha for v in self.bifurcations],
             "jumps": [v.alpha for v in self.jumps],
-            "uniqueness_limit": self.uniqueness_limit,
+            "unique_throughout": uniqueness.throughout,
+            "uniqueness_limit": uniqueness.limit,
+            "several_solutions_by": uniqueness.several_by,
             "uniqueness_bound": self.uniqueness_bound,
+            "multiplicity": {
+                "exact": steps.exact,
+                "alphas": [float(alpha) for alpha in steps.alphas],
+                "at": list(steps.at),
+                "between": list(steps.between),
+            },
             "stats": asdict(self.stats),
         }
+
+
+def _shape(branch: Branch) -> str:
+    if branch.sheet:
+        return "sheet"
+    if branch.closed:
+        return "closed"
+    return "unfinished" if any(v.kind == UNSETTLED for v in branch.vertices) else "open"

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from enumsol.branches.claims import Claims, Standing
+from enumsol.branches.elements import UNSETTLED
+
 if TYPE_CHECKING:
     from fractions import Fraction
 
@@ -73,11 +76,36 @@ class GraphData:
     pieces: tuple[SearchedPiece, ...] = ()
     proof: Proof | None = None
 
+    @property
+    def complete(self) -> bool:
+        """Whether it is proven that no solution is missing: proven leaves, nothing undecided, degrees balanced."""
+        return self.arithmetic != "fast" and not self.all_reasons
+
     @cached_property
-    def imbalances(self) -> tuple[str, ...]:
-        """Violations of the balance of degrees (theory, section 7); each proves that something is missing."""
+    def all_reasons(self) -> tuple[str, ...]:
+        """Why the graph is not complete: what was left out, and what contradicts the balance of degrees."""
+        return (*self.reasons, *self.gaps)
+
+    @cached_property
+    def claims(self) -> Claims:
+        """What may be said about the number of solutions: numbers of a graph without gaps, lower bounds otherwise."""
+        whole = Standing.PROVEN if self.complete else Standing.NOT_PROVEN
+        ends = (float(self.interval[0]), float(self.interval[1]))
+        return Claims(self.vertices, self.arcs, ends, Standing.INCOMPLETE if self.all_reasons else whole)
+
+    @cached_property
+    def gaps(self) -> tuple[str, ...]:
+        """Violations of the balance of degrees, and vertices that are not settled (theory, (7.3)).
+
+        Each of them proves that something is missing.
+        """
         found, first = [], float(self.interval[0])
+        unsettled = sum(v.kind == UNSETTLED for v in self.vertices)
+        if unsettled and not self.reasons:
+            found.append(f"selections that were not examined hold at {unsettled} of {len(self.vertices)} vertices")
         for v in self.vertices:
+            if v.kind == UNSETTLED:
+                continue
             if v.index_left is None or v.index_right is None:
                 found.append(f"vertex {v.number} at alpha = {v.alpha:.17g}: the degree of an arc is not known")
             elif not v.border and v.index_left != v.index_right:
@@ -86,6 +114,7 @@ class GraphData:
                     f"and {v.index_right:+d} to the right do not balance"
                 )
         start = [v.index_right for v in self.vertices if v.border and v.alpha == first]
-        if None not in start and (total := sum(k for k in start if k is not None)) != 1:
+        total = sum(k for k in start if k is not None)
+        if not self.reasons and None not in start and total != 1:
             found.append(f"the degrees of all arcs at alpha = {first:g} sum to {total:+d} and not to +1")
         return tuple(found)

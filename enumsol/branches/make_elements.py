@@ -1,4 +1,4 @@
-"""Vertices, arcs, components and branches in the user's terms, made from a gluing (theory, section 7)."""
+"""Vertices, arcs, components and branches in the user's terms, made from a gluing (theory, section 7.11)."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import numpy as np
 from flint import fmpq
 
 from enumsol.arithmetic.rationals import to_fraction
-from enumsol.branches.elements import CUTS, Arc, Branch, Component, Vertex
+from enumsol.branches.elements import CUTS, UNSETTLED, Arc, Branch, Component, Vertex
 from enumsol.roots.root_set import Polytope, RootFamily
+from enumsol.roots.slip_signs import shown_status, sign_over, slip_names
 from enumsol.selections.ordered_field import FiberSelections, as_float
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus, contact_status
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,18 +21,14 @@ if TYPE_CHECKING:
     from enumsol.branches.gluing import GluedArc, GluedVertex, Gluing
     from enumsol.condensation.exact import ExactPath
 
-_IN_CONTACT = frozenset((ContactStatus.STICK, ContactStatus.SLIP_PLUS, ContactStatus.SLIP_MINUS))
-
 
 def make_arcs(gluing: Gluing) -> list[Arc]:
     """The arcs of a gluing."""
     path, arcs = gluing.path, []
     for number, edge in enumerate(gluing.edges):
         tail, head = (float(gluing.vertices[k].alpha) for k in (edge.tail, edge.head))
-        slips = np.zeros(path.p)
-        if any(path.frictionless):
-            slips = _slips(path, edge)
-        statuses = tuple(contact_status(c, u) for c, u in zip(edge.codes, slips.tolist(), strict=True))
+        slips = _slips(path, edge) if any(path.frictionless) else (0,) * path.p
+        statuses = tuple(shown_status(c, s) for c, s in zip(edge.codes, slips, strict=True))
         selections = (edge.codes, *(c for c in edge.selections if c != edge.codes))
         grazing = gluing.arcs[edge.codes].grazing
         sample = to_fraction(fmpq(edge.sample))
@@ -54,10 +51,11 @@ def make_arcs(gluing: Gluing) -> list[Arc]:
     return arcs
 
 
-def _slips(path: ExactPath, edge: GluedArc) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _slips(path: ExactPath, edge: GluedArc) -> tuple[int, ...]:
+    """Signs of u_t in the middle of an arc."""
     solver = FiberSelections(path, fmpq(edge.sample))
     solution = solver.solve(edge.codes)
-    return np.zeros(path.p) if solution is None else solver.displacements(solution.vertices[0])[path.p :]
+    return (0,) * path.p if solution is None else solver.slip_signs(solution.vertices[0])
 
 
 def make_vertices(gluing: Gluing, arcs: Sequence[Arc]) -> list[Vertex]:
@@ -71,17 +69,26 @@ def make_vertices(gluing: Gluing, arcs: Sequence[Arc]) -> list[Vertex]:
     for number, glued in enumerate(gluing.vertices):
         border = glued.alpha.is_rational and glued.alpha.lo in (gluing.a, gluing.b)
         p = gluing.path.p
-        degrees = _sum(left[number]), _sum(right[number])
+        degrees = (_sum(left[number]), _sum(right[number])) if glued.settled else (None, None)
         # at the last alpha only the arcs from the left tell the degree
         degree = degrees[0] if border and glued.alpha.lo == gluing.b else degrees[1]
         family = _family(glued, degree, proven=gluing.path.condensed_exactly)
         forces, w = _values(gluing, glued)
-        active = tuple(_names(codes, w[p + i]) for i, codes in enumerate(glued.active))
+        active = tuple(
+            frozenset(
+                name
+                for code in codes
+                for name in (slip_names(_slip_sign(gluing, glued, i)) if code == FRICTIONLESS else (STATUSES[code],))
+            )
+            for i, codes in enumerate(glued.active)
+        )
         made.append(
             Vertex(
                 number,
                 float(glued.alpha),
-                _kind(left[number], right[number], border=border, dimension=glued.dimension),
+                _kind(left[number], right[number], border=border, dimension=glued.dimension)
+                if glued.settled
+                else UNSETTLED,
                 border,
                 tuple(next(s for s in STATUSES if s in names) for names in active),
                 active,
@@ -118,11 +125,17 @@ def _kind(left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dimension:
     return {(0, 0): "point", (2, 0): "fold", (0, 2): "fold"}.get(count, "bifurcation")
 
 
-def _names(codes: frozenset[int], u_t: float) -> frozenset[ContactStatus]:
-    names = {STATUSES[code] for code in codes if code != FRICTIONLESS}
-    if FRICTIONLESS in codes:
-        names |= _IN_CONTACT if u_t == 0 else {contact_status(FRICTIONLESS, u_t)}
-    return frozenset(names)
+def _slip_sign(gluing: Gluing, glued: GluedVertex, node: int) -> int:
+    """Sign of u_t of a node at a vertex, exactly; 0 on a continuum over which it changes."""
+    if glued.solver is not None:
+        signs = (glued.solver.slip_signs(v)[node] for s in glued.solutions for v in s.vertices)
+        return sign_over(signs)
+    for codes in glued.members:
+        functions = gluing.arcs[codes].functions
+        if not functions.singular and (det := glued.alpha.sign_of(functions.det)) != 0:
+            slip = functions.slip(node)
+            return 0 if slip.is_zero() else int(det * glued.alpha.sign_of(slip))
+    return 0  # the unloaded body at rest
 
 
 def _values(gluing: Gluing, glued: GluedVertex) -> tuple[Any, Any]:
@@ -144,7 +157,7 @@ def _values(gluing: Gluing, glued: GluedVertex) -> tuple[Any, Any]:
         (fmpq(0),) * (2 * p),
     )
     g = path.at(alpha)[0]
-    S = path.S.tolist()
+    S = path.rows
     w = np.array(
         [as_float(a - sum((s * v for s, v in zip(r, exact, strict=True)), fmpq(0))) for a, r in zip(g, S, strict=True)]
     )
@@ -166,9 +179,9 @@ def _family(glued: GluedVertex, index: int | None, *, proven: bool) -> RootFamil
     largest = [s for s in glued.solutions if s.dimension > 0]
     for solution in largest:
         points = np.array([solver.forces(v) for v in solution.vertices])
-        moves = np.array([solver.displacements(v)[solver.p :] for v in solution.vertices]).mean(axis=0)
+        slips = [solver.slip_signs(v) for v in solution.vertices]
         order = np.lexsort(points.T[::-1])
-        statuses = tuple(contact_status(c, u) for c, u in zip(solution.codes, moves.tolist(), strict=True))
+        statuses = tuple(shown_status(c, sign_over(s[i] for s in slips)) for i, c in enumerate(solution.codes))
         parts.append(
             Polytope(
                 statuses, np.stack([points[order, : solver.p], points[order, solver.p :]], axis=2), solution.dimension
@@ -188,7 +201,7 @@ def _without_repetition(parts: Sequence[Polytope]) -> list[Polytope]:
 
 
 def multigraph(vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> Any:
-    """The networkx.MultiGraph: vertices by number, arcs as edges keyed by their number."""
+    """The networkx.MultiGraph, frozen: vertices by number, arcs as edges keyed by their number."""
     graph = nx.MultiGraph()
     for v in vertices:
         graph.add_node(
@@ -216,7 +229,7 @@ def multigraph(vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> Any:
             values=arc.values,
             arc=arc,
         )
-    return graph
+    return nx.freeze(graph)
 
 
 def make_components(graph: Any, vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> tuple[Component, ...]:

@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from enumsol.branches.elements import UNSETTLED
+from enumsol.checks import one_of, positive_integer, shown
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from fractions import Fraction
 
     from numpy.typing import NDArray
 
+    from enumsol.branches.claims import Claims
     from enumsol.branches.elements import Arc, Branch, Vertex
     from enumsol.problem import ContactProblem
     from enumsol.roots.root_set import RootSet
@@ -36,8 +38,15 @@ class DrawnGraph(Protocol):
         """Paths and closed loops of arcs, and sheets."""
 
     @property
-    def steps(self) -> tuple[list[Fraction], list[int], list[int]]:
-        """Critical alphas, and the multiplicity at them and between them."""
+    def complete(self) -> bool:
+        """Whether it is proven that no solution is missing."""
+
+    @property
+    def claims(self) -> Claims:
+        """What may be said about the number of solutions."""
+
+    def completeness(self) -> str:
+        """One sentence about it."""
 
     def roots_at(self, alpha: float) -> RootSet:
         """All solutions at one alpha."""
@@ -101,8 +110,8 @@ def plot_graph(
     MissingDependencyError
         matplotlib is not installed.
     """
-    if quantity not in QUANTITIES:
-        raise InvalidArgumentError(f"quantity is {quantity!r}; expected one of {', '.join(QUANTITIES)}")
+    one_of(quantity, "quantity", QUANTITIES)
+    samples = positive_integer(samples, "samples", 2, 100_000)
     figure_class, canvas = _matplotlib()
     curves = {arc.number: _curve(arc, quantity, samples) for arc in graph.arcs if not arc.dimension}
     chosen = _nodes(graph, nodes, curves)
@@ -124,6 +133,8 @@ def plot_graph(
     axes[-1].set_xlabel("alpha")
     axes[-1].set_xlim(*graph.interval)
     _legend(figure, graph)
+    if not graph.complete:
+        axes[0].set_title(graph.completeness(), fontsize=8, color=_FAMILY, wrap=True)
     if file is not None:
         figure.savefig(file, dpi=150)
     return figure
@@ -149,10 +160,14 @@ def _curve(arc: Arc, quantity: str, samples: int) -> tuple[NDArray[np.float64], 
 def _nodes(graph: DrawnGraph, nodes: Sequence[Any] | None, curves: dict[int, Any]) -> list[int]:
     ids = list(graph.problem.node_ids)
     if nodes is not None:
-        unknown = [node for node in nodes if node not in ids]
-        if unknown or not nodes:
-            raise InvalidArgumentError(f"nodes contains {unknown}; expected labels among {ids[:12]}")
-        return [ids.index(node) for node in nodes]
+        row = {label: k for k, label in enumerate(ids)}
+        try:
+            chosen = [row[node] for node in nodes]
+        except (KeyError, TypeError):
+            chosen = []
+        if not chosen:
+            raise InvalidArgumentError(f"nodes is {shown(nodes)}; expected labels among {shown(ids)}")
+        return chosen
     if len(ids) <= _MAX_PANELS or not curves:
         return list(range(min(len(ids), _MAX_PANELS)))
     values = np.concatenate([values for _, values in curves.values()])
@@ -179,14 +194,22 @@ def _panel(axis: Any, graph: DrawnGraph, quantity: str, node: int, curves: dict[
     axis.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
 
 
-_MARKERS = {"transition": "o", "touch": "o", "fold": "s", "bifurcation": "D", "point": "x", "broken": "X"}
+_MARKERS = {
+    "transition": "o",
+    "touch": "o",
+    "fold": "s",
+    "bifurcation": "D",
+    "point": "x",
+    "broken": "X",
+    UNSETTLED: "4",
+}
 
 
 def _marker(axis: Any, v: Vertex, value: float) -> None:
     marker = _MARKERS.get(v.kind)
     if marker is None:
         return
-    filled = "#333333" if marker in "xX" else "white"
+    filled = "#333333" if marker in "xX4" else "white"
     axis.plot([v.alpha], [value], marker=marker, markersize=4.5, color=_FAMILY, markerfacecolor=filled, zorder=4)
 
 
@@ -237,16 +260,19 @@ def _sheet(axis: Any, graph: DrawnGraph, arc: Arc, quantity: str, node: int) -> 
 
 
 def _steps(axis: Any, graph: DrawnGraph) -> None:
-    alphas, at, between = graph.steps
-    edges = [float(alpha) for alpha in alphas]
-    axis.stairs(between, edges, color=_FAMILY, linewidth=1.4, baseline=None)
+    steps = graph.claims.steps()
+    edges = [float(alpha) for alpha in steps.alphas]
+    if steps.between:
+        axis.stairs(steps.between, edges, color=_FAMILY, linewidth=1.4, baseline=None)
     special = [
-        (x, n) for k, (x, n) in enumerate(zip(edges, at, strict=True)) if n not in between[max(k - 1, 0) : k + 1]
+        (x, n)
+        for k, (x, n) in enumerate(zip(edges, steps.at, strict=True))
+        if n not in steps.between[max(k - 1, 0) : k + 1]
     ]
     if special:
         axis.plot([x for x, _ in special], [n for _, n in special], ".", color=_FAMILY, markersize=5)
-    axis.set_ylabel("solutions")
-    axis.set_ylim(0, max([*between, *at]) + 0.8)
+    axis.set_ylabel("solutions" if steps.exact else "solutions,\nat least")
+    axis.set_ylim(0, max([*steps.between, *steps.at], default=1) + 0.8)
     axis.yaxis.get_major_locator().set_params(integer=True)
 
 
@@ -262,10 +288,16 @@ def _legend(figure: Any, graph: DrawnGraph) -> None:
         )
     ]
     kinds = {v.kind for v in graph.vertices}
-    for kind, label in (("transition", "transition"), ("fold", "fold"), ("bifurcation", "bifurcation")):
+    for kind, label in (
+        ("transition", "transition"),
+        ("fold", "fold"),
+        ("bifurcation", "bifurcation"),
+        (UNSETTLED, "not followed further"),
+    ):
         if kind in kinds:
+            filled = "#333333" if kind == UNSETTLED else "white"
             handles.append(
-                Line2D([], [], linestyle="", marker=_MARKERS[kind], color=_FAMILY, markerfacecolor="white", label=label)
+                Line2D([], [], linestyle="", marker=_MARKERS[kind], color=_FAMILY, markerfacecolor=filled, label=label)
             )
     if any(v.family is not None for v in graph.vertices):
         handles.append(Line2D([], [], color=_FAMILY, linewidth=2.4, label="continuum"))

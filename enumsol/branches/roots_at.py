@@ -47,6 +47,7 @@ def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes], stopped
     families = [builder.family(c, proven=exact) for c in components if c.dimension > 0]
     roots.sort(key=lambda root: ([s.value for s in root.statuses], root.lambda_n.tolist(), root.lambda_t.tolist()))
     families.sort(key=lambda family: family.vertices.tolist())
+    whole = sum(c.whole for c in components)
     return RootSet(
         alpha=alpha,
         roots=roots,
@@ -57,6 +58,7 @@ def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes], stopped
         stopped=stopped,
         stats=SearchStats(selections=len(selections)),
         node_ids=problem.node_ids,
+        at_least=whole + int(whole < len(components)) if stopped is not None else None,
     )
 
 

@@ -1,4 +1,4 @@
-"""link_samples: roots at sampled alphas joined into a graph, and what sampling misses (theory, section 7)."""
+"""link_samples: roots at sampled alphas joined into a graph, and what sampling misses (theory, section 7.12)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import networkx as nx
 
-from enumsol.checks import finite_alpha
+from enumsol.checks import alpha_list, instance_of, optional_callable
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.roots.enumerate import enumerate_roots
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from enumsol.branches.graph import BranchGraph
-    from enumsol.checks import Alpha
+    from enumsol.checks import AlphaLike
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.roots.root_set import Root, RootSet
 
@@ -102,7 +102,7 @@ class SampledGraph:
 
 def link_samples(
     problem: ContactProblem,
-    alphas: Iterable[Alpha],
+    alphas: Iterable[AlphaLike],
     *,
     arithmetic: str = "fast",
     progress: Callable[[int, int], object] | None = None,
@@ -118,7 +118,7 @@ def link_samples(
     Parameters
     ----------
     problem : ContactProblem
-    alphas : iterable of float or Fraction
+    alphas : iterable of float, Fraction or whatever enumerate_roots takes for alpha
         Sorted by the function; at least one.
     arithmetic : str
         Of ``enumerate_roots``.
@@ -134,13 +134,11 @@ def link_samples(
     InvalidArgumentError
         There is no alpha, or one is not a finite number.
     """
-    if not isinstance(problem, ContactProblem):
-        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
-    samples = sorted(set(alphas))
+    instance_of(problem, ContactProblem, "problem")
+    optional_callable(progress, "progress")
+    samples = sorted(set(alpha_list(alphas)))
     if not samples:
         raise InvalidArgumentError("alphas is empty; expected at least one number")
-    for alpha in samples:
-        finite_alpha(alpha)
     root_sets = []
     for k, alpha in enumerate(samples):
         root_sets.append(enumerate_roots(problem, alpha, arithmetic))  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""The alpha at which one selection holds: its critical points and the intervals between them (theory, section 7).
+"""The alpha at which one selection holds: its critical points and the intervals between them (theory, section 7.3).
 
 A selection is cut at every alpha where its determinant or one of its conditions vanishes. Between neighbouring critical
 points all signs are constant, so one rational sample decides whether the selection is consistent there; at a critical

@@ -1,4 +1,4 @@
-"""Selections that are singular for every alpha: families over an interval, sheets (theory, section 7)."""
+"""Selections that are singular for every alpha: families over an interval, sheets (theory, section 7.5)."""
 
 from __future__ import annotations
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import asdict
 from fractions import Fraction
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import networkx as nx
@@ -16,6 +16,7 @@ from flint import fmpq, fmpz, fmpz_poly
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.branches.elements import Arc, Vertex
 from enumsol.branches.graph_data import GraphData, GraphStats
+from enumsol.checks import file_path, writing
 from enumsol.condensation.exact import ExactPath
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
@@ -24,8 +25,12 @@ from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
-FORMAT, VERSION = "enumsol-branch-graph", 1
+FORMAT, VERSION = "enumsol-branch-graph", 2
+#: Version 1 gave kinds to the vertices of graphs that were not complete; only its complete graphs are read.
+_READ = (1, 2)
+_FRACTION = re.compile(r"-?\d+(/\d+)?", re.ASCII)
 
 
 def save_graph(data: GraphData, file: str | Path) -> None:
@@ -42,7 +47,9 @@ def save_graph(data: GraphData, file: str | Path) -> None:
         "vertices": [_vertex_record(v) for v in data.vertices],
         "arcs": [_arc_record(arc) for arc in data.arcs],
     }
-    Path(file).write_text(json.dumps(record), encoding="utf-8")
+    place = file_path(file, "file")
+    with writing(place, "file"):
+        place.write_text(json.dumps(record), encoding="utf-8")
 
 
 def load_graph(file: str | Path) -> GraphData:
@@ -53,17 +60,23 @@ def load_graph(file: str | Path) -> GraphData:
     InvalidArgumentError
         The file cannot be read or is not such a graph.
     """
+    place = file_path(file, "file")
     try:
-        record = json.loads(Path(file).read_text(encoding="utf-8"))
+        record = json.loads(place.read_text(encoding="utf-8"))
     except OSError as error:
         raise InvalidArgumentError(f"graph {file} cannot be read ({error.strerror}); expected a saved graph") from error
     except ValueError as error:
         raise InvalidArgumentError(f"graph {file} is not a JSON file ({error}); expected a saved graph") from error
-    if not isinstance(record, dict) or record.get("format") != FORMAT or record.get("version") != VERSION:
+    if not isinstance(record, dict) or record.get("format") != FORMAT or record.get("version") not in _READ:
         raise InvalidArgumentError(f"graph {file} has another format; expected {FORMAT}, version {VERSION}")
     try:
+        if record["version"] == 1 and record["reasons"]:
+            raise InvalidArgumentError(
+                f"graph {file} is not complete and was saved by an earlier version, which said more about such graphs "
+                "than is known; expected a complete one, or one saved by this version"
+            )
         return _from_record(record)
-    except (KeyError, TypeError, IndexError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise InvalidArgumentError(f"graph {file} is damaged (at {error}); expected a saved graph") from error
 
 
@@ -71,7 +84,7 @@ def _from_record(record: dict[str, Any]) -> GraphData:
     problem = _problem(record["problem"])
     exactly = record["condensed_exactly"]
     path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem.condensed)
-    first, last = (Fraction(end) for end in record["interval"])
+    first, last = (_fraction(end) for end in record["interval"])
     vertices = tuple(_vertex(k, item) for k, item in enumerate(record["vertices"]))
     arcs = tuple(_arc(k, item, vertices, path) for k, item in enumerate(record["arcs"]))
     reasons, stats = tuple(record["reasons"]), GraphStats(**record["stats"])
@@ -154,8 +167,15 @@ def _vertex_record(v: Vertex) -> dict[str, Any]:
     }
 
 
+def _fraction(text: str) -> Fraction:
+    """The fraction that str made a text of; no other text, such as one with an exponent of millions."""
+    if _FRACTION.fullmatch(text) is None:
+        raise ValueError(f"{text[:20]!r}, which is no fraction")
+    return Fraction(text)
+
+
 def _vertex(number: int, item: dict[str, Any]) -> Vertex:
-    lo, hi = (fmpq(*Fraction(item[end]).as_integer_ratio()) for end in ("lo", "hi"))
+    lo, hi = (fmpq(*_fraction(item[end]).as_integer_ratio()) for end in ("lo", "hi"))
     coefficients = item["polynomial"]
     poly = None if coefficients is None else fmpz_poly([fmpz(c) for c in coefficients])
     family = None
@@ -209,7 +229,7 @@ def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], path: Ex
         item["dimension"],
         item["grazing"],
         tuple(tuple(codes) for codes in item["selections"]),
-        Fraction(item["sample"]),
+        _fraction(item["sample"]),
         path,
     )
 
@@ -219,7 +239,7 @@ def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], path: Ex
 
 def write_graphml(data: GraphData, branch_of: Mapping[int, int], file: str | Path) -> None:
     """Write vertices and arcs as GraphML, arrays as text."""
-    plain = nx.MultiGraph()
+    plain = nx.MultiGraph(complete=data.complete, standing=data.claims.standing.value)
     for v in data.vertices:
         plain.add_node(
             v.number,
@@ -240,4 +260,6 @@ def write_graphml(data: GraphData, branch_of: Mapping[int, int], file: str | Pat
             dimension=arc.dimension,
             branch=branch_of[arc.number],
         )
-    nx.write_graphml(plain, file)
+    place = file_path(file, "file")
+    with writing(place, "file"):
+        nx.write_graphml(plain, place)

@@ -1,4 +1,4 @@
-"""multiplicity_table: the roots at many alphas, counted (theory, sections 2 and 6)."""
+"""multiplicity_table: the roots at many alphas, counted (theory, section 7.12)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from enumsol.checks import finite_alpha
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.checks import alpha_list, instance_of, optional_callable, optional_executor
+from enumsol.errors import Interrupted
 from enumsol.problem import ContactProblem
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.statuses import STATUSES, ContactStatus
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from enumsol.checks import Alpha
+    from enumsol.checks import Alpha, AlphaLike
     from enumsol.roots.root_set import RootSet
 
 #: Tasks handed to an executor ahead of the one that is awaited; keeps an interruption from waiting for all of them.
@@ -48,7 +48,8 @@ class _Rows:
             "nodes",
             "seconds",
         ]
-        return pd.DataFrame([self.done[k] for k in sorted(self.done)], columns=columns)
+        table = pd.DataFrame([self.done[k] for k in sorted(self.done)], columns=columns)
+        return table.astype({"index_sum": "Int64"})  # whole numbers, and missing ones
 
 
 #: Columns with the number of roots at which at least one node has the status.
@@ -57,7 +58,7 @@ _KINDS = {status: f"with_{status.name.lower()}" for status in STATUSES}
 
 def multiplicity_table(
     problem: ContactProblem,
-    alphas: Iterable[Alpha],
+    alphas: Iterable[AlphaLike],
     *,
     arithmetic: str = "verified",
     executor: Executor | None = None,
@@ -69,7 +70,7 @@ def multiplicity_table(
     Parameters
     ----------
     problem : ContactProblem
-    alphas : iterable of float or Fraction
+    alphas : iterable of float, Fraction or whatever enumerate_roots takes for alpha
     arithmetic : str
         Of ``enumerate_roots``.
     executor : concurrent.futures.Executor, optional
@@ -85,20 +86,21 @@ def multiplicity_table(
         One row an alpha, in the order given: alpha, roots, families, with_open, with_stick, with_slip_plus and
         with_slip_minus (isolated roots at which at least one node has the status), index_sum (missing where a degree is
         not known), complete, undecided, stopped (why the search ended early, or missing), nodes of the search, and
-        seconds.
+        seconds. Where a search was cut short or left something undecided, the counts are those of what was found, and
+        so lower bounds.
 
     Raises
     ------
     InvalidArgumentError
-        An alpha is not a finite number, or makes a friction coefficient negative.
+        ``alphas`` is one number, an alpha is not a finite number, or makes a friction coefficient negative.
     Interrupted
         On Ctrl-C; ``partial`` is the table of what was done.
     """
-    if not isinstance(problem, ContactProblem):
-        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
-    rows = _Rows(list(alphas))
+    instance_of(problem, ContactProblem, "problem")
+    optional_executor(executor)
+    optional_callable(progress, "progress")
+    rows = _Rows(alpha_list(alphas))
     for alpha in rows.alphas:
-        finite_alpha(alpha)
         problem.friction_at(alpha)
     options = {"arithmetic": arithmetic, **options}
     try:

@@ -3,7 +3,7 @@
 What a verified proof says
     For the problem's own A, Bn, Bt, f, gap, slip offset and friction, read as exact numbers (or, where the report says
     "S and g as computed", for the condensed data), and for alpha as an exact fraction: the listed roots and families
-    solve the problem, and nothing else does. It rests on the energy bound (theory, section 5), on branchings that cover
+    solve the problem, and nothing else does. It rests on the energy bound (theory, (5.2)), on branchings that cover
     (``kernel.rows.children_of``), on the a-priori error bounds of IEEE double arithmetic with rounding to nearest in
     ``arithmetic.balls``, ``condensation.enclosure`` and ``kernel``, and on rational arithmetic in ``checker.rational``
     and ``checker.hull``. Linear algebra kernels may sum in any order and fuse multiplications and additions; fast

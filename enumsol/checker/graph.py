@@ -8,7 +8,7 @@ Records after the header (see enumsol.proof.proof_file for the file): for every 
 What is checked: pieces partition the interval, with the subtrees left by a piece searched in both its halves; the
 leaves of every piece cover all selections of its roots; every exclusion is proven at both ends of the piece. What is
 not: that the arcs of the selections handed on are all there. They follow from these selections by exact algebra, and
-the balance of degrees checks them (theory, section 7).
+the balance of degrees checks them (theory, section 7.7).
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ class Hull:
 def hull_of_selections(system: RationalSystem, *selections: Sequence[int]) -> Hull:
     """The root set that the given selections have in common, a polytope.
 
-    It is bounded, and therefore the hull of its vertices, because S is positive definite (theory, section 5). Every
+    It is bounded, and therefore the hull of its vertices, because S is positive definite (theory, section 5.1). Every
     vertex is the only common zero of some of the conditions on the affine solution set.
 
     Raises

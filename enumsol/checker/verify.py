@@ -18,6 +18,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.graph import GraphChecker, GraphVerificationReport
+from enumsol.checks import optional_callable
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
@@ -115,6 +116,7 @@ def verify(
     for name, value, kind in (("problem", problem, ContactProblem), ("proof", proof, Proof)):
         if not isinstance(value, kind):
             raise InvalidArgumentError(f"{name} is a {type(value).__name__}; expected a {kind.__name__}")
+    optional_callable(progress, "progress")
     proof.check_integrity()
     records = proof.records()
     header = next(records, None)

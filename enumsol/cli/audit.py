@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -20,14 +20,16 @@ from enumsol.cli.common import (
 )
 from enumsol.cli.graph import build, read_graph
 from enumsol.cli.output import as_json, check_outputs, write_text
-from enumsol.errors import InvalidArgumentError
+from enumsol.errors import Interrupted, InvalidArgumentError
 
 if TYPE_CHECKING:
-    import pandas as pd
+    from collections.abc import Sequence
 
-    from enumsol.branches import BranchGraph
     from enumsol.checks import Alpha
-    from enumsol.continuation import AuditReport
+    from enumsol.continuation import AuditReport, PointRun
+
+#: As of ``read_points``, which is not imported for --help.
+Columns = Literal["auto", "rows", "labels"]
 
 
 def audit(
@@ -36,7 +38,8 @@ def audit(
         str,
         typer.Argument(
             metavar="POINTS",
-            help="CSV with columns alpha, lambda_n_0, .., lambda_t_0, .. and, for several paths, path; - is stdin.",
+            help="CSV with columns alpha, lambda_n_X and lambda_t_X for every contact node X and, for several paths, "
+            "path; - is stdin.",
             show_default=False,
         ),
     ],
@@ -52,8 +55,15 @@ def audit(
     arithmetic: Annotated[Arithmetic, typer.Option(help="Of the graph, as in enumsol graph.")] = "verified",
     tolerance: Annotated[
         float,
-        typer.Option(min=0.0, metavar="LENGTH", help="Distance from the graph beyond which a point is off it."),
+        typer.Option(
+            metavar="LENGTH",
+            help="Distance from every arc beyond which a point is off the graph, as explained above; without units.",
+        ),
     ] = 1e-5,
+    columns: Annotated[
+        Columns,
+        typer.Option(help="Whether the X of lambda_n_X is the node's row number (from 0) or its label."),
+    ] = "auto",
     json_file: JsonOption = None,
     csv_file: Annotated[
         str | None,
@@ -62,78 +72,75 @@ def audit(
 ) -> None:
     """Check POINTS, from any continuation code, against all solutions of PROBLEM.
 
-    Tells how far every point is from the nearest branch, where a path jumped from one branch to another, and which
-    arcs in the interval no path visited.
+    Tells how far every point is from the nearest arc of the branch graph, where a path jumped from one branch to
+    another, which arcs in the interval no path visited, and which points could not be compared. Points are named by
+    path and row; rows are counted from 0, which is the first one below the names of the columns.
 
-    Exit status: 0 when every point is on the graph, nothing jumped and nothing was missed; 3 otherwise, or when the
-    graph is known to be incomplete; 2 on bad input; 130 on Ctrl-C.
+    The X of lambda_n_X is the row number of a contact node or its label, as in --node; a file that fits both is
+    refused, and --columns says which.
+
+    Distance: sqrt(e^2 + a^2). e is the energy norm sqrt(d' S d) of the difference d of the contact forces, where S is
+    the compliance of the contact nodes, relative to the load, that is to the largest sqrt(g' S^-1 g) in the interval;
+    it is at most 1 for the forces of every solution. a is the difference of alpha in twentieths of the interval.
+
+    Tolerance: the default suits paths of enumsol follow, which are corrected to a tenth of it. For points of another
+    code give ten times the relative error of its forces: 1e-3 where the solver stops at a relative error of 1e-4, or
+    the file has five digits. Where it stops at a small residual, the error of the forces may be larger. Solutions
+    closer to each other than the tolerance, and jumps between them, are not told apart.
+
+    Exit status: 0 when every point is on the graph, nothing jumped and no arc was missed; 3 when not, or when the graph
+    is known to be incomplete (in fast arithmetic, which proves nothing: when its degrees do not balance); 4 when points
+    were not compared, whatever else was found: their alpha is outside the interval of the graph, or a graph that is
+    known to be incomplete has no arc there; 2 on bad input; 130 on Ctrl-C.
     """
     from enumsol.continuation import audit as check
+    from enumsol.continuation import read_points
+    from enumsol.continuation.graph_map import checked_tolerance
 
+    checked_tolerance(tolerance)
     check_outputs(json=json_file, csv=csv_file)
     if graph_file is not None and (first is not None or last is not None):
         raise InvalidArgumentError("--graph and --from or --to are both given; a graph has its own interval")
     body = load_problem(problem)
-    frame = _read(points)
-    found = (
-        build(body, _interval(frame, first, last), arithmetic) if graph_file is None else read_graph(graph_file, body)
-    )
-    report = check(frame, found, tolerance=tolerance)
+    source, name = (sys.stdin, "stdin") if points == "-" else (points, points)
+    runs = read_points(source, body, columns=columns, name=name)
+    if not runs:
+        raise InvalidArgumentError(f"{name} holds no points; expected one row a point below the names of columns")
+    interrupted = False
+    found: Any
+    try:
+        if graph_file is None:
+            found = build(body, _interval(runs, first, last), arithmetic)
+        else:
+            found = read_graph(graph_file, body)
+    except Interrupted as interruption:
+        interrupted, found = True, interruption.partial
+    report = check(runs, found, tolerance=tolerance)
     if "-" not in (json_file, csv_file):
         low, high = found.interval
         typer.echo(repr(report))
         typer.echo(f"graph for alpha in [{low:g}, {high:g}], {len(found.arcs)} arcs; {found.completeness()}")
     if json_file is not None:
-        write_text(json_file, as_json({"problem": problem, **_content(report, found)}))
+        write_text(json_file, as_json({"problem": problem, **report.summary(), "graph": found.summary()}))
     if csv_file is not None:
         write_text(csv_file, report.to_frame().to_csv(index=False))
-    passed = report.ok and report.complete and not found.reasons
-    raise typer.Exit(ExitStatus.DONE if passed else ExitStatus.INCOMPLETE)
+    raise typer.Exit(ExitStatus.INTERRUPTED if interrupted else _status(report))
 
 
-def _read(points: str) -> pd.DataFrame:
-    import pandas as pd  # slow to import
-
-    try:
-        frame = pd.read_csv(sys.stdin if points == "-" else points)
-    except (OSError, ValueError) as error:
-        raise InvalidArgumentError(f"{points}: {error}; expected a CSV file of points") from error
-    if not len(frame):
-        raise InvalidArgumentError(f"{points} holds no points; expected one row a point below the names of columns")
-    return frame
+def _status(report: AuditReport) -> ExitStatus:
+    if report.not_compared:
+        return ExitStatus.NOT_COMPARED
+    passed = report.ok and report.all_visited and not report.graph_reasons
+    return ExitStatus.DONE if passed else ExitStatus.INCOMPLETE
 
 
-def _interval(frame: pd.DataFrame, first: str | None, last: str | None) -> tuple[Alpha, Alpha]:
+def _interval(runs: Sequence[PointRun], first: str | None, last: str | None) -> tuple[Alpha, Alpha]:
     if first is not None and last is not None:
         return parse_interval(first, last)
-    if "alpha" not in frame.columns or not _is_number(frame["alpha"]):
-        raise InvalidArgumentError("POINTS has no column 'alpha' of numbers; expected one, or --from and --to")
-    low = float(frame["alpha"].min()) if first is None else parse_alpha(first)
-    high = float(frame["alpha"].max()) if last is None else parse_alpha(last)
+    low = min(float(run.alpha.min()) for run in runs) if first is None else parse_alpha(first, "--from")
+    high = max(float(run.alpha.max()) for run in runs) if last is None else parse_alpha(last, "--to")
     if not low < high:
         raise InvalidArgumentError(
             f"alpha goes from {float(low):g} to {float(high):g}; expected an interval, by --from and --to"
         )
     return low, high
-
-
-def _is_number(column: Any) -> bool:
-    from pandas.api.types import is_numeric_dtype
-
-    return bool(is_numeric_dtype(column))
-
-
-def _content(report: AuditReport, found: BranchGraph) -> dict[str, Any]:
-    return {
-        "ok": report.ok,
-        "complete": report.complete,
-        "points": len(report.alpha),
-        "tolerance": report.tolerance,
-        "max_distance": report.max_distance,
-        "off": report.off,
-        "jumps": [vars(jump) for jump in report.jumps],
-        "visited": sorted(report.visited),
-        "missed": [{**vars(item), "statuses": [status.value for status in item.statuses]} for item in report.missed],
-        "missed_families": report.missed_families,
-        "graph": found.summary(),
-    }

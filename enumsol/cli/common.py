@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import enum
 from contextlib import contextmanager
-from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -63,6 +62,7 @@ class ExitStatus(enum.IntEnum):
     DONE = 0
     BAD_INPUT = 2
     INCOMPLETE = 3
+    NOT_COMPARED = 4
     INTERRUPTED = 130
     BROKEN_PIPE = 141
 
@@ -84,35 +84,28 @@ def load_problem(name: str) -> ContactProblem:
     return read_problem(name)
 
 
-def parse_alpha(text: str) -> Alpha:
-    """A float, or an exact Fraction for text such as 8/3.
+def parse_alpha(text: str, option: str = "--alpha") -> Alpha:
+    """The alpha that an option names, read as Python's functions read it.
 
     Raises
     ------
     InvalidArgumentError
-        It is neither, or not finite.
+        It is no number, or not finite.
     """
-    from enumsol.checks import finite_alpha  # as above
+    from enumsol.checks import alpha_value  # numpy: not for --help
 
-    try:
-        value = Fraction(text) if "/" in text else float(text)
-    except (ValueError, ZeroDivisionError):
-        raise InvalidArgumentError(
-            f"alpha is {text!r}; expected a number such as 2.5 or a fraction such as 8/3"
-        ) from None
-    finite_alpha(value)
-    return value
+    return alpha_value(text, option)
 
 
 def parse_interval(first: str, last: str) -> tuple[Alpha, Alpha]:
-    """Both ends of an interval of alpha.
+    """Both ends of an interval of alpha, those of --from and --to.
 
     Raises
     ------
     InvalidArgumentError
         One is not a number, or the first is not below the last.
     """
-    low, high = parse_alpha(first), parse_alpha(last)
+    low, high = parse_alpha(first, "--from"), parse_alpha(last, "--to")
     if not low < high:
         raise InvalidArgumentError(f"--from is {first} and --to is {last}; expected the first below the second")
     return low, high

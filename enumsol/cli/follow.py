@@ -1,4 +1,4 @@
-"""``enumsol follow``: branches of solutions by continuation (Algorithm 5.1)."""
+"""``enumsol follow``: branches of solutions by continuation (paper, Algorithm 5.1)."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def follow(
     if tangent is not None and (root is None or direction == "both"):
         raise InvalidArgumentError("--tangent is given without --root or --direction; expected one root and direction")
     options = _options(h_max, h_min, h_init, eps, max_steps, check_steps)
-    interval, alpha, signs = parse_interval(first, last), parse_alpha(start), _directions(direction)
+    interval, alpha, signs = parse_interval(first, last), parse_alpha(start, "--start"), _directions(direction)
     body = load_problem(problem)
     row = node_row(body, node)
     over = None if graph_file is None else read_graph(graph_file, body)

@@ -176,15 +176,7 @@ def _same_problem(a: ContactProblem, b: ContactProblem) -> bool:
 def as_text(found: BranchGraph) -> str:
     """The printed graph, and before its closing line the answers that users ask for."""
     *lines, closing = repr(found).splitlines()
-    limit, bound = found.uniqueness_limit, found.uniqueness_bound
-    if limit is None:
-        lines.append("one solution throughout")
-    elif limit > found.interval[0]:
-        lines.append(f"one solution below alpha = {limit:.8g}")
-    else:
-        lines.append("several solutions from the first alpha on")
-    if bound is not None:
-        lines[-1] += f" (without any search, uniqueness follows up to {bound:.8g})"
+    lines += found.claims.sentences(found.uniqueness_bound)
     if found.bifurcations:
         lines.append("bifurcations at alpha = " + ", ".join(f"{v.alpha:.8g}" for v in found.bifurcations[:8]))
     if found.jumps:

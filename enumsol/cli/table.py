@@ -37,6 +37,8 @@ _NAMES = {
     "with_slip_minus": "slip-",
     "index_sum": "index sum",
 }
+#: Columns that count solutions; a row whose search was cut short shows what it found as a lower bound.
+_COUNTS = ("roots", "families", "open", "stick", "slip+", "slip-")
 #: Longer tables are printed as runs of equal counts.
 _ROWS = 40
 
@@ -102,7 +104,7 @@ def _alphas(first: str | None, last: str | None, samples: int, listed: str | Non
     if listed is not None:
         if first is not None or last is not None:
             raise InvalidArgumentError("--alphas and --from or --to are both given; expected one or the other")
-        return [parse_alpha(text.strip()) for text in listed.split(",")]
+        return [parse_alpha(text, f"--alphas[{k}]") for k, text in enumerate(listed.split(","))]
     if first is None or last is None:
         raise InvalidArgumentError("expected --from and --to, or --alphas")
     low, high = parse_interval(first, last)
@@ -126,9 +128,13 @@ def _search(
 
 
 def _open(frame: pd.DataFrame) -> pd.DataFrame:
-    """Rows at which something is undecided or known to be missing."""
-    known = frame["index_sum"].notna()
-    return frame[frame["undecided"].gt(0) | (known & frame["index_sum"].ne(1))]
+    """Rows at which the search was cut short, something is undecided, or the indices show that something is missing."""
+    return frame[_gaps(frame) | (frame["index_sum"].notna() & frame["index_sum"].ne(1))]
+
+
+def _gaps(frame: pd.DataFrame) -> pd.Series[bool]:
+    """Whether the counts of a row are lower bounds."""
+    return frame["undecided"].gt(0) | frame["stopped"].notna()
 
 
 def _as_text(frame: pd.DataFrame, asked: int) -> str:
@@ -136,7 +142,9 @@ def _as_text(frame: pd.DataFrame, asked: int) -> str:
     if not shown["undecided"].any():
         shown = shown.drop(columns="undecided")
     known = shown["index sum"].notna()
-    shown["index sum"] = shown["index sum"].map("{:+}".format).where(known, "?")
+    shown["index sum"] = shown["index sum"].map("{:+d}".format, na_action="ignore").astype(object).where(known, "?")
+    for name in _COUNTS:
+        shown[name] = shown[name].astype(str).where(~_gaps(frame), ">=" + shown[name].astype(str))
     shown["complete"] = ["yes" if value else "no" for value in shown["complete"]]
     if len(shown) > _ROWS:
         shown = _runs(shown)

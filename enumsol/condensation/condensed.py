@@ -1,4 +1,4 @@
-"""Condensation to the contact nodes: S = B A^{-1} B', g(alpha) and F(alpha) (theory, section 4)."""
+"""Condensation to the contact nodes: S = B A^{-1} B', g(alpha) and F(alpha) (theory, section 4.1)."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.checks import Alpha, finite_alpha
+from enumsol.checks import Alpha, alpha_value
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.sealed import Sealed, sealed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from enumsol.checks import AlphaLike
     from enumsol.condensation.data import ProblemData
 
 #: Units of force and length lie between 2^-900 and 2^900; products and quotients of two of them and proofs need that.
@@ -125,7 +127,7 @@ def _cholesky(S: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True)
-class CondensedProblem:
+class CondensedProblem(Sealed):
     """The problem condensed for all alpha: S, g(alpha) = g0 + alpha g1, F(alpha) = F0 + alpha F1.
 
     Attributes
@@ -164,8 +166,6 @@ class CondensedProblem:
         F0, F1 = problem.friction
         if not (np.all(np.isfinite(S)) and np.all(np.isfinite(g0)) and np.all(np.isfinite(g1))):
             raise InvalidProblemError("A, f: the condensed problem overflows float64; expected data in smaller units")
-        for array in (S, g0, g1):
-            array.setflags(write=False)
         return cls(S, g0, g1, F0, F1, problem)
 
     @cached_property
@@ -173,13 +173,13 @@ class CondensedProblem:
         """Roots of the geometric means of every node's normal and tangential compliance, twice over, shape (2p,)."""
         p, diagonal = len(self.F0), np.diagonal(self.S)
         node = (diagonal[:p] * diagonal[p:]) ** 0.25
-        return np.concatenate([node, node])
+        return sealed(np.concatenate([node, node]))
 
     @cached_property
     def balanced(self) -> NDArray[np.float64]:
         """S in units in which every node has compliance one, shape (2p, 2p)."""
         scale = self.node_scale
-        return np.asarray(self.S / scale[:, None] / scale[None, :])
+        return sealed(np.asarray(self.S / scale[:, None] / scale[None, :]))
 
     def at(self, alpha: Alpha) -> CondensedSystem:
         """The condensed system at one alpha.
@@ -189,7 +189,7 @@ class CondensedProblem:
         InvalidArgumentError
             alpha is not finite or makes a friction coefficient negative.
         """
-        value = finite_alpha(alpha)
+        value = float(alpha_value(alpha))
         F = self.problem.friction_at(alpha)
         with np.errstate(over="ignore", invalid="ignore"):
             g = self.g0 + value * self.g1
@@ -197,7 +197,7 @@ class CondensedProblem:
             raise InvalidArgumentError(f"alpha = {value:g} makes the load overflow float64; expected a smaller value")
         return CondensedSystem(self.S, g, F)
 
-    def displacement(self, alpha: Alpha, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+    def displacement(self, alpha: AlphaLike, forces: NDArray[np.float64]) -> NDArray[np.float64]:
         """u = A^{-1} (f(alpha) - B' lambda), shape (n,), for forces of shape (2p,)."""
         problem, p = self.problem, self.problem.p
         rhs = problem.load_at(alpha) - problem.Bn.T @ forces[:p] - problem.Bt.T @ forces[p:]

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     import scipy.sparse as sp
     from numpy.typing import NDArray
 
-    from enumsol.checks import Alpha
+    from enumsol.checks import AlphaLike
     from enumsol.condensation.factorization import Factorization
 
     Vector = NDArray[np.float64]
@@ -28,14 +28,23 @@ class ProblemData(Protocol):
     friction : pair of (p,) arrays, F(alpha) = F0 + alpha F1
     """
 
-    A: sp.csc_array
-    Bn: sp.csr_array
-    Bt: sp.csr_array
     f: Vector
     load_slope: Vector | None
     gap: Vector
     slip_offset: Vector
     friction: tuple[Vector, Vector]
+
+    @property
+    def A(self) -> sp.csc_array:  # noqa: N802 (the field's letter)
+        """Stiffness."""
+
+    @property
+    def Bn(self) -> sp.csr_array:  # noqa: N802 (as above)
+        """Normal displacement of the contact nodes."""
+
+    @property
+    def Bt(self) -> sp.csr_array:  # noqa: N802 (as above)
+        """Tangential displacement of the contact nodes."""
 
     @property
     def n(self) -> int:
@@ -49,8 +58,8 @@ class ProblemData(Protocol):
     def factorization(self) -> Factorization:
         """Factors of A."""
 
-    def friction_at(self, alpha: Alpha) -> Vector:
+    def friction_at(self, alpha: AlphaLike) -> Vector:
         """F(alpha), shape (p,)."""
 
-    def load_at(self, alpha: Alpha) -> Vector:
+    def load_at(self, alpha: AlphaLike) -> Vector:
         """f(alpha), shape (n,)."""

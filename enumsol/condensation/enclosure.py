@@ -1,4 +1,4 @@
-"""Rigorous enclosures of the condensed problem, from the user's own A, Bn, Bt, f (theory, sections 4 and 6).
+"""Rigorous enclosures of the condensed problem, from the user's own A, Bn, Bt, f (theory, section 4.4).
 
 With X an approximation of A^{-1} K, K = [B', f, load_slope], and R = K - A X its residual,
 
@@ -27,13 +27,15 @@ from enumsol.arithmetic.balls import (
     sparse_eigenvalue_bound,
     upper_norm,
 )
+from enumsol.checks import alpha_value
 from enumsol.errors import EnumsolError
+from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from enumsol.arithmetic.balls import Array
-    from enumsol.checks import Alpha
+    from enumsol.checks import AlphaLike
     from enumsol.condensation.data import ProblemData
 
 #: Columns that are made dense together.
@@ -45,8 +47,8 @@ class NotEnclosedError(EnumsolError):
 
 
 @dataclass(frozen=True)
-class CondensedEnclosure:
-    """Balls that hold S, g0 and g1 of a problem for its exact data (theory, section 4).
+class CondensedEnclosure(Sealed):
+    """Balls that hold S, g0 and g1 of a problem for its exact data (theory, section 4.4).
 
     Attributes
     ----------
@@ -120,9 +122,9 @@ class CondensedEnclosure:
         g0_rad = (free_rad[:, 0] + 2 * UNIT * np.abs(g0)) * SAFE + TINY
         return cls(sym, S_rad, g0, g0_rad, free[:, 1], free_rad[:, 1], bound, problem)
 
-    def at(self, alpha: Alpha, force: Array, length: Array) -> EnclosedSystem:
+    def at(self, alpha: AlphaLike, force: Array, length: Array) -> EnclosedSystem:
         """The enclosed system at one alpha, in units given by powers of two (see ScaledSystem)."""
-        a = Fraction(alpha)
+        a = alpha if isinstance(alpha, Fraction) else Fraction(alpha_value(alpha))
         F0, F1 = self.problem.friction
         exact = [Fraction(float(x)) + a * Fraction(float(y)) for x, y in zip(F0, F1, strict=True)]
         try:

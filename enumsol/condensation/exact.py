@@ -64,14 +64,15 @@ class ExactPath:
 
     Attributes
     ----------
-    S : fmpq_mat (2p, 2p)
+    rows : tuple of 2p tuples of 2p fmpq
+        S, in tuples: what a graph answers is computed from it again and again, and a matrix of flint can be written to.
     g0, g1 : tuples of 2p fmpq
     F0, F1 : tuples of p fmpq
     condensed_exactly : bool
         S and g follow from A, Bn, Bt, f without rounding; otherwise they are the floats computed in CondensedProblem.
     """
 
-    S: Any
+    rows: tuple[tuple[Any, ...], ...]
     g0: tuple[Any, ...]
     g1: tuple[Any, ...]
     F0: tuple[Any, ...]
@@ -102,14 +103,20 @@ class ExactPath:
         g0 = tuple(row[2 * p] - o for row, o in zip(table, offset, strict=True))
         g1 = tuple(row[2 * p + 1] for row in table)
         F0, F1 = (tuple(rational(v) for v in part) for part in problem.friction)
-        return cls(fmpq_mat([row[: 2 * p] for row in table]), g0, g1, F0, F1, condensed_exactly=True)
+        return cls(tuple(tuple(row[: 2 * p]) for row in table), g0, g1, F0, F1, condensed_exactly=True)
+
+    @property
+    def S(self) -> Any:  # noqa: N802 (the field's letter)
+        """S as a new fmpq_mat (2p, 2p)."""
+        return fmpq_mat([list(row) for row in self.rows])
 
     @classmethod
     def from_condensed(cls, condensed: CondensedProblem) -> ExactPath:
         """The exact values of S, g and F as computed in floats."""
         vectors = (condensed.g0, condensed.g1, condensed.F0, condensed.F1)
         g0, g1, F0, F1 = (tuple(rational(v) for v in part) for part in vectors)
-        return cls(rational_matrix(condensed.S), g0, g1, F0, F1, condensed_exactly=False)
+        rows = tuple(map(tuple, rational_matrix(condensed.S).tolist()))
+        return cls(rows, g0, g1, F0, F1, condensed_exactly=False)
 
     @property
     def p(self) -> int:
@@ -148,16 +155,15 @@ class ExactPath:
     @cached_property
     def integers(self) -> _Integers:
         """The same data as integers over common denominators."""
-        S = self.S.tolist()
-        dS = lcm(*(int(v.q) for row in S for v in row))
+        dS = lcm(*(int(v.q) for row in self.rows for v in row))
         dg = lcm(*(int(v.q) for v in (*self.g0, *self.g1)))
         dF = lcm(*(int(v.q) for v in (*self.F0, *self.F1)))
         return _Integers(
-            [[_times(v, dS) for v in row] for row in S],
-            [_times(v, dg) for v in self.g0],
-            [_times(v, dg) for v in self.g1],
-            [_times(v, dF) for v in self.F0],
-            [_times(v, dF) for v in self.F1],
+            tuple(tuple(_times(v, dS) for v in row) for row in self.rows),
+            tuple(_times(v, dg) for v in self.g0),
+            tuple(_times(v, dg) for v in self.g1),
+            tuple(_times(v, dF) for v in self.F0),
+            tuple(_times(v, dF) for v in self.F1),
             dF,
             fmpq(dS, dg),
         )
@@ -177,11 +183,11 @@ class ExactPath:
 class _Integers:
     """Integer data: S = S_int / dS, g = g_int / dg, F = F_int / dF."""
 
-    S: list[list[Any]]
-    g0: list[Any]
-    g1: list[Any]
-    F0: list[Any]
-    F1: list[Any]
+    S: tuple[tuple[Any, ...], ...]
+    g0: tuple[Any, ...]
+    g1: tuple[Any, ...]
+    F0: tuple[Any, ...]
+    F1: tuple[Any, ...]
     friction_unit: int  # dF
     force: Any  # dS / dg
 

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from enumsol.errors import InvalidProblemError
+from enumsol.sealed import Immutable, SealedMatrix, sealed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 PIVOT_TOLERANCE = 64 * float(np.finfo(np.float64).eps)
 
 
-class Factorization:
+class Factorization(Immutable):
     """Sparse symmetric factorization A = L D L' with diagonal pivots, after scaling A to unit diagonal.
 
     Parameters
@@ -27,7 +28,7 @@ class Factorization:
     """
 
     def __init__(self, A: sp.csc_array) -> None:
-        self._A = A
+        self._A = SealedMatrix.of(A)
         diagonal = A.diagonal()
         if np.any(diagonal <= 0):
             row = int(np.argmin(diagonal))
@@ -35,8 +36,8 @@ class Factorization:
                 f"A is not positive definite: its diagonal entry {row} is {diagonal[row]:g}; expected a positive value"
             )
         # powers of two: the scaling itself makes no rounding error
-        self._scale = np.exp2(-np.round(0.5 * np.log2(diagonal)))
-        self._diagonal = self._scale * diagonal * self._scale
+        self._scale = sealed(np.exp2(-np.round(0.5 * np.log2(diagonal))))
+        self._diagonal = sealed(self._scale * diagonal * self._scale)
         scaling = sp.diags_array(self._scale)
         options = {"SymmetricMode": True, "Equil": False}
         try:
@@ -49,6 +50,7 @@ class Factorization:
             )
         except RuntimeError as error:  # SuperLU: "Factor is exactly singular"
             raise InvalidProblemError(_RIGID.format(ratio=0.0)) from error
+        self._freeze()
 
     def check_positive_definite(self) -> None:
         """Raise InvalidProblemError unless every pivot is positive and above rounding."""
@@ -72,7 +74,7 @@ class Factorization:
         for copy in (L, U):
             copy.data, copy.indices = copy.data[:0].copy(), copy.indices[:0].copy()
             copy.indptr = np.zeros_like(copy.indptr)
-        return np.asarray(pivots)
+        return sealed(np.asarray(pivots))
 
     def solve(self, rhs: NDArray[np.float64], *, refined: bool = True) -> NDArray[np.float64]:
         """A^{-1} rhs for rhs of shape (n,) or (n, k), by default with one step of iterative refinement."""
@@ -80,7 +82,7 @@ class Factorization:
         x = d * self._lu.solve(d * rhs)
         if not refined:
             return np.asarray(x)
-        residual = rhs - self._A @ x
+        residual = rhs - self._A.matrix() @ x
         return np.asarray(x + d * self._lu.solve(d * residual))
 
 

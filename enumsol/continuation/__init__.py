@@ -1,6 +1,7 @@
-"""Piecewise smooth Newton and Moore-Penrose continuation (Algorithm 5.1), the local branch test and audits."""
+"""Piecewise smooth Newton and Moore-Penrose continuation (paper, Algorithm 5.1), the local branch test and audits."""
 
-from enumsol.continuation.audit import AuditReport, Jump, MissedArc, audit
+from enumsol.continuation.audit import audit
+from enumsol.continuation.audit_report import AuditedPoint, AuditReport, Jump, MissedArc
 from enumsol.continuation.errors import AmbiguousStart, NewtonIteration, NotConverged
 from enumsol.continuation.follow import follow, start_tangents
 from enumsol.continuation.follow_all import FollowAllResult, follow_all, follow_arc
@@ -9,12 +10,14 @@ from enumsol.continuation.options import ContinuationOptions
 from enumsol.continuation.parameter_path import SmoothPath
 from enumsol.continuation.path import Path
 from enumsol.continuation.path_data import PathPoint, PathStats, Transition
+from enumsol.continuation.points import PointRun, read_points
 from enumsol.continuation.tangents import Tangent
 from enumsol.roots.local_branch import LocalBranchTest, local_branch_test
 
 __all__ = [
     "AmbiguousStart",
     "AuditReport",
+    "AuditedPoint",
     "ContinuationOptions",
     "FollowAllResult",
     "Jump",
@@ -25,6 +28,7 @@ __all__ = [
     "Path",
     "PathPoint",
     "PathStats",
+    "PointRun",
     "SmoothPath",
     "Tangent",
     "Transition",
@@ -34,5 +38,6 @@ __all__ = [
     "follow_arc",
     "local_branch_test",
     "newton",
+    "read_points",
     "start_tangents",
 ]

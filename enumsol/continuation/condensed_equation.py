@@ -1,6 +1,6 @@
 """The equation H = 0 condensed to the contact nodes and without units, on which the continuation works.
 
-The first block of H is linear in u and is eliminated once and for all: w = g(alpha) - S lambda (theory, section 4).
+The first block of H is linear in u and is eliminated once and for all: w = g(alpha) - S lambda (theory, section 8.1).
 What is left has 2p + 1 unknowns x = (lambda, alpha), scaled so that
 
 - the energy of the load is one: forces are measured by G / s_i and displacements by G s_i, where s_i^2 is the geometric

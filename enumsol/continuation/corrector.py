@@ -1,4 +1,4 @@
-"""Corrections: the Moore-Penrose corrector of Algorithm 5.1 and smooth Newton corrections inside one selection."""
+"""Corrections: the Moore-Penrose corrector (theory, (8.5)) and smooth Newton corrections inside one selection."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Correction:
 
 
 def moore_penrose(equation: CondensedEquation, x: Vector, tangent: Vector, options: ContinuationOptions) -> Correction:
-    """Steps 3-6 of Algorithm 5.1 from the prediction x: Newton's method across selections with a rotating tangent."""
+    """Steps 3-6 of the paper's Algorithm 5.1 from x: Newton's method across selections with a rotating tangent."""
     size = 2 * equation.p
     T: Vector = tangent
     residual = np.inf

@@ -1,9 +1,10 @@
-"""Piecewise smooth Moore-Penrose continuation (Algorithm 5.1): one branch of solutions from a start."""
+"""Piecewise smooth Moore-Penrose continuation (theory, section 8): one branch of solutions from a start."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from enumsol.checks import direction_value, row_number, shown
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follower import Follower
 from enumsol.continuation.path import Path, finished
@@ -14,7 +15,10 @@ from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+from enumsol.problem import ContactProblem
 
+if TYPE_CHECKING:
+    from enumsol.checks import AlphaLike
     from enumsol.continuation.options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.problem import ContactProblem
@@ -24,14 +28,14 @@ def follow(
     problem: ContactProblem,
     start: Any,
     direction: int = +1,
-    interval: tuple[float, float] | None = None,
+    interval: tuple[AlphaLike, AlphaLike] | None = None,
     options: ContinuationOptions | None = None,
     smooth_path: SmoothPath | None = None,
     *,
     tangent: int | None = None,
     visited: Sequence[Path] = (),
 ) -> Path:
-    """The branch of solutions through a start, in one direction, by Algorithm 5.1.
+    """The branch of solutions through a start, in one direction, by the paper's Algorithm 5.1.
 
     Predictions along the tangent are corrected by the piecewise smooth Moore-Penrose method. When corrections fail even
     for the shortest step, the selection is changed at the test function that vanishes next (Step 8). Transition points
@@ -47,8 +51,8 @@ def follow(
     start : Root, PathPoint, or tuple (alpha, lambda_n, lambda_t)
         A root, for example of enumerate_roots, newton or ``graph.starting_points()``.
     direction : {+1, -1}
-        +1 is the positively oriented tangent of Definition 5.1; alpha then increases where the root's index is +1.
-    interval : (float, float) or None
+        +1 is the positively oriented tangent (theory, (8.2)); alpha then increases where the root's index is +1.
+    interval : pair of alphas or None
         Range of alpha; infinite ends are allowed. None: all alpha with F >= 0.
     options : ContinuationOptions or None
     smooth_path : SmoothPath or None
@@ -72,8 +76,9 @@ def follow(
     Interrupted
         On Ctrl-C; ``partial`` holds the path so far.
     """
-    if direction not in (1, -1):
-        raise InvalidArgumentError(f"direction is {direction!r}; expected +1 or -1")
+    direction = direction_value(direction)
+    if not isinstance(visited, (list, tuple)) or not all(isinstance(path, Path) for path in visited):
+        raise InvalidArgumentError(f"visited is {shown(visited)}; expected a list of Path")
     first = Start(problem, start, interval, options, smooth_path)
     chosen = _choose(first, direction, tangent)
     point = CurvePoint(first.x, chosen.codes, chosen.vector)
@@ -84,11 +89,11 @@ def follow(
 def start_tangents(
     problem: ContactProblem,
     start: Any,
-    interval: tuple[float, float] | None = None,
+    interval: tuple[AlphaLike, AlphaLike] | None = None,
     options: ContinuationOptions | None = None,
     smooth_path: SmoothPath | None = None,
 ) -> tuple[Tangent, ...]:
-    """All tangents along which solutions leave a root, in the order of their selections (Remark 5.1).
+    """All tangents along which solutions leave a root, in the order of their selections (paper, Remark 5.1).
 
     Two at a regular root and at an ordinary transition point; more at a bifurcation point. ``tangent=k`` of `follow`
     takes the k-th. Parameters are those of `follow`.
@@ -100,9 +105,8 @@ def start_tangents(
 def _choose(first: Start, direction: int, index: int | None) -> Tangent:
     tangents = admissible_tangents(first.equation, first.x, ACTIVE_TOLERANCE)
     if index is not None:
-        if not 0 <= index < len(tangents):
-            raise InvalidArgumentError(f"tangent is {index}; expected an index below {len(tangents)} of start_tangents")
-        return tangents[index]
+        count = len(tangents)
+        return tangents[row_number(index, "tangent", count, f"an index below {count} of start_tangents")]
     fitting = [t for t in tangents if t.orientation == direction]
     if len(fitting) != 1:
         listing = "; ".join(f"{k}: {t!r}" for k, t in enumerate(tangents)) or "none"

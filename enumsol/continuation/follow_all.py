@@ -7,20 +7,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.continuation.audit import DETOUR, POINT_TOLERANCE, AuditReport, audit_on
+from enumsol.checks import alpha_interval, instance_of, optional_callable, positive_integer, shown
+from enumsol.continuation.audit import DETOUR, POINT_TOLERANCE, audit_on
+from enumsol.continuation.audit_report import AuditReport
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follow import follow, start_tangents
-from enumsol.continuation.graph_map import GraphMap
+from enumsol.continuation.graph_map import GraphMap, checked_graph
 from enumsol.continuation.path import Path
 from enumsol.continuation.path_data import PathStats
+from enumsol.continuation.points import read_points
 from enumsol.errors import InvalidArgumentError, TooLargeError
+from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from enumsol.checks import AlphaLike
     from enumsol.continuation.graph_map import GraphLike
     from enumsol.continuation.options import ContinuationOptions
-    from enumsol.problem import ContactProblem
 
 #: Where on a missed arc it is started anew, as fractions of its interval; its ends are transition points.
 _SEEDS = (0.5, 0.25, 0.75)
@@ -50,7 +54,7 @@ class FollowAllResult:
 
     @property
     def complete(self) -> bool:
-        """Every arc was visited, every point lies on the graph, and there is no jump."""
+        """The graph is proven complete, every arc was visited, every point lies on it, and there is no jump."""
         return self.report.ok and self.report.complete
 
     @property
@@ -71,7 +75,7 @@ class FollowAllResult:
 
 def follow_all(
     problem: ContactProblem,
-    interval: tuple[float, float],
+    interval: tuple[AlphaLike, AlphaLike],
     options: ContinuationOptions | None = None,
     *,
     graph: GraphLike | None = None,
@@ -80,12 +84,13 @@ def follow_all(
     """Every branch in the interval followed in both directions, and the audit of all paths.
 
     Paths start from ``graph.starting_points()``; starts on arcs that were already passed are left out. Arcs missed by
-    these, which may happen beyond bifurcations, are started anew.
+    these, which may happen beyond bifurcations, are started anew. Points outside the graph's interval, as those of an
+    ``overshoot``, are not compared, and the result is then not complete.
 
     Parameters
     ----------
     problem : ContactProblem
-    interval : (float, float)
+    interval : pair of alphas
     options : ContinuationOptions or None
     graph : BranchGraph or None
         Of this problem over this interval; made by ``branch_graph`` when None.
@@ -99,21 +104,25 @@ def follow_all(
     Raises
     ------
     InvalidArgumentError
-        The graph belongs to another problem.
+        The graph belongs to another problem, or is no branch graph.
     """
+    instance_of(problem, ContactProblem, "problem")
+    ends = alpha_interval(interval)
+    optional_callable(progress, "progress")
     if graph is None:
         from enumsol.branches import branch_graph  # python-flint and networkx, slow to import
 
-        graph = branch_graph(problem, interval)
+        graph = branch_graph(problem, ends)
+    chart = GraphMap(checked_graph(graph), POINT_TOLERANCE)
     if graph.problem is not problem and graph.problem.p != problem.p:
         raise InvalidArgumentError(f"graph has {graph.problem.p} contact nodes; expected the problem's {problem.p}")
-    coverage = _Coverage(problem, interval, options, graph, progress)
+    coverage = _Coverage(problem, (float(ends[0]), float(ends[1])), options, chart, progress)
     for start in graph.starting_points():
         coverage.start(start)
     seeded = len(coverage.paths)
     for seed in coverage.missed_seeds():
         coverage.start(seed)
-    report = audit_on(coverage.chart, coverage.paths, DETOUR)
+    report = audit_on(chart, read_points(coverage.paths, graph.problem), DETOUR)
     return FollowAllResult(tuple(coverage.paths), report, tuple(coverage.failures), len(coverage.paths) - seeded, graph)
 
 
@@ -125,12 +134,12 @@ class _Coverage:
         problem: ContactProblem,
         interval: tuple[float, float],
         options: ContinuationOptions | None,
-        graph: GraphLike,
+        chart: GraphMap,
         progress: Callable[[int, int], object] | None,
     ) -> None:
         self.problem, self.interval, self.options = problem, interval, options
-        self.graph, self.progress = graph, progress
-        self.chart = GraphMap(graph, POINT_TOLERANCE)
+        self.graph, self.progress = chart.graph, progress
+        self.chart = chart
         self.paths: list[Path] = []
         self.failures: list[tuple[float, str]] = []
         self.visited: set[int] = set()
@@ -149,7 +158,7 @@ class _Coverage:
             self.paths.append(path)
             if path.status in ("stalled", "dead end", "step limit"):
                 self.failures.append((float(path.alpha[-1]), path.message))
-            self.visited |= audit_on(self.chart, path, DETOUR).visited
+            self.visited |= audit_on(self.chart, read_points(path, self.problem), DETOUR).visited
             if self.progress is not None:
                 self.progress(len(self.visited), len(self.graph.arcs))
             if path.closed:
@@ -182,7 +191,7 @@ def follow_arc(
     graph: GraphLike,
     vertex: int,
     arc: int,
-    interval: tuple[float, float] | None = None,
+    interval: tuple[AlphaLike, AlphaLike] | None = None,
     options: ContinuationOptions | None = None,
 ) -> Path:
     """A path that leaves a vertex of the graph on one of the arcs that meet there (branch switching).
@@ -205,11 +214,16 @@ def follow_arc(
     InvalidArgumentError
         The arc does not end at the vertex, or is a sheet.
     """
+    instance_of(problem, ContactProblem, "problem")
+    checked_graph(graph)
+    vertex, arc = positive_integer(vertex, "vertex", 0), positive_integer(arc, "arc", 0)
     chosen = next((item for item in graph.arcs if item.number == arc), None)
     point = next((item for item in graph.vertices if item.number == vertex), None)
     if chosen is None or point is None or vertex not in (chosen.tail, chosen.head) or chosen.dimension:
-        raise InvalidArgumentError(f"arc {arc} is not an arc of single roots that ends at vertex {vertex} of the graph")
-    span = interval if interval is not None else (float(graph.interval[0]), float(graph.interval[1]))
+        raise InvalidArgumentError(
+            f"arc {shown(arc)} is not an arc of single roots that ends at vertex {shown(vertex)} of the graph"
+        )
+    span: Any = interval if interval is not None else (float(graph.interval[0]), float(graph.interval[1]))
     sign = 1 if vertex == chosen.tail else -1
     if point.family is None:
         tangents = start_tangents(problem, point, span, options)

@@ -1,4 +1,4 @@
-"""The loop of Algorithm 5.1: predictions, corrections, step control, checks of steps, and stop conditions."""
+"""The loop of the paper's Algorithm 5.1: predictions, corrections, step control, checks of steps, stop conditions."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ class Follower:
     def _alpha(self) -> float:
         return self.equation.alpha(self.current.x)
 
-    # -- one step of Algorithm 5.1 -----------------------------------------------------------------------------------
+    # -- one step of the paper's Algorithm 5.1 -----------------------------------------------------------------------
 
     def _advance(self) -> _Stop | None:
         if self.record.stats.accepted >= self.options.max_steps:
@@ -200,7 +200,7 @@ class Follower:
         return None if tangent is None else CurvePoint(x, codes, tangent)
 
     def _unchecked(self, correction: Correction, h: float) -> _Step | None:
-        """The step as Algorithm 5.1 takes it: any converged correction, with the tangent of its last correction."""
+        """The step as the paper's Algorithm 5.1 takes it: any converged correction, with the tangent of its last."""
         tolerance = max(STATUS_TOLERANCE, 10 * correction.residual)
         codes = self.equation.codes(correction.x, self.current.codes, tolerance)
         tangent = curve_tangent(self.equation, codes, correction.x, self.sign)

@@ -10,17 +10,20 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from enumsol.checks import real_or_nan, shown
 from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.parameter_path import AffinePath
+from enumsol.continuation.selection_distance import selection_distance
 from enumsol.continuation.start import ALPHA_FRACTION
+from enumsol.errors import InvalidArgumentError
+from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from enumsol.continuation.condensed_equation import Vector
-    from enumsol.problem import ContactProblem
+    from enumsol.continuation.condensed_equation import Codes, Vector
     from enumsol.statuses import ContactStatus
 
 #: Points at which the length of an arc is measured.
@@ -30,10 +33,17 @@ _NEAREST_ITERATIONS = 8
 _DIFFERENCE = 1e-6
 #: A distance below this fraction of the tolerance need not be made smaller.
 _EXACT = 1e-4
+#: A vertex is nearer than the arcs that end there only when it is so by more than rounding.
+_NEARER = 1 - 1e-9
+#: What is asked of a graph.
+_ASKED = ("problem", "interval", "arcs", "vertices", "branches", "complete", "reasons")
 
 
 class ArcLike(Protocol):
-    """An arc of a branch graph between the vertices ``tail`` and ``head``; a sheet has a positive dimension."""
+    """An arc of a branch graph between the vertices ``tail`` and ``head``; a sheet has a positive dimension.
+
+    ``selections`` are the status codes that hold on it; of a sheet, each gives a polytope of solutions at every alpha.
+    """
 
     number: int
     statuses: tuple[ContactStatus, ...]
@@ -42,9 +52,10 @@ class ArcLike(Protocol):
     tail: int
     head: int
     dimension: int
+    selections: tuple[Codes, ...]
 
     def values(self, alpha: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(lambda_n, lambda_t) at an alpha of the arc."""
+        """(lambda_n, lambda_t) at an alpha of the arc, which is no sheet."""
 
 
 class VertexLike(Protocol):
@@ -58,12 +69,21 @@ class VertexLike(Protocol):
 
 
 class GraphLike(Protocol):
-    """What an audit asks of a BranchGraph: ``arcs`` are ArcLike and ``vertices`` VertexLike."""
+    """What an audit asks of a BranchGraph: ``arcs`` are ArcLike and ``vertices`` VertexLike.
+
+    ``reasons`` tell why solutions may be missing from the graph; where there are none, ``complete`` still tells whether
+    that none is missing is proven.
+    """
 
     problem: ContactProblem
     interval: tuple[float, float]
     arcs: tuple[Any, ...]
     vertices: tuple[Any, ...]
+    reasons: tuple[str, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether it is proven that no solution in the interval is missing."""
 
     @property
     def branches(self) -> Sequence[Any]:
@@ -73,22 +93,57 @@ class GraphLike(Protocol):
         """Regular roots, one or more on every branch."""
 
 
+def checked_graph(graph: Any) -> GraphLike:
+    """The argument ``graph``, which is a branch graph.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is something else.
+    """
+    lacking = [name for name in _ASKED if not hasattr(graph, name)]
+    if lacking or not isinstance(graph.problem, ContactProblem):
+        why = f", which has no {lacking[0]}" if lacking else ""
+        raise InvalidArgumentError(
+            f"graph is a {type(graph).__name__}{why}; expected a BranchGraph, which holds arcs over an interval "
+            "(of branch_graph or BranchGraph.load)"
+        )
+    found: GraphLike = graph
+    return found
+
+
 @dataclass(frozen=True)
 class Place:
     """Where a point lies.
 
     Attributes
     ----------
-    kind : {"arc", "vertex"}
+    kind : {"arc", "vertex", "outside", "none"}
+        "arc" may be a sheet. "outside": the point was not compared, because its alpha is outside the graph's interval.
+        "none": the graph has no arc and no vertex.
     number : int
-        Of the arc or vertex.
+        Of the arc or vertex; -1 for none.
     distance : float
-        From it, in the lengths of ContinuationOptions [-].
+        From it, in the lengths of ContinuationOptions [-]; nan outside, infinite for none.
     """
 
     kind: str
     number: int
     distance: float
+
+
+def checked_tolerance(tolerance: float) -> float:
+    """The argument ``tolerance``, which is one: the forces of every solution have at most length one.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is not a number between 0 and 1.
+    """
+    number = real_or_nan(tolerance)
+    if not 0 < number < 1:
+        raise InvalidArgumentError(f"tolerance is {shown(tolerance)}; expected a number above 0 and below 1")
+    return number
 
 
 class GraphMap:
@@ -99,10 +154,15 @@ class GraphMap:
     graph : GraphLike
     tolerance : float
         Points within this of an arc or vertex lie on it.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The graph is no branch graph, or the tolerance is not between 0 and 1.
     """
 
     def __init__(self, graph: GraphLike, tolerance: float) -> None:
-        self.graph, self.tolerance = graph, tolerance
+        self.graph, self.tolerance = checked_graph(graph), checked_tolerance(tolerance)
         low, high = (float(end) for end in graph.interval)
         scale = ALPHA_FRACTION * (high - low)
         self.equation = CondensedEquation(AffinePath(graph.problem), (low, high), low, alpha_scale=scale)
@@ -117,23 +177,30 @@ class GraphMap:
 
     # -- distances ---------------------------------------------------------------------------------------------------
 
+    def outside(self, alpha: float) -> bool:
+        """Whether an alpha is outside the graph's interval, by more than the tolerance."""
+        low, high = (float(end) for end in self.graph.interval)
+        slack = self.tolerance * self.equation.alpha_scale
+        return not low - slack <= alpha <= high + slack
+
     def place(self, x: Vector, near: Place | None = None) -> Place:
-        """Nearest vertex or arc; the arc of the point before is tried first, until one is close enough."""
-        best = min(
+        """Nearest arc or vertex; the arc of the point before is tried first, until one is close enough."""
+        vertex = min(
             (Place("vertex", number, self.vertex_distance(x, number)) for number in self.vertices),
             key=lambda place: place.distance,
-            default=Place("vertex", -1, math.inf),
+            default=Place("none", -1, math.inf),
         )
-        if best.distance <= self.tolerance:
-            return self._at_vertex(x, best)
+        if vertex.distance <= self.tolerance:
+            return self._at_vertex(x, vertex)
+        best = Place("none", -1, math.inf)
         for arc in self._in_order(near):
-            if arc.lo - self._reach <= self.equation.alpha(x) <= arc.hi + self._reach:
+            if self._gap(x, arc) <= min(best.distance, vertex.distance):
                 distance = self.arc_distance(x, arc)
                 if distance < best.distance:
                     best = Place("arc", arc.number, distance)
                 if distance <= self.tolerance:
                     break
-        return best
+        return vertex if vertex.distance < _NEARER * best.distance else best
 
     def _at_vertex(self, x: Vector, place: Place) -> Place:
         """A place at a vertex with the distance from it or from an arc that ends there."""
@@ -141,25 +208,27 @@ class GraphMap:
         distance = min((self.arc_distance(x, arc) for arc in ends), default=math.inf)
         return Place("vertex", place.number, min(place.distance, distance))
 
-    @property
-    def _reach(self) -> float:
-        # a point off the graph is compared with what is near in alpha
-        return self.equation.alpha_scale
+    def _gap(self, x: Vector, arc: ArcLike) -> float:
+        """Distance in alpha alone, a lower bound."""
+        alpha = self.equation.alpha(x)
+        return max(arc.lo - alpha, alpha - arc.hi, 0.0) / self.equation.alpha_scale
 
     def _in_order(self, near: Place | None) -> Iterable[ArcLike]:
         if near is None:
-            return self.curves
+            return self.arcs.values()
         if near.kind == "arc" and near.number in self.arcs:
             arc = self.arcs[near.number]
             ends, first = {arc.tail, arc.head}, arc.number
         else:
             ends, first = {near.number}, -1
-        return sorted(self.curves, key=lambda a: (a.number != first, not ends & {a.tail, a.head}, a.number))
+        return sorted(self.arcs.values(), key=lambda a: (a.number != first, not ends & {a.tail, a.head}, a.number))
 
     def arc_distance(self, x: Vector, arc: ArcLike) -> float:
-        """Distance of a point from an arc."""
+        """Distance of a point from an arc (from a sheet: at the alpha of the point)."""
         low, high = arc.lo, arc.hi
         alpha = min(max(self.equation.alpha(x), low), high)
+        if arc.dimension:
+            return self._sheet_distance(x, arc, alpha)
         best = math.inf
         for _ in range(_NEAREST_ITERATIONS):
             y = self.on_arc(arc, alpha)
@@ -176,6 +245,11 @@ class GraphMap:
             slope = (self.on_arc(arc, other) - y) / (other - alpha)
             alpha = min(max(alpha + self.equation.dot(x - y, slope) / self.equation.dot(slope, slope), low), high)
         return best
+
+    def _sheet_distance(self, x: Vector, arc: ArcLike, alpha: float) -> float:
+        y = np.append(x[:-1], alpha / self.equation.alpha_scale)
+        across = min(selection_distance(self.equation, codes, y) for codes in arc.selections)
+        return math.hypot(across, float(x[-1] - y[-1]))
 
     def on_arc(self, arc: ArcLike, alpha: float) -> Vector:
         """Scaled point of an arc."""
@@ -213,11 +287,16 @@ class GraphMap:
 
         network = nx.MultiGraph()
         network.add_nodes_from(self.vertices)
-        for arc in self.curves:
-            points = [self.on_arc(arc, alpha) for alpha in np.linspace(arc.lo, arc.hi, _SAMPLES)]
-            length = sum(self.equation.norm(b - a) for a, b in pairwise(points))
-            network.add_edge(arc.tail, arc.head, key=arc.number, weight=length)
+        for arc in self.arcs.values():
+            network.add_edge(arc.tail, arc.head, key=arc.number, weight=self._length(arc))
         return network
+
+    def _length(self, arc: ArcLike) -> float:
+        """Length of an arc; of a sheet, what every way across it has at least."""
+        if arc.dimension:
+            return (arc.hi - arc.lo) / self.equation.alpha_scale
+        points = [self.on_arc(arc, alpha) for alpha in np.linspace(arc.lo, arc.hi, _SAMPLES)]
+        return sum(self.equation.norm(b - a) for a, b in pairwise(points))
 
     def way(self, x: Vector, start: Place, y: Vector, end: Place) -> tuple[float, tuple[int, ...]]:
         """Length of the shortest way along the graph between two points, and the arcs that it passes whole.

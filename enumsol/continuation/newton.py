@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.checks import finite_alpha
+from enumsol.array_checks import real_array
+from enumsol.checks import alpha_value, instance_of, positive_integer, positive_number
 from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.errors import NewtonIteration, NotConverged
 from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
@@ -18,7 +19,7 @@ from enumsol.statuses import FRICTIONLESS, STATUSES, STICK
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.checks import Alpha
+    from enumsol.checks import Alpha, AlphaLike
     from enumsol.continuation.condensed_equation import Vector
     from enumsol.continuation.parameter_path import ParameterPath
 
@@ -32,7 +33,7 @@ SUFFICIENT_DECREASE = 1e-4
 
 def newton(
     problem: ContactProblem,
-    alpha: Alpha,
+    alpha: AlphaLike,
     start: Root | ArrayLike | None = None,
     *,
     r: float | None = None,
@@ -48,7 +49,7 @@ def newton(
     Parameters
     ----------
     problem : ContactProblem
-    alpha : float or Fraction
+    alpha : float, Fraction or whatever enumerate_roots takes for alpha
     start : Root, (2p,) or (p, 2) array_like, or None
         Contact forces: those of a root, lambda_n followed by lambda_t, or a row (lambda_n, lambda_t) per node [force].
         None: zero.
@@ -70,18 +71,20 @@ def newton(
     InvalidArgumentError
         An argument cannot be used as given.
     """
-    if not isinstance(problem, ContactProblem):
-        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
-    value = finite_alpha(alpha)
-    if r is not None and not 0 < r < np.inf:
-        raise InvalidArgumentError(f"r is {r}; expected a positive finite number")
+    instance_of(problem, ContactProblem, "problem")
+    exact = alpha_value(alpha)
+    value = float(exact)
+    r = None if r is None else positive_number(r, "r")
+    if smooth_path is not None:
+        instance_of(smooth_path, SmoothPath, "smooth_path")
+    max_iterations = positive_integer(max_iterations, "max_iterations")
     frozen = problem if smooth_path is None else smooth_path.problem_at(problem, value)
-    frozen.friction_at(value)
+    frozen.friction_at(exact)
     path: ParameterPath = AffinePath(problem) if smooth_path is None else CallablePath(problem, smooth_path, value)
     equation = CondensedEquation(path, start=value, r=r)
     x = equation.point(value, _start_forces(start, problem.p))
     x = _iterate(equation, x, value, max_iterations)
-    return build_root(frozen, alpha if smooth_path is None else value, equation, x)
+    return build_root(frozen, exact if smooth_path is None else value, equation, x)
 
 
 def _start_forces(start: Root | ArrayLike | None, p: int) -> NDArray[np.float64]:
@@ -90,10 +93,10 @@ def _start_forces(start: Root | ArrayLike | None, p: int) -> NDArray[np.float64]
     if isinstance(start, Root):
         forces = np.concatenate([start.lambda_n, start.lambda_t])
     else:
-        forces = np.asarray(start, dtype=np.float64)
+        forces = real_array(start, "start", error=InvalidArgumentError)
         if forces.shape == (p, 2):
             forces = forces.T.ravel()
-    if forces.shape != (2 * p,) or not np.all(np.isfinite(forces)):
+    if forces.shape != (2 * p,):
         raise InvalidArgumentError(
             f"start has shape {forces.shape}; expected a Root or finite contact forces of shape ({2 * p},) or ({p}, 2)"
         )

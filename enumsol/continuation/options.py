@@ -1,11 +1,11 @@
-"""Settings of Algorithm 5.1."""
+"""Settings of the paper's Algorithm 5.1."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
+from enumsol.checks import nonnegative_number, optional_callable, positive_integer, positive_number, shown
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class ContinuationOptions:
-    """Settings of `follow`; the defaults are those of the paper's Section 6.
+    """Settings of `follow`; the defaults are those of paper, Section 6.
 
     Lengths and residuals are without units. Contact forces are measured in the energy norm relative to the load,
     sqrt(lambda' S lambda) / sqrt(g' S^-1 g), which is at most one at every solution, and alpha in units of
@@ -45,12 +45,12 @@ class ContinuationOptions:
         Accuracy to which transition points are located, at most 1e-8: the checks of steps rely on it.
     check_steps : bool
         Accept a step only when its end is the continuation of its start: in the same selection, or behind one located
-        change of status. False is Algorithm 5.1 as printed, which may jump between branches when steps are long.
+        change of status. False is the paper's Algorithm 5.1 as printed; with long steps it may jump between branches.
     overshoot : float
         How far outside the interval the path is followed in the hope that it returns, in the units of alpha.
     choose : callable or None
-        Called with the admissible tangents where more than one continues the path (Remark 5.1); returns an index. None:
-        the one that turns least.
+        Called with the admissible tangents where several continue the path (theory, section 8.8); returns an index.
+        None: the one that turns least.
     """
 
     eps: float = 1e-6
@@ -71,24 +71,27 @@ class ContinuationOptions:
     choose: Callable[[Sequence[Tangent]], int] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("eps", "eps_prime", "h_min", "transition_tolerance"):
-            self._require(name, getattr(self, name) > 0, "a positive number")
+        lengths = ("eps", "eps_prime", "h_min", "h_max", "h_init", "h_inc", "h_dec", "transition_tolerance")
+        for name in (*lengths, *(name for name in ("r", "alpha_scale") if getattr(self, name) is not None)):
+            self._set(name, positive_number(getattr(self, name), f"options.{name}"))
+        for name in ("k_max", "k_thr", "max_steps"):
+            self._set(name, positive_integer(getattr(self, name), f"options.{name}"))
+        self._set("overshoot", nonnegative_number(self.overshoot, "options.overshoot"))
+        optional_callable(self.choose, "options.choose")
+        self._require("check_steps", isinstance(self.check_steps, bool), "True or False")
         self._require("transition_tolerance", self.transition_tolerance <= 1e-8, "at most 1e-8")
         self._require("h_init", self.h_min <= self.h_init <= self.h_max, "h_min <= h_init <= h_max")
-        self._require("h_max", math.isfinite(self.h_max), "a finite number")
-        self._require("h_inc", 1 < self.h_inc < math.inf, "a number > 1")
-        self._require("h_dec", 0 < self.h_dec < 1, "a number between 0 and 1")
-        self._require("k_thr", isinstance(self.k_thr, int) and 0 < self.k_thr <= self.k_max, "0 < k_thr <= k_max")
-        self._require("k_max", isinstance(self.k_max, int), "an integer")
-        self._require("max_steps", isinstance(self.max_steps, int) and self.max_steps > 0, "a positive integer")
-        self._require("overshoot", 0 <= self.overshoot < math.inf, "a finite number >= 0")
-        for name in ("r", "alpha_scale"):
-            value = getattr(self, name)
-            self._require(name, value is None or 0 < value < math.inf, "a positive finite number or None")
+        self._require("h_inc", self.h_inc > 1, "a number > 1")
+        self._require("h_dec", self.h_dec < 1, "a number between 0 and 1")
+        self._require("k_thr", self.k_thr <= self.k_max, "0 < k_thr <= k_max")
+
+    def _set(self, name: str, value: float) -> None:
+        """Keep a number as the plain Python type, as files have it."""
+        object.__setattr__(self, name, value)
 
     def _require(self, name: str, holds: bool, expected: str) -> None:
         if not holds:
-            raise InvalidArgumentError(f"options.{name} is {getattr(self, name)!r}; expected {expected}")
+            raise InvalidArgumentError(f"options.{name} is {shown(getattr(self, name))}; expected {expected}")
 
     def to_dict(self) -> dict[str, Any]:
         """The settings that can be saved: all but ``choose``."""

@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.array_checks import real_array
+from enumsol.checks import alpha_value, instance_of, optional_callable
 from enumsol.condensation.condensed import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from enumsol.checks import AlphaLike
 
 #: A user's derivative may differ from a central difference by this fraction of its size: wrong formulas differ by more.
 DERIVATIVE_TOLERANCE = 1e-4
@@ -50,6 +54,8 @@ class SmoothPath:
     df: PathFunction | None = None
 
     def __post_init__(self) -> None:
+        for name in ("F", "dF", "f", "df"):
+            optional_callable(getattr(self, name), f"SmoothPath.{name}")
         if (self.F is None) != (self.dF is None) or (self.f is None) != (self.df is None):
             raise InvalidArgumentError(
                 "SmoothPath has a function without its derivative; expected F with dF, f with df"
@@ -57,10 +63,13 @@ class SmoothPath:
         if self.F is None and self.f is None:
             raise InvalidArgumentError("SmoothPath has neither F nor f; expected at least one of them")
 
-    def problem_at(self, problem: ContactProblem, alpha: float) -> ContactProblem:
+    def problem_at(self, problem: ContactProblem, alpha: AlphaLike) -> ContactProblem:
         """The problem with friction and load frozen at alpha, to enumerate roots on the path."""
-        F = problem.friction_at(alpha) if self.F is None else _evaluate(self.F, alpha, "F", problem.p, broadcast=True)
-        f = problem.load_at(alpha) if self.f is None else _evaluate(self.f, alpha, "f", problem.n)
+        instance_of(problem, ContactProblem, "problem")
+        exact = alpha_value(alpha)
+        value = float(exact)
+        F = problem.friction_at(exact) if self.F is None else _evaluate(self.F, value, "F", problem.p, broadcast=True)
+        f = problem.load_at(exact) if self.f is None else _evaluate(self.f, value, "f", problem.n)
         return ContactProblem(
             problem.A,
             problem.Bn,
@@ -123,7 +132,20 @@ class CallablePath:
         self._smooth = smooth
         self._affine = AffinePath(problem)
         self._start = alpha
+        self._check_start(alpha)
         self._check_derivatives(alpha)
+
+    def _check_start(self, alpha: float) -> None:
+        """Refuse friction and load that are no such thing where the path starts."""
+        values = self.at(alpha)
+        if not (np.all(np.isfinite(values.F)) and np.all(values.F >= 0)):
+            node = int(np.argmin(np.isfinite(values.F) & (values.F >= 0)))
+            raise InvalidArgumentError(
+                f"SmoothPath.F gives {values.F[node]:g} for contact node {self.problem.node_ids[node]} at "
+                f"alpha = {alpha:g}; expected F >= 0"
+            )
+        if not np.all(np.isfinite(values.g)):
+            raise InvalidArgumentError(f"SmoothPath.f is not finite at alpha = {alpha:g}; expected a load")
 
     @cached_property
     def _influence(self) -> NDArray[np.float64]:
@@ -184,7 +206,8 @@ class CallablePath:
 def _evaluate(
     function: PathFunction, alpha: float, name: str, size: int, *, broadcast: bool = False
 ) -> NDArray[np.float64]:
-    value = np.asarray(function(alpha), dtype=np.float64)
+    what = f"the value of SmoothPath.{name} at alpha = {alpha:g}"
+    value = real_array(function(alpha), what, error=InvalidArgumentError, finite=False)
     if value.ndim == 0 and broadcast:
         value = np.full(size, float(value))
     if value.shape != (size,):

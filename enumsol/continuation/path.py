@@ -16,6 +16,7 @@ from enumsol.errors import Interrupted, InvalidArgumentError
 if TYPE_CHECKING:
     import os
 
+    from enumsol.checks import AlphaLike
     from enumsol.continuation.options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.problem import ContactProblem
@@ -44,7 +45,7 @@ class Path(PathData):
     message : str
         The same as a sentence, with what may be done.
     orientation : int
-        +1 when it was followed in the positive orientation of Definition 5.1, else -1.
+        +1 when it was followed in the positive orientation of theory, (8.2), else -1.
     interval : (float, float)
     options : ContinuationOptions
         With the ``alpha_scale`` that was used.
@@ -106,7 +107,7 @@ class Path(PathData):
         self,
         problem: ContactProblem | None = None,
         *,
-        interval: tuple[float, float] | None = None,
+        interval: tuple[AlphaLike, AlphaLike] | None = None,
         options: ContinuationOptions | None = None,
         smooth_path: SmoothPath | None = None,
     ) -> Path:
@@ -126,7 +127,8 @@ class Path(PathData):
         InvalidArgumentError
             The problem is missing, or the path ended in a way from which it cannot go on.
         """
-        return _resumed(self, problem or self._problem, interval, options, smooth_path or self._smooth_path)
+        body = self._problem if problem is None else problem
+        return _resumed(self, body, interval, options, self._smooth_path if smooth_path is None else smooth_path)
 
 
 def finished(follower: Follower) -> Path:
@@ -146,7 +148,7 @@ def finished(follower: Follower) -> Path:
 def _resumed(
     path: Path,
     problem: ContactProblem | None,
-    interval: tuple[float, float] | None,
+    interval: tuple[AlphaLike, AlphaLike] | None,
     options: ContinuationOptions | None,
     smooth_path: SmoothPath | None,
 ) -> Path:
@@ -155,7 +157,8 @@ def _resumed(
         raise InvalidArgumentError("problem is missing; a path loaded from a file needs it: path.resume(problem)")
     if path.status in ("closed", "dead end"):
         raise InvalidArgumentError(f"the path cannot go on: {path.message}")
-    start = Start(problem, path[-1], interval or path.interval, options or path.options, smooth_path)
+    span = path.interval if interval is None else interval
+    start = Start(problem, path[-1], span, path.options if options is None else options, smooth_path)
     codes = tuple(int(code) for code in path.codes[-1])
     vector = curve_tangent(start.equation, codes, start.x, path.orientation)
     if vector is None:

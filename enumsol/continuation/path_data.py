@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.roots.root_set import summary
+from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +32,7 @@ KINDS = ("start", "step", "transition", "end")
 
 
 @dataclass(frozen=True)
-class PathPoint:
+class PathPoint(Sealed):
     """One point of a path.
 
     Attributes
@@ -42,7 +43,7 @@ class PathPoint:
     statuses : tuple of p ContactStatus
         The selection on which the path leaves the point.
     kind : {"start", "step", "transition", "end"}
-        "step" is an accepted step of Algorithm 5.1; the others were located.
+        "step" is an accepted step of the paper's Algorithm 5.1; the others were located.
     """
 
     alpha: float
@@ -71,7 +72,7 @@ class Transition:
     local_test : LocalBranchTest or None
         Whether a local Lipschitz branch exists there; None when too many selections hold to tell.
     alternatives : tuple of Tangent
-        Further directions in which solutions leave the point (Remark 5.1); not kept in files.
+        Further directions in which solutions leave the point (paper, Remark 5.1); not kept in files.
     """
 
     point: int
@@ -125,7 +126,7 @@ def _values(stats: PathStats) -> tuple[Any, ...]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PathData(Sequence[PathPoint]):
+class PathData(Sequence[PathPoint], Sealed):
     """The points of a path, its transition points and how it ended; for its attributes see Path."""
 
     alpha: NDArray[np.float64]

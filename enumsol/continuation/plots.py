@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from enumsol.checks import one_of, row_number
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 
 if TYPE_CHECKING:
@@ -14,10 +15,8 @@ _QUANTITIES = ("lambda_n", "lambda_t", "u_n", "u_t")
 
 def draw_path(path: PathData, graph: Any, node: int, quantity: str, ax: Any, graph_options: dict[str, Any]) -> Any:
     """See Path.plot."""
-    if quantity not in _QUANTITIES:
-        raise InvalidArgumentError(f"quantity is {quantity!r}; expected one of {', '.join(map(repr, _QUANTITIES))}")
-    if not 0 <= node < path.lambda_n.shape[1]:
-        raise InvalidArgumentError(f"node is {node!r}; expected a row number below {path.lambda_n.shape[1]}")
+    one_of(quantity, "quantity", _QUANTITIES)
+    node = row_number(node, "node", path.lambda_n.shape[1])
     if graph is not None and ax is not None:
         raise InvalidArgumentError("graph and ax are both given; draw further paths with path.plot(ax=...) alone")
     if graph is not None:

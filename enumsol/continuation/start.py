@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checks import finite_alpha
+from enumsol.array_checks import real_array
+from enumsol.checks import alpha_value, instance_of, unbounded_interval
 from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.options import ContinuationOptions
 from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
@@ -16,6 +17,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
+    from enumsol.checks import AlphaLike
     from enumsol.continuation.condensed_equation import Vector
     from enumsol.continuation.parameter_path import ParameterPath
 
@@ -35,13 +37,15 @@ class Start:
         self,
         problem: ContactProblem,
         start: Any,
-        interval: tuple[float, float] | None,
+        interval: tuple[AlphaLike, AlphaLike] | None,
         options: ContinuationOptions | None,
         smooth_path: SmoothPath | None,
     ) -> None:
-        if not isinstance(problem, ContactProblem):
-            raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
-        self.options = options or ContinuationOptions()
+        instance_of(problem, ContactProblem, "problem")
+        if smooth_path is not None:
+            instance_of(smooth_path, SmoothPath, "smooth_path")
+        chosen = ContinuationOptions() if options is None else options
+        self.options = instance_of(chosen, ContinuationOptions, "options")
         alpha, forces = _start_values(start, problem.p)
         self.interval = _interval(problem, interval, alpha, smooth_path)
         low, high = self.interval
@@ -68,7 +72,8 @@ class Start:
     def _on_solution(self, alpha: float, forces: Vector) -> Vector:
         equation = self.equation
         x = equation.point(alpha, forces)
-        residual = float(np.linalg.norm(equation.residual(x)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            residual = float(np.linalg.norm(equation.residual(x)))
         if not residual <= START_TOLERANCE:
             raise InvalidArgumentError(
                 f"start is not a root at alpha = {alpha:g}: the residual of H is {residual:.2e} relative to the load; "
@@ -86,21 +91,21 @@ def _start_values(start: Any, p: int) -> tuple[float, Vector]:
         raise InvalidArgumentError(
             f"start is a {type(start).__name__}; expected a Root, a PathPoint or (alpha, lambda_n, lambda_t)"
         )
-    parts = [np.atleast_1d(np.asarray(part, dtype=np.float64)) for part in (lambda_n, lambda_t)]
-    if any(part.shape != (p,) or not np.all(np.isfinite(part)) for part in parts):
-        raise InvalidArgumentError(f"start has contact forces of shape {parts[0].shape}; expected finite arrays ({p},)")
-    return finite_alpha(alpha), np.concatenate(parts)
+    parts = []
+    for name, part in (("lambda_n", lambda_n), ("lambda_t", lambda_t)):
+        parts.append(np.atleast_1d(real_array(part, f"{name} of start", error=InvalidArgumentError)))
+        if parts[-1].shape != (p,):
+            raise InvalidArgumentError(f"{name} of start has shape {parts[-1].shape}; expected ({p},)")
+    return float(alpha_value(alpha, "alpha of start")), np.concatenate(parts)
 
 
 def _interval(
-    problem: ContactProblem, interval: tuple[float, float] | None, start: float, smooth_path: SmoothPath | None
+    problem: ContactProblem, interval: tuple[AlphaLike, AlphaLike] | None, start: float, smooth_path: SmoothPath | None
 ) -> tuple[float, float]:
     affine = smooth_path is None or smooth_path.F is None
     if interval is None:
         return friction_domain(problem) if affine else (-math.inf, math.inf)
-    low, high = (float(end) for end in interval)
-    if not low < high:
-        raise InvalidArgumentError(f"interval is ({low:g}, {high:g}); expected two numbers, the first the smaller")
+    low, high = unbounded_interval(interval)
     if not low <= start <= high:
         raise InvalidArgumentError(f"start has alpha = {start:g}, outside the interval ({low:g}, {high:g})")
     if affine:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path as FilePath
+import zipfile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.checks import file_path, writing
 from enumsol.continuation.options import ContinuationOptions
 from enumsol.continuation.path_data import ARRAYS, PathData, PathStats, Transition
 from enumsol.errors import InvalidArgumentError
@@ -37,20 +38,31 @@ def save_path(path: PathData, file: str | os.PathLike[str]) -> None:
         "names": [[status.value for status in point.statuses] for point in path],
     }
     arrays = {name: getattr(path, name) for name in ARRAYS}
-    with FilePath(file).open("wb") as stream:
+    place = file_path(file, "path")
+    with writing(place, "path"), place.open("wb") as stream:
         np.savez_compressed(stream, allow_pickle=False, meta=np.array(json.dumps(meta)), **arrays)
 
 
 def load_path(file: str | os.PathLike[str]) -> PathData:
     """Read a path; see Path.load."""
+    place = file_path(file, "path")
     try:
-        with np.load(FilePath(file), allow_pickle=False) as data:
+        with np.load(place, allow_pickle=False) as data:
             meta = json.loads(str(data["meta"]))
             arrays = {name: data[name] for name in ARRAYS}
-    except (KeyError, ValueError, TypeError) as error:
+        if meta["format"] != _FORMAT:
+            raise InvalidArgumentError(f"{file} has format {meta['format']!r}; this version reads format {_FORMAT}")
+        return _unpacked(meta, arrays)
+    except OSError as error:
+        reason = error.strerror or error
+        raise InvalidArgumentError(f"{file} cannot be read ({reason}); expected a file of Path.save") from error
+    except (LookupError, ValueError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
+        if isinstance(error, InvalidArgumentError):
+            raise
         raise InvalidArgumentError(f"{file} does not hold a path ({error}); expected a file of Path.save") from error
-    if meta.get("format") != _FORMAT:
-        raise InvalidArgumentError(f"{file} has format {meta.get('format')!r}; this version reads format {_FORMAT}")
+
+
+def _unpacked(meta: dict[str, Any], arrays: dict[str, Any]) -> PathData:
     low, high = meta["interval"]
     return PathData(
         **arrays,

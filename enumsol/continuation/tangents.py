@@ -1,4 +1,4 @@
-"""Tangents of solution curves: orientation, and all that are admissible at a point (Definition 5.1, Remark 5.1)."""
+"""Tangents of solution curves: orientation, and all that are admissible at a point (theory, section 8.3)."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.errors import TooLargeError
 from enumsol.roots.local_branch import MAX_SELECTIONS
+from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -34,7 +35,7 @@ ORIENTATION_STEP = 1e-4
 
 
 @dataclass(frozen=True)
-class Tangent:
+class Tangent(Sealed):
     """A direction in which a solution curve leaves a point.
 
     Attributes
@@ -46,7 +47,7 @@ class Tangent:
     dlambda : (p, 2) array
         Derivatives of (lambda_n, lambda_t) [force].
     orientation : int
-        +1 positively oriented (Definition 5.1), -1 negatively, 0 undecided.
+        +1 positively oriented (theory, (8.2)), -1 negatively, 0 undecided.
     codes, vector :
         The same in the variables of the continuation.
     """

@@ -1,4 +1,4 @@
-"""Transition points: located by the sign changes of the test functions, and passed (Step 8 and Remark 5.1).
+"""Transition points: located by the sign changes of the test functions, and passed (theory, sections 8.7 and 8.8).
 
 Within one selection a solution curve is smooth, and the conditions of its statuses are smooth functions along it. The
 point at which the first of them vanishes is found by Newton's method, and checked: nothing else may have vanished
@@ -202,7 +202,7 @@ def passed_kink(
 def continuations(equation: CondensedEquation, arrival: CurvePoint, sign: int) -> tuple[list[Tangent], list[Tangent]]:
     """Directions that leave a transition point: those that keep the orientation, and all others but the arrival's.
 
-    The balance of degrees at a vertex (theory, section 7) leaves at least one of the first kind where all solutions
+    The balance of degrees at a vertex (theory, (7.3)) leaves at least one of the first kind where all solutions
     near the point are curves.
     """
     tangents = admissible_tangents(equation, arrival.x, ACTIVE_TOLERANCE)

@@ -15,14 +15,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.array_checks import plain_array, real_array, vector_2d
+from enumsol.checks import shown
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.arguments import lame_coefficients, vector_2d
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
+
+#: Areas are computed of coordinates up to this.
+LARGEST_COORDINATE = 1e150
 
 
 def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]) -> sp.csc_array:
@@ -52,7 +56,8 @@ def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]
     from skfem.models.elasticity import linear_elasticity
 
     lam, mu = lame_coefficients(lame)
-    nodes, cells = _points(points), _elements(triangles, "triangles", 3, points)
+    nodes = _points(points)
+    cells = _elements(triangles, "triangles", 3, len(nodes))
     _check_areas(nodes, cells)
     used = np.unique(cells)
     if len(used) != len(nodes):
@@ -115,7 +120,8 @@ def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> NDA
     InvalidArgumentError
         An argument has the wrong shape, or a node number is out of range.
     """
-    nodes, ends = _points(points), _elements(edges, "edges", 2, points)
+    nodes = _points(points)
+    ends = _elements(edges, "edges", 2, len(nodes))
     density = _rows(traction, "traction", len(ends))
     lengths = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
     forces = np.zeros_like(nodes)
@@ -141,7 +147,8 @@ def body_forces(points: ArrayLike, triangles: ArrayLike, density: ArrayLike) -> 
     InvalidArgumentError
         An argument has the wrong shape, or a node number is out of range.
     """
-    nodes, cells = _points(points), _elements(triangles, "triangles", 3, points)
+    nodes = _points(points)
+    cells = _elements(triangles, "triangles", 3, len(nodes))
     values = _rows(density, "density", len(cells))
     third = np.abs(_double_areas(nodes, cells)) / 6.0
     forces = np.zeros_like(nodes)
@@ -250,32 +257,44 @@ def _tangents(tangents: ArrayLike | None, normal: NDArray[np.float64]) -> NDArra
     return tangent
 
 
-def _real_array(value: ArrayLike, name: str) -> NDArray[np.float64]:
-    try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+def lame_coefficients(value: Any) -> tuple[float, float]:
+    """Value as the Lame coefficients (l, m) with m > 0 and l + m > 0, which make plane-strain energy positive.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The value is not two such numbers.
+    """
+    lam, mu = (float(entry) for entry in vector_2d(value, "lame"))
+    if not (mu > 0 and lam + mu > 0):
         raise InvalidArgumentError(
-            f"{name} is not an array of real numbers (found {type(value).__name__}); expected float64 values"
-        ) from None
+            f"lame is {shown(value)}; expected Lame coefficients (l, m) with m > 0 and l + m > 0"
+        )
+    return lam, mu
 
 
 def _points(points: ArrayLike) -> NDArray[np.float64]:
-    nodes = _real_array(points, "points")
-    if nodes.ndim != 2 or nodes.shape[1] != 2 or not np.all(np.isfinite(nodes)):
-        raise InvalidArgumentError(f"points has shape {nodes.shape}; expected (N, 2) with finite coordinates")
+    nodes = real_array(points, "points", error=InvalidArgumentError)
+    if nodes.ndim != 2 or nodes.shape[1] != 2:
+        raise InvalidArgumentError(f"points has shape {nodes.shape}; expected (N, 2)")
+    size = float(np.max(np.abs(nodes), initial=0.0))
+    if size > LARGEST_COORDINATE:
+        raise InvalidArgumentError(
+            f"points has the coordinate {size:g}, whose square overflows; expected at most {LARGEST_COORDINATE:g}"
+        )
     return nodes
 
 
-def _elements(value: ArrayLike, name: str, corners: int, points: ArrayLike) -> NDArray[np.int64]:
-    array = np.asarray(value)
+def _elements(value: ArrayLike, name: str, corners: int, count: int) -> NDArray[np.int64]:
+    array = plain_array(value, name, error=InvalidArgumentError)
     if array.ndim != 2 or array.shape[1] != corners or len(array) == 0:
         raise InvalidArgumentError(f"{name} has shape {array.shape}; expected (k, {corners}) node numbers, k >= 1")
-    return _node_numbers(array.ravel(), name, len(np.asarray(points)), distinct=False).reshape(array.shape)
+    return _node_numbers(array.ravel(), name, count, distinct=False).reshape(array.shape)
 
 
 def _node_numbers(value: ArrayLike, name: str, count: int, *, distinct: bool = True) -> NDArray[np.int64]:
-    array = np.asarray(value)
-    if array.ndim != 1 or array.size == 0 or not np.issubdtype(array.dtype, np.integer):
+    array = plain_array(value, name, error=InvalidArgumentError)
+    if array.ndim != 1 or array.size == 0 or array.dtype.kind not in "iu":
         raise InvalidArgumentError(
             f"{name} has shape {array.shape} and type {array.dtype}; expected at least one node number (integers)"
         )
@@ -289,7 +308,7 @@ def _node_numbers(value: ArrayLike, name: str, count: int, *, distinct: bool = T
 
 
 def _held_mask(held: ArrayLike, count: int) -> NDArray[np.bool_]:
-    array = np.asarray(held)
+    array = plain_array(held, "held", error=InvalidArgumentError)
     mask = np.zeros((count, 2), dtype=bool)
     if array.size == 0:
         return mask
@@ -302,11 +321,11 @@ def _held_mask(held: ArrayLike, count: int) -> NDArray[np.bool_]:
 
 
 def _rows(value: ArrayLike, name: str, count: int) -> NDArray[np.float64]:
-    array = _real_array(value, name)
+    array = real_array(value, name, error=InvalidArgumentError)
     if array.ndim == 1:
         return np.tile(vector_2d(value, name), (count, 1))
-    if array.shape != (count, 2) or not np.all(np.isfinite(array)):
-        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected (2,) or ({count}, 2), finite")
+    if array.shape != (count, 2):
+        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected (2,) or ({count}, 2)")
     return array
 
 
@@ -327,7 +346,7 @@ def _springs(springs: ArrayLike, count: int) -> NDArray[np.float64]:
 def _nodal(forces: ArrayLike | None, name: str, count: int) -> NDArray[np.float64]:
     if forces is None:
         return np.zeros(2 * count)
-    array = _real_array(forces, name)
+    array = real_array(forces, name, error=InvalidArgumentError)
     if array.shape != (count, 2):
         raise InvalidArgumentError(f"{name} has shape {array.shape}; expected ({count}, 2), a force for every node")
     return array.ravel()

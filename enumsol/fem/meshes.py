@@ -7,10 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.fem.arguments import positive_integer, positive_number
+from enumsol.array_checks import plain_array
+from enumsol.checks import positive_integer, positive_number
+from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
+
+#: Most cells along one side of a mesh.
+MOST_CELLS = 10_000
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,7 @@ def rectangle(nx: int, ny: int, length: float = 1.0, height: float = 1.0) -> Mes
     Parameters
     ----------
     nx, ny : int
-        Cells along x and y, at least 1.
+        Cells along x and y, 1 to MOST_CELLS.
     length, height : float
         Lengths of the sides [length].
 
@@ -50,7 +55,7 @@ def rectangle(nx: int, ny: int, length: float = 1.0, height: float = 1.0) -> Mes
     InvalidArgumentError
         A number is not positive.
     """
-    nx, ny = positive_integer(nx, "nx"), positive_integer(ny, "ny")
+    nx, ny = (positive_integer(count, name, most=MOST_CELLS) for name, count in (("nx", nx), ("ny", ny)))
     length, height = positive_number(length, "length"), positive_number(height, "height")
     x, y = np.meshgrid(np.linspace(0.0, length, nx + 1), np.linspace(0.0, height, ny + 1))
     return _structured(nx, ny, x, y, mirrored=False)
@@ -62,7 +67,7 @@ def trapezoid(nx: int, ny: int, bottom: float, top: float, height: float) -> Mes
     Parameters
     ----------
     nx, ny : int
-        Cells across and along y, at least 1.
+        Cells across and along y, 1 to MOST_CELLS.
     bottom, top : float
         Widths at y = 0 and at y = height [length].
     height : float
@@ -73,7 +78,7 @@ def trapezoid(nx: int, ny: int, bottom: float, top: float, height: float) -> Mes
     InvalidArgumentError
         A number is not positive.
     """
-    nx, ny = positive_integer(nx, "nx"), positive_integer(ny, "ny")
+    nx, ny = (positive_integer(count, name, most=MOST_CELLS) for name, count in (("nx", nx), ("ny", ny)))
     bottom, top = positive_number(bottom, "bottom"), positive_number(top, "top")
     height = positive_number(height, "height")
     across, y = np.meshgrid(np.linspace(-0.5, 0.5, nx + 1), np.linspace(0.0, height, ny + 1))
@@ -81,15 +86,25 @@ def trapezoid(nx: int, ny: int, bottom: float, top: float, height: float) -> Mes
     return _structured(nx, ny, x, y, mirrored=True)
 
 
-def edges_along(nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+def edges_along(nodes: ArrayLike) -> NDArray[np.int64]:
     """Edges between consecutive nodes, (k - 1, 2), as for the nodes of a side of a mesh.
 
     Parameters
     ----------
     nodes : (k,) int array
         Nodes in their order along a line.
+
+    Raises
+    ------
+    InvalidArgumentError
+        They are no node numbers in a row.
     """
-    return np.stack([nodes[:-1], nodes[1:]], axis=1)
+    line = plain_array(nodes, "nodes", error=InvalidArgumentError)
+    if line.ndim != 1 or line.dtype.kind not in "iu":
+        raise InvalidArgumentError(
+            f"nodes has shape {line.shape} and type {line.dtype}; expected (k,) node numbers (integers)"
+        )
+    return np.stack([line[:-1], line[1:]], axis=1)
 
 
 def _structured(nx: int, ny: int, x: NDArray[np.float64], y: NDArray[np.float64], *, mirrored: bool) -> Mesh:

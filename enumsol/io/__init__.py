@@ -30,15 +30,20 @@ NumPy archives and MatrixMarket directories give every number back bit by bit. P
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
+from typing import TYPE_CHECKING
 
+from enumsol.checks import file_path, instance_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.io import fclib, matrix_market, npz
 from enumsol.problem import ContactProblem
 
+if TYPE_CHECKING:
+    import os
+    from pathlib import Path
+
 __all__ = ["read_problem", "write_problem"]
 
+_A_PLACE = "the name of a file or directory"
 _FORMATS = "a .npz file, a directory of MatrixMarket files, or an fclib file (.h5, .hdf5)"
 
 
@@ -58,7 +63,7 @@ def read_problem(path: str | os.PathLike[str]) -> ContactProblem:
     MissingDependencyError
         An fclib file, and h5py is not installed.
     """
-    place = _path(path)
+    place = file_path(path, "path", _A_PLACE)
     try:
         return _read(place)
     except InvalidProblemError as error:
@@ -88,9 +93,8 @@ def write_problem(problem: ContactProblem, path: str | os.PathLike[str]) -> None
     MissingDependencyError
         An fclib file, and h5py is not installed.
     """
-    if not isinstance(problem, ContactProblem):
-        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
-    place = _path(path)
+    instance_of(problem, ContactProblem, "problem")
+    place = file_path(path, "path", _A_PLACE)
     try:
         _write(problem, place)
     except InvalidProblemError as error:
@@ -126,9 +130,3 @@ def _write(problem: ContactProblem, place: Path) -> None:
         fclib.write(problem, place)
     else:
         raise InvalidArgumentError(f"{place}: its name ends in {place.suffix!r}; expected {_FORMATS}")
-
-
-def _path(path: object) -> Path:
-    if not isinstance(path, (str, os.PathLike)):
-        raise InvalidArgumentError(f"path is a {type(path).__name__}; expected the name of a file or directory")
-    return Path(path)

@@ -38,6 +38,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 import numpy as np
 
+from enumsol.checks import file_path, writing
 from enumsol.errors import EnumsolError, InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -186,7 +187,9 @@ class Proof:
     def save(self, path: str | Path) -> None:
         """Write the proof to a file."""
         data = self._source.read_bytes() if isinstance(self._source, Path) else self._source
-        Path(path).write_bytes(data)
+        place = file_path(path, "path")
+        with writing(place, "path"):
+            place.write_bytes(data)
 
     @classmethod
     def load(cls, path: str | Path) -> Proof:
@@ -197,7 +200,7 @@ class Proof:
         ProofFormatError
             The file cannot be read, is no proof, is damaged or of another version.
         """
-        proof = cls(Path(path))
+        proof = cls(file_path(path, "path"))
         proof.check_integrity()
         return proof
 

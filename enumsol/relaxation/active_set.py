@@ -33,6 +33,7 @@ class CompiledEngine:
     """
 
     name = "active-set"
+    module = "enumsol.relaxation._active_set"
 
     def __init__(
         self, data: QPData, rule: BranchingRule, size: int, offset: float = 0.0, always: tuple[int, ...] = ()
@@ -53,22 +54,38 @@ class CompiledEngine:
 class ActiveSetEngine(CompiledEngine):
     """Relaxations at one alpha.
 
+    Parameters
+    ----------
+    system : ScaledSystem
+    candidates : int
+        Nodes whose children are bounded before one of them is branched on.
+    form : (H, h), optional
+        Shapes (2p, 2p) and (2p,): minimise lambda' H lambda - h' lambda in place of the energy, H = S and h = g. H must
+        be positive definite, and the form at most zero at every solution.
+
     Raises
     ------
     ImportError
         The compiled solver is not available.
     """
 
-    def __init__(self, system: ScaledSystem) -> None:
+    def __init__(
+        self,
+        system: ScaledSystem,
+        *,
+        candidates: int = BRANCHING_CANDIDATES,
+        form: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    ) -> None:
         from enumsol.relaxation import _active_set  # compiled; its absence is handled by make_engine
 
         p = system.p
         start, index, value = row_terms(p, system.F)
         rhs = np.zeros(len(start) - 1)
-        data = _active_set.QPData(system.S, system.g, -system.S, system.g, start, index, value, rhs)
+        H, h = (system.S, system.g) if form is None else form
+        data = _active_set.QPData(H, h, -system.S, system.g, start, index, value, rhs)
         cones = np.array([RowKind.CONE_PLUS, RowKind.CONE_MINUS])[:, None] * p + np.arange(p)
         modes = np.full((2, p), EQUALITY, dtype=np.int8)
-        super().__init__(data, _active_set.BranchingRule(system.F, cones, modes, BRANCHING_CANDIDATES), 2 * p)
+        super().__init__(data, _active_set.BranchingRule(system.F, cones, modes, candidates), 2 * p)
 
 
 class ActiveSetRelaxation:

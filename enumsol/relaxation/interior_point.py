@@ -39,7 +39,7 @@ class InteriorPointEngine:
         return np.asarray(solve_triangular(self.system.cholesky, rhs, lower=True))
 
     def dual_bound(self, rows: NDArray[np.intp], values: NDArray[np.float64]) -> float:
-        """Lower bound on the energy that the multipliers prove (theory, section 6, in floats)."""
+        """Lower bound on the energy that the multipliers prove (theory, (6.1), in floats)."""
         v = self.system.g + self.normals[rows].T @ values
         return float(values @ self.offsets[rows] - 0.25 * np.sum(self.lower(v) ** 2))
 

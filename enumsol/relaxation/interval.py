@@ -1,4 +1,4 @@
-"""The relaxation of a partial assignment for all alpha in an interval: one convex QP (theory, sections 5 and 7).
+"""The relaxation of a partial assignment for all alpha in an interval: one convex QP (theory, section 7.8).
 
 The cone of a status is the union of its cones over the interval: |lambda_t| <= F_hi lambda_n, and for a slipping node
 lambda_t between F_lo lambda_n and F_hi lambda_n. On a loading path alpha = middle + tau half is a further unknown,
@@ -141,9 +141,11 @@ class IntervalEngine(CompiledEngine):
         try:
             from enumsol.relaxation import _active_set
         except ImportError as error:
+            from enumsol.compiled import why_missing  # seldom needed
+
             raise MissingDependencyError(
-                "branch_graph needs the compiled active-set solver, which this installation lacks; expected enumsol "
-                "installed with a C compiler"
+                "branch_graph needs the compiled active-set solver, which is not available: "
+                f"{why_missing(self.module, error)}"
             ) from error
         p = system.p
         rule = _active_set.BranchingRule(system.F, *_slip_rows(system), BRANCHING_CANDIDATES)

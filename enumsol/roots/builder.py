@@ -8,12 +8,11 @@ import numpy as np
 
 from enumsol.roots.linearisation import SelectionTangent
 from enumsol.roots.root_set import Enclosure, Polytope, Root, RootFamily, Undecided
+from enumsol.roots.slip_signs import SlipSigns, shown_status, sign_over
 from enumsol.statuses import (
     CONTACT,
     FRICTIONLESS,
     OPEN,
-    SLIP_MINUS,
-    SLIP_PLUS,
     STATUSES,
     STICK,
     UNDECIDED,
@@ -21,7 +20,7 @@ from enumsol.statuses import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -32,8 +31,6 @@ if TYPE_CHECKING:
     from enumsol.search.tree import UndecidedPart
     from enumsol.selections.floats import FloatSelections
     from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
-
-_IN_CONTACT = frozenset((ContactStatus.STICK, ContactStatus.SLIP_PLUS, ContactStatus.SLIP_MINUS))
 
 
 class RootBuilder:
@@ -68,9 +65,12 @@ class RootBuilder:
         active_codes = [set(codes) for codes in component.active]
         canonical = tuple(min(codes) for codes in active_codes)
         force, w = self._values(canonical, solution)
+        slips = self._slip_signs(canonical, solution)
         statuses, active = [], []
         for i, codes in enumerate(active_codes):
-            names = {s for code in codes for s in self._names(code, w[p + i], i)}
+            names = {STATUSES[code] for code in codes if code != FRICTIONLESS}
+            if FRICTIONLESS in codes:
+                names |= slips.names(i)
             statuses.append(next(s for s in STATUSES if s in names))
             active.append(frozenset(names))
         regular = component.regular
@@ -90,28 +90,35 @@ class RootBuilder:
             enclosure=self._enclosure(solution),
             _condensed=self._problem.condensed,
             _tangent=SelectionTangent(self._floats, self._problem.condensed, canonical, force, w) if regular else None,
+            _slips=slips,
         )
 
+    def _slip_signs(self, codes: Codes, solution: SelectionSolution) -> SlipSigns:
+        """Signs of u_t: from the ball where it does not hold zero, otherwise those of the solver's arithmetic."""
+        p, ball = self._problem.p, self._verified.get(solution.codes)
+        known: tuple[int | None, ...]
+        if ball is None:
+            known = self._solver.slip_signs(solution.vertices[0])
+        else:
+            balls = zip(ball.w[p:].tolist(), ball.w_rad[p:].tolist(), strict=True)
+            known = tuple(int(np.sign(w)) if abs(w) > r or w == r == 0 else None for w, r in balls)
+        return SlipSigns(self._problem, self._alpha, codes, known)
+
     def _enclosure(self, solution: SelectionSolution) -> Enclosure | None:
-        """Bounds of forces and displacements: from the balls, or one rounding around a rational root."""
+        """Bounds of forces and displacements: from the balls, or the floats next to a rational root."""
         p, system = self._problem.p, self._floats.system
         ball = self._verified.get(solution.codes)
-        point = solution.vertices[0]
         if ball is not None:
-            mid = (ball.force * system.force, ball.w * system.length)
-            rad = (ball.force_rad * system.force, ball.w_rad * system.length)
-        elif isinstance(point, tuple):
-            mid = (self._solver.forces(point), self._solver.displacements(point))
-            rad = (np.spacing(np.abs(mid[0])) * (mid[0] != 0), np.spacing(np.abs(mid[1])) * (mid[1] != 0))
-        elif not np.any(point) and self._problem.is_unloaded(self._alpha):
-            # nothing but lambda = 0, w = 0 solves, exactly
-            mid = rad = (np.zeros(2 * p), np.zeros(2 * p))
+            mid = np.concatenate([ball.force * system.force, ball.w * system.length])
+            rad = np.concatenate([ball.force_rad * system.force, ball.w_rad * system.length])
+            low = np.where(rad > 0, np.nextafter(mid - rad, -np.inf), mid)
+            high = np.where(rad > 0, np.nextafter(mid + rad, np.inf), mid)
+        elif (around := self._solver.bounds(solution.vertices[0])) is not None:
+            low, high = around
         else:
             return None
-        low = [np.where(r > 0, np.nextafter(m - r, -np.inf), m) for m, r in zip(mid, rad, strict=True)]
-        high = [np.where(r > 0, np.nextafter(m + r, np.inf), m) for m, r in zip(mid, rad, strict=True)]
-        columns = [np.stack([a, b], axis=1) for a, b in zip(low, high, strict=True)]
-        return Enclosure(columns[0][:p], columns[0][p:], columns[1][:p], columns[1][p:])
+        bounds = np.stack([low, high], axis=1)
+        return Enclosure(bounds[:p], bounds[p : 2 * p], bounds[2 * p : 3 * p], bounds[3 * p :])
 
     def family(self, component: RootComponent, *, proven: bool) -> RootFamily:
         """The family of a component of positive dimension."""
@@ -122,8 +129,10 @@ class RootBuilder:
             # polytopes that meet share their corners to the last bit
             corners = [self._representative(v, known) for v in solution.vertices]
             points = np.array([self._solver.forces(v) for v in corners])
-            moves = np.array([self._solver.displacements(v)[p:] for v in solution.vertices])
-            statuses = tuple(self._polytope_status(code, moves[:, i], i) for i, code in enumerate(solution.codes))
+            slips = [self._solver.slip_signs(v) for v in solution.vertices]
+            statuses = tuple(
+                shown_status(code, sign_over(s[i] for s in slips)) for i, code in enumerate(solution.codes)
+            )
             order = np.lexsort(points.T[::-1])
             vertices = np.stack([points[order, :p], points[order, p:]], axis=2)
             parts.append(Polytope(statuses, vertices, solution.dimension))
@@ -163,16 +172,3 @@ class RootBuilder:
                     w[p + i] = 0.0
         # -0.0 prints badly
         return force + 0.0, w + 0.0
-
-    def _names(self, code: int, w_t: float, node: int) -> Sequence[ContactStatus]:
-        if code != FRICTIONLESS:
-            return (STATUSES[code],)
-        size = w_t / float(self._floats.system.length[self._problem.p + node])
-        if abs(size) <= self._floats.tolerance:
-            return tuple(_IN_CONTACT)
-        return (STATUSES[SLIP_PLUS if size > 0 else SLIP_MINUS],)
-
-    def _polytope_status(self, code: int, w_t: NDArray[np.float64], node: int) -> ContactStatus:
-        """A frictionless node's slip may change sign within a polytope; its mean names it."""
-        names = self._names(code, float(np.mean(w_t)), node)
-        return next(s for s in STATUSES if s in names)

@@ -2,7 +2,7 @@
 
 A root at which several statuses hold solves several selections and is one root; roots that touch a polytope belong to
 its family. The local degree (index) of a root or family is the sum of sign det over the regular selections whose root
-stays one when g is moved a little in a generic direction (theory, section 6).
+stays one when g is moved a little in a generic direction (theory, sections 6.6 and 6.7).
 """
 
 from __future__ import annotations

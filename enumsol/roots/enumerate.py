@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import math
 import time
-from fractions import Fraction
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
-from enumsol.checks import finite_alpha
+from enumsol.checks import (
+    alpha_value,
+    file_path,
+    instance_of,
+    one_of,
+    optional_callable,
+    optional_count,
+    optional_executor,
+    optional_seconds,
+    share,
+)
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.proof.proof_file import Proof, ProofWriter
+from enumsol.roots.at_rest import AtRest
 from enumsol.roots.builder import RootBuilder
 from enumsol.roots.components import RootComponent, connected_components
 from enumsol.roots.local_degree import perturbed_degree
@@ -30,7 +38,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from pathlib import Path
 
-    from enumsol.checks import Alpha
+    from enumsol.checks import AlphaLike
     from enumsol.selections.solution import ActiveSets, SelectionSolver
 
 Method = Literal["tree", "exhaustive"]
@@ -40,7 +48,7 @@ _REPORT_SECONDS = 0.1
 
 def enumerate_roots(
     problem: ContactProblem,
-    alpha: Alpha,
+    alpha: AlphaLike,
     arithmetic: Arithmetic = "verified",
     method: Method = "tree",
     executor: Executor | None = None,
@@ -58,15 +66,16 @@ def enumerate_roots(
     Parameters
     ----------
     problem : ContactProblem
-    alpha : float or Fraction
-        The parameter; a float is read as the exact rational number that it is.
+    alpha : float, Fraction, any other real number, or str
+        The parameter, read as the exact number that it is; a text is a fraction such as "8/3" or a decimal number,
+        which is read as float64.
     arithmetic : {"verified", "fast", "exact"}
         "verified": every root is enclosed and every excluded selection proven by rigorous error bounds for the data as
         given, in rationals where a sign cannot be decided otherwise; what stays open is listed. "fast": float64 and a
         tolerance, never claimed to be complete. "exact": the data are read as exact rationals and everything is
         decided without rounding (small problems).
     method : {"tree", "exhaustive"}
-        "tree": pruned search (theory, section 5). "exhaustive": all 4^p selections, the oracle for small p.
+        "tree": pruned search (theory, section 5.4). "exhaustive": all 4^p selections, the oracle for small p.
     executor : concurrent.futures.Executor, optional
         Runs subtrees in parallel (method "tree").
     progress : callable, optional
@@ -97,10 +106,18 @@ def enumerate_roots(
     Interrupted
         On Ctrl-C; ``partial`` holds what was found.
     """
-    _check(problem, alpha, arithmetic, method, stop_after, max_nodes, time_limit, tolerance, engine)
+    instance_of(problem, ContactProblem, "problem")
+    value = alpha_value(alpha)
+    one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
+    one_of(method, "method", ("tree", "exhaustive"))
+    one_of(engine, "engine", (None, "active-set", "clarabel"))
+    optional_executor(executor)
+    optional_callable(progress, "progress")
+    counts = optional_count(stop_after, "stop_after"), optional_count(max_nodes, "max_nodes")
+    seconds, tolerance = optional_seconds(time_limit), share(tolerance)
     _check_proof(arithmetic, method, proof_path)
-    solvers = Solvers(problem, alpha, arithmetic, tolerance)
-    return _Enumeration(solvers, method, progress, engine, proof_path).run(executor, stop_after, max_nodes, time_limit)
+    solvers = Solvers(problem, value, arithmetic, tolerance)
+    return _Enumeration(solvers, method, progress, engine, proof_path).run(executor, *counts, seconds)
 
 
 class _Enumeration:
@@ -117,6 +134,7 @@ class _Enumeration:
         self.solvers, self.method, self.progress, self.engine = solvers, method, progress, engine
         self.started = time.perf_counter()
         self.outcome = SearchOutcome()
+        self.at_rest: AtRest | None = None
         self.solver: SelectionSolver = solvers.floats
         if solvers.arithmetic == "exact" and solvers.exact is not None:
             self.solver = solvers.exact
@@ -162,8 +180,9 @@ class _Enumeration:
         search = TreeSearch(solvers.scaled, self.certifier, engine=self.engine, limits=limits, progress=self.progress)
         self.outcome = search.outcome
         if solvers.unloaded():
-            # the energy bound is then lambda' S lambda <= 0: lambda = 0 and nothing else
-            self.outcome.solutions.append(self._unloaded())
+            if isinstance(self.certifier, VerifiedCertifier):
+                self.certifier.unloaded()
+            self.at_rest = AtRest(solvers.floats.F_positive, proven=solvers.arithmetic != "fast")
         elif (reason := solvers.undecidable) is not None:
             # without any means of proof the tree would only grow
             codes = search.first().codes
@@ -173,18 +192,6 @@ class _Enumeration:
             run_parallel(executor, solvers, search, self.engine, solvers.floats.tolerance)
         else:
             search.run()
-
-    def _unloaded(self) -> SelectionSolution:
-        if isinstance(self.certifier, VerifiedCertifier):
-            self.certifier.unloaded()
-        p = self.solvers.problem.p
-        solver = self.solver
-        if solver is self.solvers.floats:
-            return SelectionSolution((0,) * p, (np.zeros(2 * p),), 0, 1, strict=False)
-        solution = solver.solve((0,) * p)
-        if solution is None:
-            raise AssertionError("the unloaded body must rest open")
-        return solution
 
     def _exhaustive(self, limits: SearchLimits) -> None:
         outcome, reported = self.outcome, self.started
@@ -214,6 +221,8 @@ class _Enumeration:
 
     def _components(self) -> list[tuple[list[RootComponent], SelectionSolver]]:
         """Components of the root set with the solver whose points they hold."""
+        if self.at_rest is not None:
+            return [([self.at_rest.component], self.at_rest)]
         solutions = self.outcome.solutions
         exact = [s for s in solutions if isinstance(s.vertices[0], tuple)]
         floats = [s for s in solutions if not isinstance(s.vertices[0], tuple)]
@@ -230,15 +239,20 @@ class _Enumeration:
     def _result(self) -> RootSet:
         outcome, solvers = self.outcome, self.solvers
         roots, families = [], []
+        apart, joinable = 0, False
         verified = self.certifier.verified if isinstance(self.certifier, VerifiedCertifier) else {}
         for components, solver in self._components():
             builder = RootBuilder(solvers.problem, solvers.alpha, solver, solvers.floats, verified)
+            # of a component that was not examined whole it is not known what joins it
+            apart += sum(c.whole for c in components)
+            joinable = joinable or not all(c.whole for c in components)
             roots += [builder.root(c) for c in components if c.dimension == 0]
             proven = solver is not solvers.floats
             families += [builder.family(c, proven=proven) for c in components if c.dimension > 0]
         roots.sort(key=lambda root: ([s.value for s in root.statuses], root.lambda_n.tolist(), root.lambda_t.tolist()))
         families.sort(key=lambda family: family.vertices.tolist())
         builder = RootBuilder(solvers.problem, solvers.alpha, self.solver, solvers.floats, verified)
+        whole = outcome.stopped is None and not outcome.undecided
         counts = (outcome.nodes, outcome.pruned, outcome.selections, outcome.qps, outcome.fallback_qps)
         return RootSet(
             alpha=solvers.alpha,
@@ -255,6 +269,7 @@ class _Enumeration:
                 outcome.presolved,
             ),
             node_ids=solvers.problem.node_ids,
+            at_least=None if whole else apart + int(joinable),
             certified_data=solvers.data,
             proof=self._proof(len(roots), len(families)),
         )
@@ -272,37 +287,6 @@ class _Enumeration:
         return proof if whole else None
 
 
-def _check(
-    problem: object,
-    alpha: Alpha,
-    arithmetic: str,
-    method: str,
-    stop_after: int | None,
-    max_nodes: int | None,
-    time_limit: float | None,
-    tolerance: float,
-    engine: str | None,
-) -> None:
-    if not isinstance(problem, ContactProblem):
-        raise InvalidArgumentError(f"problem is a {type(problem).__name__}; expected a ContactProblem")
-    if not isinstance(alpha, Fraction):
-        finite_alpha(alpha)
-    for name, value, known in (
-        ("arithmetic", arithmetic, ("fast", "verified", "exact")),
-        ("method", method, ("tree", "exhaustive")),
-        ("engine", engine, (None, "active-set", "clarabel")),
-    ):
-        if value not in known:
-            raise InvalidArgumentError(f"{name} is {value!r}; expected one of {', '.join(map(repr, known))}")
-    for name, count in (("stop_after", stop_after), ("max_nodes", max_nodes)):
-        if count is not None and (not isinstance(count, int) or count < 1):
-            raise InvalidArgumentError(f"{name} is {count!r}; expected a positive integer or None")
-    if time_limit is not None and not time_limit > 0:
-        raise InvalidArgumentError(f"time_limit is {time_limit!r}; expected a positive number of seconds or None")
-    if not 0 <= tolerance < 1:
-        raise InvalidArgumentError(f"tolerance is {tolerance!r}; expected a number in [0, 1)")
-
-
 def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None) -> None:
     if method == "exhaustive" and arithmetic == "verified":
         raise InvalidArgumentError(
@@ -312,3 +296,5 @@ def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None) ->
         raise InvalidArgumentError(
             f'proof_path is given with arithmetic {arithmetic!r}; expected "verified", which alone writes proofs'
         )
+    if proof_path is not None:
+        file_path(proof_path, "proof_path")

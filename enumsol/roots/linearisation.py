@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.sealed import Sealed
 from enumsol.statuses import FRICTIONLESS, SLIP_MINUS, SLIP_PLUS
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class SelectionTangent:
+class SelectionTangent(Sealed):
     """The linear system of a regular root's selection.
 
     Attributes

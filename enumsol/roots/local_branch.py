@@ -1,4 +1,4 @@
-"""Whether a local Lipschitz branch passes through a root: coherent orientation of the normal map (Section 4)."""
+"""Whether a local Lipschitz branch passes through a root: coherent orientation of the normal map (theory, (3.3))."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from enumsol.checks import instance_of
 from enumsol.errors import InvalidArgumentError, TooLargeError
+from enumsol.problem import ContactProblem
 from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, STATUSES, STICK, contact_status
 
 if TYPE_CHECKING:
@@ -19,11 +21,10 @@ if TYPE_CHECKING:
 
     from enumsol.checks import Alpha
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.problem import ContactProblem
     from enumsol.selections.solution import Codes
     from enumsol.statuses import ContactStatus
 
-#: Selections examined at one point (Remark 5.1); six nodes in a corner of three statuses have 729.
+#: Selections examined at one point (paper, Remark 5.1); six nodes in a corner of three statuses have 729.
 MAX_SELECTIONS = 4096
 #: A singular value of the normal map's scaled matrix below this counts as zero, as in arithmetic "fast".
 SINGULAR_TOLERANCE = 1e-12
@@ -53,14 +54,14 @@ class LocalBranchTest:
 
     The contact forces are a Lipschitz function of the load near the root, at fixed friction, exactly when the
     determinants of the normal map have one and the same sign, not zero, over all statuses that hold there. By
-    Theorem 4.1 they then are one of the friction coefficients too, provided that F > 0 at every node.
+    paper, Theorem 4.1, they then are one of the friction coefficients too, provided that F > 0 at every node.
 
     Attributes
     ----------
     exists : bool
         A local Lipschitz branch in the load exists.
     premise : bool
-        F > 0 at every node: the premise of Theorem 4.1 for a branch in F.
+        F > 0 at every node: the premise of the paper's Theorem 4.1 for a branch in F.
     signs : tuple of (statuses, sign)
         Every selection that holds at the root with the sign of its determinant: +1, -1 or 0.
     differing : tuple of tuples of ContactStatus
@@ -90,7 +91,7 @@ class LocalBranchTest:
 
 
 def local_branch_test(problem: ContactProblem, root: SolutionPoint) -> LocalBranchTest:
-    """Whether a local Lipschitz branch of solutions passes through a root (Section 4, Theorem 4.1).
+    """Whether a local Lipschitz branch of solutions passes through a root (theory, section 3.2).
 
     The test looks at the normal map G(z) = w + S lambda, which does not depend on the parameter r of H, over the
     statuses that hold at the root (``root.active``).
@@ -112,7 +113,9 @@ def local_branch_test(problem: ContactProblem, root: SolutionPoint) -> LocalBran
     TooLargeError
         More than MAX_SELECTIONS selections hold at the root.
     """
-    if len(getattr(root, "active", ())) != problem.p:
+    instance_of(problem, ContactProblem, "problem")
+    active = getattr(root, "active", None)
+    if not isinstance(active, tuple) or len(active) != problem.p:
         raise InvalidArgumentError(f"root is {type(root).__name__}; expected a Root with {problem.p} contact nodes")
     return branch_test(problem.condensed, root)
 

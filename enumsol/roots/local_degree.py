@@ -1,4 +1,4 @@
-"""Local degree of a root at which very many selections hold: a search on the perturbed problem (theory, section 6)."""
+"""Local degree of a root at which very many selections hold: a search on a perturbed problem (theory, section 6.7)."""
 
 from __future__ import annotations
 

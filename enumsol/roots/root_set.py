@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from enumsol.roots.local_branch import branch_test
+from enumsol.sealed import Immutable, Sealed, sealed
 from enumsol.statuses import ContactStatus, sign_array
 
 if TYPE_CHECKING:
@@ -22,13 +23,14 @@ if TYPE_CHECKING:
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.linearisation import SelectionTangent
     from enumsol.roots.local_branch import LocalBranchTest
+    from enumsol.roots.slip_signs import SlipSigns
     from enumsol.search.certifiers.verified import Escalations
 
 _PRINTED_ROOTS = 20
 
 
 @dataclass(frozen=True)
-class Enclosure:
+class Enclosure(Sealed):
     """Proven bounds of a root's forces and displacements.
 
     Attributes
@@ -46,7 +48,7 @@ class Enclosure:
 
 
 @dataclass(frozen=True)
-class Root:
+class Root(Sealed):
     """An isolated solution at one alpha.
 
     Attributes
@@ -54,15 +56,16 @@ class Root:
     alpha : float or Fraction
     statuses : tuple of p ContactStatus
         Where several hold, the first of OPEN, STICK, SLIP_PLUS, SLIP_MINUS. At a node with F = 0 in contact the sign
-        of u_t names it.
+        of u_t names it: in verified and exact arithmetic that of the enclosure, or in rationals.
     active : tuple of p frozensets of ContactStatus
-        All statuses that hold at the node.
+        All statuses that hold at the node; at a node with F = 0 in contact, all that the sign of u_t does not exclude
+        (of a body too large for rationals, n > 250, the enclosure of u_t may hold zero and leave the sign open).
     lambda_n, lambda_t : (p,) arrays
         Contact forces on the nodes (nodal forces, not pressures) [force].
     u_n, u_t : (p,) arrays
         Bn u - gap <= 0 and Bt u - slip_offset [length].
     index : int or None
-        Local degree (theory, section 6): sign det of the selection at a regular root. It says nothing about physical
+        Local degree (theory, section 6.7): sign det of the selection at a regular root. It says nothing about physical
         stability. None when it could not be found within the limits of the local analysis.
     regular : bool
         Exactly one status holds at every node, strictly, and the selection is not singular.
@@ -86,6 +89,7 @@ class Root:
     enclosure: Enclosure | None = field(repr=False, compare=False)
     _condensed: CondensedProblem = field(repr=False, compare=False)
     _tangent: SelectionTangent | None = field(repr=False, compare=False)
+    _slips: SlipSigns | None = field(repr=False, compare=False, default=None)
 
     @cached_property
     def condition(self) -> float:
@@ -95,7 +99,8 @@ class Root:
     @cached_property
     def dlambda_dalpha(self) -> NDArray[np.float64] | None:
         """Derivatives of (lambda_n, lambda_t) along the branch, shape (p, 2); None unless the root is regular."""
-        return None if self._tangent is None else self._tangent.derivative()
+        derivative = None if self._tangent is None else self._tangent.derivative()
+        return None if derivative is None else sealed(derivative)
 
     @property
     def u(self) -> NDArray[np.float64]:
@@ -103,7 +108,7 @@ class Root:
         return self._condensed.displacement(self.alpha, np.concatenate([self.lambda_n, self.lambda_t]))
 
     def local_branch_test(self) -> LocalBranchTest:
-        """Whether a local Lipschitz branch of solutions passes through the root (Section 4, Theorem 4.1).
+        """Whether a local Lipschitz branch of solutions passes through the root (theory, section 3.2).
 
         Its ``exists`` is True when the determinants of all selections that hold at the root have one and the same
         sign; ``differing`` names those that break this. A regular root always has such a branch. ``premise`` tells
@@ -116,14 +121,23 @@ class Root:
         """
         return branch_test(self._condensed, self)
 
+    def _slip_sign(self, node: int) -> int:
+        sign = None if self._slips is None else self._slips.sign(node)
+        return int(np.sign(self.u_t[node])) if sign is None else sign
+
     @property
     def signs(self) -> NDArray[np.int8]:
-        """Signs of the test functions at the root, shape (p, 3); 0 where a test function vanishes."""
+        """Signs of the test functions at the root, shape (p, 3); 0 where a test function vanishes.
+
+        At an open node theta2 and theta3 have the sign of u_t. In verified and exact arithmetic it follows from the
+        enclosure or from rationals; of a body too large for these (n > 250) whose enclosure holds zero, it is that of
+        the computed value.
+        """
         signs = sign_array(self.statuses)
         for i, holds in enumerate(self.active):
             if ContactStatus.OPEN in holds:
                 signs[i, 0] = 0 if len(holds) > 1 else -1
-                signs[i, 1:] = int(np.sign(self.u_t[i]))
+                signs[i, 1:] = self._slip_sign(i)
             else:
                 if ContactStatus.SLIP_PLUS in holds and ContactStatus.STICK in holds:
                     signs[i, 1] = 0
@@ -133,7 +147,7 @@ class Root:
 
 
 @dataclass(frozen=True)
-class Polytope:
+class Polytope(Sealed):
     """A convex set of roots in one selection.
 
     Attributes
@@ -177,7 +191,7 @@ class RootFamily:
     @cached_property
     def vertices(self) -> NDArray[np.float64]:
         """All vertices, shape (k, p, 2), without repetition, in lexical order."""
-        return np.unique(np.concatenate([part.vertices for part in self.polytopes]), axis=0)
+        return sealed(np.unique(np.concatenate([part.vertices for part in self.polytopes]), axis=0))
 
 
 @dataclass(frozen=True)
@@ -231,7 +245,7 @@ class SearchStats:
     presolved: int = 0
 
 
-class RootSet(Sequence[Root]):
+class RootSet(Sequence[Root], Immutable):
     """All solutions at one alpha, as a sequence of the isolated roots in a deterministic order.
 
     Attributes
@@ -244,6 +258,9 @@ class RootSet(Sequence[Root]):
     arithmetic, method : str
     stopped : str or None
         Why the search ended early, or None.
+    at_least : int
+        Number of isolated roots and families together if nothing is known to be missing; otherwise a lower bound of it,
+        in which roots and families that a continuum not found may join are counted as one.
     stats : SearchStats
     certified_data : str
         What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed).
@@ -263,6 +280,7 @@ class RootSet(Sequence[Root]):
         stopped: str | None,
         stats: SearchStats,
         node_ids: tuple[Any, ...],
+        at_least: int | None = None,
         certified_data: str = "problem",
         proof: Proof | None = None,
     ) -> None:
@@ -274,18 +292,30 @@ class RootSet(Sequence[Root]):
         self.method = method
         self.stopped = stopped
         self.stats = stats
+        self.at_least = len(self._roots) + len(self.families) if at_least is None else at_least
         self.node_ids = node_ids
         self.certified_data = certified_data
         self.proof = proof
+        self._freeze()
 
     @property
     def complete(self) -> bool:
         """Whether completeness is proven: exact arithmetic, nothing undecided, search not cut short."""
-        return self.arithmetic != "fast" and self.stopped is None and not self.undecided
+        return self.arithmetic != "fast" and self.whole
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is known to be missing: the search ran to its end and left nothing undecided."""
+        return self.stopped is None and not self.undecided
 
     @property
     def index_sum(self) -> int | None:
-        """Sum of the indices of all roots and families: +1 when nothing is missing; None if one is unknown."""
+        """Sum of the indices of all roots and families: +1 when nothing is missing; None if one is unknown.
+
+        It is unknown, too, after a search that was cut short or left something undecided.
+        """
+        if not self.whole:
+            return None
         indices = [root.index for root in self._roots] + [family.index for family in self.families]
         return None if any(index is None for index in indices) else sum(index for index in indices if index is not None)
 
@@ -335,6 +365,8 @@ class RootSet(Sequence[Root]):
         heading = f"RootSet at alpha = {float(self.alpha):g}: {_count(len(self), 'root')}"
         if self.families:
             heading += f", {_count(len(self.families), 'family', 'families')}"
+        if not self.whole:
+            heading += f" found, at least {self.at_least} in all"
         lines = [f"{heading} ({self.arithmetic}, {self.method})"]
         if len(self):
             lines.append(f"{'':>6} {'index':>5} {'regular':>7} {'margin':>9} {'max lambda_n':>12}  contact")
@@ -357,9 +389,7 @@ class RootSet(Sequence[Root]):
         lines += [f"undecided, {count} times: {reason} ({hint})" for (reason, hint), count in alike.most_common(5)]
         total = self.index_sum
         # a sum other than +1 proves that something is missing or wrong
-        note = (
-            "unknown" if total is None else (f"{total:+d}" if total == 1 or self.stopped else f"{total:+d} (not +1!)")
-        )
+        note = "unknown" if total is None else f"{total:+d}" if total == 1 else f"{total:+d} (not +1!)"
         lines.append(f"index sum: {note}")
         lines.append(self.completeness())
         return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""Which selections may hold somewhere in an interval of alpha: the tree search on pieces of it (theory, section 7).
+"""Which selections may hold somewhere in an interval of alpha: the tree search on pieces of it (theory, section 7.8).
 
 Every piece is a tree of its own whose leaves cover all selections: a leaf is either proven empty on the whole piece
 or a complete selection that is handed on. A piece whose tree grows too large is cut in two; both halves go on with

@@ -1,4 +1,4 @@
-"""The tree search: partial assignments, pruned by the energy-bounded relaxation (theory, section 5).
+"""The tree search: partial assignments, pruned by the energy-bounded relaxation (theory, section 5.4).
 
 Every node of the tree is a partial assignment of statuses. Its relaxation is solved, warm-started from its parent; it
 is pruned when the certifier accepts the multipliers as a proof that it holds no solution, branched on otherwise, and
@@ -16,6 +16,7 @@ import warnings
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
+from enumsol.errors import MissingDependencyError
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
@@ -30,10 +31,6 @@ if TYPE_CHECKING:
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
-_NO_COMPILED_ENGINE = (
-    "the compiled active-set solver is not available in this installation; the much slower interior-point solver is "
-    "used (install a C compiler and reinstall enumsol to get it)"
-)
 
 
 @dataclass(frozen=True)
@@ -130,15 +127,24 @@ class TreeNode:
 
 
 def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
-    """The relaxation engine of that name; by default the compiled one, or the fallback with a warning."""
+    """The relaxation engine of that name; by default the compiled one, or the fallback with a warning.
+
+    Raises
+    ------
+    MissingDependencyError
+        The compiled one was asked for and cannot be imported.
+    """
     if name == InteriorPointEngine.name:
         return InteriorPointEngine(system)
     try:
         return ActiveSetEngine(system)
-    except ImportError:
+    except ImportError as error:
+        from enumsol.compiled import why_missing  # seldom needed
+
+        missing = f"the compiled active-set solver is not available: {why_missing(ActiveSetEngine.module, error)}"
         if name is not None:
-            raise
-        warnings.warn(_NO_COMPILED_ENGINE, RuntimeWarning, stacklevel=2)
+            raise MissingDependencyError(missing) from error
+        warnings.warn(f"{missing}; the much slower interior-point solver is used", RuntimeWarning, stacklevel=2)
         return InteriorPointEngine(system)
 
 

@@ -230,6 +230,15 @@ class FloatSelections:
         """Unscaled w = g - S lambda."""
         return self._w(point) * self.system.length
 
+    def bounds(self, point: NDArray[np.float64]) -> None:
+        """Floats prove no bounds."""
+        del point
+
+    def slip_signs(self, point: NDArray[np.float64]) -> tuple[int, ...]:
+        """Signs of w_t; zero within the tolerance."""
+        w = (self._w(point) / self._length_scale)[self.p :]
+        return tuple(int(np.sign(v)) if abs(v) > self.tolerance else 0 for v in w)
+
 
 def _vertices(C: NDArray[np.float64], d: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
     """Vertices t of {C t + d >= 0}, shape (k, dim), by trying every basis; the set is known to be bounded."""
@@ -263,7 +272,7 @@ def _vertices(C: NDArray[np.float64], d: NDArray[np.float64], tolerance: float) 
 def selection_systems(
     S: NDArray[np.float64], g: NDArray[np.float64], F: NDArray[np.float64], codes: NDArray[np.int8]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Linear systems M lambda = b of condensed selections (theory, section 2, with w = g - S lambda).
+    """Linear systems M lambda = b of condensed selections (theory, section 2.3).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""All solutions of selections at one exact alpha, rational or irrational (theory, sections 2, 6 and 7)."""
+"""All solutions of selections at one exact alpha, rational or irrational (theory, section 7.4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Vertices of the polytopes of roots of a singular selection, in any exact ordered field (theory, section 6).
+"""Vertices of the polytopes of roots of a singular selection, in any exact ordered field (theory, section 2.4).
 
 A field comes as a function that brings a table of its elements to reduced row echelon form.
 """

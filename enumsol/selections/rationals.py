@@ -1,7 +1,8 @@
-"""Selections solved in rational arithmetic: the given data read as exact rationals (theory, section 6)."""
+"""Selections solved in rational arithmetic: the given data read as exact rationals (theory, section 6.5)."""
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.selections.polytopes import Form, Point, Table
+
+
+def _outward(number: Any) -> tuple[float, float]:
+    """The floats next below and above a rational; the same one twice if it is a float."""
+    exact = Fraction(int(number.p), int(number.q))
+    near = float(exact)
+    if near == exact:
+        return near, near
+    return math.nextafter(near, -math.inf), math.nextafter(near, math.inf)
 
 
 class ExactSelections:
@@ -213,3 +223,12 @@ class ExactSelections:
     def displacements(self, point: Point) -> NDArray[np.float64]:
         """w = g - S lambda as floats, rounded once."""
         return np.array([self.as_float(v) for v in self._w(point)])
+
+    def slip_signs(self, point: Point) -> tuple[int, ...]:
+        """Signs of w_t, exactly."""
+        return tuple((v > 0) - (v < 0) for v in self._w(point)[self.p :])
+
+    def bounds(self, point: Point) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Floats below and above (lambda, w), two arrays of shape (4p,), equal where a value is a float."""
+        pairs = [_outward(v) for v in (*point, *self._w(point))]
+        return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])

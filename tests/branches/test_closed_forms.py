@@ -1,4 +1,4 @@
-"""Examples 6.1 to 6.3 and all one-node problems against their closed form (paper_examples.md)."""
+"""The paper's Examples 6.1 to 6.3 and all one-node problems against their closed form."""
 
 from fractions import Fraction
 

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from oracles import exact_solutions
 from proof_tools import copied, multipliers, proof_of, records_of, with_multipliers
+from rational_checker import check_records
 
 from enumsol import ContactProblem, branch_graph, gallery, verify
 
@@ -75,7 +76,8 @@ def _mutate_values(draw, record):
 def _mutate_header(draw, record):
     if "interval" in record:
         place = draw(st.integers(0, 1))
-        record["interval"][place] = str(Fraction(record["interval"][place]) + draw(st.sampled_from((-1, 1))) / 4)
+        shift = Fraction(draw(st.sampled_from((-1, 1))), 4)
+        record["interval"][place] = str(Fraction(record["interval"][place]) + shift)
     elif "piece" in record:
         key = draw(st.sampled_from(("piece", "force", "length", "roots")))
         place = draw(st.integers(0, len(record[key]) - 1))
@@ -144,6 +146,7 @@ def test_accepted_mutants_name_every_selection_that_holds(name):
             assert report.failures
             return
         accepted.append(records != original)
+        assert check_records(problem, records) == report.selections
         a, b = report.interval
         for alpha, codes in holding.items():
             if a <= alpha <= b:

@@ -11,6 +11,7 @@ from generators import integer_problem
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from proof_tools import Judge, bytes_of, copied, multipliers, proof_of, records_of, with_multipliers
+from rational_checker import check_records
 
 from enumsol import Proof, ProofFormatError, enumerate_roots, gallery, verify
 
@@ -108,6 +109,7 @@ def test_an_accepted_mutant_is_still_a_proof(name, data):
     assert report.ok == (not report.failures)
     if report.ok and report.data == "problem":
         assert Judge(problem).valid(changed)
+        assert check_records(problem, changed) == changed[-1]
     elif report.ok:
         # certified are S and g as computed, which the exact judge does not know; nothing else may have changed
         assert changed[0]["data"] == "condensed"

@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 from enumsol import Proof, gallery, read_problem, verify, write_problem
 from enumsol.cli import main
 from enumsol.cli.app import app
+from enumsol.relaxation.active_set import ActiveSetEngine
 
 A = np.array([[2.0, -0.5, 0.0, 0.0], [-0.5, 2.0, -0.5, 0.0], [0.0, -0.5, 2.0, -0.5], [0.0, 0.0, -0.5, 2.0]])
 DENSE = {"A": A, "Bn": np.eye(4)[[0, 2]], "Bt": np.eye(4)[[1, 3]], "f": np.array([1.0, -2.0, 0.5, 1.0])}
@@ -267,15 +268,15 @@ def test_bad_problems_get_one_sentence(capsys, tmp_path, case):
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (("roots", "gallery:chain-2", "--alpha", "nan"), "alpha is nan; expected a finite real number"),
-        (("roots", "gallery:chain-2", "--alpha", "inf"), "alpha is inf; expected a finite real number"),
-        (("roots", "gallery:chain-2", "--alpha", "1e999"), "alpha is inf; expected a finite real number"),
+        (("roots", "gallery:chain-2", "--alpha", "nan"), "--alpha is 'nan'; expected a finite real number"),
+        (("roots", "gallery:chain-2", "--alpha", "inf"), "--alpha is 'inf'; expected a finite real number"),
+        (("roots", "gallery:chain-2", "--alpha", "1e999"), "--alpha is '1e999'; expected a finite real number"),
         (
             ("roots", "gallery:chain-2", "--alpha", "five"),
-            "alpha is 'five'; expected a number such as 2.5 or a fraction",
+            "--alpha is 'five'; expected a finite real number such as 2.5 or a fraction such as 8/3",
         ),
-        (("roots", "gallery:chain-2", "--alpha", "1/0"), "alpha is '1/0'; expected a number"),
-        (("roots", "gallery:chain-2", "--alpha", "1/2/3"), "alpha is '1/2/3'; expected a number"),
+        (("roots", "gallery:chain-2", "--alpha", "1/0"), "--alpha is '1/0'; expected a finite real number"),
+        (("roots", "gallery:chain-2", "--alpha", "1/2/3"), "--alpha is '1/2/3'; expected a finite real number"),
         (("roots", "gallery:chain-2", "--alpha", "1" + 400 * "0" + "/3"), "expected a finite real number"),
         (
             ("roots", "gallery:chain-2", "--alpha", "-1"),
@@ -338,11 +339,12 @@ def test_every_bad_input_is_status_2_of_the_process_too(tmp_path):
 
 @pytest.mark.filterwarnings("default")
 def test_warnings_are_lines_without_source_code(capsys, monkeypatch):
-    def failing(*_args):
-        raise ImportError
+    class Missing(ActiveSetEngine):
+        def __init__(self, *_args):
+            raise ImportError
 
     # an installation without the compiled engine
-    monkeypatch.setattr("enumsol.search.tree.ActiveSetEngine", failing)
+    monkeypatch.setattr("enumsol.search.tree.ActiveSetEngine", Missing)
     status, out, err = run(capsys, "roots", "gallery:one-node-6.1", "--alpha", 5, "--arithmetic", "fast")
     assert status == 0
     assert "3 roots" in out

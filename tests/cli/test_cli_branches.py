@@ -191,7 +191,7 @@ TABLE = ("table", "gallery:one-node-6.1")
         ((*TABLE, "--from", 1), "expected --from and --to, or --alphas"),
         ((*TABLE, "--from", 5, "--to", 1), "--from is 5 and --to is 1; expected the first below the second"),
         ((*TABLE, "--from", 1, "--to", 5, "--alphas", "1"), "--alphas and --from or --to are both given"),
-        ((*TABLE, "--alphas", "1,two"), "alpha is 'two'"),
+        ((*TABLE, "--alphas", "1,two"), "--alphas[1] is 'two'"),
         ((*TABLE, "--alphas", "1,-1"), "friction at alpha = -1 is -1 at contact node 0"),
         ((*TABLE, "--from", 0, "--to", 1, "--samples", 1), "'--samples'"),
         ((*TABLE, "--from", 0, "--to", 1, "--csv", "-", "--json", "-"), "--json and --csv are both -"),

@@ -8,14 +8,14 @@ import pandas as pd
 import pytest
 from cli.test_cli import assert_refused, on_terminal, run
 
-from enumsol import gallery, write_problem
+from enumsol import Interrupted, branch_graph, gallery, write_problem
 
 FOLLOW = ("follow", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--start", 5)
 
 
 @pytest.fixture
 def points(capsys, tmp_path):
-    """All branches of Example 6.1, followed."""
+    """All branches of the paper's Example 6.1, followed."""
     file = tmp_path / "points.csv"
     assert run(capsys, *FOLLOW, "--csv", file)[0] == 0
     return file
@@ -206,6 +206,26 @@ def test_audit_reads_stdin(points):
     assert ": ok, complete" in done.stdout
 
 
+def test_audit_reads_points_before_it_searches(capsys, tmp_path, monkeypatch):
+    file = tmp_path / "bad.csv"
+    file.write_text("alpha,lambda_n_0\n1,2\n2,2\n")
+    monkeypatch.setattr("enumsol.cli.audit.build", lambda *_, **__: pytest.fail("the graph was built"))
+    assert_refused(*run(capsys, "audit", "gallery:one-node-6.1", file), "no column 'lambda_t_0'")
+
+
+def test_ctrl_c_audits_what_was_found(capsys, points, monkeypatch):
+    body = gallery.get("one-node-6.1").build()
+    partial = branch_graph(body, (0.0, 20.0), max_nodes=3)
+
+    def interrupted(*_, **__):
+        raise Interrupted("interrupted", partial)
+
+    monkeypatch.setattr("enumsol.cli.audit.build", interrupted)
+    status, out, _ = run(capsys, "audit", "gallery:one-node-6.1", points)
+    assert status == 130
+    assert "but the graph is not complete: stopped" in out
+
+
 # -- bad input ---------------------------------------------------------------------------------------------------------
 
 
@@ -216,7 +236,7 @@ def test_audit_reads_stdin(points):
         (("--root", 3), "--root is 3; expected a number below 3, the number of roots at alpha = 5"),
         (("--tangent", 0), "--tangent is given without --root or --direction"),
         (("--root", 0, "--direction", "+1", "--tangent", 9), "tangent is 9; expected an index below 2"),
-        (("--h-max", -1), "options.h_init"),
+        (("--h-max", -1), "options.h_max is -1.0; expected a finite number > 0"),
         (("--h-min", 3), "options.h_init is 0.05"),
         (("--eps", 0), "options.eps is 0.0"),
         (("--graph", "graph.json"), "--graph is given without --plot"),
@@ -237,7 +257,7 @@ def test_bad_follow_calls_get_one_sentence(capsys, tmp_path, monkeypatch, option
     [
         (25, "one-node-6.1", "--start is 25; expected an alpha between 0 and 20"),
         (2, "one-node-6.3", "there is no isolated root at alpha = 2 (complete: yes (proven))"),
-        ("two", "one-node-6.3", "alpha is 'two'"),
+        ("two", "one-node-6.3", "--start is 'two'"),
     ],
 )
 def test_bad_starts(capsys, alpha, name, part):

@@ -1,5 +1,6 @@
 from dataclasses import dataclass, field
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -7,6 +8,7 @@ import pytest
 import enumsol
 from enumsol import gallery
 from enumsol.continuation import ContinuationOptions, audit, follow, follow_all, follow_arc, newton
+from enumsol.continuation.graph_map import GraphMap
 
 enumerate_roots = partial(enumsol.enumerate_roots, arithmetic="fast")
 
@@ -46,13 +48,15 @@ class Branch:
 
 @dataclass
 class Graph:
-    """Example 6.1 in closed form, sharing nothing with the package but the problem."""
+    """The paper's Example 6.1 in closed form, sharing nothing with the package but the problem."""
 
     problem: object
     interval: tuple = (0.0, 20.0)
     arcs: tuple = field(init=False)
     vertices: tuple = field(init=False)
     branches: tuple = field(init=False)
+    complete: bool = True
+    reasons: tuple = ()
 
     def __post_init__(self):
         fold = 8 / 3
@@ -156,6 +160,12 @@ def test_bad_arguments(graph, path, source, message):
         audit(given, graph)
 
 
+def test_a_graph_that_does_not_say_whether_it_is_complete_is_refused(graph, path):
+    parts = {name: getattr(graph, name) for name in ("problem", "interval", "arcs", "vertices", "branches", "complete")}
+    with pytest.raises(enumsol.InvalidArgumentError, match="graph is a SimpleNamespace, which has no reasons"):
+        audit(path, SimpleNamespace(**parts))
+
+
 class TestBranchGraph:
     """Against the exact branch graphs."""
 
@@ -194,6 +204,30 @@ class TestBranchGraph:
         result = follow_all(problem, (0.0, 20.0), graph=graph)
         assert result.complete
 
+    @pytest.mark.parametrize("nodes", [1, 2, 3])
+    def test_distances_from_sheets(self, branch_graph, nodes):
+        """Nodes at which slip is singular for F = 2, and one that is not: polytopes of up to two dimensions."""
+        slopes = [[1.0, -2.0], [1.0, 0.5], [2.0, -4.0]][:nodes]
+        load = [0.0, 0.0, 1.0, -1.0, 0.0, 0.0][: 2 * nodes]
+        A, rows = np.kron(np.eye(nodes), [[2.0, -1.0], [-1.0, 2.0]]), np.eye(2 * nodes)
+        problem = enumsol.ContactProblem(A, rows[0::2], rows[1::2], load, friction=2.0, load_slope=np.ravel(slopes))
+        graph = branch_graph(problem, (0.25, 2.0), "exact")
+        assert max(arc.dimension for arc in graph.sheets) == (2 if nodes == 3 else 1)
+        chart, rng = GraphMap(graph, 1e-5), np.random.default_rng(nodes)
+        for sheet in graph.sheets:
+            for alpha in rng.uniform(sheet.lo, sheet.hi, 4):
+                polytopes = [part for family in graph.roots_at(float(alpha)).families for part in family.polytopes]
+                for part in polytopes:
+                    inside = np.tensordot(rng.dirichlet(np.ones(len(part.vertices))), part.vertices, 1)
+                    for size in (0.0, 0.02, 0.5):
+                        point = inside + size * rng.normal(size=inside.shape) * chart.equation.force.reshape(2, -1).T
+                        x = chart.point(alpha, point[:, 0], point[:, 1])
+                        found = min(chart.arc_distance(x, arc) for arc in graph.sheets if arc.lo <= alpha <= arc.hi)
+                        assert found == pytest.approx(
+                            min(hull_distance(chart, alpha, x, p) for p in polytopes), abs=1e-7
+                        )
+                        assert found < 1e-8 or size
+
     def test_every_arc_at_a_bifurcation_can_be_taken(self, branch_graph):
         problem = gallery.get("chain-2").build()
         graph = branch_graph(problem, (0.0, 6.0))
@@ -205,3 +239,19 @@ class TestBranchGraph:
                 assert path.alpha[0] == pytest.approx(8 / 3)
         with pytest.raises(enumsol.InvalidArgumentError, match="not an arc"):
             follow_arc(problem, graph, vertex.number, 10_000)
+
+
+def hull_distance(chart, alpha, x, polytope):
+    """Distance from the vertices' convex combinations by a general method."""
+    from scipy.optimize import LinearConstraint, minimize
+
+    corners = np.array([chart.point(alpha, corner[:, 0], corner[:, 1]) for corner in polytope.vertices])
+    count = len(corners)
+    done = minimize(
+        lambda share: chart.equation.norm(share @ corners - x) ** 2,
+        np.full(count, 1 / count),
+        bounds=[(0, 1)] * count,
+        constraints=[LinearConstraint(np.ones(count), 1, 1)],
+        options={"ftol": 1e-18, "maxiter": 1000},
+    )
+    return chart.equation.norm(done.x @ corners - x)

@@ -59,7 +59,7 @@ def test_a_root_reports_it(random_problems):
 
 
 def test_transition_between_equal_signs_has_a_branch():
-    # example 6.2: stick to slip+ at alpha = 14/3
+    # paper, Example 6.2: stick to slip+ at alpha = 14/3
     problem = enumsol.ContactProblem([[2, -1], [-1, 2]], [[1, 0]], [[0, 1]], [1.0, 3.0], friction=3.0)
     root = next(iter(enumerate_roots(problem, 0.0)))
     assert len(root.active[0]) == 2

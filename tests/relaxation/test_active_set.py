@@ -30,7 +30,7 @@ def rows_of(codes, F, nodes=None):
 
 
 def dense_rows(system):
-    """Rows n'lambda - b >= 0 written out from their meaning (theory, section 5), in the order of RowKind."""
+    """Rows n'lambda - b >= 0 written out from their meaning (theory, section 5.2), in the order of RowKind."""
     p, S, g, F = system.p, system.S, system.g, system.F
     eye = np.eye(2 * p)
     n, t, wn, wt = eye[:p], eye[p:], -S[:p], -S[p:]
@@ -55,7 +55,7 @@ def reference(system, codes):
 
 
 def proven(system, codes, relaxation):
-    """Lower bound that the multipliers prove, by theory section 6, after checking that they may be used."""
+    """Lower bound that the multipliers prove, by theory, (6.1), after checking that they may be used."""
     normals, offsets = dense_rows(system)
     rows, values = relaxation.multipliers()
     p = system.p

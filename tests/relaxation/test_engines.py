@@ -12,6 +12,9 @@ import enumsol
 from enumsol import gallery
 from enumsol.relaxation import active_set
 from enumsol.relaxation import interior_point as fallback
+from enumsol.search.certifiers.floats import FastCertifier
+from enumsol.search.tree import TreeSearch
+from enumsol.selections.floats import FloatSelections
 
 
 def problems():
@@ -34,6 +37,35 @@ def test_clarabel_gives_the_same(problem, alpha):
     assert not differences(other, own)
     assert other.index_sum == 1
     assert own.stats.fallback_qps == 0
+
+
+def searched(problem, alpha, **options):
+    """Outcome of the fast tree search with an engine that has these options."""
+    system = problem.condensed.at(alpha).scaled
+    certifier = FastCertifier(FloatSelections(system))
+    return TreeSearch(system, certifier, engine=active_set.ActiveSetEngine(system, **options)).run()
+
+
+@pytest.mark.parametrize("candidates", [1, 4, 1000])
+@pytest.mark.parametrize("name", ["wedge-8-5", "clamped-block-8"])
+def test_candidates_change_the_tree_and_not_what_is_found(name, candidates):
+    entry = gallery.get(name)
+    problem = entry.build()
+    want, found = searched(problem, entry.alpha), searched(problem, entry.alpha, candidates=candidates)
+    assert sorted(s.codes for s in found.solutions) == sorted(s.codes for s in want.solutions)
+    assert len(found.solutions) == entry.roots
+
+
+def test_the_energy_is_the_form_that_is_minimised_by_default():
+    entry = gallery.get("wedge-8-5")
+    problem = entry.build()
+    system = problem.condensed.at(entry.alpha).scaled
+    want = searched(problem, entry.alpha)
+    assert searched(problem, entry.alpha, form=(system.S, system.g)).nodes == want.nodes
+    # any multiple of the energy bounds it as well; a small one prunes no sooner
+    slack = searched(problem, entry.alpha, form=(1e-9 * system.S, 1e-9 * system.g))
+    assert slack.nodes > want.nodes
+    assert sorted(s.codes for s in slack.solutions) == sorted(s.codes for s in want.solutions)
 
 
 class Failing:

@@ -130,7 +130,7 @@ def test_grazing_root_lists_all_statuses(arithmetic, method):
 
 @pytest.mark.parametrize(("arithmetic", "method"), METHODS)
 def test_stick_at_the_slip_bound(arithmetic, method):
-    # f = (1.5, 2), alpha = 4/3: theory, section 6: one root, not regular
+    # f = (1.5, 2), alpha = 4/3: theory, section 6.7: one root, not regular
     problem = gallery.one_node_triangle((3.0, 4.0))
     alpha = Fraction(4, 3) if arithmetic == "exact" else 4 / 3
     roots = enumsol.enumerate_roots(problem, alpha, arithmetic, method)

@@ -88,7 +88,7 @@ def test_family_and_isolated_root_apart(arithmetic, method):
 
 @pytest.mark.parametrize(("arithmetic", "method"), METHODS)
 def test_roots_that_touch_a_family_belong_to_it(arithmetic, method):
-    # Example 6.3 ends in open (grazing) and in stick, both regular selections with their own root there
+    # paper, Example 6.3, ends in open (grazing) and in stick, both regular selections with their own root there
     roots = enumsol.enumerate_roots(separate_nodes([(1, -2)], [2]), 0.0, arithmetic, method)
     assert (len(roots), len(roots.families)) == (0, 1)
     assert roots.index_sum == 1

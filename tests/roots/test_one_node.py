@@ -1,4 +1,4 @@
-"""The one-node problem of the paper, in closed form: Examples 6.1-6.3 and the criterion (j), (jj), (jjj)."""
+"""The one-node problem in closed form: the paper's Examples 6.1-6.3 and its criterion (j), (jj), (jjj)."""
 
 from fractions import Fraction
 
@@ -136,7 +136,7 @@ def test_example_6_3_perturbed_has_no_family(arithmetic, method):
 
 @pytest.mark.parametrize("method", ["tree", "exhaustive"])
 def test_sheet_of_families_on_a_loading_path(method):
-    # theory, section 7: F = 2, f = alpha (1, -2): a family at every alpha > 0
+    # theory, section 7.5: F = 2, f = alpha (1, -2): a family at every alpha > 0
     problem = ContactProblem([[2, -1], [-1, 2]], [[1, 0]], [[0, 1]], [0.0, 0.0], friction=2.0, load_slope=[1.0, -2.0])
     for alpha in (Fraction(1, 3), 1, 7.5):
         roots = enumsol.enumerate_roots(problem, alpha, "exact", method)

@@ -1,4 +1,4 @@
-"""Leaves proven empty over a whole piece of the interval in rational arithmetic (theory, sections 6 and 7)."""
+"""Leaves proven empty over a whole piece of the interval in rational arithmetic (theory, section 7.9)."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ExactIntervalCertifier:
     def __init__(self, path: ExactPath) -> None:
         self._path = path
         self._inverse: Any = None
-        self._S = path.S.tolist()
+        self._S = path.rows
         self._bounds: tuple[Piece, tuple[Any, ...], tuple[Any, ...]] | None = None
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:

@@ -1,4 +1,4 @@
-"""The certifier of arithmetic "exact": every conclusion in rationals (theory, section 6)."""
+"""The certifier of arithmetic "exact": every conclusion in rationals (theory, section 6.5)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _FORCE_ROWS = (RowKind.NORMAL_FORCE, RowKind.TANGENTIAL_FORCE, RowKind.CONE_PLUS
 
 
 class ExactCertifier(Silent):
-    """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, section 6)."""
+    """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, (6.1))."""
 
     def __init__(self, selections: ExactSelections, scaled: ScaledSystem) -> None:
         self._selections = selections

@@ -1,0 +1,208 @@
+"""What a branch graph may claim: the one place that knows how far its statements reach (theory, section 7.13).
+
+Arcs and settled vertices of any graph are solutions, whatever cut the search short: each arc is one of regular roots,
+and no two of them meet between their ends. So a graph that is not complete gives lower bounds. A number of solutions,
+uniqueness and a critical alpha need a graph without gaps. Texts, JSON, plots and Python all ask here.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.branches.elements import UNSETTLED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from enumsol.branches.elements import Arc, Vertex
+
+
+class Standing(enum.Enum):
+    """How far the statements of a branch graph reach."""
+
+    PROVEN = "proven"
+    NOT_PROVEN = "not proven"
+    INCOMPLETE = "incomplete"
+
+
+@dataclass(frozen=True)
+class Multiplicity:
+    """A number of solutions (isolated roots and families together), or a lower bound of it.
+
+    Attributes
+    ----------
+    count : int
+    exact : bool
+        ``count`` is the number; otherwise there are at least so many.
+    """
+
+    count: int
+    exact: bool
+
+    def __str__(self) -> str:
+        return str(self.count) if self.exact else f"at least {self.count}"
+
+
+@dataclass(frozen=True)
+class MultiplicitySteps:
+    """The number of solutions as a step function of alpha, or a lower bound of it.
+
+    Attributes
+    ----------
+    alphas : tuple of Fraction
+        Critical alphas, rounded to floats, in order.
+    at : tuple of int
+        Values at the critical alphas.
+    between : tuple of int
+        Values on the open intervals between them (one fewer).
+    exact : bool
+        Whether these are the numbers of solutions and not lower bounds.
+    """
+
+    alphas: tuple[Fraction, ...]
+    at: tuple[int, ...]
+    between: tuple[int, ...]
+    exact: bool
+
+
+@dataclass(frozen=True)
+class Uniqueness:
+    """Up to which alpha the solution is unique.
+
+    Attributes
+    ----------
+    known : bool
+        False for a graph with gaps: then only ``several_by`` is a statement.
+    throughout : bool or None
+        One solution at every alpha of the interval; None when that is not known.
+    limit : float or None
+        The alpha up to which the solution is unique, from the interval's first alpha on; None when it is unique
+        throughout, and when that is not known.
+    several_by : float or None
+        An alpha at which, or right behind which, there are several solutions: the limit is not beyond it. None when no
+        second solution was found.
+    """
+
+    known: bool
+    throughout: bool | None
+    limit: float | None
+    several_by: float | None
+
+
+class Claims:
+    """What the arcs and vertices that were found prove.
+
+    Parameters
+    ----------
+    vertices : sequence of Vertex, in the order of alpha
+    arcs : sequence of Arc
+    interval : (float, float)
+    standing : Standing
+    """
+
+    def __init__(
+        self, vertices: Sequence[Vertex], arcs: Sequence[Arc], interval: tuple[float, float], standing: Standing
+    ) -> None:
+        self._vertices, self._arcs, self._interval = vertices, arcs, interval
+        self.standing = standing
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is known to be missing, so that numbers are numbers and not lower bounds."""
+        return self.standing is not Standing.INCOMPLETE
+
+    def multiplicity(self, arcs: Sequence[Arc], vertices: Sequence[Vertex]) -> Multiplicity:
+        """Number of solutions at one alpha, given the arcs over it and the vertices at it.
+
+        In a graph with gaps, solutions that a continuum not found may join are counted as one.
+        """
+        if self.whole:
+            return Multiplicity(len(arcs) + len(vertices), exact=True)
+        apart = sum(not arc.grazing for arc in arcs) + sum(v.kind != UNSETTLED for v in vertices)
+        joinable = any(arc.grazing for arc in arcs) or any(v.kind == UNSETTLED for v in vertices)
+        return Multiplicity(apart + int(joinable), exact=False)
+
+    def steps(self) -> MultiplicitySteps:
+        """The number of solutions over the whole interval, or its lower bound."""
+        groups: list[list[Vertex]] = []
+        for v in self._vertices:
+            if groups and groups[-1][0].exact.compare(v.exact) == 0:
+                groups[-1].append(v)
+            else:
+                groups.append([v])
+        place = {v.number: k for k, group in enumerate(groups) for v in group}
+        apart, joinable = _Cover(len(groups)), _Cover(len(groups))
+        for arc in self._arcs:
+            cover = apart if self.whole or not arc.grazing else joinable
+            cover.add(place[arc.tail], place[arc.head])
+        at = []
+        for group, over, joined in zip(groups, apart.at(), joinable.at(), strict=True):
+            settled = sum(self.whole or v.kind != UNSETTLED for v in group)
+            at.append(over + settled + int(joined > 0 or settled < len(group)))
+        between = [n + int(m > 0) for n, m in zip(apart.between(), joinable.between(), strict=True)]
+        alphas = tuple(Fraction(group[0].alpha) for group in groups)
+        return MultiplicitySteps(alphas, tuple(at), tuple(between), self.whole)
+
+    def uniqueness(self) -> Uniqueness:
+        """Up to which alpha the solution is unique, or what is known about it."""
+        steps = self.steps()
+        continua = {v.alpha for v in self._vertices if v.family is not None}
+        several = None
+        for k, (alpha, number) in enumerate(zip(steps.alphas, steps.at, strict=True)):
+            behind = steps.between[k] if k < len(steps.between) else 1
+            if max(number, behind) > 1 or float(alpha) in continua:
+                several = float(alpha)
+                break
+        if not self.whole:
+            return Uniqueness(known=False, throughout=None, limit=None, several_by=several)
+        return Uniqueness(known=True, throughout=several is None, limit=several, several_by=several)
+
+    def sentences(self, bound: float | None) -> list[str]:
+        """What a user asks first, as lines of text.
+
+        Parameters
+        ----------
+        bound : float or None
+            An alpha up to which uniqueness follows without any search.
+        """
+        found = self.uniqueness()
+        if not found.known and found.several_by is None:
+            line = "no second solution was found; whether there is one is not known"
+        elif not found.known:
+            line = f"several solutions at or right above alpha = {found.several_by:.8g}; where they begin is not known"
+        elif found.limit is None:
+            line = "one solution throughout"
+        elif found.limit > self._interval[0]:
+            line = f"one solution below alpha = {found.limit:.8g}"
+        else:
+            line = "several solutions from the first alpha on"
+        if self.standing is Standing.NOT_PROVEN:
+            line += ", not proven"
+        lines = [line]
+        if bound is not None:
+            lines.append(f"without any search, a bound evaluated in floats gives one solution up to {bound:.8g}")
+        return lines
+
+
+class _Cover:
+    """How many of some arcs pass over every critical alpha, and over every interval between two of them."""
+
+    def __init__(self, count: int) -> None:
+        self._through, self._beside = np.zeros((2, count + 1), dtype=int)
+
+    def add(self, tail: int, head: int) -> None:
+        self._beside[tail] += 1
+        self._beside[head] -= 1
+        self._through[tail + 1] += 1
+        self._through[head] -= 1
+
+    def at(self) -> list[int]:
+        return [int(n) for n in np.cumsum(self._through)[:-1]]
+
+    def between(self) -> list[int]:
+        return [int(n) for n in np.cumsum(self._beside)[:-2]]

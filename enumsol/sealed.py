@@ -1,0 +1,121 @@
+"""Data that cannot change: arrays in memory that nobody may write to, and objects whose attributes stay as they are.
+
+A proof, a fingerprint and everything computed once and kept belong to the data they were made of. So what a problem or
+a result holds is copied when it is made, and sealed: writing to it raises, and write access cannot be taken back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+import scipy.sparse as sp
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+
+def sealed(array: NDArray[Any]) -> NDArray[Any]:
+    """The array as a read-only copy for good; one that is sealed already comes back as it is.
+
+    The copy lives in a bytes object, which Python lets nobody write to: ``setflags(write=True)`` is refused.
+    """
+    if _is_sealed(array):
+        return array
+    order: Literal["C", "F"] = "F" if array.flags.f_contiguous and not array.flags.c_contiguous else "C"
+    return np.ndarray(array.shape, array.dtype, buffer=array.tobytes(order), order=order)
+
+
+def _is_sealed(array: NDArray[Any]) -> bool:
+    base: Any = array
+    while isinstance(base, np.ndarray):
+        base = base.base
+    return isinstance(base, bytes)
+
+
+def _sealed_within(value: Any) -> Any:
+    """Arrays and those in tuples sealed; anything else as it is."""
+    if isinstance(value, np.ndarray):
+        return value if value.dtype.hasobject else sealed(value)
+    if type(value) is tuple and any(isinstance(item, np.ndarray) for item in value):
+        return tuple(_sealed_within(item) for item in value)
+    return value
+
+
+class Sealed:
+    """Base of frozen dataclasses: their arrays are sealed, also those of copies and of what was pickled."""
+
+    def __post_init__(self) -> None:
+        self.__setstate__(self.__dict__)
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        # a frozen dataclass refuses setattr; arrays come out of a pickle writable
+        self.__dict__.update({name: _sealed_within(value) for name, value in state.items()})
+
+
+class Immutable:
+    """Base of classes whose attributes are set in ``__init__``, which ends with ``self._freeze()``."""
+
+    #: What to do instead of setting an attribute, for the message.
+    _instead: ClassVar[str] = "make a new one"
+
+    def _freeze(self) -> None:
+        self.__dict__["_frozen"] = True
+
+    def __setattr__(self, name: str, value: object) -> None:
+        self._refuse(name, "set")
+        super().__setattr__(name, value)
+
+    def __delattr__(self, name: str) -> None:
+        self._refuse(name, "deleted")
+        super().__delattr__(name)
+
+    def _refuse(self, name: str, done: str) -> None:
+        if "_frozen" in self.__dict__:
+            raise AttributeError(f"{type(self).__name__} is immutable: {name} cannot be {done}; {self._instead}")
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        self.__dict__.update({name: _sealed_within(value) for name, value in state.items()})
+
+
+@dataclass(frozen=True, eq=False)
+class SealedMatrix(Sealed):
+    """A sparse matrix whose parts are sealed.
+
+    scipy's matrices let anyone replace their parts (``matrix.data = other``). So this keeps the parts, and every
+    ``matrix()`` is a new object on them, made without copying: what is done to one object reaches no other.
+
+    Attributes
+    ----------
+    layout : {"csc", "csr"}
+    data, indices, indptr : arrays
+        Of scipy.sparse; indices sorted, without duplicates.
+    shape : (int, int)
+    """
+
+    layout: str
+    data: NDArray[np.float64]
+    indices: NDArray[np.int_]
+    indptr: NDArray[np.int_]
+    shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, matrix: sp.csc_array | sp.csr_array) -> SealedMatrix:
+        """A copy of a matrix; one that ``matrix()`` gave shares its parts."""
+        if not matrix.has_canonical_format:
+            matrix = matrix.copy()
+            matrix.sum_duplicates()
+        # with indices of the type that scipy would give them again at every access
+        again = type(matrix)((matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape, copy=False)
+        return cls(again.format, again.data, again.indices, again.indptr, again.shape)
+
+    def matrix(self) -> Any:
+        """A csc_array or csr_array of the sealed parts."""
+        kind = sp.csc_array if self.layout == "csc" else sp.csr_array
+        matrix = kind((self.data, self.indices, self.indptr), shape=self.shape, copy=False)
+        # known, and so not looked for again in every new object
+        matrix.has_canonical_format = True
+        return matrix

@@ -1,0 +1,32 @@
+"""The tree search with an engine of one's own, put together from the parts that ``enumerate_roots`` uses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from enumsol.proof.proof_file import ProofWriter
+from enumsol.search.solvers import Solvers
+from enumsol.search.tree import SearchLimits, TreeSearch
+from enumsol.selections.floats import SIGN_TOLERANCE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from enumsol import ContactProblem
+    from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.relaxation.engine import Engine
+    from enumsol.search.tree import SearchOutcome
+
+
+def search(
+    problem: ContactProblem,
+    alpha: float,
+    make_engine: Callable[[ScaledSystem], Engine],
+    arithmetic: str = "fast",
+    max_nodes: int | None = None,
+) -> SearchOutcome:
+    """What the search finds: ``solutions``, ``nodes``, ``qps``, ``stopped`` and so on; no roots are made of it."""
+    solvers = Solvers(problem, alpha, arithmetic, SIGN_TOLERANCE)
+    certifier = solvers.certifier(ProofWriter() if arithmetic == "verified" else None)
+    engine = make_engine(solvers.scaled)
+    return TreeSearch(solvers.scaled, certifier, engine=engine, limits=SearchLimits(max_nodes=max_nodes)).run()

@@ -1,0 +1,380 @@
+"""docs/proof_format.md suffices: a checker written from it alone accepts proofs of small problems, and no forgery."""
+
+import ast
+import functools
+import json
+from fractions import Fraction
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rational_checker
+from generators import integer_problem, random_problem, singular_problem, through_the_unloaded_state
+from proof_tools import MAGIC, bytes_of, copied, leaves_of, multipliers, proof_of, records_of, sealed, with_multipliers
+from rational_checker import Refused, check, check_records, fingerprint
+
+from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "proof_format.md"
+
+
+def triangle(**data):
+    body = gallery.one_node_triangle()
+    return ContactProblem(body.A, body.Bn, body.Bt, data.pop("f", body.f), **data)
+
+
+def three_with_everything():
+    """Gap, press fit, slip offset, a node without friction, load and friction that vary."""
+    block = gallery.clamped_block(3, 1)
+    rng = np.random.default_rng(5)
+    path = {"friction": ([0.0, 0.2, 0.3], [0.0, 0.5, 1.0]), "load_slope": 0.1 * rng.normal(size=block.n)}
+    return ContactProblem(block.A, block.Bn, block.Bt, block.f, [1e-3, -2e-3, 0.0], slip_offset=1e-3, **path)
+
+
+POINTS = {
+    "one-node-6.1": lambda: (gallery.get("one-node-6.1").build(), 5.0),
+    "fold": lambda: (gallery.get("one-node-6.1").build(), 8 / 3),
+    "near a fold": lambda: (gallery.get("one-node-6.1").build(), 8 / 3 - 1e-10),
+    "exact fold": lambda: (gallery.get("one-node-6.1").build(), Fraction(8, 3)),
+    "family": lambda: (gallery.get("one-node-6.3").build(), 2.0),
+    "five roots": lambda: (gallery.get("two-node-6.4").build(), 3.5),
+    "27 roots": lambda: (gallery.chain(3), 5.0),
+    "unloaded": lambda: (triangle(f=[0.0, 0.0]), 5.0),
+    "unloaded at 3": lambda: (triangle(f=[-3.0, 6.0], load_slope=[1.0, -2.0], friction=2.0), 3.0),
+    "frictionless": lambda: (triangle(friction=0.0), 1.0),
+    "everything": lambda: (three_with_everything(), Fraction(7, 3)),
+    "all statuses": lambda: (integer_problem(np.random.default_rng(20), 2), 0.0),
+}
+GRAPHS = {
+    "friction": lambda: (gallery.get("two-node-6.4").build(), (0.0, 6.0)),
+    "load": lambda: (gallery.get("two-node-6.7-minus").build(), (-3.0, 3.0)),
+    "both": lambda: (triangle(f=[1.0, -2.5], load_slope=[0.2, -0.5], friction=(0.5, 0.7)), (0.0, 6.0)),
+    "unloaded": through_the_unloaded_state,
+    "frictionless": lambda: (triangle(load_slope=[-1.0, 0.5], friction=0.0), (0.0, 4.0)),
+    "everything": lambda: (three_with_everything(), (0.0, 3.0)),
+}
+
+
+@functools.cache
+def point(name):
+    """Problem, records and enumeration."""
+    problem, alpha = POINTS[name]()
+    roots = enumerate_roots(problem, alpha)
+    assert roots.complete
+    return problem, records_of(roots.proof), roots
+
+
+@functools.cache
+def graph(name):
+    problem, interval = GRAPHS[name]()
+    made = branch_graph(problem, interval)
+    assert made.complete
+    return problem, records_of(made.proof), made
+
+
+def accepted(problem, records):
+    try:
+        check_records(problem, records)
+    except Refused:
+        return False
+    return True
+
+
+def refused(problem, records):
+    """Both checkers refuse."""
+    assert not verify(problem, proof_of(records)).ok
+    return not accepted(problem, records)
+
+
+# -- the checker is another program ------------------------------------------------------------------------------------
+
+
+def test_the_checker_imports_nothing_of_the_package():
+    tree = ast.parse(Path(rational_checker.__file__).read_text(encoding="utf-8"))
+    names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    assert not any(name.startswith("enumsol") for name in names)
+    assert {"flint", "zlib", "json", "struct"} <= names
+
+
+def test_the_document_names_what_the_proofs_hold():
+    text = DOCUMENT.read_text(encoding="utf-8")
+    seen = [record for name in POINTS for record in point(name)[1]] + [r for name in GRAPHS for r in graph(name)[1]]
+    for record in seen:
+        words = record if isinstance(record, dict) else record[:1]
+        assert all(f'"{word}"' in text or f'["{word}"' in text for word in words), words
+
+
+# -- accepted ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", POINTS)
+def test_point_proofs_are_accepted(name):
+    problem, _, roots = point(name)
+    counts = check(problem, bytes_of(roots.proof))
+    assert (counts["roots"], counts["families"], counts["undecided"]) == (len(roots), len(roots.families), 0)
+
+
+def test_every_kind_of_leaf_is_among_them():
+    kinds = {record[0] for name in POINTS for record in point(name)[1][1:-1]}
+    assert kinds == {"b", "x", "r", "n", "N", "D", "z"}
+
+
+@pytest.mark.parametrize("make", [random_problem, integer_problem, singular_problem])
+@pytest.mark.parametrize("p", [1, 2, 3])
+def test_point_proofs_of_random_problems_are_accepted(make, p):
+    for seed in range(6):
+        problem = make(np.random.default_rng([seed, p]), p)
+        roots = enumerate_roots(problem, 0.0)
+        counts = check(problem, bytes_of(roots.proof))
+        assert (counts["roots"], counts["families"]) == (len(roots), len(roots.families))
+        assert counts["undecided"] == 0
+
+
+def test_a_search_cut_short_counts_what_is_undecided():
+    problem = gallery.chain(3)
+    roots = enumerate_roots(problem, 5.0, max_nodes=12)
+    assert check(problem, bytes_of(roots.proof))["undecided"] == len(roots.undecided) > 0
+
+
+@pytest.mark.parametrize("name", ["near a fold", "five roots", "everything"])
+def test_leaves_that_ask_for_rationals(name):
+    problem, records, _ = point(name)
+    changed = [[record[0].upper(), *record[1:]] if record[0] in ("x", "n") else record for record in records[1:-1]]
+    changed = [records[0], *changed, records[-1]]
+    assert changed != records
+    assert accepted(problem, changed)
+    assert verify(problem, proof_of(changed)).complete
+
+
+@pytest.mark.parametrize("name", GRAPHS)
+def test_graph_proofs_are_accepted(name):
+    problem, _, made = graph(name)
+    assert check(problem, bytes_of(made.proof)) == verify(problem, made.proof).selections
+
+
+@pytest.mark.parametrize("name", ["friction", "load", "both", "everything"])
+def test_graph_proofs_in_halves_are_accepted(name):
+    problem, records, _ = graph(name)
+    halves = cut_in_two(records)
+    assert accepted(problem, halves)
+    assert verify(problem, proof_of(halves)).ok
+
+
+def cut_in_two(records):
+    """The proof of one piece as one that leaves its selections to both halves."""
+    header, piece, *leaves, footer = records
+    (a, b), selections = (Fraction(end) for end in piece["piece"]), [leaf for leaf in leaves if leaf[0] == "s"]
+    middle = str((a + b) / 2)
+    changed = [header, piece, *(["c", leaf[1]] if leaf[0] == "s" else leaf for leaf in leaves)]
+    for ends in ([piece["piece"][0], middle], [middle, piece["piece"][1]]):
+        changed += [{**piece, "piece": ends, "roots": [leaf[1] for leaf in selections]}, *selections]
+    return [*changed, {**footer, "pieces": 3}]
+
+
+def test_fingerprints():
+    for name in POINTS:
+        problem = point(name)[0]
+        assert fingerprint(problem) == problem.fingerprint
+    wedge = gallery.wedge(3, 7)
+    assert fingerprint(wedge) == wedge.fingerprint
+
+
+def test_solutions_at_samples_are_among_the_selections_of_a_graph_proof():
+    codes = {"open": 0, "stick": 1, "slip+": 2, "slip-": 3}
+    for name in ("friction", "load", "both"):
+        problem, records, made = graph(name)
+        selections = check_records(problem, records)
+        for alpha in np.random.default_rng(1).uniform(*made.interval, 6):
+            for root in enumerate_roots(problem, float(alpha)):
+                assert set(product(*([codes[s.value] for s in active] for active in root.active))) <= selections
+
+
+def test_the_example_of_the_document_is_a_proof():
+    problem, records, _ = point("one-node-6.1")
+    block = DOCUMENT.read_text(encoding="utf-8").partition("## 9.")[2]
+    text = " ".join(line for line in block.splitlines() if line.startswith("    "))
+    example, decoder = [], json.JSONDecoder()
+    while "{" in text or "[" in text:
+        text = text[min(text.find(bracket) for bracket in "{[" if bracket in text) :]
+        record, end = decoder.raw_decode(text)
+        example.append(record)
+        text = text[end:]
+    example[0]["problem"] = problem.fingerprint
+    assert check_records(problem, example) == records[-1]
+    assert verify(problem, proof_of(example)).complete
+
+
+# -- refused -----------------------------------------------------------------------------------------------------------
+
+
+def of_kind(records, *kinds):
+    return [k for k, record in enumerate(records) if isinstance(record, list) and record[0] in kinds]
+
+
+def replaced(records, k, record):
+    changed = copied(records)
+    changed[k] = record
+    return changed
+
+
+@pytest.mark.parametrize("name", ["one-node-6.1", "five roots", "everything"])
+def test_forged_exclusions(name):
+    problem, records, _ = point(name)
+    roots = of_kind(records, "r")
+    for k in of_kind(records, "x"):
+        rows, values = multipliers(records[k])
+        for some in (
+            ([], []),
+            (rows, [0.0] * len(rows)),
+            (rows, [-1e3 * value for value in values]),
+            (rows, [1e-9 * value for value in values]),
+            ([*rows, 7 * problem.p], [*values, 0.0]),
+        ):
+            assert refused(problem, replaced(records, k, with_multipliers(records[k], *some)))
+        changed = replaced(records, roots[0], records[k])
+        changed[-1]["roots"] -= 1
+        assert refused(problem, changed)
+
+
+@pytest.mark.parametrize("name", ["one-node-6.1", "near a fold", "five roots", "everything"])
+def test_forged_roots(name):
+    problem, records, _ = point(name)
+    for k in of_kind(records, "r"):
+        _, mid, rad, index = records[k]
+        for other in (
+            ["r", [m + 1.0 for m in mid], rad, index],
+            ["r", mid, rad, -index],
+            ["r", mid, [-1.0, *rad[1:]], index],
+            ["r", mid[1:], rad[1:], index],
+            ["n"],
+            ["N"],
+            ["D", [[f"{Fraction(m).numerator:x}/{Fraction(m).denominator:x}".replace("0x", "") for m in mid]], 1],
+        ):
+            changed = replaced(records, k, other)
+            changed[-1]["roots"] -= other[0] in "nN"
+            assert refused(problem, changed)
+    for k in of_kind(records, "n", "N"):
+        changed = replaced(records, k, ["r", [0.0] * (2 * problem.p), [10.0] * (2 * problem.p), 1])
+        changed[-1]["roots"] += 1
+        assert refused(problem, changed)
+
+
+@pytest.mark.parametrize("name", ["family", "all statuses"])
+def test_forged_polytopes(name):
+    problem, records, _ = point(name)
+    for k in of_kind(records, "D"):
+        _, points, dimension = records[k]
+        moved = [["1/3", *points[0][1:]], *points[1:]]
+        for other in (
+            ["D", moved, dimension],
+            ["D", [*points, points[0]], dimension],
+            ["D", points[1:], dimension],
+            ["D", points, dimension + 1],
+            ["N"],
+            ["n"],
+        ):
+            assert refused(problem, replaced(records, k, other))
+
+
+@pytest.mark.parametrize("name", ["one-node-6.1", "five roots", "family", "27 roots", "frictionless"])
+def test_forged_trees_and_counts(name):
+    problem, records, _ = point(name)
+    for k, _ in leaves_of(records)[:6]:
+        changed = copied(records)
+        changed[-1]["leaves"] -= 1
+        assert refused(problem, changed[:k] + changed[k + 1 :])
+    for k in of_kind(records, "b")[:6]:
+        _, node, children = records[k]
+        for other in (children[:-1], [*children[:-1], children[0]], [0, 5, 4], [1, 2], []):
+            assert refused(problem, replaced(records, k, ["b", node, other]))
+        assert refused(problem, replaced(records, k, ["b", node + problem.p, children]))
+    for key in records[-1]:
+        assert refused(problem, replaced(records, -1, {**records[-1], key: records[-1][key] + 1}))
+    assert refused(problem, [*records, records[-1]])
+    assert refused(problem, records[:-1])
+
+
+def test_a_loaded_body_is_not_unloaded():
+    problem, records, _ = point("one-node-6.1")
+    assert refused(problem, [records[0], ["z"], {"roots": 1, "families": 0, "undecided": 0, "leaves": 1}])
+
+
+@pytest.mark.parametrize("name", ["one-node-6.1", "five roots"])
+def test_forged_headers(name):
+    problem, records, _ = point(name)
+    header = records[0]
+    for change in (
+        {"version": 2},
+        {"format": "another"},
+        {"problem": "0" * 64},
+        {"p": header["p"] + 1},
+        {"data": "other"},
+        {"alpha": "-1"},
+        {"alpha": "1/0"},
+        {"alpha": 5},
+        {"force": [header["force"][0] + 1, *header["force"][1:]]},
+        {"force": [901] * len(header["force"])},
+    ):
+        assert refused(problem, [{**header, **change}, *records[1:]]), change
+
+
+def test_another_alpha_makes_other_roots():
+    problem, records, _ = point("five roots")
+    assert refused(problem, [{**records[0], "alpha": "9/2"}, *records[1:]])
+
+
+@pytest.mark.parametrize("name", ["friction", "load", "both", "unloaded", "everything"])
+def test_forged_graph_proofs(name):
+    problem, records, _ = graph(name)
+    a, b = records[0]["interval"]
+    assert refused(problem, [{**records[0], "interval": [a, str(Fraction(b) + 1)]}, *records[1:]])
+    pieces = [k for k, record in enumerate(records) if isinstance(record, dict) and "piece" in record]
+    for k in of_kind(records, "x", "s"):
+        assert refused(problem, records[:k] + records[k + 1 :])
+    for k in of_kind(records, "x"):
+        rows, values = multipliers(["x", *records[k][2:]])
+        for some in ((rows, [0.0] * len(rows)), (rows, [-value for value in values])):
+            forged = with_multipliers(["x", "", ""], *some)
+            assert refused(problem, replaced(records, k, ["x", records[k][1], *forged[1:]]))
+    certificate = records[of_kind(records, "x")[0]]
+    for k in of_kind(records, "s"):
+        changed = replaced(records, k, ["x", records[k][1], *certificate[2:]])
+        changed[-1]["leaves"] += 1
+        changed[-1]["selections"] -= 1
+        assert refused(problem, changed)
+    for k in pieces:
+        x, y = records[k]["piece"]
+        assert refused(problem, replaced(records, k, {**records[k], "piece": [x, str(Fraction(y) - 1)]}))
+        assert refused(problem, replaced(records, k, {**records[k], "roots": ["0" * problem.p]}))
+    for key in records[-1]:
+        assert refused(problem, replaced(records, -1, {**records[-1], key: records[-1][key] + 1}))
+
+
+def test_halves_out_of_order_or_missing():
+    problem, records, _ = graph("friction")
+    halves = cut_in_two(records)
+    _, second, third = [k for k, record in enumerate(halves) if isinstance(record, dict) and "piece" in record]
+    head, left, right, footer = halves[:second], halves[second:third], halves[third:-1], halves[-1:]
+    assert accepted(problem, head + left + right + footer)
+    assert refused(problem, head + right + left + footer)
+    assert refused(problem, head + left + [{**footer[0], "pieces": 2}])
+
+
+def test_containers():
+    problem, records, roots = point("one-node-6.1")
+    data = bytes_of(roots.proof)
+    body = data[len(MAGIC) : -32]
+    for forged in (
+        data[:-1],
+        data[:-32] + bytes(32),
+        bytes([data[0] ^ 1]) + data[1:],
+        bytes_of(sealed(body + b"more")),
+        bytes_of(sealed(body[:-3])),
+        bytes_of(proof_of([*records[:-1], json.dumps(records[-1]) + " "], magic=b"enumsol-proof 2\n")),
+        bytes_of(proof_of([records[0], '["r",[NaN,0.0],[Infinity,1.0],1]', *records[2:]])),
+    ):
+        with pytest.raises(Refused):
+            check(problem, forged)
+    assert check(problem, data) == records[-1]

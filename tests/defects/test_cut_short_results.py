@@ -1,0 +1,89 @@
+"""Whatever a result that was cut short prints or returns is true of the complete one (random problems and limits)."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from branches.problems import generic_problem, integer_problem, mirrored_problem
+from defects.cut_short import false_claims_of_graph, false_claims_of_roots
+from generators import integer_problem as integer_data
+from generators import random_problem, singular_problem
+
+from enumsol import branch_graph, enumerate_roots, gallery, multiplicity_table
+from enumsol.branches import BranchGraph
+from enumsol.errors import Interrupted
+
+KINDS = ("friction", "load", "both")
+INTERVAL = (0.0, 3.0)
+
+
+def _problem(rng, seed):
+    if seed % 4 == 3:
+        return mirrored_problem(rng, load=bool(seed % 8 == 3))
+    make = generic_problem if seed % 4 == 0 else integer_problem
+    return make(rng, int(rng.integers(1, 4)), KINDS[seed % 3])
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_graph_cut_short_at_random_claims_nothing_false(seed, tmp_path):
+    rng = np.random.default_rng(7000 + seed)
+    problem = _problem(rng, seed)
+    arithmetic = ("verified", "exact", "fast")[seed % 3]
+    full = branch_graph(problem, INTERVAL, "exact")
+    if full.reasons:
+        pytest.fail(f"the reference is not complete: {full.reasons}")
+    limits = {1, *(int(k) for k in rng.integers(1, max(full.stats.nodes, 3), size=5))}
+    for limit in sorted(limits):
+        graph = branch_graph(problem, INTERVAL, arithmetic, max_nodes=limit)
+        assert list(false_claims_of_graph(graph, full)) == []
+    graph.save(tmp_path / "graph.json")
+    read = BranchGraph.load(tmp_path / "graph.json")
+    assert list(false_claims_of_graph(read, full)) == []
+    assert (read.summary(), repr(read)) == (graph.summary(), repr(graph))
+
+
+@pytest.mark.parametrize("name", ["two-node-6.4", "chain-4", "one-node-6.3", "wedge-8-3"])
+def test_gallery_graphs_cut_short_claim_nothing_false(name):
+    problem = gallery.get(name).build()
+    full = branch_graph(problem, (0.0, 5.0))
+    assert full.complete
+    for limit in np.unique(np.geomspace(1, full.stats.nodes, 8).astype(int)):
+        graph = branch_graph(problem, (0.0, 5.0), max_nodes=int(limit))
+        assert list(false_claims_of_graph(graph, full)) == []
+
+
+@pytest.mark.parametrize("calls", [1, 2, 3])
+def test_a_graph_cut_short_by_an_interruption_claims_nothing_false(calls):
+    problem = gallery.get("wedge-8-3").build()
+    full = branch_graph(problem, (0.0, 5.0))
+    seen = []
+
+    def progress(stage, share):
+        seen.append((stage, share))
+        if stage == "search" and len(seen) == calls:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted) as caught:
+        branch_graph(problem, (0.0, 5.0), progress=progress)
+    assert list(false_claims_of_graph(caught.value.partial, full)) == []
+
+
+def _body(rng, seed):
+    p = int(rng.integers(1, 4))
+    return (random_problem, integer_data, singular_problem)[seed % 3](rng, p)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_search_cut_short_at_random_claims_nothing_false(seed):
+    rng = np.random.default_rng(8000 + seed)
+    problem = _body(rng, seed)
+    full = enumerate_roots(problem, 0.0, "exact")
+    arithmetic = ("verified", "exact")[seed % 2]
+    cuts = [{"max_nodes": int(k)} for k in {1, *rng.integers(1, max(full.stats.nodes, 3), size=4)}]
+    for options in [*cuts, {"stop_after": 1}, {"stop_after": 2}, {"stop_after": 1, "method": "exhaustive"}]:
+        given = {"arithmetic": "exact", **options} if "method" in options else {"arithmetic": arithmetic, **options}
+        roots = enumerate_roots(problem, 0.0, **given)
+        assert list(false_claims_of_roots(roots, full)) == []
+        table = multiplicity_table(problem, [0.0], **given).iloc[0]
+        assert table["roots"] + table["families"] <= len(full) + len(full.families)
+        assert bool(table["complete"]) == (roots.stopped is None)
+        assert table["complete"] != pd.isna(table["index_sum"])

@@ -1,0 +1,197 @@
+"""Part F, line 8: any object as any argument is accepted, or refused by an error of ours in one sentence."""
+
+import numpy as np
+import pytest
+from odd_objects import CALLABLE, ODD
+
+import enumsol
+from enumsol import EnumsolError, fem, gallery
+from enumsol.continuation import follow_arc, start_tangents
+
+POINTS, TRIANGLES = [[0, 0], [1, 0], [0, 1]], [[0, 1, 2]]
+PROBLEM = gallery.one_node_triangle()
+ROOTS = enumsol.enumerate_roots(PROBLEM, 5.0)
+GRAPH = enumsol.branch_graph(PROBLEM, (0, 10))
+PATH = enumsol.follow(PROBLEM, ROOTS[0], interval=(0, 10))
+SHORT = enumsol.ContinuationOptions(max_steps=20)
+SMOOTH = enumsol.SmoothPath(F=lambda alpha: alpha, dF=lambda alpha: 1.0)
+EQUATION = enumsol.PiecewiseSmoothEquation(PROBLEM)
+ARC = GRAPH.arcs[0]
+
+
+def graph_from(alpha):
+    return enumsol.branch_graph(PROBLEM, (alpha, 9), "fast")
+
+
+def graph_to(alpha):
+    return enumsol.branch_graph(PROBLEM, (0, alpha), "fast")
+
+
+def follow_from(alpha=5.0, lambda_n=(0.0,), lambda_t=(0.0,)):
+    return enumsol.follow(PROBLEM, (alpha, lambda_n, lambda_t), 1, (0, 10))
+
+
+def smooth_friction(value):
+    """A path whose friction is whatever the user's function gives."""
+    smooth = enumsol.SmoothPath(F=lambda alpha: value, dF=lambda alpha: 0.0)
+    return enumsol.follow(PROBLEM, ROOTS[0], 1, (0, 10), SHORT, smooth)
+
+
+def smooth_load(value):
+    smooth = enumsol.SmoothPath(f=lambda alpha: value, df=lambda alpha: [0.0, 0.0])
+    return enumsol.follow(PROBLEM, ROOTS[0], 1, (0, 10), SHORT, smooth)
+
+
+#: Functions with arguments that they accept, and the names of those that are replaced.
+CALLS = [
+    (
+        enumsol.ContactProblem,
+        {"A": np.eye(2), "Bn": [[1.0, 0.0]], "Bt": [[0.0, 1.0]], "f": [1.0, 2.0]},
+        "A Bn Bt f gap friction load_slope slip_offset node_ids coordinates",
+    ),
+    (PROBLEM.friction_at, {}, "alpha"),
+    (PROBLEM.load_at, {}, "alpha"),
+    (PROBLEM.is_unloaded, {}, "alpha"),
+    (PROBLEM.condensed.at, {}, "alpha"),
+    (
+        enumsol.enumerate_roots,
+        {"problem": PROBLEM, "alpha": 5.0, "arithmetic": "fast"},
+        "problem alpha arithmetic method executor progress stop_after max_nodes time_limit tolerance engine",
+    ),
+    (enumsol.enumerate_roots, {"problem": PROBLEM, "alpha": 5.0}, "alpha proof_path"),
+    (enumsol.enumerate_roots, {"problem": PROBLEM, "alpha": 5.0, "arithmetic": "exact"}, "alpha"),
+    (
+        enumsol.multiplicity_table,
+        {"problem": PROBLEM, "alphas": [5.0], "arithmetic": "fast"},
+        "problem alphas arithmetic executor progress max_nodes time_limit",
+    ),
+    (enumsol.link_samples, {"problem": PROBLEM, "alphas": [5.0, 6.0]}, "problem alphas arithmetic progress"),
+    (
+        enumsol.branch_graph,
+        {"problem": PROBLEM, "interval": (0, 1)},
+        "problem interval arithmetic progress max_nodes time_limit",
+    ),
+    (graph_from, {}, "alpha"),
+    (graph_to, {}, "alpha"),
+    (GRAPH.roots_at, {}, "alpha"),
+    (GRAPH.multiplicity_at, {}, "alpha"),
+    (GRAPH.arcs_at, {}, "alpha"),
+    (ARC.values, {}, "alpha"),
+    (ARC.displacements, {}, "alpha"),
+    (GRAPH.plot, {}, "quantity nodes samples"),
+    (GRAPH.save, {}, "file"),
+    (enumsol.BranchGraph.load, {}, "file"),
+    (GRAPH.write_graphml, {}, "file"),
+    (
+        enumsol.newton,
+        {"problem": PROBLEM, "alpha": 5.0},
+        "problem alpha start r smooth_path max_iterations",
+    ),
+    (
+        enumsol.follow,
+        {"problem": PROBLEM, "start": ROOTS[0], "interval": (0, 10), "options": SHORT},
+        "problem start direction interval options smooth_path tangent visited",
+    ),
+    (follow_from, {}, "alpha lambda_n lambda_t"),
+    (smooth_friction, {}, "value"),
+    (smooth_load, {}, "value"),
+    (
+        start_tangents,
+        {"problem": PROBLEM, "start": ROOTS[0]},
+        "problem start interval options smooth_path",
+    ),
+    (PATH.resume, {}, "problem interval options smooth_path"),
+    (PATH.save, {}, "path"),
+    (enumsol.Path.load, {}, "path"),
+    (PATH.plot, {}, "node quantity"),
+    (
+        enumsol.follow_all,
+        {"problem": PROBLEM, "interval": (0, 10), "graph": GRAPH},
+        "problem interval options graph progress",
+    ),
+    (
+        follow_arc,
+        {"problem": PROBLEM, "graph": GRAPH, "vertex": 0, "arc": 0},
+        "problem graph vertex arc interval options",
+    ),
+    (enumsol.audit, {"path": PATH, "graph": GRAPH}, "path graph tolerance detour"),
+    (
+        enumsol.ContinuationOptions,
+        {},
+        "eps eps_prime h_min h_max h_init h_inc h_dec k_max k_thr r max_steps alpha_scale transition_tolerance "
+        "check_steps overshoot choose",
+    ),
+    (enumsol.SmoothPath, {"F": abs, "dF": abs}, "F dF f df"),
+    (SMOOTH.problem_at, {"problem": PROBLEM, "alpha": 5.0}, "problem alpha"),
+    (enumsol.local_branch_test, {"problem": PROBLEM, "root": ROOTS[0]}, "problem root"),
+    (enumsol.PiecewiseSmoothEquation, {"problem": PROBLEM}, "problem r"),
+    (EQUATION.residual, {"x": np.zeros(4), "alpha": 5.0}, "x alpha"),
+    (EQUATION.selection_jacobian, {"signs": [[1, 1, 1]], "x": np.zeros(4), "alpha": 5.0}, "signs x alpha"),
+    (enumsol.sign_array, {}, "statuses"),
+    (enumsol.verify, {"problem": PROBLEM, "proof": ROOTS.proof}, "problem proof progress"),
+    (enumsol.Proof.load, {}, "path"),
+    (ROOTS.proof.save, {}, "path"),
+    (enumsol.read_problem, {}, "path"),
+    (enumsol.write_problem, {"problem": PROBLEM, "path": "problem.npz"}, "problem path"),
+    (gallery.get, {}, "name"),
+    (gallery.one_node_triangle, {}, "f lame"),
+    (gallery.two_node_square, {}, "f1 f2 lame friction load_slope"),
+    (gallery.clamped_block, {"nx": 1, "ny": 1}, "nx ny length height lame traction friction gap contact"),
+    (
+        gallery.wedge,
+        {"nx": 1, "ny": 1},
+        "nx ny pull press springs width height half_angle lame friction",
+    ),
+    (gallery.chain, {"p": 1}, "p coupling f lame"),
+    (fem.stiffness, {"points": POINTS, "triangles": TRIANGLES, "lame": (1, 1)}, "points triangles lame"),
+    (fem.triangle_stiffness, {"corners": POINTS, "lame": (1, 1)}, "corners lame"),
+    (fem.edge_forces, {"points": POINTS, "edges": [[0, 1]], "traction": (1, 1)}, "points edges traction"),
+    (fem.body_forces, {"points": POINTS, "triangles": TRIANGLES, "density": (1, 1)}, "points triangles density"),
+    (
+        fem.contact_problem,
+        {
+            "points": POINTS,
+            "triangles": TRIANGLES,
+            "lame": (1, 1),
+            "contact": [0],
+            "normals": (0, -1),
+            "held": [1, 2],
+        },
+        "points triangles lame contact normals tangents held springs forces forces_slope gap friction slip_offset "
+        "node_ids",
+    ),
+    (fem.rectangle, {"nx": 1, "ny": 1}, "nx ny length height"),
+    (fem.trapezoid, {"nx": 1, "ny": 1, "bottom": 1, "top": 1, "height": 1}, "nx ny bottom top height"),
+    (fem.edges_along, {}, "nodes"),
+]
+CASES = [(function, good, name) for function, good, names in CALLS for name in names.split()]
+
+
+@pytest.mark.parametrize(
+    ("function", "good", "name"), CASES, ids=[f"{function.__qualname__}-{name}" for function, _, name in CASES]
+)
+def test_any_object_as_any_argument(tmp_path, monkeypatch, function, good, name):
+    monkeypatch.chdir(tmp_path)  # some of them are names of files
+    accepted = 0
+    for kind, make in ODD.items():
+        if kind in CALLABLE and name in ("progress", "choose"):
+            continue  # what a user's function raises is the user's
+        try:
+            function(**(good | {name: make()}))
+        except EnumsolError as error:
+            message = str(error)
+        else:
+            accepted += 1
+            continue
+        assert "\n" not in message, kind
+        assert not message.endswith("."), kind
+        assert len(message) < 700, kind
+    assert accepted < len(ODD)
+
+
+def test_the_arguments_that_are_replaced_are_accepted_as_given(tmp_path, monkeypatch):
+    """So that nothing above is refused for another reason."""
+    monkeypatch.chdir(tmp_path)
+    for function, good, _ in CALLS:
+        if good:
+            function(**good)

@@ -1,0 +1,330 @@
+"""Part F, line 9: what a problem or a result holds cannot be written to, so that no answer changes behind a proof."""
+
+import copy
+import pickle
+from fractions import Fraction
+
+import networkx as nx
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+import enumsol
+from enumsol import ContactProblem, gallery
+from enumsol.sealed import SealedMatrix, sealed
+
+A = np.array([[2.0, -0.5, 0.0, 0.0], [-0.5, 2.0, -0.5, 0.0], [0.0, -0.5, 2.0, -0.5], [0.0, 0.0, -0.5, 2.0]])
+DATA = {
+    "A": A,
+    "Bn": np.eye(4)[[0, 2]],
+    "Bt": np.eye(4)[[1, 3]],
+    "f": np.array([1.0, -2.0, 0.5, 1.0]),
+    "gap": np.array([0.0, 0.125]),
+    "friction": (np.array([0.25, 0.5]), np.array([0.5, 0.0])),
+    "load_slope": np.array([0.5, 0.25, 0.0, -0.5]),
+    "slip_offset": np.array([0.0, 0.0625]),
+    "coordinates": np.array([[0.0, 0.0], [1.0, 0.0]]),
+}
+MATRICES = ("A", "Bn", "Bt")
+
+
+@pytest.fixture
+def problem():
+    """A problem that has answered, so that everything is in its caches."""
+    made = ContactProblem(**DATA, node_ids=["a", "b"])
+    assert made.fingerprint
+    assert made.condensed.S.shape == made.enclosure.S.shape == (4, 4)
+    assert enumsol.enumerate_roots(made, 1.5).complete
+    return made
+
+
+def answers(problem):
+    roots = enumsol.enumerate_roots(problem, 1.5)
+    assert roots.complete
+    assert enumsol.verify(problem, roots.proof).complete
+    fresh = ContactProblem(
+        *(getattr(problem, name) for name in (*MATRICES, "f")),
+        **{name: getattr(problem, name) for name in ("gap", "friction", "load_slope", "slip_offset")},
+    )
+    # what is cached belongs to what is there
+    assert problem.fingerprint == fresh.fingerprint
+    assert np.array_equal(problem.condensed.S, fresh.condensed.S)
+    assert np.array_equal(problem.enclosure.S, fresh.enclosure.S)
+    return [(root.statuses, root.lambda_n.tolist(), root.lambda_t.tolist(), root.u.tolist()) for root in roots]
+
+
+def assert_locked(array):
+    with pytest.raises(ValueError, match="read-only"):
+        array[...] = 0
+    for locked in (array, array[...], array.view(), array.T):
+        with pytest.raises(ValueError, match="cannot set WRITEABLE"):
+            locked.setflags(write=True)
+    if isinstance(array.base, np.ndarray):
+        assert_locked(array.base)
+
+
+# -- sparse matrices -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("part", ["data", "indices", "indptr"])
+@pytest.mark.parametrize("name", MATRICES)
+def test_replacing_a_part_of_a_matrix_changes_nothing(problem, name, part):
+    before = answers(problem)
+    matrix = getattr(problem, name)
+    setattr(matrix, part, np.zeros_like(getattr(matrix, part)))
+    assert answers(problem) == before
+
+
+@pytest.mark.parametrize("part", ["data", "indices", "indptr"])
+@pytest.mark.parametrize("name", MATRICES)
+def test_writing_into_a_part_of_a_matrix_is_refused(problem, name, part):
+    assert_locked(getattr(getattr(problem, name), part))
+
+
+@pytest.mark.parametrize("name", MATRICES)
+def test_writing_an_entry_of_a_matrix_is_refused_or_changes_nothing(problem, name):
+    before = answers(problem)
+    matrix = getattr(problem, name)
+    rows, columns = matrix.nonzero()
+    with pytest.raises(ValueError, match="read-only"):
+        matrix[rows[0], columns[0]] = 7.0
+    for operation in ("setdiag", "resize", "eliminate_zeros", "sum_duplicates", "sort_indices", "prune"):
+        arguments = {"setdiag": (5.0,), "resize": ((1, 1),)}.get(operation, ())
+        try:
+            getattr(getattr(problem, name), operation)(*arguments)
+        except ValueError as error:
+            assert "read-only" in str(error)  # noqa: PT017 (either is right)
+    assert answers(problem) == before
+
+
+def test_in_place_arithmetic_reaches_no_problem(problem):
+    before = answers(problem)
+    matrix = problem.A
+    with pytest.raises(ValueError, match="read-only"):
+        matrix *= 2.0
+    dense = problem.A.toarray()
+    dense[:] = 0.0
+    copied = problem.A.copy()
+    copied.data[:] = 0.0
+    assert answers(problem) == before
+
+
+def test_matrices_are_made_without_copying_and_work_as_any(problem):
+    assert isinstance(problem.A, sp.csc_array)
+    assert isinstance(problem.Bn, sp.csr_array)
+    assert problem.A is not problem.A
+    assert np.shares_memory(problem.A.data, problem.A.data)
+    assert np.shares_memory(problem.factorization._A.matrix().data, problem.A.data)
+    assert np.array_equal((problem.A @ problem.Bn.T).toarray(), A @ DATA["Bn"].T)
+    assert np.array_equal((problem.A + problem.A.T).toarray(), 2 * A)
+    assert problem.A[0, 0] == 2.0
+
+
+# -- everything else that a problem holds ----------------------------------------------------------------------------
+
+
+def reachable(value, path, seen=None):
+    """Arrays that can be reached by attributes and items, with the way to each."""
+    seen = set() if seen is None else seen
+    if id(value) in seen:
+        return
+    seen.add(id(value))
+    if isinstance(value, np.ndarray):
+        yield path, value
+    elif isinstance(value, (tuple, list, frozenset)):
+        for k, item in enumerate(value):
+            yield from reachable(item, f"{path}[{k}]", seen)
+    elif type(value).__module__.startswith("enumsol."):
+        for name, item in getattr(value, "__dict__", {}).items():
+            if name != "_tangent":  # how to compute the derivative, in floats: its solver is working memory
+                yield from reachable(item, f"{path}.{name}", seen)
+
+
+def test_no_array_of_a_problem_can_be_written(problem):
+    assert len(problem.factorization._pivots) == 4
+    found = dict(reachable(problem, "problem"))
+    for name in ("._A.data", ".f", ".friction[0]", ".coordinates", ".factorization._scale", ".factorization._pivots"):
+        assert f"problem{name}" in found
+    for name in ("S", "g0", "g1"):
+        assert f"problem.condensed.{name}" in found
+    for name in ("S", "S_rad", "g0", "g0_rad", "g1", "g1_rad"):
+        assert f"problem.enclosure.{name}" in found
+    for array in found.values():
+        assert_locked(array)
+
+
+def test_no_attribute_of_a_problem_can_be_set(problem):
+    for owner, name in (
+        (problem, "A"),
+        (problem, "_A"),
+        (problem, "f"),
+        (problem, "node_ids"),
+        (problem, "fingerprint"),
+        (problem, "condensed"),
+        (problem, "new"),
+        (problem.condensed, "S"),
+        (problem.enclosure, "S"),
+        (problem.factorization, "_scale"),
+        (problem.factorization, "_lu"),
+        (problem._A, "data"),
+    ):
+        with pytest.raises(AttributeError):
+            setattr(owner, name, None)
+        with pytest.raises(AttributeError):
+            delattr(owner, name)
+    assert isinstance(problem.node_ids, tuple)
+    assert isinstance(problem.friction, tuple)
+
+
+def test_what_flint_computes_with_cannot_be_written():
+    graph = enumsol.branch_graph(gallery.two_node_square(), (0, 4))
+    before = graph.roots_at(3.5)
+    matrix = graph.path.S
+    matrix[0, 0] = 77
+    assert graph.path.S[0, 0] != 77
+    assert [root.lambda_n.tolist() for root in graph.roots_at(3.5)] == [root.lambda_n.tolist() for root in before]
+    for rows in (graph.path.rows, graph.path.integers.S):
+        with pytest.raises(TypeError, match="does not support item assignment"):
+            rows[0][0] = 77
+
+
+def test_the_callers_arrays_are_copied():
+    data = {name: tuple(map(np.copy, value)) if name == "friction" else value.copy() for name, value in DATA.items()}
+    data |= {name: sp.csc_array(data[name]) for name in MATRICES}
+    labels = ["a", "b"]
+    made = ContactProblem(**data, node_ids=labels)
+    before = made.fingerprint
+    for value in data.values():
+        parts = [value.data] if sp.issparse(value) else value if isinstance(value, tuple) else [value]
+        for part in parts:
+            part[...] = 99.0
+    labels[0] = "z"
+    assert made.node_ids == ("a", "b")
+    assert made.fingerprint == before == ContactProblem(**DATA).fingerprint
+    assert np.array_equal(made.coordinates, DATA["coordinates"])
+
+
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_copies_are_as_locked_and_as_right(problem, again):
+    other = again(problem)
+    assert answers(other) == answers(problem)
+    for array in dict(reachable(other, "copy")).values():
+        assert_locked(array)
+    with pytest.raises(AttributeError, match="ContactProblem is immutable: f cannot be set; build a new problem"):
+        other.f = other.f
+    with pytest.raises(AttributeError, match="ContactProblem is immutable: f cannot be deleted"):
+        del other.f
+
+
+# -- results ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def results():
+    problem = gallery.two_node_square((1.0, -3.0), (1.0, -1.0))
+    roots = enumsol.enumerate_roots(problem, 3.5)
+    family = enumsol.enumerate_roots(gallery.one_node_triangle((1.0, -2.0)), 2.0)
+    assert family.families[0].vertices.size
+    assert all(root.dlambda_dalpha is not None for root in roots)
+    graph = enumsol.branch_graph(problem, (0, 10))
+    assert graph.components
+    assert graph.branches
+    path = enumsol.follow(problem, roots[0], 1, (0, 10))
+    return {
+        "roots": roots,
+        "exact": enumsol.enumerate_roots(problem, Fraction(7, 2), "exact"),
+        "family": family,
+        "vertices": graph.vertices,
+        "components": graph.components,
+        "path": path,
+        "point": path[1],
+        "tangents": enumsol.continuation.start_tangents(problem, roots[0]),
+        "audit": enumsol.audit(path, graph),
+        "graph": graph,
+    }
+
+
+@pytest.mark.parametrize("name", ["roots", "exact", "family", "vertices", "components", "path", "point", "tangents"])
+def test_no_array_of_a_result_can_be_written(results, name):
+    found = dict(reachable(results[name], name))
+    assert found
+    for array in found.values():
+        assert_locked(array)
+    # nor of a copy
+    for array in dict(reachable(copy.deepcopy(results[name]), name)).values() if name in ("roots", "path") else ():
+        assert_locked(array)
+
+
+def test_no_attribute_of_a_result_can_be_set(results):
+    """``roots.stopped = None`` made a search that was cut short print "complete: yes (proven)"."""
+    cut = enumsol.enumerate_roots(gallery.get("wedge-8-5").build(), 3.0, max_nodes=20)
+    for owner, name in (
+        (cut, "stopped"),
+        (cut, "undecided"),
+        (cut, "arithmetic"),
+        (results["graph"], "reasons"),
+        (results["graph"], "arithmetic"),
+        (results["graph"], "arcs"),
+        (results["graph"].vertices[0], "kind"),
+        (results["graph"].arcs[0], "index"),
+        (results["roots"][0], "index"),
+        (results["path"], "alpha"),
+    ):
+        with pytest.raises(AttributeError):
+            setattr(owner, name, ())
+    assert not cut.complete
+
+
+def test_the_network_of_a_graph_is_frozen(results):
+    graph = results["graph"]
+    assert nx.is_frozen(graph.graph)
+    for change in (lambda: graph.graph.add_edge(0, 1), lambda: graph.graph.remove_node(0)):
+        with pytest.raises(nx.NetworkXError, match="Frozen graph"):
+            change()
+    loose = nx.MultiGraph(graph.graph)
+    loose.remove_node(0)
+    assert len(graph.graph) == len(loose) + 1
+    with pytest.raises(TypeError, match="does not support item assignment"):
+        graph.branch_of[0] = 5
+
+
+def test_frames_are_new_at_every_call(results):
+    for name in ("roots", "path", "graph", "audit"):
+        frame = results[name].to_frame()
+        column = "alpha" if "alpha" in frame else "alpha_from"
+        frame[column] = -1.0
+        frame.loc[:, :] = frame.iloc[::-1].to_numpy()
+        assert not results[name].to_frame().equals(frame)
+        assert (results[name].to_frame()[column] >= 0).all()
+
+
+# -- the means -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("shape", [(), (0,), (3,), (2, 3), (0, 2)])
+@pytest.mark.parametrize("dtype", [float, np.int8, bool])
+def test_sealing_keeps_everything_but_the_lock(shape, order, dtype):
+    array = np.ones(shape, dtype=dtype, order=order)
+    locked = sealed(array)
+    assert np.array_equal(locked, array)
+    assert (locked.dtype, locked.shape) == (array.dtype, array.shape)
+    assert locked.flags.c_contiguous == array.flags.c_contiguous
+    assert locked.flags.f_contiguous == array.flags.f_contiguous
+    assert locked.flags.aligned
+    assert sealed(locked) is locked
+    assert sealed(locked[...]).base is not None
+    if array.size:
+        assert_locked(locked)
+        array[...] = 0
+        assert np.all(locked == 1)
+
+
+def test_a_sealed_matrix_shares_what_is_sealed_and_copies_what_is_not():
+    loose = sp.csr_array(A)
+    once = SealedMatrix.of(loose)
+    loose.data[:] = 0.0
+    assert np.array_equal(once.matrix().toarray(), A)
+    again = SealedMatrix.of(once.matrix())
+    assert np.shares_memory(again.data, once.data)
+    assert again.matrix().has_canonical_format

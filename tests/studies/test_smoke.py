@@ -1,0 +1,138 @@
+"""Every study runs at its smoke size, by the command that README gives, and writes the results that it promises."""
+
+import csv
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+import enumsol
+
+STUDIES = Path(__file__).parents[2] / "studies"
+NAMES = sorted(file.parent.name for file in STUDIES.glob("*/run.py"))
+#: Studies that compare versions; this interpreter stands for that of an older one.
+VERSIONS = ("requirements", "search_profile")
+#: Study -> the library of its peer, what it says when that is not installed, and a column that is there all the same.
+PEERS = {
+    "against_scip": ("pyscipopt", "pyscipopt is not installed: SCIP is left out", "roots"),
+    "qp_engines": ("daqp", "daqp is not installed: it is left out", "proven by multipliers"),
+}
+#: What studies at their smoke size conclude.
+CONCLUSIONS = {
+    "accuracy_vs_speed": ("all 4^p selections: 38, 0 differ", "verified: 0 wrong answers, 0 wrong claims"),
+    "branch_shapes": ("40 squares, 0 not complete; 2 closed branches",),
+    "continuation_coverage": ("random: 8 of 8 problems settled",),
+    "continuation_steps": ("checked steps, h_max 1 5: jumps 0 0",),
+    "extremes": ("all: 28 cases, 28 right, 0 undecided, 0 wrong",),
+    "paper_examples": ("all 19 facts hold", "no arc or continuum missed, no jump"),
+    "requirements": ("both interpreters import the same enumsol", "import enumsol: "),
+    "samples_vs_graph": ("branches of length 0.001 are missed by 50 samples", "40 of 40 root sets agree"),
+    "search_profile": ("both interpreters import the same enumsol", "the times"),
+}
+
+
+def run(*command):
+    """Output of a new process that imports the enumsol of this one; warnings are errors."""
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(Path(enumsol.__file__).parents[1])}
+    command = [sys.executable, "-W", "error", *map(str, command)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def results():
+    """Size and time of all results in the tree."""
+    files = [file for file in STUDIES.glob("*/results/*") if file.is_file()]
+    return {file: (file.stat().st_size, file.stat().st_mtime_ns) for file in files}
+
+
+def names(folder, suffix):
+    return {file.name for file in folder.iterdir() if file.suffix == suffix}
+
+
+def rows_of(file):
+    with file.open(encoding="utf-8") as table:
+        return list(csv.DictReader(table))
+
+
+def on_this_platform(name):
+    marks = pytest.mark.skipif(sys.platform != "linux", reason="peak memory is read from /proc")
+    return pytest.param(name, marks=marks) if name == "requirements" else name
+
+
+@pytest.mark.parametrize("name", [on_this_platform(name) for name in NAMES])
+def test_a_study_runs_at_its_smoke_size(name, tmp_path):
+    before = results()
+    versions = ("--rounds", "1", "--against", sys.executable) if name in VERSIONS else ()
+    output = run(STUDIES, name, "--smoke", "--results", tmp_path, *versions)
+    for text in CONCLUSIONS.get(name, ()):
+        assert text in output
+    committed = STUDIES / name / "results"
+    assert names(tmp_path, ".csv") == names(committed, ".csv")
+    assert bool(names(tmp_path, ".png")) == bool(names(committed, ".png"))
+    assert bool(names(tmp_path, ".json")) == (name in VERSIONS)
+    for file in names(tmp_path, ".csv"):
+        rows = rows_of(tmp_path / file)
+        assert rows
+        assert all(None not in row and None not in row.values() for row in rows)
+    if name in PEERS:
+        library, sentence, _ = PEERS[name]
+        assert (sentence in output) == (find_spec(library) is None)
+    assert results() == before
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_a_study_without_its_peer_does_the_rest_and_says_so(name, tmp_path):
+    library, sentence, column = PEERS[name]
+    hidden = (
+        f"import sys, runpy; sys.modules[{library!r}] = None; runpy.run_path({str(STUDIES)!r}, run_name='__main__')"
+    )
+    output = run("-c", hidden, name, "--smoke", "--results", tmp_path)
+    assert sentence in output.splitlines()
+    (file,) = names(tmp_path, ".csv")
+    rows = rows_of(tmp_path / file)
+    assert rows
+    assert all(int(row[column]) > 0 for row in rows)
+
+
+def test_the_profile_knows_every_function_that_it_names(tmp_path):
+    """After a renaming in the package the table of functions must follow, or their time counts for others."""
+    code = (
+        f"import sys; sys.path.insert(0, {str(STUDIES)!r}); import enumsol; "
+        "from search_profile.sampler import unknown_functions; "
+        "problem = enumsol.gallery.one_node_triangle(); "
+        "print(unknown_functions(lambda: enumsol.enumerate_roots(problem, 5.0))); "
+        "problem = enumsol.gallery.get('wedge-8-5').build(); "
+        "print(unknown_functions(lambda: enumsol.enumerate_roots(problem, 2.2)))"
+    )
+    assert run("-c", code).splitlines()[1] == "[]"
+
+
+def test_one_part_of_a_study(tmp_path):
+    run(STUDIES, "samples_vs_graph", "--smoke", "--results", tmp_path, "--part", "thin")
+    assert {file.name for file in tmp_path.iterdir()} == {"branch_thin.csv", "branch_thin.txt", "branch_thin.png"}
+
+
+def test_a_smoke_run_without_a_folder_leaves_the_results_alone(tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    before = results()
+    run(STUDIES, "condensation_cost", "--smoke")
+    assert results() == before
+    assert [file.name for file in tmp_path.glob("condensation_cost*/*.csv")] == ["condensation.csv"]
+
+
+def test_without_a_name_the_questions_are_listed():
+    lines = run(STUDIES).splitlines()
+    for name in NAMES:
+        (line,) = [line for line in lines if line.startswith(f"{name} ")]
+        assert line.endswith("?")
+
+
+def test_an_unknown_study_is_refused():
+    done = subprocess.run([sys.executable, STUDIES, "nothing"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "there is no study 'nothing'" in done.stderr
+    assert all(name in done.stdout for name in NAMES)

@@ -1,0 +1,206 @@
+"""References: every one to docs/theory.md, to the paper or to a file of the repository leads somewhere."""
+
+import io
+import re
+import tokenize
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+THEORY = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
+DOCUMENTS = [ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+SOURCES = sorted(
+    path
+    for folder in ("enumsol", "tests", "studies")
+    for suffix in ("py", "pyx")
+    for path in (ROOT / folder).rglob(f"*.{suffix}")
+    if path != Path(__file__)
+)
+
+NUMBER = r"\d+(?:\.\d+)?"
+_SECTIONS = rf"section {NUMBER}|sections {NUMBER}(?:(?:, | and | to |-){NUMBER})+"
+_EQUATIONS = r"\(\d+\.\d+\)(?:(?:, | and | to )\(\d+\.\d+\))*"
+_ITEM = rf"(?:{_SECTIONS}|{_EQUATIONS})"
+THEORY_REFERENCE = re.compile(rf"theory, {_ITEM}(?:(?:, | and |; ){_ITEM})*")
+THEORY_WORD = re.compile(r"\btheory\b(?!\.md)", re.IGNORECASE)
+OWN_REFERENCE = re.compile(rf"\b(?:{_SECTIONS})")
+PAPER_ITEM = re.compile(
+    rf"\b(Algorithm|Definition|Theorem|Lemma|Remark|Examples?|Sections?) ({NUMBER})(?:(?:, | and | to |-)({NUMBER}))?"
+)
+#: Where a theorem may come from: the paper, or a work in the theory's list of references.
+SOURCE = re.compile(r"(?:\bpaper,|\bpaper's|\bHigham(?: 2002)?,) $")
+
+
+def headings(text):
+    """Numbers of the sections of a document, in order."""
+    return re.findall(rf"^#+ ({NUMBER})\.? ", text, re.MULTILINE)
+
+
+def labels(text):
+    """Numbers of the equations of a document, in order: each ends a line of an indented block."""
+    return re.findall(r"^    .*\((\d+\.\d+)\)$", text, re.MULTILINE)
+
+
+def paper_items(text):
+    """What the table at the end of the theory says about the paper: ("Algorithm", "5.1"), ..."""
+    return set(re.findall(rf"^\| (\w+) ({NUMBER}) \|", text, re.MULTILINE))
+
+
+SECTIONS, EQUATIONS, PAPER = set(headings(THEORY)), set(labels(THEORY)), paper_items(THEORY)
+
+
+def unresolved(text, own=None):
+    """Complaints about the references in a running text; ``own`` are the section numbers of the text itself, if any."""
+    found = []
+    left = list(text)
+    for word in THEORY_WORD.finditer(text):
+        reference = THEORY_REFERENCE.match(text, word.start())
+        if reference is None:
+            found.append(f"'{text[word.start() : word.start() + 40]}' is no reference")
+            continue
+        equations = re.findall(r"\((\d+\.\d+)\)", reference[0])
+        rest = re.sub(r"\(\d+\.\d+\)", "", reference[0])
+        found += [f"theory has no equation ({number})" for number in equations if number not in EQUATIONS]
+        found += [f"theory has no section {n}" for n in re.findall(NUMBER, rest) if n not in SECTIONS]
+        left[reference.start() : reference.end()] = " " * len(reference[0])
+    rest = "".join(left)
+    for item in PAPER_ITEM.finditer(rest):
+        source = SOURCE.search(rest[: item.start()])
+        if source is None:
+            found.append(f"'{item[0]}' does not say of what work")
+        elif "paper" in source[0]:
+            kind, *numbers = item[1].removesuffix("s"), item[2], item[3]
+            found += [f"theory says nothing of paper, {kind} {n}" for n in numbers if n and (kind, n) not in PAPER]
+    for section in OWN_REFERENCE.finditer(rest):
+        if own is None:
+            found.append(f"'{section[0]}' does not say of what document")
+        else:
+            found += [f"no section {n} here" for n in re.findall(NUMBER, section[0]) if n not in own]
+    return found
+
+
+def joined(text):
+    return re.sub(r"\s+", " ", text)
+
+
+def prose(source):
+    """Docstrings and blocks of comments of a Python or Cython source, each as one line."""
+    blocks, comment, last, fresh = [], [], -1, True
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT:
+            if token.start[0] != last + 1:
+                blocks.append(" ".join(comment))
+                comment = []
+            comment.append(token.string.lstrip("#: "))
+            last = token.start[0]
+        elif token.type == tokenize.STRING and fresh:
+            blocks.append(token.string.strip("\"'"))
+        if token.type not in (tokenize.NL, tokenize.COMMENT):
+            fresh = token.type in (tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)
+    return [joined(block) for block in (*blocks, " ".join(comment)) if block]
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_references_in_sources(path):
+    assert [c for block in prose(path.read_text(encoding="utf-8")) for c in unresolved(block)] == []
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_references_in_documents(path):
+    text = path.read_text(encoding="utf-8")
+    # a title is no reference, and no more is what the table of the paper's items is about
+    body = re.sub(rf"^(#.*|\| \w+ {NUMBER} \|)", "", text, flags=re.MULTILINE)
+    assert unresolved(joined(body), own=set(headings(text))) == []
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_equations_referred_to_inside_documents(path):
+    text = path.read_text(encoding="utf-8")
+    body = THEORY_REFERENCE.sub("", re.sub(r"^    .*$", "", text, flags=re.MULTILINE))
+    # pairs of data, such as (1.5, -4), have no such form
+    assert set(re.findall(r"\((\d+\.\d+)\)", body)) <= set(labels(text))
+
+
+def test_numbering_of_the_theory():
+    tops = [number for number in headings(THEORY) if "." not in number]
+    assert tops == [str(k + 1) for k in range(len(tops))]
+    # sections 1 to 7 keep their subjects: other texts refer to them
+    subjects = ("problem", "selections", "branches", "condensation", "energy", "certificates", "alpha")
+    for number, subject in zip(tops, subjects, strict=False):
+        assert re.search(rf"^## {number}\. .*{subject}", THEORY, re.MULTILINE | re.IGNORECASE)
+    for numbers in (headings(THEORY), labels(THEORY)):
+        for top in tops:
+            inside = [n.split(".")[1] for n in numbers if n.startswith(f"{top}.")]
+            assert inside == [str(k + 1) for k in range(len(inside))]
+    for part in re.split(r"^## ", THEORY, flags=re.MULTILINE)[1:]:
+        assert all(part.startswith(label.split(".")[0] + ".") for label in labels(part))
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_named_in_documents_exist(path):
+    named = re.findall(r"`((?:enumsol|tests|studies|docs)/[\w./-]*)`", path.read_text(encoding="utf-8"))
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "(theory, section 5)",
+        "theory, section 5.2",
+        "theory, sections 2, 4 and 6.1",
+        "theory, sections 2-5",
+        "theory, (6.1)",
+        "theory, (6.1) and (6.3)",
+        "by theory, section 6.2, (6.3)",
+        "Steps 3-6 of the paper's Algorithm 5.1 (paper, Remark 5.1)",
+        "the paper's Examples 6.1-6.3",
+        "(Higham, Theorem 9.3)",
+        "see docs/theory.md",
+    ],
+)
+def test_references_that_resolve(text):
+    assert unresolved(text) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "theory, section 99",
+        "theory, section 5.99",
+        "theory, sections 5 and 99",
+        "theory, (5.99)",
+        "theory, (6.1) and (6.99)",
+        "theory: equilibrium, Signorini, Coulomb",
+        "theory, 4 and 7",
+        "(theory, 1-2)",
+        "theory section 6",
+        "by the theory",
+        "Algorithm 5.1",
+        "paper, Algorithm 9.9",
+        "the paper's Examples 6.1-6.9",
+        "(Section 4, Theorem 4.1)",
+        "see section 6",
+    ],
+)
+def test_references_that_do_not(text):
+    assert unresolved(text) != []
+
+
+def test_a_broken_reference_in_a_source_is_found():
+    source = '"""Title (theory,\nsection 99)."""\n\n#: A number that\n#: theory, (5.99) explains.\nx = "theory"\n'
+    assert [c for block in prose(source) for c in unresolved(block)] == [
+        "theory has no section 99",
+        "theory has no equation (5.99)",
+    ]
+
+
+def test_the_citation_names_this_software_and_its_paper():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    fields = dict(re.findall(r"^(\w[\w-]*): (.+)$", citation, re.MULTILINE))
+    assert fields["version"] == project["version"]
+    assert fields["license"] == project["license"]
+    assert fields["title"].strip('"').lower() == f"{project['name']}: {project['description']}".lower()
+    assert "Qualitative analysis of solutions to discrete static contact problems with" in citation
