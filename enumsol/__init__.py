@@ -6,9 +6,28 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from enumsol import arithmetic as arithmetic
+    from enumsol import branches as branches
+    from enumsol import checker as checker
+    from enumsol import checks as checks
+    from enumsol import condensation as condensation
+    from enumsol import continuation as continuation
+    from enumsol import equation as equation
+    from enumsol import errors as errors
+    from enumsol import fem as fem
     from enumsol import gallery
+    from enumsol import io as io
+    from enumsol import kernel as kernel
+    from enumsol import problem as problem
+    from enumsol import proof as proof
+    from enumsol import relaxation as relaxation
+    from enumsol import roots as roots
+    from enumsol import search as search
+    from enumsol import selections as selections
+    from enumsol import statuses as statuses
     from enumsol.branches import BranchGraph, branch_graph, link_samples, multiplicity_table
-    from enumsol.checker.verify import VerificationReport, verify
+    from enumsol.checker.reports import VerificationReport
+    from enumsol.checker.verify import verify
     from enumsol.continuation import (
         ContinuationOptions,
         NotConverged,
@@ -28,7 +47,9 @@ if TYPE_CHECKING:
         InvalidArgumentError,
         InvalidProblemError,
         MissingDependencyError,
+        OutputError,
         TooLargeError,
+        WorkerError,
     )
     from enumsol.io import read_problem, write_problem
     from enumsol.problem import ContactProblem
@@ -38,12 +59,15 @@ if TYPE_CHECKING:
     from enumsol.search.tree import SearchProgress
     from enumsol.statuses import ContactStatus, sign_array
 
+    __version__: str
+
 #: Where the public names are at home. A module is loaded when a name of it is first used, so that a program loads what
 #: it works with and no more: sparse matrices come with a problem, networkx and rational arithmetic with a branch graph.
 _HOMES = {
     "enumsol.branches": ("BranchGraph", "branch_graph", "link_samples", "multiplicity_table"),
-    "enumsol.checker.verify": ("VerificationReport", "verify"),
+    "enumsol.checker.verify": ("verify",),
     "enumsol.proof.proof_file": ("Proof", "ProofFormatError"),
+    "enumsol.checker.reports": ("VerificationReport",),
     "enumsol.continuation": (
         "ContinuationOptions",
         "NotConverged",
@@ -64,7 +88,9 @@ _HOMES = {
         "InvalidArgumentError",
         "InvalidProblemError",
         "MissingDependencyError",
+        "OutputError",
         "TooLargeError",
+        "WorkerError",
     ),
     "enumsol.io": ("read_problem", "write_problem"),
     "enumsol.problem": ("ContactProblem",),
@@ -111,6 +137,7 @@ __all__ = [
     "InvalidProblemError",
     "MissingDependencyError",
     "NotConverged",
+    "OutputError",
     "Path",
     "PiecewiseSmoothEquation",
     "Polytope",
@@ -125,6 +152,7 @@ __all__ = [
     "TooLargeError",
     "Undecided",
     "VerificationReport",
+    "WorkerError",
     "audit",
     "branch_graph",
     "enumerate_roots",
@@ -142,14 +170,19 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    if name in _MODULES:
-        return import_module(f"{__name__}.{name}")
-    if name not in _HOME_OF:
-        raise AttributeError(f"module 'enumsol' has no attribute {name!r}")
-    value = getattr(import_module(_HOME_OF[name]), name)
-    globals()[name] = value  # found without this detour from now on
-    return value
+if not TYPE_CHECKING:  # or a type checker would take any name for one of ours
+
+    def __getattr__(name: str) -> object:
+        if name in _MODULES:
+            return import_module(f"{__name__}.{name}")
+        if name == "__version__":
+            value = import_module(f"{__name__}._version").find_version()
+        elif name in _HOME_OF:
+            value = getattr(import_module(_HOME_OF[name]), name)
+        else:
+            raise AttributeError(f"module 'enumsol' has no attribute {name!r}")
+        globals()[name] = value  # found without this detour from now on
+        return value
 
 
 def __dir__() -> list[str]:

@@ -12,6 +12,7 @@ Every refusal is one sentence: which argument, what was found, what was expected
 
 from __future__ import annotations
 
+import errno
 import math
 import numbers
 import operator
@@ -26,7 +27,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from enumsol.errors import InvalidArgumentError
+from enumsol.errors import InvalidArgumentError, OutputError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -249,16 +250,11 @@ def _pair(value: Any, name: str) -> list[Any]:
 
 
 # -- counts and numbers ----------------------------------------------------------------------------------------------
+# Each gives the value in a plain type and raises InvalidArgumentError for anything else.
 
 
 def positive_integer(value: Any, name: str, least: int = 1, most: int | None = None) -> int:
-    """Value as an int of at least ``least`` and, where that is given, at most ``most``.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is not an integer, or not within these bounds.
-    """
+    """Value as an int of at least ``least`` and, where that is given, at most ``most``."""
     number = _integer(value)
     if number is None or number < least:
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected an integer of at least {least}")
@@ -268,13 +264,7 @@ def positive_integer(value: Any, name: str, least: int = 1, most: int | None = N
 
 
 def optional_count(value: Any, name: str) -> int | None:
-    """Value as a positive int, or None for no limit.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is neither.
-    """
+    """Value as a positive int, or None for no limit."""
     if value is None:
         return None
     number = _integer(value)
@@ -284,13 +274,7 @@ def optional_count(value: Any, name: str) -> int | None:
 
 
 def row_number(value: Any, name: str, count: int, expected: str = "") -> int:
-    """Value as an int in 0 .. count - 1; ``expected`` says in messages what it counts.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is no such number.
-    """
+    """Value as an int in 0 .. count - 1; ``expected`` says in messages what it counts."""
     number = _integer(value)
     if number is None or not 0 <= number < count:
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected {expected or f'a row number below {count}'}")
@@ -298,13 +282,7 @@ def row_number(value: Any, name: str, count: int, expected: str = "") -> int:
 
 
 def optional_seconds(value: Any, name: str = "time_limit") -> float | None:
-    """Value as a positive number of seconds, or None for no limit.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is neither.
-    """
+    """Value as a positive number of seconds, or None for no limit."""
     if value is None:
         return None
     number = real_or_nan(value)
@@ -314,13 +292,7 @@ def optional_seconds(value: Any, name: str = "time_limit") -> float | None:
 
 
 def share(value: Any, name: str = "tolerance") -> float:
-    """Value as a float of at least zero and below one.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is no such number.
-    """
+    """Value as a float of at least zero and below one."""
     number = real_or_nan(value)
     if not 0 <= number < 1:
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected a number in [0, 1)")
@@ -328,13 +300,7 @@ def share(value: Any, name: str = "tolerance") -> float:
 
 
 def finite_number(value: Any, name: str) -> float:
-    """Value as a finite float, which it is exactly.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is no such number.
-    """
+    """Value as a finite float, which it is exactly."""
     number = real_or_nan(value)
     if not math.isfinite(number):
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number")
@@ -344,13 +310,7 @@ def finite_number(value: Any, name: str) -> float:
 
 
 def direction_value(value: Any) -> int:
-    """Value as +1 or -1.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is neither.
-    """
+    """Value as +1 or -1."""
     number = exact_number(value)
     if number not in (1, -1):
         raise InvalidArgumentError(f"direction is {shown(value)}; expected +1 or -1")
@@ -358,13 +318,7 @@ def direction_value(value: Any) -> int:
 
 
 def positive_number(value: Any, name: str) -> float:
-    """Value as a finite float above zero, rounded if need be.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is no such number.
-    """
+    """Value as a finite float above zero, rounded if need be."""
     number = real_or_nan(value)
     if not (math.isfinite(number) and number > 0):
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number > 0")
@@ -372,13 +326,7 @@ def positive_number(value: Any, name: str) -> float:
 
 
 def nonnegative_number(value: Any, name: str) -> float:
-    """Value as a finite float of at least zero, rounded if need be.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is no such number.
-    """
+    """Value as a finite float of at least zero, rounded if need be."""
     number = real_or_nan(value)
     if not (math.isfinite(number) and number >= 0):
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number >= 0")
@@ -407,26 +355,14 @@ def real_or_nan(value: Any) -> float:
 
 
 def one_of(value: Any, name: str, known: Collection[str | None]) -> Any:
-    """Value, which is one of the known texts (or None, where that is one of them).
-
-    Raises
-    ------
-    InvalidArgumentError
-        It is not.
-    """
+    """Value, which is one of the known texts (or None, where that is one of them)."""
     if not (value is None or isinstance(value, str)) or value not in known:
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected one of {', '.join(map(repr, known))}")
     return value
 
 
 def instance_of(value: Any, kind: type[T], name: str) -> T:
-    """Value, which is of a type.
-
-    Raises
-    ------
-    InvalidArgumentError
-        It is of another type.
-    """
+    """Value, which is of a type."""
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
         raise InvalidArgumentError(f"{name} is a {type(value).__name__}; expected {article} {kind.__name__}")
@@ -434,39 +370,21 @@ def instance_of(value: Any, kind: type[T], name: str) -> T:
 
 
 def optional_callable(value: Any, name: str) -> Any:
-    """Value, which can be called, or None.
-
-    Raises
-    ------
-    InvalidArgumentError
-        It is neither.
-    """
+    """Value, which can be called, or None."""
     if value is not None and not callable(value):
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected a function or None")
     return value
 
 
 def optional_executor(value: Any, name: str = "executor") -> Any:
-    """Value, which is like a concurrent.futures.Executor, or None.
-
-    Raises
-    ------
-    InvalidArgumentError
-        It is neither.
-    """
+    """Value, which is like a concurrent.futures.Executor, or None."""
     if value is not None and not callable(getattr(value, "submit", None)):
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected a concurrent.futures.Executor or None")
     return value
 
 
 def file_path(value: Any, name: str, expected: str = "the name of a file") -> Path:
-    """Value as a path.
-
-    Raises
-    ------
-    InvalidArgumentError
-        It is no name that a file can have.
-    """
+    """Value as a path."""
     try:
         text = os.fspath(value)
     except TypeError:
@@ -475,9 +393,17 @@ def file_path(value: Any, name: str, expected: str = "the name of a file") -> Pa
         raise InvalidArgumentError(f"{name} is a {type(value).__name__}; expected {expected}")
     if not text:
         raise InvalidArgumentError(f"{name} is an empty text; expected {expected}")
-    if "\0" in text:
-        raise InvalidArgumentError(f"{name} is {shown(text)}, with a null character in it; expected {expected}")
+    try:
+        unusable = b"\0" in os.fsencode(text)
+    except UnicodeEncodeError:
+        unusable = True
+    if unusable:
+        raise InvalidArgumentError(f"{name} is {shown(text)}, with a character that no name has; expected {expected}")
     return Path(text)
+
+
+#: What the operating system says when a file can be opened and not be written to.
+_NO_ROOM = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EPIPE))
 
 
 @contextmanager
@@ -486,13 +412,17 @@ def writing(place: Path, name: str) -> Iterator[None]:
 
     Raises
     ------
+    OutputError
+        There is no room for it, or the device failed.
     InvalidArgumentError
-        The file cannot be written.
+        There can be no such file.
     """
     try:
         yield
     except OSError as error:
         reason = error.strerror or error
+        if error.errno in _NO_ROOM:
+            raise OutputError(f"{name} {place} cannot be written ({reason}); expected a place with room") from error
         raise InvalidArgumentError(
             f"{name} {place} cannot be written ({reason}); expected a path for a new file"
         ) from error

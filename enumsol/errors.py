@@ -29,15 +29,47 @@ class MissingDependencyError(EnumsolError, ImportError):
     """An optional package is needed for this call and is not installed."""
 
 
-class Interrupted(EnumsolError, KeyboardInterrupt):  # noqa: N818 (the name is part of the public interface)
-    """Ctrl-C during a search; what was found so far is in ``partial``.
-
-    Attributes
-    ----------
-    partial : RootSet, BranchGraph, Path or DataFrame
-        What the interrupted call would have returned, as far as it came; ``complete`` is False where there is one.
-    """
+class _PartialResultError(EnumsolError):
+    """Base of the errors that hold what was found before them."""
 
     def __init__(self, message: str, partial: Any) -> None:
         super().__init__(message)
         self.partial = partial
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.partial)  # a worker may have to send it home
+
+
+class Interrupted(_PartialResultError, KeyboardInterrupt):  # noqa: N818 (the name is part of the public interface)
+    """Ctrl-C during a search; what was found so far is in ``partial``.
+
+    Attributes
+    ----------
+    partial : RootSet
+        The roots found before the interruption, with ``complete`` False. Of other functions than enumerate_roots: what
+        they would have returned, as far as it was done.
+    """
+
+
+class WorkerError(_PartialResultError, RuntimeError):
+    """A worker of an executor died, ran out of memory or was cancelled; what was found so far is in ``partial``.
+
+    Attributes
+    ----------
+    partial : RootSet or pandas.DataFrame
+        Of enumerate_roots: the roots of the subtrees that were finished, with ``complete`` False and the other subtrees
+        under ``undecided``; its proof covers what was finished. Of multiplicity_table: the rows that were finished.
+    """
+
+
+class OutputError(_PartialResultError):
+    """A result cannot be written: a disk is full, or whoever reads the output went away.
+
+    Attributes
+    ----------
+    partial : RootSet or None
+        Of enumerate_roots with a ``proof_path``: the result of the search, which ran on without a proof.
+    """
+
+    def __init__(self, message: str, partial: Any = None) -> None:
+        super().__init__(message, partial)

@@ -343,9 +343,16 @@ def get(name: str) -> GalleryEntry:
         raise InvalidArgumentError(f"name is {shown(name)}; expected a name of the gallery, such as one-node-6.1")
     if name in GALLERY:
         return GALLERY[name]
-    close = difflib.get_close_matches(name, GALLERY, n=5, cutoff=0.5)
+    close = close_names(name)
     known = f"did you mean {', '.join(close)}?" if close else f"expected one of {', '.join(GALLERY)}"
     raise InvalidArgumentError(f"the gallery has no problem named {shown(name)}; {known}")
+
+
+def close_names(name: str) -> list[str]:
+    """Up to five names of `GALLERY` that are like this one, the most alike first; its own alone if it is one."""
+    if name.lower() in GALLERY:
+        return [name.lower()]
+    return difflib.get_close_matches(name.lower(), GALLERY, n=5, cutoff=0.5)
 
 
 def _small() -> Iterator[GalleryEntry]:

@@ -130,3 +130,25 @@ def through_the_unloaded_state():
     triangle = gallery.one_node_triangle()
     load = {"load_slope": [1.5, -4.0], "friction": 3.0}
     return ContactProblem(triangle.A, triangle.Bn, triangle.Bt, [0.0, 0.0], **load), (-1.0, 2.0)
+
+
+def vanishing_problem(rng, p, zero, *, inner=0, friction=0.0):
+    """Small integers for which g vanishes exactly at the rational ``zero``, mostly by load, gap and slip together.
+
+    ``inner`` degrees of freedom are not in contact; loads on them may cancel what others do to the contact nodes.
+    """
+    n = 2 * p + inner
+    G = rng.integers(-1, 2, size=(n, n))
+    A = G @ G.T + int(rng.integers(1, 4)) * np.eye(n, dtype=int)
+    B = np.eye(n, dtype=int)[rng.permutation(n)[: 2 * p]]
+    if inner and rng.random() < 0.3:
+        B[0] += np.eye(n, dtype=int)[np.flatnonzero(~B.any(axis=0))[0]]
+    rest = rng.integers(-2, 3, size=n)  # the displacement at the zero
+    if rng.random() < 0.3:
+        rest = np.where(B.any(axis=0), 0, rest)
+    slope = rng.integers(-2, 3, size=n)
+    slope[np.flatnonzero(B.any(axis=0))[0]] = 1
+    f = A @ rest - zero.numerator * slope
+    slope = zero.denominator * slope
+    data = {"gap": B[:p] @ rest, "slip_offset": B[p:] @ rest, "load_slope": slope, "friction": friction}
+    return ContactProblem(A, B[:p], B[p:], f, **data)

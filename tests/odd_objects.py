@@ -80,6 +80,7 @@ ODD = {
     "text": lambda: "five",
     "empty text": lambda: "",
     "null character": lambda: "a\0b",
+    "half a character": lambda: "a\ud800",
     "bytes": lambda: b"1",
     "bytearray": lambda: bytearray(b"12"),
     "empty list": list,

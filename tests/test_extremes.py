@@ -22,10 +22,10 @@ from enumsol import (
 )
 from enumsol.arithmetic import balls
 from enumsol.condensation import enclosure
-from enumsol.condensation import exact as rational_condensation
 from enumsol.continuation import NotConverged, start_tangents
 from enumsol.equation import PiecewiseSmoothEquation
 from enumsol.kernel.point import exclusion_margin
+from enumsol.search import solvers as workbench
 from enumsol.search.solvers import Solvers
 
 
@@ -189,7 +189,7 @@ def test_loads_of_all_sizes():
 
 def test_nothing_can_be_proven_about_a_body_on_the_verge(monkeypatch):
     # S definite only within rounding and too large for rationals: one undecided entry, and not 4^p of them
-    monkeypatch.setattr(rational_condensation, "EXACT_DOF_LIMIT", 0)
+    monkeypatch.setattr(workbench, "EXACT_DOF_LIMIT", 0)
     monkeypatch.setattr(enclosure, "dense_eigenvalue_bound", lambda S: 0.0)
     problem = gallery.clamped_block(16, 8)
     found = enumerate_roots(problem, 1.0)

@@ -14,20 +14,21 @@ import enumsol
 
 #: Rooms from the ground up ("." is the package's own ``__init__``). A room imports rooms of lower layers only.
 LAYERS = (
-    ("errors", "sealed", "compiled", "arithmetic"),
+    ("errors", "sealed", "compiled", "executors", "_version", "arithmetic"),
     ("checks",),
-    ("array_checks", "statuses", "proof"),
+    ("array_checks", "statuses"),
     ("condensation",),
     ("problem",),
     ("equation", "kernel", "selections"),
-    ("relaxation",),
+    ("relaxation", "proof"),
     ("search", "checker"),
     ("roots",),
     ("branches",),
     ("continuation",),
     ("fem", "io"),
     ("gallery",),
-    ("cli", "."),
+    (".",),
+    ("cli",),
     ("__main__",),
 )
 #: Rooms that share no more than what both must trust: who finds roots and who checks the proofs of it.

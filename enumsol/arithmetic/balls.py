@@ -96,7 +96,10 @@ def dense_eigenvalue_bound(S: Array) -> float:
     A Cholesky factorization of S - mu I that runs to its end proves S - mu I >= -gamma trace (Rump 2006).
     """
     n = len(S)
-    estimate = float(np.linalg.eigvalsh(S)[0])
+    try:
+        estimate = float(np.linalg.eigvalsh(S)[0])
+    except np.linalg.LinAlgError:
+        return 0.0
     slack = gamma(n + 2) / (1 - gamma(n + 2)) * float(np.trace(np.abs(S))) * SAFE + TINY
     shift = 0.9 * estimate
     for _ in range(4):

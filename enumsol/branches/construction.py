@@ -6,7 +6,7 @@ import time
 from fractions import Fraction
 from typing import TYPE_CHECKING, Literal
 
-from enumsol.arithmetic.rationals import rational, to_fraction
+from enumsol.arithmetic.rationals import rational
 from enumsol.branches.gluing import Gluing
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphData, GraphStats
@@ -93,14 +93,13 @@ def branch_graph(
     _check_friction(problem, a, b)
     started = time.perf_counter()
     exactly = arithmetic == "exact" or problem.n <= FAST_EXACT_DOF
-    path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem.condensed)
+    path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
     deadline = None if time_limit is None else started + time_limit
-    origin = None if path.origin is None else to_fraction(path.origin)
     certifier = _certifier(problem, path, arithmetic)
     search = IntervalSearch(
         problem.condensed,
         (a, b),
-        origin,
+        path.zero,
         certifier,
         max_nodes=max_nodes,
         deadline=deadline,

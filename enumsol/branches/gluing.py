@@ -371,7 +371,8 @@ class Gluing:
                 key = (tail, head, frozenset(selections))
                 if key not in seen:
                     seen.add(key)
-                    first = component.solutions[0].codes
+                    # a search that was cut short may not have given the others
+                    first = next(s.codes for s in component.solutions if s.codes in self.arcs)
                     found.append(
                         GluedArc(first, selections, cell.sample, tail, head, component.index, component.dimension)
                     )

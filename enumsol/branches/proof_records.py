@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.proof.proof_file import Proof, ProofWriter, packed
+from enumsol.proof.reading import fits
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,8 +20,10 @@ if TYPE_CHECKING:
 
 def write_graph_proof(
     problem: ContactProblem, interval: tuple[Fraction, Fraction], data: str, pieces: Sequence[SearchedPiece]
-) -> Proof:
-    """The leaves of all pieces with their multipliers."""
+) -> Proof | None:
+    """The leaves of all pieces with their multipliers; None where an end of a piece is too long a fraction for it."""
+    if not all(fits(end) for found in pieces for end in (found.piece.a, found.piece.b)):
+        return None
     writer = ProofWriter()
     ends = [str(end) for end in interval]
     writer.write(

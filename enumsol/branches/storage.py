@@ -83,7 +83,7 @@ def load_graph(file: str | Path) -> GraphData:
 def _from_record(record: dict[str, Any]) -> GraphData:
     problem = _problem(record["problem"])
     exactly = record["condensed_exactly"]
-    path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem.condensed)
+    path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
     first, last = (_fraction(end) for end in record["interval"])
     vertices = tuple(_vertex(k, item) for k, item in enumerate(record["vertices"]))
     arcs = tuple(_arc(k, item, vertices, path) for k, item in enumerate(record["arcs"]))

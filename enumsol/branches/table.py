@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from enumsol.checks import alpha_list, instance_of, optional_callable, optional_executor
-from enumsol.errors import Interrupted
+from enumsol.errors import Interrupted, WorkerError
+from enumsol.executors import WorkerLost, has_result, result_of, submit
 from enumsol.problem import ContactProblem
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.statuses import STATUSES, ContactStatus
@@ -95,6 +96,8 @@ def multiplicity_table(
         ``alphas`` is one number, an alpha is not a finite number, or makes a friction coefficient negative.
     Interrupted
         On Ctrl-C; ``partial`` is the table of what was done.
+    WorkerError
+        A worker of the executor died; ``partial`` is the table of what was done.
     """
     instance_of(problem, ContactProblem, "problem")
     optional_executor(executor)
@@ -116,6 +119,8 @@ def multiplicity_table(
         raise Interrupted(
             f"multiplicity_table was interrupted after {done} of {len(rows.alphas)} alphas", rows.frame()
         ) from interruption
+    except WorkerLost as loss:
+        raise WorkerError(f"{loss}; {len(rows.done)} of {len(rows.alphas)} alphas so far", rows.frame()) from loss
     return rows.frame()
 
 
@@ -126,19 +131,29 @@ def _spread(
     progress: Callable[[int, int], object] | None,
     options: dict[str, Any],
 ) -> None:
-    """Hand the alphas to the executor, a limited number ahead of those awaited."""
+    """Hand the alphas to the executor, a limited number ahead of those awaited.
+
+    Raises
+    ------
+    WorkerLost
+        A worker died; the rows that were finished by then are kept.
+    """
     running: dict[Future[dict[str, Any]], int] = {}
     waiting = list(enumerate(rows.alphas))[::-1]
     try:
         while waiting or running:
             while waiting and len(running) < _AHEAD:
                 k, alpha = waiting.pop()
-                running[executor.submit(table_row, problem, alpha, options)] = k
+                running[submit(executor, table_row, problem, alpha, options)] = k
             finished, _ = wait(running, return_when=FIRST_COMPLETED)
             for future in finished:
-                rows.done[running.pop(future)] = future.result()
+                rows.done[running[future]] = result_of(future)
+                del running[future]
                 if progress is not None:
                     progress(len(rows.done), len(rows.alphas))
+    except WorkerLost:
+        rows.done |= {k: result_of(future) for future, k in running.items() if has_result(future)}
+        raise
     finally:
         for future in running:
             future.cancel()

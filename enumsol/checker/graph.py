@@ -1,102 +1,91 @@
 """Checker of a branch graph's search: every solution in the interval lies in one of the selections handed on.
 
-Records after the header (see enumsol.proof.proof_file for the file): for every piece ``{"piece": [a, b], "force",
-"length", "roots"}``, then its leaves ``["x", codes, rows, multipliers]`` (no solution anywhere in the piece),
-``["s", codes]`` (a selection handed on) and ``["c", codes]`` (left to both halves of the piece); at the end
-``{"pieces", "leaves", "selections"}``. Codes are strings of p digits.
+Records (see enumsol.proof.proof_file for the file and the reader): a header ``{"format": "enumsol-proof",
+"version": 1, "kind": "graph", "problem": <fingerprint>, "interval": [a, b], "p": p, "data": "problem" | "condensed"}``;
+for every piece ``{"piece": [a, b], "force", "length", "roots"}``, then its leaves ``["x", codes, rows, multipliers]``
+(no solution anywhere in the piece), ``["s", codes]`` (a selection handed on) and ``["c", codes]`` (left to both halves
+of the piece); at the end ``{"pieces", "leaves", "selections"}``. Codes are strings of p digits; ends of pieces are
+fractions ``"a/b"`` in decimal digits.
 
-What is checked: pieces partition the interval, with the subtrees left by a piece searched in both its halves; the
-leaves of every piece cover all selections of its roots; every exclusion is proven at both ends of the piece. What is
-not: that the arcs of the selections handed on are all there. They follow from these selections by exact algebra, and
-the balance of degrees checks them (theory, section 7.7).
+What is checked: pieces partition the interval (it is cut first where g vanishes, see ``unloaded``), with the subtrees
+left by a piece searched in both its halves; the leaves of every piece cover all selections of its roots; every
+exclusion is proven at both ends of the piece. What is not: that the arcs of the selections handed on are all there.
+They follow from these selections by exact algebra, and the balance of degrees checks them (theory, section 7.7).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.condensation.unloaded import vanishing_alpha
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.kernel.interval import (
+    KINDS,
     EnclosedPiece,
     as_computed,
     interval_exclusion_margins,
-    vanishing_alpha,
 )
-from enumsol.kernel.rows import CONTACT, UNDECIDED, children_of
-from enumsol.proof.proof_file import unpacked
+from enumsol.kernel.rows import CONTACT, SLIP_MINUS, STICK, UNDECIDED, children_of
+from enumsol.proof.reading import (
+    RefusedError,
+    codes_from,
+    data_of,
+    friction_at,
+    multipliers_from,
+    rational_from,
+    shown,
+    units_from,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
+    from fractions import Fraction
 
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.data import Data
     from enumsol.problem import ContactProblem
 
-_MAX_FAILURES = 20
-_EXPONENTS = range(-900, 901)
-_READ_ERRORS = (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, OverflowError, AttributeError)
+    Array = NDArray[np.float64]
+    Codes = NDArray[np.uint8]
 
-Codes = tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class GraphVerificationReport:
-    """What the checker found about a branch graph's search.
-
-    Attributes
-    ----------
-    ok : bool
-        Every solution for every alpha in the interval lies in one of ``selections``.
-    failures : tuple of str
-    interval : (Fraction, Fraction) or None
-    pieces, leaves : int
-    selections : frozenset of tuples of status codes
-    data : str
-        "problem": about the problem's own matrices; "condensed": about S and g as computed.
-    """
-
-    ok: bool
-    failures: tuple[str, ...]
-    interval: tuple[Fraction, Fraction] | None
-    pieces: int
-    leaves: int
-    selections: frozenset[Codes]
-    data: str
-
-    @property
-    def complete(self) -> bool:
-        """Same as ok: a search that was cut short has no proof."""
-        return self.ok
-
-    def __repr__(self) -> str:
-        ends = () if self.interval is None else tuple(float(end) for end in self.interval)
-        span = f" for alpha in [{ends[0]:g}, {ends[1]:g}]" if ends else ""
-        lines = [
-            f"proof: {'verified' if self.ok else 'REFUSED'}{span}",
-            f"  {self.leaves} leaves in {self.pieces} pieces; every solution lies in one of "
-            f"{len(self.selections)} selections",
-            f"  certified data: {'A, Bn, Bt, f as given' if self.data == 'problem' else 'S and g as computed'}",
-        ]
-        return "\n".join(lines + [f"  failure: {failure}" for failure in self.failures])
-
-
-class _Refused(Exception):  # noqa: N818 (never leaves this module)
-    """The proof cannot be followed any further."""
+#: Leaves read and checked together.
+_BATCH = 256
+#: Leaves of a piece after which they are first looked at for repetitions; then whenever they have doubled.
+_LOOK = 1024
+#: Entries of a leaf's record, by its kind.
+_ENTRIES = {"x": 4, "s": 2, "c": 2}
+_END = object()
 
 
 @dataclass
 class _Piece:
+    """A piece whose leaves are being read."""
+
     a: Fraction
     b: Fraction
-    force: np.ndarray[Any, Any]
-    length: np.ndarray[Any, Any]
-    roots: list[Codes]
-    empty: list[tuple[Codes, Any, Any]] = field(default_factory=list)
-    handed: list[Codes] = field(default_factory=list)
-    cut: list[Codes] = field(default_factory=list)
+    force: Array
+    length: Array
+    roots: Codes
+    #: of every leaf its kind, and its p codes as bytes
+    kinds: bytearray = field(default_factory=bytearray)
+    codes: bytearray = field(default_factory=bytearray)
+    look: int = _LOOK
+    #: made when there is something to exclude
+    enclosed: EnclosedPiece | None = None
+
+    def leaves(self, *kinds: str) -> Codes:
+        """Codes of the leaves of these kinds, shape (k, p); all without a kind."""
+        codes = np.frombuffer(bytes(self.codes), dtype=np.uint8).reshape(-1, self.roots.shape[1])
+        of_kind = np.isin(np.frombuffer(bytes(self.kinds), dtype=np.uint8), [ord(kind) for kind in kinds])
+        return codes[of_kind] if kinds else codes
 
 
 class GraphChecker:
@@ -116,167 +105,220 @@ class GraphChecker:
         self.problem, self.header, self.progress = problem, header, progress
         self.failures: list[str] = []
         self.pieces = self.leaves = 0
-        self.selections: set[Codes] = set()
+        self.selections: set[bytes] = set()
         self.interval: tuple[Fraction, Fraction] | None = None
-        self.data = "problem"
+        self.data: Data = "problem"
+        self._friction: list[bool] = []
+        self._zero: Fraction | None = None
 
     def run(self, records: Iterator[Any]) -> GraphVerificationReport:
-        """Check all records."""
+        """Check all records after the header."""
         try:
-            self._check(records)
-        except _Refused as refusal:
+            self._check(self._read_header(), records)
+        except RefusedError as refusal:
             self.failures.append(str(refusal))
-        except NotEnclosedError as error:
+        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
             self.failures.append(f"the problem's data cannot be enclosed: {error}")
-        failures = tuple(self.failures[:_MAX_FAILURES])
-        selections = frozenset(self.selections)
+        failures = tuple(self.failures)
+        selections = frozenset() if failures else frozenset(map(tuple, self.selections))
         return GraphVerificationReport(
             not failures, failures, self.interval, self.pieces, self.leaves, selections, self.data
         )
 
-    def _check(self, records: Iterator[Any]) -> None:
-        self._read_header()
-        assert self.interval is not None
-        a, b = self.interval
-        everything = [(UNDECIDED,) * self.problem.p]
-        enclosure = as_computed(self.problem) if self.data == "condensed" else self._enclosure()
-        origin = vanishing_alpha(self.problem, enclosure)
-        ends = [a, origin, b] if origin is not None and a < origin < b else [a, b]
-        # pieces in the order in which they are searched: halves come directly after the piece that was cut
-        waiting = [(x, y, everything) for x, y in pairwise(ends)]
-        record = next(records, None)
+    def _check(self, interval: tuple[Fraction, Fraction], records: Iterator[Any]) -> None:
+        a, b = interval
+        self._zero = vanishing_alpha(self.problem, self.data)
+        ends = [a, self._zero, b] if self._zero is not None and a < self._zero < b else [a, b]
+        everything = np.full((1, self.problem.p), UNDECIDED, dtype=np.uint8)
+        # pieces in the order in which they are searched, the next one last: halves come directly after what was cut
+        waiting = [(x, y, everything) for x, y in pairwise(ends)][::-1]
+        record = next(records, _END)
         while waiting:
-            x, y, roots = waiting.pop(0)
-            piece, record = self._read_piece(record, records)
-            if (piece.a, piece.b) != (x, y) or sorted(piece.roots) != sorted(roots):
-                raise _Refused(f"piece {self.pieces + 1} is not the one that is due: the interval is not covered")
-            self._check_piece(piece, enclosure, origin if origin in (x, y) else None)
-            if piece.cut:
-                middle = (x + y) / 2
-                waiting[:0] = [(x, middle, piece.cut), (middle, y, piece.cut)]
+            x, y, roots = waiting.pop()
+            cut, record = self._piece(record, records, (x, y, roots))
+            if len(cut):
+                waiting += [((x + y) / 2, y, cut), (x, (x + y) / 2, cut)]
         claim = {"pieces": self.pieces, "leaves": self.leaves, "selections": len(self.selections)}
         if record != claim:
-            self.failures.append(f"the counts at the end are {str(record)[:80]}; the pieces give {claim!r}")
-        if next(records, None) is not None:
-            self.failures.append("records follow after the end of the proof")
+            found = "missing" if record is _END else shown(record)
+            self._fail(f"the counts at the end are {found}; the pieces give {claim!r}")
+        if next(records, _END) is not _END:
+            self._fail("records follow after the end of the proof")
 
-    def _enclosure(self) -> CondensedEnclosure:
-        return CondensedEnclosure.from_problem(self.problem)
+    @cached_property
+    def enclosure(self) -> CondensedEnclosure:
+        """Balls for what is certified; only exclusions ask for it."""
+        return as_computed(self.problem) if self.data == "condensed" else CondensedEnclosure.from_problem(self.problem)
 
-    def _read_header(self) -> None:
-        header = self.header
-        if header.get("version") != 1 or header.get("problem") != self.problem.fingerprint:
-            raise _Refused("the proof belongs to another problem or version")
-        if header.get("p") != self.problem.p or header.get("data") not in ("problem", "condensed"):
-            raise _Refused("the header does not fit the problem")
-        self.data = header["data"]
+    def _read_header(self) -> tuple[Fraction, Fraction]:
+        self.data = data_of(self.header, self.problem, "graph")
         try:
-            a, b = (Fraction(end) for end in header["interval"])
-        except _READ_ERRORS:
-            raise _Refused("the header's interval cannot be read") from None
-        if not a < b:
-            raise _Refused("the header's interval is empty")
+            a, b = _interval_from(self.header.get("interval"))
+            ends = [friction_at(self.problem, end) for end in (a, b)]
+        except ValueError as error:
+            raise RefusedError(f"the header cannot be read: {error}") from None
         self.interval = (a, b)
-        for end in (a, b):
-            F0, F1 = self.problem.friction
-            if any(Fraction(x) + end * Fraction(y) < 0 for x, y in zip(F0.tolist(), F1.tolist(), strict=True)):
-                raise _Refused(f"friction is negative at alpha = {end}")
+        self._friction = [max(pair) > 0 for pair in zip(*ends, strict=True)]
+        return a, b
+
+    def _fail(self, message: str) -> None:
+        self.failures.append(message)
+        if len(self.failures) == MAX_FAILURES:
+            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
 
     # -- pieces ----------------------------------------------------------------------------------------------------
 
-    def _read_piece(self, record: Any, records: Iterator[Any]) -> tuple[_Piece, Any]:
-        """A piece and the record after it."""
-        p = self.problem.p
+    def _piece(self, record: Any, records: Iterator[Any], due: tuple[Fraction, Fraction, Codes]) -> tuple[Codes, Any]:
+        """Check the piece that begins with this record; gives what it leaves to its halves, and the record after it."""
+        number = self.pieces + 1
         try:
-            a, b = (Fraction(end) for end in record["piece"])
-            units = [[int(x) for x in record[key]] for key in ("force", "length")]
-            force, length = (np.array(exponents, dtype=int) for exponents in units)
-            roots = [self._codes(text) for text in record["roots"]]
-        except _READ_ERRORS:
-            raise _Refused(f"piece {self.pieces + 1} is missing or cannot be read") from None
-        if not (
-            force.shape == length.shape == (2 * p,)
-            and all(x in _EXPONENTS for x in units[0] + units[1])
-            and np.ptp(force + length) == 0
-            and np.array_equal(force[:p], force[p:])
-        ):
-            raise _Refused("the units of a piece are no common scaling of energy and of the two directions of a node")
-        piece = _Piece(a, b, np.ldexp(1.0, force), np.ldexp(1.0, length), roots)
-        record = next(records, None)
+            piece = self._begin(record)
+        except ValueError as error:
+            raise RefusedError(f"piece {number} is missing or cannot be read: {error}") from None
+        if (piece.a, piece.b) != due[:2] or not np.array_equal(_sorted(piece.roots), _sorted(due[2])):
+            raise RefusedError(f"piece {number} is not the one that is due: the interval is not covered")
+        self.pieces = number
+        record = next(records, _END)
         while isinstance(record, list):
+            batch: list[list[Any]] = []
+            while isinstance(record, list) and len(batch) < _BATCH:
+                batch.append(record)
+                record = next(records, _END)
             try:
-                kind, text, *rest = record
-                codes = self._codes(text)
-                if kind == "x":
-                    piece.empty.append((codes, *unpacked(*rest)))
-                elif kind in ("s", "c") and not rest:
-                    (piece.handed if kind == "s" else piece.cut).append(codes)
-                else:
-                    raise _Refused(f"unknown kind of record {str(kind)[:20]!r}")
-            except _READ_ERRORS as error:
-                raise _Refused(f"a leaf of piece {self.pieces + 1} cannot be read ({error})") from None
-            record = next(records, None)
-        return piece, record
-
-    def _codes(self, text: str) -> Codes:
-        codes = tuple(int(digit) for digit in text)
-        if len(codes) != self.problem.p or not all(0 <= c <= UNDECIDED for c in codes):
-            raise ValueError("codes of the wrong length or value")
-        return codes
-
-    def _check_piece(self, piece: _Piece, enclosure: CondensedEnclosure, origin: Fraction | None) -> None:
-        self.pieces += 1
-        enclosed = EnclosedPiece.from_enclosure(enclosure, piece.a, piece.b, piece.force, piece.length, origin)
-        friction = [bool(F > 0) for F in enclosed.high]
-        for codes in piece.handed:
-            if any(code >= CONTACT for code in codes):
-                self.failures.append(f"piece {self.pieces}: a selection handed on is not complete")
-        leaves = [codes for codes, _, _ in piece.empty] + piece.handed + piece.cut
-        for root in piece.roots:
-            if not covers(root, [leaf for leaf in leaves if _below(leaf, root)], friction):
-                self.failures.append(f"piece {self.pieces}: its leaves do not cover all selections")
-        if piece.empty:
-            codes, rows, values = zip(*piece.empty, strict=True)
-            leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
-            margins = interval_exclusion_margins(
-                enclosed, np.array(codes, dtype=np.intp), leaf, np.concatenate(rows), np.concatenate(values)
-            )
-            for number in np.flatnonzero(~(margins > 0)):
-                # alone it is added up in another order, that of the search: for a nearly singular S that may decide
-                alone = np.array([codes[number]], dtype=np.intp), np.zeros(len(rows[number]), dtype=np.intp)
-                if interval_exclusion_margins(enclosed, *alone, rows[number], values[number])[0] > 0:
-                    continue
-                self.failures.append(f"leaf {self.leaves + number + 1}: its multipliers do not exclude it")
-        self.leaves += len(piece.empty)
-        self.selections |= set(piece.handed)
+                self._read_leaves(piece, batch)
+            except ValueError as error:
+                raise RefusedError(f"a leaf of piece {number} cannot be read: {error}") from None
+        _check_repetitions(piece)
+        handed = piece.leaves("s")
+        if np.any(handed >= CONTACT):
+            self._fail(f"piece {number}: a selection handed on is not complete")
+        if not covers(piece.roots, piece.leaves(), self._friction):
+            self._fail(f"piece {number}: its leaves do not cover all selections")
+        self.selections.update(row.tobytes() for row in handed)
         if self.progress is not None:
             self.progress(self.leaves)
+        return piece.leaves("c"), record
 
+    def _begin(self, record: Any) -> _Piece:
+        if not isinstance(record, dict):
+            raise ValueError("no piece begins here")  # noqa: TRY004 (as in reading)
+        a, b = _interval_from(record.get("piece"))
+        units = units_from(record, self.problem.p)
+        return _Piece(a, b, *units, codes_from(record.get("roots"), self.problem.p))
 
-def _below(leaf: Codes, root: Codes) -> bool:
-    """Whether the assignment ``leaf`` is ``root`` or refines it."""
-    return all(_refines(x, y) for x, y in zip(leaf, root, strict=True))
+    def _read_leaves(self, piece: _Piece, batch: list[list[Any]]) -> None:
+        """Take note of some leaves, and check the dual inequalities of those that are said to be empty."""
+        for record in batch:
+            kind = record[0] if record else None
+            if not isinstance(kind, str) or kind not in _ENTRIES:
+                raise ValueError(f"unknown kind of record {shown(kind)}")
+            if len(record) != _ENTRIES[kind]:
+                raise ValueError(f"a record of kind {kind!r} has {len(record)} entries; expected {_ENTRIES[kind]}")
+        codes = codes_from([record[1] for record in batch], self.problem.p)
+        piece.codes += codes.tobytes()
+        piece.kinds += "".join(record[0] for record in batch).encode()
+        if len(piece.kinds) >= piece.look:
+            _check_repetitions(piece)
+            piece.look = 2 * len(piece.kinds)
+        empty = [k for k, record in enumerate(batch) if record[0] == "x"]
+        if empty:
+            texts = (batch[k][2:] for k in empty)
+            pairs = [multipliers_from(text, KINDS * self.problem.p) for text in texts]
+            self._exclusions(self._enclosed(piece), codes[empty].astype(np.intp), pairs)
 
+    def _exclusions(
+        self, enclosed: EnclosedPiece, codes: NDArray[np.intp], pairs: list[tuple[NDArray[np.intp], Array]]
+    ) -> None:
+        rows, values = zip(*pairs, strict=True)
+        leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
+        margins = interval_exclusion_margins(enclosed, codes, leaf, np.concatenate(rows), np.concatenate(values))
+        for number in np.flatnonzero(~(margins > 0)):
+            # alone it is added up in another order, that of the search: for a nearly singular S that may decide
+            alone = codes[number : number + 1], np.zeros(len(rows[number]), dtype=np.intp)
+            if not interval_exclusion_margins(enclosed, *alone, rows[number], values[number])[0] > 0:
+                self._fail(f"leaf {self.leaves + number + 1}: its multipliers do not exclude it")
+        self.leaves += len(rows)
 
-def _refines(fine: int, coarse: int) -> bool:
-    return coarse in (fine, UNDECIDED) or (coarse == CONTACT and fine in (1, 2, 3))
-
-
-def covers(root: Codes, leaves: list[Codes], friction: list[bool]) -> bool:
-    """Whether the leaves, all refinements of ``root``, cover every selection in it.
-
-    They come from a tree, so that at some node every leaf refines the root; splitting there gives smaller covers. A
-    list that is no tree is refused even if it covers.
-    """
-    if root in leaves:
-        return True
-    if not leaves:
-        return False
-    for node, code in enumerate(root):
-        children = children_of(code, friction=friction[node])
-        if children and all(leaf[node] != code for leaf in leaves):
-            return all(
-                covers(child, [leaf for leaf in leaves if _below(leaf, child)], friction)
-                for child in ((*root[:node], c, *root[node + 1 :]) for c in children)
+    def _enclosed(self, piece: _Piece) -> EnclosedPiece:
+        """The data at both ends of the piece, with S proven positive definite."""
+        if piece.enclosed is None:
+            origin = self._zero if self._zero in (piece.a, piece.b) else None
+            piece.enclosed = EnclosedPiece.from_enclosure(
+                self.enclosure, piece.a, piece.b, piece.force, piece.length, origin
             )
-    return False
+            if not all(end.smallest_eigenvalue > 0 for end in piece.enclosed.ends):
+                raise RefusedError("S is not proven positive definite")
+        return piece.enclosed
+
+
+def _interval_from(ends: Any) -> tuple[Fraction, Fraction]:
+    if not isinstance(ends, list) or len(ends) != 2:
+        raise ValueError(f"{shown(ends)} is no interval")
+    a, b = (rational_from(end) for end in ends)
+    if not a < b:
+        raise ValueError("an interval is empty")
+    return a, b
+
+
+def _check_repetitions(piece: _Piece) -> None:
+    """Refuse a piece that gives a leaf twice: the leaves of a tree are different, and so bounded in number."""
+    leaves = piece.leaves()
+    if len(np.unique(leaves, axis=0)) < len(leaves):
+        raise RefusedError("a piece has a leaf twice")
+
+
+def _sorted(codes: Codes) -> Codes:
+    return codes[np.lexsort(codes.T)]
+
+
+def covers(roots: Codes, leaves: Codes, friction: Sequence[bool]) -> bool:
+    """Whether the leaves that refine one of the roots together cover every selection in the roots.
+
+    Both are sets of partial assignments, (k, p) arrays of codes. They come from trees, so that in every cell that holds
+    some of them there is a node at which all of them refine it; splitting there gives smaller cells. A list that is no
+    tree is refused even if it covers.
+    """
+    cell = np.full(len(friction), UNDECIDED, dtype=np.uint8)
+    # a cell, the roots in it (None: the whole cell is to be covered), and the leaves in it
+    cells: list[tuple[Codes, Codes | None, Codes]] = [(cell, np.unique(roots, axis=0), np.unique(leaves, axis=0))]
+    while cells:
+        cell, targets, found = cells.pop()
+        if targets is not None and len(targets) == 1:
+            cell, found, targets = targets[0], found[_within(found, targets[0])], None
+        elif targets is not None and np.any(np.all(targets == cell, axis=1)):
+            targets = None
+        if targets is None and np.any(np.all(found == cell, axis=1)):
+            continue
+        node = _split(cell, found if targets is None else targets, friction)
+        if node is None:
+            return False
+        for child in children_of(int(cell[node]), friction=friction[node]):
+            smaller = cell.copy()
+            smaller[node] = child
+            part = found[_refines(found[:, node], child)]
+            inside = None if targets is None else targets[_refines(targets[:, node], child)]
+            if inside is None or len(inside):
+                cells.append((smaller, inside, part))
+    return True
+
+
+def _split(cell: Codes, refinements: Codes, friction: Sequence[bool]) -> int | None:
+    """A node of the cell with alternatives at which all of its refinements are finer than the cell itself."""
+    if not len(refinements):
+        return None
+    for node in np.flatnonzero(np.all(refinements != cell, axis=0)).tolist():
+        if children_of(int(cell[node]), friction=friction[node]):
+            return int(node)
+    return None
+
+
+def _within(leaves: Codes, root: Codes) -> NDArray[np.bool_]:
+    """Which assignments are ``root`` or refine it."""
+    held = (root == CONTACT) & (leaves >= STICK) & (leaves <= SLIP_MINUS)
+    return np.asarray(np.all((leaves == root) | (root == UNDECIDED) | held, axis=1))
+
+
+def _refines(codes: Codes, child: int) -> NDArray[np.bool_]:
+    """Which codes of a node are ``child`` or refine it, where none is coarser."""
+    held = (codes >= STICK) & (codes <= SLIP_MINUS) & (child == CONTACT)
+    return np.asarray((codes == child) | held)

@@ -1,4 +1,4 @@
-"""The condensed problem in rationals, written for the checker alone: it shares no code with the search."""
+"""The condensed problem in rationals, as the checker computes it; the search condenses by code of its own."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import is_positive_definite
 from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.free_displacements import exact_matrices, free_displacements, solved
 from enumsol.kernel.rows import (
     FORBIDDEN,
     FRICTIONLESS,
@@ -47,25 +48,17 @@ class RationalSystem:
     Raises
     ------
     NotEnclosedError
-        S is not positive definite: the energy bound and all that rests on it need that.
+        S is not positive definite: the energy bound and all that rests on it need that. Or the problem has more than
+        EXACT_DOF_LIMIT degrees of freedom.
     """
 
     def __init__(self, problem: ContactProblem, alpha: Fraction) -> None:
-        self.p = problem.p
-        n, a = problem.n, fmpq_of(alpha)
-        A = _exact_matrix(problem.A.toarray())
-        B = fmpq_mat(_exact_matrix(problem.Bn.toarray()).tolist() + _exact_matrix(problem.Bt.toarray()).tolist())
-        slope = [0.0] * n if problem.load_slope is None else problem.load_slope.tolist()
-        load = fmpq_mat([[fmpq_of(x) + a * fmpq_of(y)] for x, y in zip(problem.f.tolist(), slope, strict=True)])
-        try:
-            self.S = B * A.solve(B.transpose())
-        except ZeroDivisionError:
-            raise NotEnclosedError("A is singular in rational arithmetic") from None
+        self.p, a = problem.p, fmpq_of(alpha)
+        A, B = exact_matrices(problem)
+        self.S = B * solved(A, B.transpose())
         if not is_positive_definite(self.S):
             raise NotEnclosedError("the condensed compliance S is not positive definite in rational arithmetic")
-        free = (B * A.solve(load)).entries()
-        offset = problem.gap.tolist() + problem.slip_offset.tolist()
-        self.g: Vector = [x - fmpq_of(y) for x, y in zip(free, offset, strict=True)]
+        self.g: Vector = [x + a * y for x, y in zip(*free_displacements(problem), strict=True)]
         F0, F1 = problem.friction
         self.F: Vector = [fmpq_of(x) + a * fmpq_of(y) for x, y in zip(F0.tolist(), F1.tolist(), strict=True)]
         self._inverse: Any = None
@@ -158,7 +151,3 @@ def _holds(code: int, n: Any, t: Any, w_n: Any, w_t: Any, F: Any) -> bool:
     if code == SLIP_MINUS:
         return bool(t == -F * n and w_t <= 0)
     return bool(code == FRICTIONLESS and F == 0 and t == 0)
-
-
-def _exact_matrix(array: NDArray[np.float64]) -> Any:
-    return fmpq_mat([[fmpq(*x.as_integer_ratio()) for x in row] for row in array.tolist()])

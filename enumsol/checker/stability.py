@@ -68,12 +68,12 @@ def stability_radius(problem: ContactProblem, proof: Proof) -> float:
     if not verify(problem, proof).complete:
         return 0.0
     search = _WidenedChecker(problem, None, radius=LARGEST, adjust=True)
-    search.run(proof.records())
+    search.run(proof)
     radius = search.radius
     # what was found leaf by leaf is proven for all leaves at once
     while radius >= SMALLEST:
         check = _WidenedChecker(problem, None, radius=radius, adjust=False)
-        if check.run(proof.records()).complete and not check.polytopes:
+        if check.run(proof).complete and not check.polytopes:
             return radius
         radius *= 0.5
     return 0.0
@@ -185,8 +185,8 @@ def _sturdiest(
     With multipliers stretched by t the bound is -a + b t - c t^2, known from three points, and its error grows like
     t^2: their quotient is largest at t = 2 a / b. The multipliers of infeasible leaves may be far from that.
     """
-    zero, one, two = (exclusion_margins(system, codes, leaf, rows, t * values) for t in (0.0, 1.0, 2.0))
-    slope = one - zero - 0.5 * (two - 2 * one + zero)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        zero, one, two = (exclusion_margins(system, codes, leaf, rows, t * values) for t in (0.0, 1.0, 2.0))
+        slope = one - zero - 0.5 * (two - 2 * one + zero)
         best = -2 * zero / slope
     return np.where((slope > 0) & np.isfinite(best), np.clip(best, 1 / _STRETCH, _STRETCH), 1.0)

@@ -1,93 +1,57 @@
-"""The independent checker: does a proof show that its list of roots is complete? It imports nothing from the search.
+"""The checker of root sets: whether a proof shows that its list of roots is complete.
 
-What it takes on faith: IEEE double arithmetic, the error bounds of ``condensation.enclosure`` and ``kernel``, and
-rational arithmetic. It recomputes S, g and F (or their enclosures) from the problem, proves S positive definite, walks
-the tree from its root, so that the leaves cover all selections by construction, and checks every leaf.
+It imports nothing of the search; what both rest on is said in ``enumsol.checker``. It recomputes S, g and F (or
+their enclosures) from the problem, proves S positive definite, walks the tree from its root, so that the leaves cover
+all selections by construction, and checks every leaf.
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
-from enumsol.checker.graph import GraphChecker, GraphVerificationReport
+from enumsol.checker.graph import GraphChecker
+from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport, VerificationReport
 from enumsol.checks import optional_callable
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
 from enumsol.kernel.rows import FRICTIONLESS, UNDECIDED, children_of, row_signs
 from enumsol.problem import ContactProblem
-from enumsol.proof.proof_file import Proof, fraction_from, unpacked
+from enumsol.proof.proof_file import Proof, fraction_text
+from enumsol.proof.reading import (
+    RefusedError,
+    data_of,
+    friction_at,
+    multipliers_from,
+    numbers_from,
+    rational_from,
+    shown,
+    units_from,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from numpy.typing import NDArray
-
     from enumsol.checker.rational import RationalSystem
+    from enumsol.condensation.data import Data
 
     #: codes of a selection, the vertices of its root set, and its dimension
     Polytope = tuple[tuple[int, ...], list[Any], int]
 
-_MAX_FAILURES = 20
 _REPORT_EVERY = 256
 #: Exclusion leaves checked together.
 _BATCH = 256
-_EXPONENTS = range(-900, 901)
-_FRACTION = re.compile(r"-?[0-9]{1,4000}(/[0-9]{1,4000})?", re.ASCII)
+#: Entries of a leaf's record, by its kind.
+_ENTRIES = {"x": 3, "X": 3, "n": 1, "r": 4, "N": 1, "D": 3, "z": 1, "u": 2}
 #: Covers underflow of one product.
 _SUBNORMAL = 2.0**-1070
 _END = object()
-
-
-@dataclass(frozen=True)
-class VerificationReport:
-    """What the checker found.
-
-    Attributes
-    ----------
-    ok : bool
-        Every leaf was checked and the counts agree; with ``undecided`` 0 the list of roots is proven complete.
-    failures : tuple of str
-    roots, families, undecided, leaves : int
-        Counts that were checked: isolated roots, families, undecided leaves, all leaves.
-    data : str
-        "problem": the theorem holds for the problem's own matrices; "condensed": for S, g and F as computed.
-    alpha : Fraction or None
-        The parameter that the proof is about; None when its header cannot be read.
-    """
-
-    ok: bool
-    failures: tuple[str, ...]
-    roots: int
-    families: int
-    undecided: int
-    leaves: int
-    data: str
-    alpha: Fraction | None
-
-    @property
-    def complete(self) -> bool:
-        """The proof shows that nothing but the listed roots and families solves the problem."""
-        return self.ok and self.undecided == 0
-
-    def __repr__(self) -> str:
-        where = "" if self.alpha is None else f" at alpha = {_shown(self.alpha)}"
-        lines = [
-            f"proof: {'verified' if self.ok else 'REFUSED'}{where}",
-            f"  {self.leaves} leaves cover all selections, {self.undecided} of them undecided",
-            f"  {self.roots} isolated roots, {self.families} families",
-            f"  certified data: {'A, Bn, Bt, f as given' if self.data == 'problem' else 'S and g as computed'}",
-            f"  complete: {'yes' if self.complete else 'no'}",
-        ]
-        return "\n".join(lines + [f"  failure: {failure}" for failure in self.failures])
 
 
 def verify(
@@ -109,7 +73,8 @@ def verify(
     Raises
     ------
     ProofFormatError
-        The file is damaged (its checksum does not agree) or of another version.
+        The file is damaged (its checksum does not agree), of another version, or holds no sequence of records. Records
+        that make no sense, or prove nothing, are a reason to refuse the proof: the report says so.
     InvalidArgumentError
         An argument is of another type.
     """
@@ -122,16 +87,15 @@ def verify(
     header = next(records, None)
     if isinstance(header, dict) and header.get("kind") == "graph":
         return GraphChecker(problem, header, progress).run(records)
-    return Checker(problem, progress).run(chain([header], records))
-
-
-class _Refused(Exception):  # noqa: N818 (never leaves this module)
-    """The proof cannot be followed any further."""
+    return Checker(problem, progress).run(proof)
 
 
 @dataclass
 class Checker:
-    """One walk through a proof."""
+    """Checks one proof: its header, then the tree alone, then every leaf.
+
+    Whatever does not fit together is found before anything is computed, which may take long.
+    """
 
     problem: ContactProblem
     progress: Callable[[int], object] | None
@@ -141,17 +105,26 @@ class Checker:
     undecided: int = 0
     leaves: int = 0
     polytopes: list[Polytope] = field(default_factory=list)
-    data: str = "problem"
+    data: Data = "problem"
     _waiting: list[tuple[int, tuple[int, ...], Any, Any]] = field(default_factory=list)
 
-    def run(self, records: Iterator[Any]) -> VerificationReport:
-        """Check all records."""
+    def run(self, proof: Proof) -> VerificationReport:
+        """Check all records.
+
+        Raises
+        ------
+        ProofFormatError
+            The content is not a sequence of records.
+        """
         families = isolated = 0
         try:
-            self._header(next(records, _END))
+            records = proof.records()
+            self._read_header(next(records, None))
+            footer = self._survey(records)
+            records = proof.records()
+            next(records, None)
             self._walk(records)
             isolated, families = self._count()
-            footer = next(records, _END)
             claim = {
                 "roots": self.regular + isolated,
                 "families": families,
@@ -159,17 +132,14 @@ class Checker:
                 "leaves": self.leaves,
             }
             if footer != claim:
-                found = "missing" if footer is _END else str(footer)[:200]
-                self.fail(f"the counts at the end are {found}; the leaves give {claim}")
-            if next(records, _END) is not _END:
-                self.fail("records follow after the end of the proof")
-        except _Refused as refusal:
-            self.fail(str(refusal))
+                self.fail(f"the counts at the end are {shown(footer)}; the leaves give {claim}")
+        except RefusedError as refusal:
+            self.failures.append(str(refusal))
         except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
-            self.fail(f"the problem's data cannot be enclosed: {error}")
+            self.failures.append(f"the problem's data cannot be enclosed: {error}")
         return VerificationReport(
             not self.failures,
-            tuple(self.failures[:_MAX_FAILURES]),
+            tuple(self.failures),
             self.regular + isolated,
             families,
             self.undecided,
@@ -180,30 +150,14 @@ class Checker:
 
     # -- header and tree -------------------------------------------------------------------------------------------
 
-    def _header(self, header: Any) -> None:
-        p = self.problem.p
-        if not isinstance(header, dict) or header.get("format") != "enumsol-proof" or header.get("version") != 1:
-            raise _Refused("the first record is no header of an enumsol-proof of version 1")
-        if header.get("problem") != self.problem.fingerprint:
-            raise _Refused("the proof belongs to another problem (its fingerprint is different)")
-        if header.get("p") != p or header.get("data") not in ("problem", "condensed"):
-            raise _Refused("the header does not fit the problem")
-        self.data = header["data"]
-        force, length, alpha = (header.get(key, []) for key in ("force", "length", "alpha"))
-        if not (_are_exponents(force, 2 * p) and _are_exponents(length, 2 * p)):
-            raise _Refused("the header's units are no binary exponents")
-        sizes = {a + b for a, b in zip(force, length, strict=True)}
-        if len(sizes) != 1 or force[:p] != force[p:]:
-            raise _Refused("the header's units are no common scaling of energy and of the two directions of a node")
-        self.force, self.length = np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))
-        if not isinstance(alpha, str) or _FRACTION.fullmatch(alpha) is None or not int(alpha.partition("/")[2] or 1):
-            raise _Refused("the header's alpha is no fraction")
-        self.alpha = Fraction(alpha)
-        F0, F1 = self.problem.friction
-        exact = [Fraction(x) + self.alpha * Fraction(y) for x, y in zip(F0.tolist(), F1.tolist(), strict=True)]
-        if min(exact) < 0:
-            raise _Refused("friction is negative at the header's alpha")
-        self.friction = [F > 0 for F in exact]
+    def _read_header(self, header: Any) -> None:
+        self.data = data_of(header, self.problem, None)
+        try:
+            self.force, self.length = units_from(header, self.problem.p)
+            self.alpha = rational_from(header.get("alpha"))
+            self.friction = [F > 0 for F in friction_at(self.problem, self.alpha)]
+        except ValueError as error:
+            raise RefusedError(f"the header cannot be read: {error}") from None
 
     @cached_property
     def system(self) -> EnclosedSystem:
@@ -216,39 +170,54 @@ class Checker:
                 S, g = scaled.S * pair, scaled.g / self.length
             finite = np.all(np.isfinite(S)) and np.all(np.isfinite(g))
             if not finite or np.any(np.array(self.friction) & (scaled.F == 0)):
-                raise _Refused("S, g or F over- or underflow in the proof's units")
+                raise RefusedError("S, g or F over- or underflow in the proof's units")
             enclosed = EnclosedSystem(S, zero(S), g, zero(g), scaled.F, 4 * np.spacing(scaled.F))
         else:
             enclosed = CondensedEnclosure.from_problem(self.problem).at(self.alpha, self.force, self.length)
         if not enclosed.smallest_eigenvalue > 0:
-            raise _Refused("S is not proven positive definite")
+            raise RefusedError("S is not proven positive definite")
         return enclosed
 
     @cached_property
     def rational(self) -> RationalSystem:
         """The condensed problem in rationals; only leaves that need it ask for it."""
         if self.data == "condensed":
-            raise _Refused("a rational leaf in a proof about S and g as computed")
+            raise RefusedError("a rational leaf in a proof about S and g as computed")
         from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
 
         return RationalSystem(self.problem, self.alpha)
 
-    def _walk(self, records: Iterator[Any]) -> None:
-        p = self.problem.p
-        stack: list[tuple[int, ...]] = [(UNDECIDED,) * p]
+    def _leaves(self, records: Iterator[Any]) -> Iterator[tuple[tuple[int, ...], list[Any]]]:
+        """The tree's leaves with the assignments that they stand for, which together cover all selections."""
+        stack: list[tuple[int, ...]] = [(UNDECIDED,) * self.problem.p]
         while stack:
             codes = stack.pop()
             record = next(records, _END)
             if not isinstance(record, list) or not record:
-                raise _Refused(f"{len(stack) + 1} subtrees are not accounted for: the tree breaks off")
+                raise RefusedError(f"{len(stack) + 1} subtrees are not accounted for: the tree breaks off")
             if record[0] == "b":
                 stack.extend(reversed(self._children(codes, record)))
-                continue
+            else:
+                yield codes, record
+
+    def _survey(self, records: Iterator[Any]) -> Any:
+        """Walk the tree without a look at its leaves; gives the counts at the end."""
+        leaves = sum(1 for _ in self._leaves(records))
+        footer = next(records, _END)
+        if not isinstance(footer, dict) or footer.get("leaves") != leaves:
+            found = "missing" if footer is _END else shown(footer)
+            raise RefusedError(f"the counts at the end are {found}; the tree has {leaves} leaves")
+        if next(records, _END) is not _END:
+            raise RefusedError("records follow after the end of the proof")
+        return footer
+
+    def _walk(self, records: Iterator[Any]) -> None:
+        for codes, record in self._leaves(records):
             self.leaves += 1
             try:
                 problem = self._leaf(codes, record)
-            except (TypeError, ValueError, OverflowError, ZeroDivisionError, IndexError) as error:
-                problem = f"the record cannot be read ({error})"
+            except ValueError as error:
+                problem = f"its record cannot be followed ({error})"
             if problem is not None:
                 self.fail(f"leaf {self.leaves}: {problem}")
             if len(self._waiting) >= _BATCH:
@@ -271,33 +240,42 @@ class Checker:
             self.fail(f"leaf {number}: its multipliers do not exclude it")
 
     def _children(self, codes: tuple[int, ...], record: list[Any]) -> list[tuple[int, ...]]:
-        try:
-            _, node, children = record
-            expected = children_of(codes[node], friction=self.friction[node]) if node >= 0 else ()
-            fits = expected and sorted(children) == sorted(expected)
-        except (TypeError, ValueError, IndexError):
-            fits = False
-        if not fits:
-            raise _Refused(f"a branching {str(record)[:60]} does not cover the assignment that it splits")
-        return [(*codes[:node], int(code), *codes[node + 1 :]) for code in children]
+        _, node, children = record if len(record) == 3 else (None, None, None)
+        if type(node) is int and 0 <= node < self.problem.p and isinstance(children, list):
+            expected = children_of(codes[node], friction=self.friction[node])
+            if expected and all(type(code) is int for code in children) and sorted(children) == sorted(expected):
+                return [(*codes[:node], code, *codes[node + 1 :]) for code in children]
+        raise RefusedError(f"a branching {shown(record)} does not cover the assignment that it splits")
 
     def fail(self, message: str) -> None:
-        """Take note of a failure."""
+        """Take note of a failure.
+
+        Raises
+        ------
+        RefusedError
+            There have been MAX_FAILURES: whoever wrote this may have written any number of such leaves.
+        """
         self.failures.append(message)
+        if len(self.failures) == MAX_FAILURES:
+            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
 
     # -- leaves ----------------------------------------------------------------------------------------------------
 
     def _leaf(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         """Check one leaf; the reason when it proves nothing."""
         kind = record[0]
+        if not isinstance(kind, str) or kind not in _ENTRIES:
+            return f"unknown kind of record {shown(kind)}"
+        if len(record) != _ENTRIES[kind]:
+            return f"its record has {len(record)} entries; expected {_ENTRIES[kind]}"
         if kind == "x":
-            self._waiting.append((self.leaves, codes, *unpacked(*record[1:])))
+            self._waiting.append((self.leaves, codes, *multipliers_from(record[1:], 7 * self.problem.p)))
             return None
         if kind == "X":
             return self._rational_exclusion(codes, record)
         if kind == "u":
             self.undecided += 1
-            return None
+            return None if isinstance(record[1], str) else "its reason is no text"
         if kind == "z":
             unloaded = all(c == UNDECIDED for c in codes) and self.problem.is_unloaded(self.alpha)
             # g = 0: the energy bound reads lambda' S lambda <= 0
@@ -305,11 +283,7 @@ class Checker:
             return None if unloaded else "the problem is not unloaded"
         if any(code > FRICTIONLESS for code in codes):
             return "a root or a solved selection is claimed where statuses are still open"
-        if kind in ("n", "r"):
-            return self._solved(codes, record)
-        if kind in ("N", "D"):
-            return self._rational_selection(codes, record)
-        return f"unknown kind of record {str(kind)[:20]!r}"
+        return self._solved(codes, record) if kind in ("n", "r") else self._rational_selection(codes, record)
 
     def _solved(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         ball = solve_selection(self.system, codes)
@@ -323,19 +297,17 @@ class Checker:
             return "its candidate is not proven to be a root"
         self.regular += 1
         _, mid, rad, index = record
-        centre, radius = _floats(mid, len(ball.force)), _floats(rad, len(ball.force))
+        centre, radius = (numbers_from(values, len(ball.force)) for values in (mid, rad))
         with np.errstate(over="ignore", invalid="ignore"):
             reach = np.abs(centre - ball.force * self.force) + ball.force_rad * self.force
             inside = reach * SAFE + np.where(ball.force_rad > 0, _SUBNORMAL, 0.0) <= radius
         if not np.all(inside):
             return "its enclosure does not hold the root"
-        return None if index == ball.det_sign else "its index is wrong"
+        return None if type(index) is int and index == ball.det_sign else "its index is wrong"
 
     def _rational_exclusion(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        rows, values = unpacked(*record[1:])
         p = self.problem.p
-        if np.any(rows >= 7 * p):
-            return "a row does not exist"
+        rows, values = multipliers_from(record[1:], 7 * p)
         signs = row_signs(np.array(codes), np.array(self.friction, dtype=float))
         units = [Fraction(self.length[r % p] if r // p < 4 else self.force[r % p]) for r in range(7 * p)]
         positive = self.rational.energy_bound_positive(signs, rows.tolist(), values.tolist(), units)
@@ -344,14 +316,16 @@ class Checker:
     def _rational_selection(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         from enumsol.checker.hull import hull_of_selections
 
-        hull = hull_of_selections(self.rational, codes)
         if record[0] == "N":
-            return "it holds a root" if hull.points else None
+            return "it holds a root" if hull_of_selections(self.rational, codes).points else None
         _, points, dimension = record
-        claimed = [tuple(fraction_from(x) for x in point) for point in points]
-        if not hull.points or sorted(claimed) != hull.points or dimension != hull.dimension:
+        _check_points(points, 2 * self.problem.p)
+        hull = hull_of_selections(self.rational, codes)
+        # in lowest terms a number has one text: there is no need to make numbers of the texts in a file
+        found = [[fraction_text(x.numerator, x.denominator) for x in point] for point in hull.points]
+        if not found or sorted(points) != sorted(found) or type(dimension) is not int or dimension != hull.dimension:
             return "its roots are not those that are claimed"
-        self.polytopes.append((codes, claimed, hull.dimension))
+        self.polytopes.append((codes, hull.points, hull.dimension))
         return None
 
     # -- counting --------------------------------------------------------------------------------------------------
@@ -361,41 +335,36 @@ class Checker:
 
         A strict root solves no second selection, so it is none of these, and strict roots of two leaves are two.
         """
-        groups: list[list[int]] = []
-        for k, polytope in enumerate(self.polytopes):
-            joined = [k]
-            rest = []
-            for group in groups:
-                if any(self._touch(polytope, self.polytopes[m]) for m in group):
-                    joined += group
-                else:
-                    rest.append(group)
-            groups = [*rest, joined]
-        families = sum(any(self.polytopes[m][2] > 0 for m in group) for group in groups)
-        return len(groups) - families, families
+        groups = list(range(len(self.polytopes)))
 
-    def _touch(self, a: Polytope, b: Polytope) -> bool:
+        def group_of(k: int) -> int:
+            while groups[k] != k:
+                groups[k] = k = groups[groups[k]]
+            return k
+
+        owner: dict[Any, int] = {}
+        for k, (_, points, _) in enumerate(self.polytopes):
+            for point in points:
+                groups[group_of(k)] = group_of(owner.setdefault(point, k))
+        # two points are one or have nothing in common; larger polytopes may meet elsewhere than in their vertices
+        for k in [k for k, polytope in enumerate(self.polytopes) if polytope[2] > 0]:
+            for m in range(len(self.polytopes)):
+                if group_of(k) != group_of(m) and self._meet(k, m):
+                    groups[group_of(k)] = group_of(m)
+        found = {group_of(k) for k in range(len(groups))}
+        families = {group_of(k) for k, polytope in enumerate(self.polytopes) if polytope[2] > 0}
+        return len(found) - len(families), len(families)
+
+    def _meet(self, k: int, m: int) -> bool:
         """Whether two root sets have a point in common."""
-        if set(a[1]) & set(b[1]):
-            return True
-        if a[2] == b[2] == 0:
-            return False
         from enumsol.checker.hull import hull_of_selections
 
-        return bool(hull_of_selections(self.rational, a[0], b[0]).points)
+        return bool(hull_of_selections(self.rational, self.polytopes[k][0], self.polytopes[m][0]).points)
 
 
-def _shown(alpha: Fraction) -> str:
-    """A short text: the float where it is the same number, or else the fraction or its beginning."""
-    exact = abs(alpha) < 10**300 and Fraction(float(alpha)) == alpha
-    return str(float(alpha)) if exact else str(alpha)[:40]
-
-
-def _are_exponents(values: Any, size: int) -> bool:
-    return isinstance(values, list) and len(values) == size and all(type(x) is int and x in _EXPONENTS for x in values)
-
-
-def _floats(values: Any, size: int) -> NDArray[np.float64]:
-    if not isinstance(values, list) or len(values) != size or not all(type(x) in (int, float) for x in values):
-        raise ValueError(f"expected {size} numbers")
-    return np.array(values, dtype=np.float64)
+def _check_points(points: Any, size: int) -> None:
+    """Raise ValueError unless it is a list of points, each a list of that many texts."""
+    if not isinstance(points, list) or not all(isinstance(point, list) and len(point) == size for point in points):
+        raise ValueError(f"expected points of {size} fractions")
+    if not all(isinstance(x, str) for point in points for x in point):
+        raise ValueError("a coordinate is no text")

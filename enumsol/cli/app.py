@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import sys
 import warnings
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +10,8 @@ import typer
 
 from enumsol.cli import audit, follow, gallery, graph, roots, table, verify
 from enumsol.cli.common import ExitStatus
-from enumsol.errors import EnumsolError
+from enumsol.cli.streams import guarded_streams
+from enumsol.errors import EnumsolError, OutputError, WorkerError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,13 +39,9 @@ app.add_typer(gallery.app, name="gallery")
 
 def _version(value: bool) -> None:
     if value:
-        from importlib.metadata import PackageNotFoundError, version  # for nothing else
+        from enumsol import __version__  # found when it is asked for
 
-        try:
-            found = version("enumsol")
-        except PackageNotFoundError:
-            found = "(not installed, run from its source)"
-        typer.echo(f"enumsol {found}")
+        typer.echo(f"enumsol {__version__}")
         raise typer.Exit
 
 
@@ -69,34 +64,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         Default: those of the process.
     """
-    with warnings.catch_warnings():
+    with guarded_streams(), warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:
             status = app(arguments, prog_name="enumsol", standalone_mode=False)
             sys.stdout.flush()
+        except OutputError as error:
+            left = isinstance(error.__cause__, BrokenPipeError)
+            return _refuse(str(error), ExitStatus.BROKEN_PIPE if left else ExitStatus.OUTPUT_FAILED)
+        except WorkerError as error:
+            return _refuse(str(error), ExitStatus.WORKER_DIED)
         except EnumsolError as error:
             return _refuse(str(error))
         except _UsageError as error:
             # several sentences: "No such command 'rots'. Did you mean 'roots'?"
             return _refuse(error.format_message().replace(". Did", "; did"))  # type: ignore[attr-defined]
-        except BrokenPipeError:
-            # whoever read our output has read enough (| head): keep the interpreter from complaining at exit
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return ExitStatus.BROKEN_PIPE
         except (KeyboardInterrupt, typer.Abort):
             return ExitStatus.INTERRUPTED
     return int(status or 0)
 
 
-def _refuse(message: str) -> int:
+def _refuse(message: str, status: ExitStatus = ExitStatus.BAD_INPUT) -> ExitStatus:
     sentence = " ".join(message.split()).rstrip(".")
     # quotes, names and capitals of our own messages stay as they are
     if sentence.startswith(("Missing ", "No such ", "Invalid ", "Got ", "Option ")):
         sentence = sentence[0].lower() + sentence[1:]
     typer.echo(f"enumsol: error: {sentence}", err=True)
-    return ExitStatus.BAD_INPUT
+    return status
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    with contextlib.suppress(OSError):
-        typer.echo(f"enumsol: warning: {' '.join(str(message).split())}", err=True)
+    typer.echo(f"enumsol: warning: {' '.join(str(message).split())}", err=True)

@@ -19,12 +19,13 @@ from enumsol.cli.common import (
     parse_interval,
 )
 from enumsol.cli.graph import build, read_graph
-from enumsol.cli.output import as_json, check_outputs, write_text
+from enumsol.cli.output import as_json, check_outputs, deliver, write_text
 from enumsol.errors import Interrupted, InvalidArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from enumsol.branches import BranchGraph
     from enumsol.checks import Alpha
     from enumsol.continuation import AuditReport, PointRun
 
@@ -91,7 +92,8 @@ def audit(
     Exit status: 0 when every point is on the graph, nothing jumped and no arc was missed; 3 when not, or when the graph
     is known to be incomplete (in fast arithmetic, which proves nothing: when its degrees do not balance); 4 when points
     were not compared, whatever else was found: their alpha is outside the interval of the graph, or a graph that is
-    known to be incomplete has no arc there; 2 on bad input; 130 on Ctrl-C.
+    known to be incomplete has no arc there; 2 on bad input; 130 on Ctrl-C; 74 when a result could not be written, 141
+    when nobody read it any more.
     """
     from enumsol.continuation import audit as check
     from enumsol.continuation import read_points
@@ -116,15 +118,19 @@ def audit(
     except Interrupted as interruption:
         interrupted, found = True, interruption.partial
     report = check(runs, found, tolerance=tolerance)
-    if "-" not in (json_file, csv_file):
-        low, high = found.interval
-        typer.echo(repr(report))
-        typer.echo(f"graph for alpha in [{low:g}, {high:g}], {len(found.arcs)} arcs; {found.completeness()}")
-    if json_file is not None:
-        write_text(json_file, as_json({"problem": problem, **report.summary(), "graph": found.summary()}))
-    if csv_file is not None:
-        write_text(csv_file, report.to_frame().to_csv(index=False))
+    content = {"problem": problem, **report.summary(), "graph": found.summary()}
+    deliver(
+        None if "-" in (json_file, csv_file) else lambda: typer.echo(_as_text(report, found)),
+        None if json_file is None else lambda: write_text(json_file, as_json(content)),
+        None if csv_file is None else lambda: write_text(csv_file, report.to_frame().to_csv(index=False)),
+    )
     raise typer.Exit(ExitStatus.INTERRUPTED if interrupted else _status(report))
+
+
+def _as_text(report: AuditReport, found: BranchGraph) -> str:
+    low, high = found.interval
+    about = f"graph for alpha in [{low:g}, {high:g}], {len(found.arcs)} arcs; {found.completeness()}"
+    return f"{report!r}\n{about}"
 
 
 def _status(report: AuditReport) -> ExitStatus:

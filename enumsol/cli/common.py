@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import enum
+import os
+import sys
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 
-from enumsol.errors import InvalidArgumentError
+from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,6 +21,8 @@ if TYPE_CHECKING:
     from enumsol.problem import ContactProblem
 
 _GALLERY = "gallery:"
+#: As many processes as Windows lets one wait for.
+_MOST_ON_WINDOWS = 61
 
 ProblemArgument = Annotated[
     str,
@@ -57,12 +62,14 @@ QuantityOption = Annotated[Quantity, typer.Option(help="What is drawn against al
 
 
 class ExitStatus(enum.IntEnum):
-    """What the command line tells its caller."""
+    """What the command line tells its caller; the two in the seventies are those of sysexits.h."""
 
     DONE = 0
     BAD_INPUT = 2
     INCOMPLETE = 3
     NOT_COMPARED = 4
+    WORKER_DIED = 71
+    OUTPUT_FAILED = 74
     INTERRUPTED = 130
     BROKEN_PIPE = 141
 
@@ -73,15 +80,33 @@ def load_problem(name: str) -> ContactProblem:
     Raises
     ------
     InvalidProblemError, InvalidArgumentError
-        It cannot be read, or the gallery has none of that name.
+        It cannot be read, or the gallery has none of that name; the message gives names that are close.
     """
     if name.startswith(_GALLERY):
         from enumsol import gallery  # numpy and scipy: not for --help
 
         return gallery.get(name.removeprefix(_GALLERY)).build()
+    if not Path(name).exists() and (close := _close_names(name)):
+        raise InvalidArgumentError(f"{name}: there is no such file or directory; did you mean {', '.join(close)}?")
     from enumsol.io import read_problem  # as above
 
     return read_problem(name)
+
+
+def _close_names(name: str) -> list[str]:
+    """Problems of the gallery and files in the same directory whose names are close to one that is neither."""
+    import difflib  # for nothing else
+
+    from enumsol import gallery  # as above
+    from enumsol.io import SUFFIXES
+
+    place = Path(name)
+    try:
+        beside = [file.name for file in place.parent.iterdir() if file.suffix in SUFFIXES or file.is_dir()]
+    except OSError:
+        beside = []  # no such directory either
+    files = [str(place.with_name(file)) for file in difflib.get_close_matches(place.name, beside, cutoff=0.75)]
+    return files + [_GALLERY + entry for entry in gallery.close_names(name.rpartition(":")[2])]
 
 
 def parse_alpha(text: str, option: str = "--alpha") -> Alpha:
@@ -128,12 +153,50 @@ def node_row(problem: ContactProblem, label: str | None) -> int:
     return labels.index(label)
 
 
+def note(text: str) -> None:
+    """Say something on stderr that is no error."""
+    typer.echo(f"enumsol: note: {text}", err=True)
+
+
+def finish(ended: EnumsolError | None, status: ExitStatus) -> NoReturn:
+    """End the command: by what ended its search early, or with a status."""
+    if isinstance(ended, Interrupted):
+        raise typer.Exit(ExitStatus.INTERRUPTED)
+    if ended is not None:
+        raise ended
+    raise typer.Exit(status)
+
+
+def processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def capped(jobs: int) -> int:
+    """That many processes, or as many as there are processors: more of them only take memory."""
+    most = processors()
+    if sys.platform == "win32":
+        most = min(most, _MOST_ON_WINDOWS)
+    if jobs > most:
+        note(f"--jobs is {jobs}; {most} {'are' if most > 1 else 'is'} used, as many as this machine can keep busy")
+    return min(jobs, most)
+
+
 @contextmanager
 def workers(jobs: int) -> Iterator[Executor | None]:
-    """An executor of that many processes, stopped at once on the way out; None for one."""
+    """An executor of that many processes at most, stopped at once on the way out; None for one.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The system starts no more processes.
+    """
     if jobs == 1:
         yield None
         return
+    jobs = capped(jobs)
     # only for several processes
     import multiprocessing
     import signal
@@ -146,8 +209,7 @@ def workers(jobs: int) -> Iterator[Executor | None]:
     # a terminal sends Ctrl-C to the workers too: processes born while it is ignored go on ignoring it
     handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        for _ in range(jobs):
-            executor.submit(int)
+        _start(executor, jobs)
         signal.signal(signal.SIGINT, handler)
         yield executor
     finally:
@@ -155,3 +217,18 @@ def workers(jobs: int) -> Iterator[Executor | None]:
         executor.shutdown(wait=False, cancel_futures=True)
         for worker in set(multiprocessing.active_children()) - before:
             worker.terminate()
+
+
+def _start(executor: Executor, jobs: int) -> None:
+    """Start the processes, one for every task that waits."""
+    from concurrent.futures import BrokenExecutor  # only for several processes
+
+    try:
+        for _ in range(jobs):
+            executor.submit(int)
+    except BrokenExecutor:
+        return  # one died already; the search finds out and says so
+    except OSError as error:
+        raise InvalidArgumentError(
+            f"--jobs is {jobs}, and the system starts no more processes ({error.strerror}); expected fewer"
+        ) from error

@@ -24,7 +24,7 @@ from enumsol.cli.common import (
     parse_interval,
 )
 from enumsol.cli.graph import read_graph
-from enumsol.cli.output import as_json, check_outputs, check_plot, write_figure, write_text
+from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure, write_text
 from enumsol.cli.progress import Display, SearchDisplay
 from enumsol.errors import Interrupted, InvalidArgumentError
 
@@ -130,7 +130,8 @@ def follow(
     found: compare with enumsol graph, or enumsol audit.
 
     Exit status: 0 when every path left the interval or closed; 3 when one ended otherwise or could not start; 2 on bad
-    input; 130 on Ctrl-C, after printing the paths so far.
+    input; 130 on Ctrl-C, after printing the paths so far; 74 when a result could not be written, 141 when nobody read
+    it any more.
     """
     check_outputs(json=json_file, csv=csv_file)
     check_plot(plot_file)
@@ -150,14 +151,16 @@ def follow(
     except KeyboardInterrupt:
         # wherever it came: the paths so far are kept
         interrupted = True
-    if "-" not in (json_file, csv_file):
-        typer.echo(followed.as_text() + (" (interrupted)" if interrupted else ""))
-    if json_file is not None:
-        write_text(json_file, as_json({"problem": problem, "start": alpha, "interval": interval, **followed.content()}))
-    if csv_file is not None:
-        write_text(csv_file, followed.frame().to_csv(index=False))
-    if plot_file is not None and followed.paths:
-        write_figure(plot_file, _draw(followed.paths, over, row, quantity))
+    about = {"problem": problem, "start": alpha, "interval": interval}
+    text = followed.as_text() + (" (interrupted)" if interrupted else "")
+    deliver(
+        None if "-" in (json_file, csv_file) else lambda: typer.echo(text),
+        None if json_file is None else lambda: write_text(json_file, as_json({**about, **followed.content()})),
+        None if csv_file is None else lambda: write_text(csv_file, followed.frame().to_csv(index=False)),
+        (lambda: write_figure(plot_file, _draw(followed.paths, over, row, quantity)))
+        if plot_file and followed.paths
+        else None,
+    )
     if interrupted:
         raise typer.Exit(ExitStatus.INTERRUPTED)
     raise typer.Exit(ExitStatus.DONE if followed.arrived else ExitStatus.INCOMPLETE)

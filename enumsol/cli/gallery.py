@@ -28,8 +28,13 @@ def list_() -> None:
     if not sys.stdout.isatty():
         # for other programs: one line a problem, however long
         widths = [max(len(row[k]) for row in rows) for k in range(3)]
-        for name, alpha, roots, summary in rows:
-            typer.echo(f"{name:<{widths[0]}}  {alpha:>{widths[1]}}  {roots:>{widths[2]}}  {summary}")
+        # written at once: nothing is left to write when a reader has read enough (| head)
+        typer.echo(
+            "\n".join(
+                f"{name:<{widths[0]}}  {alpha:>{widths[1]}}  {roots:>{widths[2]}}  {summary}"
+                for name, alpha, roots, summary in rows
+            )
+        )
         return
     from rich.console import Console
     from rich.table import Table

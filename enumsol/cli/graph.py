@@ -18,15 +18,28 @@ from enumsol.cli.common import (
     ProblemArgument,
     QuantityOption,
     ToOption,
+    finish,
     load_problem,
     node_row,
+    note,
     parse_interval,
 )
-from enumsol.cli.output import as_json, check_outputs, check_plot, check_writable, write_figure, write_text
+from enumsol.cli.output import (
+    as_json,
+    check_outputs,
+    check_plot,
+    check_writable,
+    deliver,
+    write_figure,
+    write_text,
+    writing,
+)
 from enumsol.cli.progress import Display
 from enumsol.errors import Interrupted, InvalidArgumentError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from enumsol.branches import BranchGraph
     from enumsol.checks import Alpha
     from enumsol.problem import ContactProblem
@@ -87,7 +100,8 @@ def graph(
     Prints branches, folds, bifurcations and continua, and whether the graph is complete.
 
     Exit status: 0 when complete (in fast arithmetic, which proves nothing: when the degrees balance at every vertex);
-    3 when the graph is known to be incomplete; 2 on bad input; 130 on Ctrl-C.
+    3 when the graph is known to be incomplete; 2 on bad input; 130 on Ctrl-C, after printing the graph so far; 74 when
+    a result could not be written, 141 when nobody read it any more.
     """
     check_outputs(json=json_file, csv=csv_file)
     for option, path in (("--save", save_file), ("--graphml", graphml_file), ("--proof", proof_file)):
@@ -97,37 +111,35 @@ def graph(
     check_plot(plot_file)
     interval, body = parse_interval(first, last), load_problem(problem)
     chosen = None if nodes is None else [body.node_ids[node_row(body, label.strip())] for label in nodes.split(",")]
-    interrupted = False
+    ended: Interrupted | None = None
     found: Any
     try:
         found = build(body, interval, arithmetic, max_nodes=max_nodes, time_limit=time_limit)
     except Interrupted as interruption:
-        interrupted, found = True, interruption.partial
-    if "-" not in (json_file, csv_file):
-        typer.echo(as_text(found))
-    if json_file is not None:
-        write_text(json_file, as_json({"problem": problem, **_content(found)}))
-    if csv_file is not None:
-        write_text(csv_file, found.to_frame().to_csv(index=False))
-    if proof_file is not None:
-        _write_proof(found, proof_file)
-    if save_file is not None:
-        found.save(save_file)
-    if graphml_file is not None:
-        found.write_graphml(graphml_file)
-    if plot_file is not None:
-        write_figure(plot_file, found.plot(quantity, chosen))
-    if interrupted:
-        raise typer.Exit(ExitStatus.INTERRUPTED)
-    raise typer.Exit(ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
+        ended, found = interruption, interruption.partial
+    deliver(
+        None if "-" in (json_file, csv_file) else lambda: typer.echo(as_text(found)),
+        None if json_file is None else lambda: write_text(json_file, as_json({"problem": problem, **_content(found)})),
+        None if csv_file is None else lambda: write_text(csv_file, found.to_frame().to_csv(index=False)),
+        None if proof_file is None else lambda: _write_proof(found, proof_file),
+        None if save_file is None else lambda: _write(found.save, save_file),
+        None if graphml_file is None else lambda: _write(found.write_graphml, graphml_file),
+        None if plot_file is None else lambda: write_figure(plot_file, found.plot(quantity, chosen)),
+    )
+    finish(ended, ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
 
 
 def _write_proof(found: BranchGraph, file: str) -> None:
     if found.proof is None:
         why = "only verified arithmetic gives one" if found.arithmetic != "verified" else "this search gave none"
-        typer.echo(f"enumsol: note: no proof was written, {why}", err=True)
+        note(f"no proof was written, {why}")
         return
-    found.proof.save(file)
+    _write(found.proof.save, file)
+
+
+def _write(save: Callable[[str], object], file: str) -> None:
+    with writing(file):
+        save(file)
 
 
 def build(

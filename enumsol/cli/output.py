@@ -1,18 +1,27 @@
-"""Results on stdout and in files: texts, JSON, figures."""
+"""Results on stdout and in files: texts, JSON, figures.
+
+What is wrong with an option is said before a long search; what cannot be written after it is an OutputError, and keeps
+no other result from being written.
+"""
 
 from __future__ import annotations
 
 import json
 import math
 import os
+from contextlib import contextmanager
 from fractions import Fraction
 from importlib.util import find_spec
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
 
 
 def check_writable(path: str | None, option: str) -> None:
@@ -41,18 +50,52 @@ def write_text(path: str, text: str) -> None:
 
     Raises
     ------
-    InvalidArgumentError
-        The file cannot be written.
+    OutputError
+        It cannot be written.
     """
     if path == "-":
         typer.echo(text, nl=not text.endswith("\n"))
         return
-    try:
+    with writing(path):
         Path(path).write_text(text if text.endswith("\n") else text + "\n", encoding="utf-8")
+
+
+@contextmanager
+def writing(path: str) -> Iterator[None]:
+    """A block that writes a file: what the system refuses is an OutputError.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    try:
+        yield
     except OSError as error:
-        raise InvalidArgumentError(
-            f"{path} cannot be written ({error.strerror}); expected a file in a writable directory"
-        ) from error
+        reason = error.strerror or error
+        raise OutputError(f"{path} cannot be written ({reason}); expected a file in a place with room") from error
+
+
+def deliver(*outputs: Callable[[], object] | None) -> None:
+    """Write results one after the other, None being nothing to write.
+
+    Raises
+    ------
+    OutputError
+        Some could not be written, after all the others were.
+    """
+    failures = []
+    for output in outputs:
+        if output is None:
+            continue
+        try:
+            output()
+        except OutputError as error:
+            failures.append(error)
+    if len(failures) == 1:
+        raise failures[0]
+    if failures:
+        raise OutputError("; ".join(map(str, failures)))
 
 
 def check_outputs(**paths: str | None) -> None:
@@ -102,15 +145,13 @@ def write_figure(path: str, figure: Any) -> None:
 
     Raises
     ------
-    InvalidArgumentError
+    OutputError
         The file cannot be written.
     """
-    try:
-        figure.savefig(path, dpi=150)
-    except OSError as error:
-        raise InvalidArgumentError(
-            f"{path} cannot be written ({error.strerror}); expected a file in a writable directory"
-        ) from error
+    drawn = BytesIO()  # not all of matplotlib's formats survive a file that cannot be written
+    figure.savefig(drawn, dpi=150, format=Path(path).suffix.removeprefix(".").lower())
+    with writing(path):
+        Path(path).write_bytes(drawn.getvalue())
 
 
 def as_json(content: Any) -> str:

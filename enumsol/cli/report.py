@@ -21,8 +21,10 @@ def as_text(found: RootSet) -> str:
     rows = (len(found) + sum(len(family.vertices) for family in found.families)) * len(found.node_ids)
     if not 0 < rows <= _ROWS:
         return repr(found)
+    from enumsol.roots.root_set import node_heading  # numpy: not for --help
+
     width = max(4, *(len(str(label)) for label in found.node_ids))
-    lines = [f"{'':>8} {'node':>{width}} {'status':<7} {'lambda_n':>12} {'lambda_t':>12} {'u_n':>12} {'u_t':>12}"]
+    lines = [f"{'':>8} {node_heading(width)}"]
     for k, root in enumerate(found):
         lines += _root_rows(f"root {k}", root, found.node_ids, width)
     for k, family in enumerate(found.families):
@@ -31,11 +33,10 @@ def as_text(found: RootSet) -> str:
 
 
 def _root_rows(title: str, root: Root, node_ids: tuple[Any, ...], width: int) -> Iterator[str]:
+    from enumsol.roots.root_set import node_line  # as above
+
     for i, label in enumerate(node_ids):
-        numbers = (root.lambda_n[i], root.lambda_t[i], root.u_n[i], root.u_t[i])
-        # + 0.0 turns a negative zero, which means nothing to a reader, into zero
-        text = " ".join(f"{number + 0.0:>12.6g}" for number in numbers)
-        yield f"{title if i == 0 else '':>8} {label!s:>{width}} {root.statuses[i].value:<7} {text}"
+        yield f"{title if i == 0 else '':>8} {node_line(root, i, label, width)}"
 
 
 def _family_rows(k: int, family: RootFamily, node_ids: tuple[Any, ...], width: int) -> Iterator[str]:

@@ -14,13 +14,15 @@ from enumsol.cli.common import (
     ExitStatus,
     JsonOption,
     ProblemArgument,
+    finish,
     load_problem,
+    note,
     parse_alpha,
     workers,
 )
-from enumsol.cli.output import check_outputs, check_writable, write_text
+from enumsol.cli.output import check_outputs, check_writable, deliver, write_text
 from enumsol.cli.progress import SearchDisplay
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutputError, WorkerError
 
 if TYPE_CHECKING:
     from enumsol.checks import Alpha
@@ -81,7 +83,8 @@ def roots(
 
     Exit status: 0 when complete (in fast arithmetic, which proves nothing: when the search ran to its end with nothing
     undecided); 3 when something stayed undecided, a limit cut the search short, or the indices do not add up to +1;
-    2 on bad input; 130 on Ctrl-C, after printing what was found so far.
+    2 on bad input; 71 when a process of --jobs died, 130 on Ctrl-C, both after printing what was found so far; 74 when
+    a result could not be written, 141 when nobody read it any more.
     """
     check_outputs(json=json_file, csv=csv_file)
     if proof_file == "-":
@@ -90,13 +93,13 @@ def roots(
         raise InvalidArgumentError(f"--jobs is {jobs} with the exhaustive method; expected 1 job, or the method tree")
     check_writable(proof_file, "--proof")
     value, body = parse_alpha(alpha), load_problem(problem)
-    interrupted = False
+    ended: EnumsolError | None = None
     try:
         found = _search(body, value, arithmetic, method, stop_after, max_nodes, time_limit, jobs, proof_file)
-    except Interrupted as interruption:
-        interrupted, found = True, interruption.partial
+    except (Interrupted, WorkerError, OutputError) as error:
+        ended, found = error, error.partial
     _output(found, problem, json_file, csv_file)
-    raise typer.Exit(ExitStatus.INTERRUPTED if interrupted else _status(found))
+    finish(ended, _status(found))
 
 
 def _search(
@@ -134,14 +137,10 @@ def _status(found: RootSet) -> ExitStatus:
 
 
 def _output(found: RootSet, name: str, json_file: str | None, csv_file: str | None) -> None:
-    if "-" not in (json_file, csv_file):
-        typer.echo(report.as_text(found))
-    if json_file is not None:
-        write_text(json_file, report.as_json(found, name))
-    if csv_file is not None:
-        write_text(csv_file, found.to_frame().to_csv(index=False))
-        if found.families:
-            typer.echo(
-                f"enumsol: note: the CSV holds the isolated roots only, --json the {len(found.families)} families too",
-                err=True,
-            )
+    deliver(
+        None if "-" in (json_file, csv_file) else lambda: typer.echo(report.as_text(found)),
+        None if json_file is None else lambda: write_text(json_file, report.as_json(found, name)),
+        None if csv_file is None else lambda: write_text(csv_file, found.to_frame().to_csv(index=False)),
+    )
+    if csv_file is not None and found.families:
+        note(f"the CSV holds the isolated roots only, --json the {len(found.families)} families too")

@@ -14,14 +14,15 @@ from enumsol.cli.common import (
     ExitStatus,
     JsonOption,
     ProblemArgument,
+    finish,
     load_problem,
     parse_alpha,
     parse_interval,
     workers,
 )
-from enumsol.cli.output import as_json, check_outputs, write_text
+from enumsol.cli.output import as_json, check_outputs, deliver, write_text
 from enumsol.cli.progress import Display
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, WorkerError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from enumsol.checks import Alpha
     from enumsol.problem import ContactProblem
 
-#: Names of the columns on the terminal.
+#: Names of the columns on the terminal, explained by `_CAPTION` underneath.
 _NAMES = {
     "with_open": "open",
     "with_stick": "stick",
@@ -39,8 +40,11 @@ _NAMES = {
 }
 #: Columns that count solutions; a row whose search was cut short shows what it found as a lower bound.
 _COUNTS = ("roots", "families", "open", "stick", "slip+", "slip-")
+_CAPTION = "open, stick, slip+, slip-: how many of the roots have a node in that status"
 #: Longer tables are printed as runs of equal counts.
 _ROWS = 40
+_FIRST, _LAST = "first alpha", "last alpha"
+_RUNS_CAPTION = "a row: all alphas tried from its first to its last, which have equal counts"
 
 
 def table(
@@ -77,27 +81,33 @@ def table(
 
     Exit status: 0 when complete at every alpha (in fast arithmetic, which proves nothing: when every search ran to its
     end with nothing undecided); 3 when something stayed undecided or the indices do not add up to +1 somewhere; 2 on
-    bad input; 130 on Ctrl-C, after printing what was done so far.
+    bad input; 71 when a process of --jobs died, 130 on Ctrl-C, both after printing what was done so far; 74 when a
+    result could not be written, 141 when nobody read it any more.
     """
     check_outputs(json=json_file, csv=csv_file)
     values, body = _alphas(first, last, samples, alphas), load_problem(problem)
     options: dict[str, Any] = {"max_nodes": max_nodes, "time_limit": time_limit}
-    interrupted = False
+    ended: EnumsolError | None = None
     frame: Any
     try:
         frame = _search(body, values, arithmetic, jobs, {k: v for k, v in options.items() if v is not None})
-    except Interrupted as interruption:
-        interrupted, frame = True, interruption.partial
-    if "-" not in (json_file, csv_file):
-        typer.echo(_as_text(frame, len(values)))
-    if json_file is not None:
-        rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
-        write_text(json_file, as_json({"problem": problem, "arithmetic": arithmetic, "rows": rows}))
-    if csv_file is not None:
-        write_text(csv_file, frame.to_csv(index=False))
-    if interrupted:
-        raise typer.Exit(ExitStatus.INTERRUPTED)
-    raise typer.Exit(ExitStatus.INCOMPLETE if len(_open(frame)) else ExitStatus.DONE)
+    except (Interrupted, WorkerError) as error:
+        ended, frame = error, error.partial
+    rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
+    content = {
+        "problem": problem,
+        "arithmetic": arithmetic,
+        "alphas": len(values),
+        "complete": len(frame) == len(values) and bool(frame["complete"].all()),
+        "completeness": _closing_line(frame, len(values), ended),
+        "rows": rows,
+    }
+    deliver(
+        None if "-" in (json_file, csv_file) else lambda: typer.echo(_as_text(frame, len(values), ended)),
+        None if json_file is None else lambda: write_text(json_file, as_json(content)),
+        None if csv_file is None else lambda: write_text(csv_file, frame.to_csv(index=False)),
+    )
+    finish(ended, ExitStatus.INCOMPLETE if len(_open(frame)) else ExitStatus.DONE)
 
 
 def _alphas(first: str | None, last: str | None, samples: int, listed: str | None) -> list[Alpha]:
@@ -137,22 +147,25 @@ def _gaps(frame: pd.DataFrame) -> pd.Series[bool]:
     return frame["undecided"].gt(0) | frame["stopped"].notna()
 
 
-def _as_text(frame: pd.DataFrame, asked: int) -> str:
+def _as_text(frame: pd.DataFrame, asked: int, ended: EnumsolError | None) -> str:
     shown = frame.drop(columns=["stopped", "nodes", "seconds"]).rename(columns=_NAMES)
     if not shown["undecided"].any():
         shown = shown.drop(columns="undecided")
     known = shown["index sum"].notna()
     shown["index sum"] = shown["index sum"].map("{:+d}".format, na_action="ignore").astype(object).where(known, "?")
-    for name in _COUNTS:
-        shown[name] = shown[name].astype(str).where(~_gaps(frame), ">=" + shown[name].astype(str))
+    if _gaps(frame).any():
+        for name in _COUNTS:
+            shown[name] = shown[name].astype(str).where(~_gaps(frame), ">=" + shown[name].astype(str))
     shown["complete"] = ["yes" if value else "no" for value in shown["complete"]]
+    captions = [_CAPTION]
     if len(shown) > _ROWS:
         shown = _runs(shown)
-    for name in ("alpha", "to alpha"):
+        captions.append(_RUNS_CAPTION)
+    for name in ("alpha", _FIRST, _LAST):
         if name in shown:
             shown[name] = [f"{value:.8g}" for value in shown[name]]
-    lines = [shown.to_string(index=False)] if len(shown) else []
-    return "\n".join([*lines, "", _closing_line(frame, asked)])
+    lines = [shown.to_string(index=False), *captions] if len(shown) else []
+    return "\n".join([*lines, "", _closing_line(frame, asked, ended)])
 
 
 def _runs(frame: pd.DataFrame) -> pd.DataFrame:
@@ -160,13 +173,14 @@ def _runs(frame: pd.DataFrame) -> pd.DataFrame:
     counts = frame.drop(columns="alpha")
     run = counts.ne(counts.shift()).any(axis=1).cumsum()
     first, last = frame.groupby(run).first(), frame["alpha"].groupby(run).last()
-    first.insert(1, "to alpha", last)
-    return first
+    first.insert(1, _LAST, last)
+    return first.rename(columns={"alpha": _FIRST})
 
 
-def _closing_line(frame: pd.DataFrame, asked: int) -> str:
+def _closing_line(frame: pd.DataFrame, asked: int, ended: EnumsolError | None) -> str:
     if len(frame) < asked:
-        return f"complete: no (interrupted after {len(frame)} of {asked} alphas)"
+        why = "a worker was lost" if isinstance(ended, WorkerError) else "interrupted"
+        return f"complete: no ({why} after {len(frame)} of {asked} alphas)"
     left = _open(frame)
     if len(left):
         some = ", ".join(f"{alpha:g}" for alpha in left["alpha"][:5]) + (", ..." if len(left) > 5 else "")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 if TYPE_CHECKING:
     import numpy as np
@@ -13,6 +13,12 @@ if TYPE_CHECKING:
     from enumsol.condensation.factorization import Factorization
 
     Vector = NDArray[np.float64]
+
+#: What a proof is about: A, Bn, Bt, f as given, or S and g as computed from them in floats.
+Data = Literal["problem", "condensed"]
+#: Most degrees of freedom of a problem of which A, Bn, Bt and f are condensed in rationals; proofs about larger ones
+#: hold no rational leaves.
+EXACT_DOF_LIMIT = 250
 
 
 class ProblemData(Protocol):
@@ -26,6 +32,7 @@ class ProblemData(Protocol):
     load_slope : (n,) array or None
     gap, slip_offset : (p,) arrays [length]
     friction : pair of (p,) arrays, F(alpha) = F0 + alpha F1
+    node_ids : tuple of p labels
     """
 
     f: Vector
@@ -33,6 +40,7 @@ class ProblemData(Protocol):
     gap: Vector
     slip_offset: Vector
     friction: tuple[Vector, Vector]
+    node_ids: tuple[Any, ...]
 
     @property
     def A(self) -> sp.csc_array:  # noqa: N802 (the field's letter)

@@ -11,15 +11,17 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import rational, rational_matrix
+from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import TooLargeError
 
 if TYPE_CHECKING:
-    from enumsol.checks import Alpha
-    from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.condensation.data import ProblemData
+    from fractions import Fraction
 
-#: Most degrees of freedom for which A, Bn, Bt and f themselves are condensed in rationals.
-EXACT_DOF_LIMIT = 250
+    from enumsol.checks import Alpha
+    from enumsol.condensation.data import ProblemData
+    from enumsol.condensation.unloaded import CondensedData
+
 #: Most degrees of freedom for which "fast" condenses without rounding; beyond, S and g as computed in floats are used.
 FAST_EXACT_DOF = 24
 
@@ -55,7 +57,10 @@ class ExactSystem:
             The problem has more than EXACT_DOF_LIMIT degrees of freedom.
         """
         problem.friction_at(alpha)
-        return ExactPath.from_problem(problem).system(rational(alpha))
+        a = rational(alpha)
+        rows, g0, g1, F0, F1 = _condensed(problem)
+        g, F = (tuple(x + a * y for x, y in zip(*parts, strict=True)) for parts in ((g0, g1), (F0, F1)))
+        return cls(fmpq_mat(list(map(list, rows))), g, F)
 
 
 @dataclass(frozen=True)
@@ -70,6 +75,9 @@ class ExactPath:
     F0, F1 : tuples of p fmpq
     condensed_exactly : bool
         S and g follow from A, Bn, Bt, f without rounding; otherwise they are the floats computed in CondensedProblem.
+    zero : Fraction or None
+        The alpha at which g(alpha) = 0, where lambda = 0 is the only solution and every selection holds; found where
+        the checker finds it.
     """
 
     rows: tuple[tuple[Any, ...], ...]
@@ -78,9 +86,10 @@ class ExactPath:
     F0: tuple[Any, ...]
     F1: tuple[Any, ...]
     condensed_exactly: bool
+    zero: Fraction | None
 
     @classmethod
-    def from_problem(cls, problem: ProblemData) -> ExactPath:
+    def from_problem(cls, problem: CondensedData) -> ExactPath:
         """Condense A, Bn, Bt, f, load_slope, gap, slip_offset and friction without any rounding.
 
         Raises
@@ -88,22 +97,8 @@ class ExactPath:
         TooLargeError
             The problem has more than EXACT_DOF_LIMIT degrees of freedom.
         """
-        n, p = problem.n, problem.p
-        if n > EXACT_DOF_LIMIT:
-            raise TooLargeError(
-                f'arithmetic="exact" condenses at most n = {EXACT_DOF_LIMIT} degrees of freedom in rationals and the '
-                f"problem has n = {n}; use another arithmetic, or condense the body to its contact nodes first"
-            )
-        B = rational_matrix(np.vstack([problem.Bn.toarray(), problem.Bt.toarray()]))
-        slope = np.zeros(n) if problem.load_slope is None else problem.load_slope
-        loads = rational_matrix(np.column_stack([problem.f, slope]))
-        rhs = [[*row, *load] for row, load in zip(B.transpose().tolist(), loads.tolist(), strict=True)]
-        table = (B * rational_matrix(problem.A.toarray()).solve(fmpq_mat(rhs))).tolist()
-        offset = [rational(v) for v in (*problem.gap, *problem.slip_offset)]
-        g0 = tuple(row[2 * p] - o for row, o in zip(table, offset, strict=True))
-        g1 = tuple(row[2 * p + 1] for row in table)
-        F0, F1 = (tuple(rational(v) for v in part) for part in problem.friction)
-        return cls(tuple(tuple(row[: 2 * p]) for row in table), g0, g1, F0, F1, condensed_exactly=True)
+        rows, g0, g1, F0, F1 = _condensed(problem)
+        return cls(rows, g0, g1, F0, F1, condensed_exactly=True, zero=vanishing_alpha(problem, "problem"))
 
     @property
     def S(self) -> Any:  # noqa: N802 (the field's letter)
@@ -111,12 +106,14 @@ class ExactPath:
         return fmpq_mat([list(row) for row in self.rows])
 
     @classmethod
-    def from_condensed(cls, condensed: CondensedProblem) -> ExactPath:
+    def from_condensed(cls, problem: CondensedData) -> ExactPath:
         """The exact values of S, g and F as computed in floats."""
+        condensed = problem.condensed
         vectors = (condensed.g0, condensed.g1, condensed.F0, condensed.F1)
         g0, g1, F0, F1 = (tuple(rational(v) for v in part) for part in vectors)
         rows = tuple(map(tuple, rational_matrix(condensed.S).tolist()))
-        return cls(rows, g0, g1, F0, F1, condensed_exactly=False)
+        zero = vanishing_alpha(problem, "condensed")
+        return cls(rows, g0, g1, F0, F1, condensed_exactly=False, zero=zero)
 
     @property
     def p(self) -> int:
@@ -140,17 +137,8 @@ class ExactPath:
 
     @cached_property
     def origin(self) -> Any:
-        """The alpha at which g(alpha) = 0, where lambda = 0 is the only solution and every selection holds; or None."""
-        at = None
-        for a, b in zip(self.g0, self.g1, strict=True):
-            if b == 0:
-                if a != 0:
-                    return None
-            elif at is None:
-                at = -a / b
-            elif at != -a / b:
-                return None
-        return at
+        """``zero`` as fmpq, or None."""
+        return None if self.zero is None else rational(self.zero)
 
     @cached_property
     def integers(self) -> _Integers:
@@ -194,3 +182,29 @@ class _Integers:
 
 def _times(value: Any, factor: int) -> Any:
     return value.p * (factor // value.q)
+
+
+def _condensed(problem: ProblemData) -> tuple[tuple[Any, ...], ...]:
+    """S as a tuple of rows, g0, g1, F0 and F1 without any rounding.
+
+    Raises
+    ------
+    TooLargeError
+        The problem has more than EXACT_DOF_LIMIT degrees of freedom.
+    """
+    n, p = problem.n, problem.p
+    if n > EXACT_DOF_LIMIT:
+        raise TooLargeError(
+            f'arithmetic="exact" condenses at most n = {EXACT_DOF_LIMIT} degrees of freedom in rationals and the '
+            f"problem has n = {n}; use another arithmetic, or condense the body to its contact nodes first"
+        )
+    B = rational_matrix(np.vstack([problem.Bn.toarray(), problem.Bt.toarray()]))
+    slope = np.zeros(n) if problem.load_slope is None else problem.load_slope
+    loads = rational_matrix(np.column_stack([problem.f, slope]))
+    rhs = [[*row, *load] for row, load in zip(B.transpose().tolist(), loads.tolist(), strict=True)]
+    table = (B * rational_matrix(problem.A.toarray()).solve(fmpq_mat(rhs))).tolist()
+    offset = [rational(v) for v in (*problem.gap, *problem.slip_offset)]
+    g0 = tuple(row[2 * p] - o for row, o in zip(table, offset, strict=True))
+    g1 = tuple(row[2 * p + 1] for row in table)
+    F0, F1 = (tuple(rational(v) for v in part) for part in problem.friction)
+    return tuple(tuple(row[: 2 * p]) for row in table), g0, g1, F0, F1

@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 __all__ = ["read_problem", "write_problem"]
 
 _A_PLACE = "the name of a file or directory"
+#: Endings of the files that hold a problem.
+SUFFIXES = (".npz", *fclib.SUFFIXES)
 _FORMATS = "a .npz file, a directory of MatrixMarket files, or an fclib file (.h5, .hdf5)"
 
 

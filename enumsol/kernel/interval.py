@@ -67,11 +67,13 @@ class EnclosedPiece:
         Solutions at alpha are then alpha's distance from the origin times those of that constant load.
         """
         systems = [enclosure.at(alpha, force, length) for alpha in (a, b)]
-        low = np.min([s.F - s.F_rad * SAFE for s in systems], axis=0)
-        high = np.max([s.F + s.F_rad * SAFE for s in systems], axis=0)
         constant = np.array(enclosure.problem.friction[1]) == 0
-        low = np.where(constant, systems[0].F, np.maximum(np.nextafter(low, -np.inf), 0.0))
-        high = np.where(constant, systems[0].F, np.nextafter(high, np.inf))
+        # a coefficient near the largest float has no upper bound, and what it multiplies gives none
+        with np.errstate(over="ignore"):
+            low = np.min([s.F - s.F_rad * SAFE for s in systems], axis=0)
+            high = np.max([s.F + s.F_rad * SAFE for s in systems], axis=0)
+            low = np.where(constant, systems[0].F, np.maximum(np.nextafter(low, -np.inf), 0.0))
+            high = np.where(constant, systems[0].F, np.nextafter(high, np.inf))
         if origin is not None:
             direction = 1.0 if b > origin else -1.0
             zero = np.zeros_like(enclosure.g1)
@@ -98,23 +100,6 @@ def as_computed(problem: ContactProblem) -> CondensedEnclosure:
     return CondensedEnclosure(c.S, zero, c.g0, none, c.g1, none, 0.0, problem)
 
 
-def vanishing_alpha(problem: ContactProblem, enclosure: CondensedEnclosure) -> Fraction | None:
-    """The alpha at which g = 0, exactly, from the data themselves or from S and g as computed; None if none."""
-    if problem.load_slope is None:
-        return None
-    computed = not np.any(enclosure.g0_rad) and not np.any(enclosure.g1_rad)
-    if computed:
-        pairs = list(zip(enclosure.g0.tolist(), enclosure.g1.tolist(), strict=True))
-    elif np.any(problem.gap) or np.any(problem.slip_offset):
-        return None
-    else:
-        pairs = list(zip(problem.f.tolist(), problem.load_slope.tolist(), strict=True))
-    ratios = {-Fraction(x) / Fraction(y) for x, y in pairs if y != 0}
-    if len(ratios) != 1 or any(x != 0 for x, y in pairs if y == 0):
-        return None
-    return ratios.pop()
-
-
 def interval_exclusion_margins(
     piece: EnclosedPiece,
     codes: NDArray[np.intp],
@@ -137,6 +122,19 @@ def interval_exclusion_margins(
     -------
     (m,) array
     """
+    # what overflows gives no bound
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _margins(piece, codes, leaf, rows, values, errors)
+
+
+def _margins(
+    piece: EnclosedPiece,
+    codes: NDArray[np.intp],
+    leaf: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    values: Array,
+    errors: float,
+) -> Array:
     m, p = codes.shape
     low, high = piece.low, piece.high
     bad = (rows < 0) | (rows >= KINDS * p) | ~np.isfinite(values)

@@ -1,7 +1,8 @@
 """Proofs as files: a streamed, compressed sequence of records under one checksum.
 
 File layout: the line ``enumsol-proof 1``, a zlib stream, and the SHA-256 digest (32 bytes) of everything before it.
-The stream holds one JSON record a line: a header, the tree in preorder, and a footer.
+The stream holds one JSON record a line, in ASCII: a header, the tree in preorder, and a footer. (Proofs of branch
+graphs have other records; see ``graph_checker``.)
 
 Header
     ``{"format": "enumsol-proof", "version": 1, "problem": <fingerprint>, "alpha": "a/b", "p": p,
@@ -17,22 +18,30 @@ Tree
     ``["r", [mid], [rad], index]``: exactly one root, regular; 2p balls of lambda in the problem's units.
     ``["N"]``: no solution, in rational arithmetic.
     ``["D", [[point], ...], dimension]``: in rational arithmetic, the selection's roots are the hull of these points,
-    each a list of 2p fractions ``"a/b"`` of lambda in the problem's units, in hexadecimal digits (they may be long).
+    each a list of 2p fractions ``"a/b"`` of lambda in the problem's units, in lowest terms and in hexadecimal digits
+    (they may be long).
     ``["z"]``: the unloaded body; nothing but lambda = 0 solves.
     ``["u", reason]``: undecided.
 Footer
     ``{"roots": ..., "families": ..., "undecided": ..., "leaves": ...}``.
+
+What reading costs
+    A file is read as a stream, its header first. Whatever its bytes are, they become at most EXPANSION times as many
+    characters, of which one record has at most RECORD_SHARE times the size of the file; numbers are finite and whole
+    numbers have at most 18 digits. The checkers read records strictly (``reading``), stop where the records cease to
+    make sense or soon after they cease to prove anything, and keep no more of them than what they still need.
 """
 
 from __future__ import annotations
 
 import base64
+import contextlib
 import hashlib
 import io
 import json
-import re
+import math
+import stat
 import zlib
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
@@ -42,7 +51,7 @@ from enumsol.checks import file_path, writing
 from enumsol.errors import EnumsolError, InvalidArgumentError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -52,9 +61,18 @@ _CHUNK = 1 << 16
 # measured on multipliers: level 6 saves 4 % of the size and takes several times as long
 _LEVEL = 1
 _ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
-#: Characters of one record; longer ones are no proof.
-_LONGEST = 1 << 26
-_HEX_FRACTION = re.compile(r"(-?[0-9a-f]+)/([0-9a-f]+)", re.ASCII)
+#: Most characters that a byte of a file may stand for. The level at which proofs are written does not go beyond 1 : 230
+#: even for one character repeated; a file that does was made to be expanded.
+EXPANSION = 256
+#: Longest record, in sizes of its file. A record is long by its multipliers, the digits of its points or the codes of
+#: its subtrees, none of which compress that far.
+RECORD_SHARE = 16
+#: Longest record of all.
+LONGEST_RECORD = 1 << 26
+#: Characters that the smallest file may hold; its few records may compress far.
+SMALL = 1 << 16
+#: Digits of a whole number and its sign; codes, exponents and counts have fewer.
+_WHOLE_DIGITS = 18
 
 
 class ProofFormatError(EnumsolError, ValueError):
@@ -69,38 +87,9 @@ def packed(rows: NDArray[np.intp], values: NDArray[np.float64]) -> tuple[str, st
     )
 
 
-def unpacked(rows: str, values: str) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Multipliers from text.
-
-    Raises
-    ------
-    ValueError
-        The text is no base64 of whole numbers, or rows and multipliers are not as many.
-    """
-    row = np.frombuffer(base64.b64decode(rows, validate=True), dtype="<u4").astype(np.intp)
-    value = np.frombuffer(base64.b64decode(values, validate=True), dtype="<f8").astype(np.float64)
-    if len(row) != len(value):
-        raise ValueError(f"{len(row)} rows and {len(value)} multipliers")
-    return row, value
-
-
 def fraction_text(numerator: int, denominator: int) -> str:
     """A fraction in hexadecimal digits, which Python converts without a limit on their number."""
     return f"{numerator:x}/{denominator:x}"
-
-
-def fraction_from(text: Any) -> Fraction:
-    """A fraction from its text.
-
-    Raises
-    ------
-    ValueError
-        It is no text of that form, or the denominator is zero.
-    """
-    match = _HEX_FRACTION.fullmatch(text) if isinstance(text, str) else None
-    if match is None or not int(match[2], 16):
-        raise ValueError(f"{str(text)[:20]!r} is no fraction")
-    return Fraction(int(match[1], 16), int(match[2], 16))
 
 
 class Recorder(Protocol):
@@ -113,10 +102,18 @@ class Recorder(Protocol):
 class ProofWriter:
     """Writes the records of a proof one by one, to a file or to memory.
 
+    A file that cannot be written to the end (a full disk) does not stop the search: the records are dropped from there
+    on, and there is no proof.
+
     Parameters
     ----------
     path : path or None
         Where the proof is streamed to; None keeps the compressed proof in memory.
+
+    Attributes
+    ----------
+    failure : str or None
+        Why the file could not be written to the end.
 
     Raises
     ------
@@ -126,32 +123,39 @@ class ProofWriter:
 
     def __init__(self, path: str | Path | None = None) -> None:
         self._path = None if path is None else Path(path)
-        try:
+        with contextlib.nullcontext() if self._path is None else writing(self._path, "proof_path"):
             self._file: BinaryIO = io.BytesIO() if self._path is None else self._path.open("wb")
-        except OSError as error:
-            raise InvalidArgumentError(
-                f"proof_path {path} cannot be written ({error.strerror}); expected a path for a new file"
-            ) from error
+        self.failure: str | None = None
         self._digest = hashlib.sha256()
         self._zip = zlib.compressobj(_LEVEL)
         self._pending: list[str] = []
         self._emit(MAGIC)
 
     def write(self, record: Any) -> None:
-        """Append one record."""
+        """Append one record.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The file takes no more.
+        """
         self._pending.append(_ENCODER.encode(record))
         if len(self._pending) >= 256:
             self._flush()
 
     def close(self) -> Proof:
-        """Finish the file and give the proof."""
+        """Finish the file and give the proof; a damaged one when there was a ``failure``."""
         self._flush()
         self._emit(self._zip.flush())
-        self._file.write(self._digest.digest())
-        if self._path is not None:
-            self._file.close()
-            return Proof(self._path)
-        return Proof(self._file.getvalue())  # type: ignore[attr-defined]
+        self._emit(self._digest.digest())
+        if self._path is None:
+            return Proof(self._file.getvalue())  # type: ignore[attr-defined]
+        if self.failure is None:
+            try:
+                self._file.close()
+            except OSError as error:
+                self._give_up(error)
+        return Proof(self._path)
 
     def _flush(self) -> None:
         if self._pending:
@@ -160,11 +164,19 @@ class ProofWriter:
 
     def _emit(self, data: bytes) -> None:
         self._digest.update(data)
-        self._file.write(data)
+        if self.failure is not None:
+            return
+        try:
+            self._file.write(data)
+        except OSError as error:
+            self._give_up(error)
 
-
-def _no_number(name: str) -> Any:
-    raise ValueError(f"{name} is no number of a proof")
+    def _give_up(self, error: OSError) -> None:
+        self.failure = (
+            f"proof_path {self._path} cannot be written to the end ({error.strerror}); expected a place with room"
+        )
+        with contextlib.suppress(OSError):  # the same once more, for what is still in its buffer
+            self._file.close()
 
 
 class Proof:
@@ -176,18 +188,40 @@ class Proof:
         A proof file or its content.
     """
 
-    def __init__(self, source: Path | bytes) -> None:
-        self._source = source
+    def __init__(self, source: str | Path | bytes) -> None:
+        if not isinstance(source, str | Path | bytes):
+            raise InvalidArgumentError(f"proof is a {type(source).__name__}; expected a path, or bytes")
+        self._source = Path(source) if isinstance(source, str) else source
+
+    @property
+    def _name(self) -> str:
+        return str(self._source) if isinstance(self._source, Path) else "in memory"
 
     @property
     def size(self) -> int:
-        """Bytes of the proof file."""
-        return self._source.stat().st_size if isinstance(self._source, Path) else len(self._source)
+        """Bytes of the proof file.
+
+        Raises
+        ------
+        ProofFormatError
+            The file cannot be read.
+        """
+        with self._open() as file:
+            return file.seek(0, io.SEEK_END)
 
     def save(self, path: str | Path) -> None:
-        """Write the proof to a file."""
-        data = self._source.read_bytes() if isinstance(self._source, Path) else self._source
+        """Write the proof to a file.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The file cannot be written.
+        ProofFormatError
+            The proof's own file cannot be read any more.
+        """
         place = file_path(path, "path")
+        with self._open() as file:
+            data = file.read()
         with writing(place, "path"):
             place.write_bytes(data)
 
@@ -199,6 +233,8 @@ class Proof:
         ------
         ProofFormatError
             The file cannot be read, is no proof, is damaged or of another version.
+        InvalidArgumentError
+            ``path`` is no path.
         """
         proof = cls(file_path(path, "path"))
         proof.check_integrity()
@@ -207,16 +243,17 @@ class Proof:
     def _open(self) -> BinaryIO:
         if not isinstance(self._source, Path):
             return io.BytesIO(self._source)
+        reason = "it is no regular file"
         try:
-            return self._source.open("rb")
-        except OSError as error:
-            raise ProofFormatError(
-                f"proof {self._source} cannot be read ({error.strerror}); expected a proof file"
-            ) from error
+            # a pipe or a device has no size that its content could be measured by
+            if stat.S_ISREG(self._source.stat().st_mode):
+                return self._source.open("rb")
+        except (OSError, ValueError) as error:
+            reason = _reason(error)
+        raise ProofFormatError(f"proof {self._source} cannot be read ({reason}); expected a proof file")
 
     def check_integrity(self) -> None:
         """Raise ProofFormatError unless magic line, version and checksum are right."""
-        name = str(self._source) if isinstance(self._source, Path) else "in memory"
         with self._open() as file:
             size = file.seek(0, io.SEEK_END)
             file.seek(0)
@@ -224,45 +261,119 @@ class Proof:
             if start != MAGIC:
                 if start.startswith(b"enumsol-proof "):
                     raise ProofFormatError(
-                        f"proof {name} has another version ({start[:20]!r}); expected {MAGIC.decode().strip()!r}"
+                        f"proof {self._name} has another version ({start[:20]!r}); expected {MAGIC.decode().strip()!r}"
                     )
-                raise ProofFormatError(f"proof {name} is no proof file; expected it to begin with 'enumsol-proof'")
+                raise ProofFormatError(
+                    f"proof {self._name} is no proof file; expected it to begin with 'enumsol-proof'"
+                )
             digest = hashlib.sha256(start)
             left = size - len(MAGIC) - _DIGEST
             while left > 0 and (chunk := file.read(min(_CHUNK, left))):
                 digest.update(chunk)
                 left -= len(chunk)
             if left != 0 or file.read() != digest.digest():
-                raise ProofFormatError(f"proof {name} is damaged or truncated: its checksum does not agree")
+                raise ProofFormatError(f"proof {self._name} is damaged or truncated: its checksum does not agree")
 
     def records(self) -> Iterator[Any]:
-        """The records in order, read as a stream.
+        """The records in order, read as a stream: no more of it is expanded than the records that were asked for.
 
         Raises
         ------
         ProofFormatError
-            The content is not a sequence of JSON records.
+            The content is not a sequence of JSON records, expands beyond what a proof may, or goes on after its end.
         """
-        inflate = zlib.decompressobj()
-        rest = b""
         with self._open() as file:
-            left = file.seek(0, io.SEEK_END) - len(MAGIC) - _DIGEST
+            size = file.seek(0, io.SEEK_END)
             file.seek(len(MAGIC))
-            while left > 0:
-                chunk = file.read(min(_CHUNK, left))
-                left -= len(chunk) or left
+            for line in _lines(_expanded(file, size), size):
                 try:
-                    rest += inflate.decompress(chunk)
-                    *lines, rest = rest.split(b"\n")
-                    decoded = [json.loads(line, parse_constant=_no_number) for line in lines]
-                except (zlib.error, ValueError, RecursionError) as error:
+                    yield _DECODER.decode(line.decode("ascii"))
+                except (ValueError, RecursionError) as error:
                     raise ProofFormatError(f"the proof's content cannot be decoded ({error})") from error
-                if len(rest) > _LONGEST:
-                    raise ProofFormatError(f"the proof has a record of more than {_LONGEST} characters")
-                yield from decoded
-        if rest or not inflate.eof or inflate.unused_data:
-            raise ProofFormatError("the proof ends in the middle of a record")
 
     def __repr__(self) -> str:
-        where = str(self._source) if isinstance(self._source, Path) else "in memory"
-        return f"Proof ({where}, {self.size} bytes)"
+        try:
+            size = f"{self.size} bytes"
+        except ProofFormatError:
+            size = "which cannot be read"
+        return f"Proof ({self._name}, {size})"
+
+
+def _reason(error: Exception) -> str:
+    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+
+
+def _expanded(file: BinaryIO, size: int) -> Iterator[bytes]:
+    """The decompressed stream in parts of at most _CHUNK bytes; ``file`` stands at its beginning."""
+    inflate = zlib.decompressobj()
+    left = size - len(MAGIC) - _DIGEST
+    total, most = 0, EXPANSION * size + SMALL
+    while left > 0 and not inflate.eof:
+        chunk = file.read(min(_CHUNK, left))
+        left -= len(chunk) or left
+        full = True
+        # a part that is not full has all that the chunk gives
+        while full and not inflate.eof:
+            try:
+                part = inflate.decompress(chunk, _CHUNK)
+            except zlib.error as error:
+                raise ProofFormatError(f"the proof's content cannot be decoded ({error})") from error
+            chunk, full = inflate.unconsumed_tail, len(part) == _CHUNK
+            total += len(part)
+            if total > most:
+                raise ProofFormatError(f"the proof's {size} bytes expand to more than {most} characters")
+            yield part
+    if not inflate.eof:
+        raise ProofFormatError("the proof ends in the middle of a record")
+    if left > 0 or inflate.unused_data:
+        raise ProofFormatError("the proof's content ends in the middle of its file")
+
+
+def _lines(parts: Iterable[bytes], size: int) -> Iterator[bytes]:
+    """The lines of a stream, the last one ended too."""
+    longest = min(LONGEST_RECORD, RECORD_SHARE * size + SMALL)
+    begun: list[bytes] = []
+    length = 0
+    for part in parts:
+        *ended, rest = part.split(b"\n")
+        for line in ended:
+            _check_length(length + len(line), longest)
+            yield b"".join([*begun, line])
+            begun, length = [], 0
+        begun.append(rest)
+        length += len(rest)
+        _check_length(length, longest)
+    if length:
+        raise ProofFormatError("the proof ends in the middle of a record")
+
+
+def _check_length(length: int, longest: int) -> None:
+    if length > longest:
+        raise ProofFormatError(f"the proof has a record of more than {longest} characters")
+
+
+def _whole(text: str) -> int:
+    if len(text) > _WHOLE_DIGITS:
+        raise ValueError(f"a whole number has {len(text)} digits")
+    return int(text)
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"a number is not finite: {text[:20]}")
+    return value
+
+
+def _no_number(name: str) -> Any:
+    raise ValueError(f"{name} is no number of a proof")
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        raise ValueError("a record gives a name twice")
+    return found
+
+
+_DECODER = json.JSONDecoder(parse_int=_whole, parse_float=_finite, parse_constant=_no_number, object_pairs_hook=_object)

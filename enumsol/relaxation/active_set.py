@@ -33,7 +33,6 @@ class CompiledEngine:
     """
 
     name = "active-set"
-    module = "enumsol.relaxation._active_set"
 
     def __init__(
         self, data: QPData, rule: BranchingRule, size: int, offset: float = 0.0, always: tuple[int, ...] = ()

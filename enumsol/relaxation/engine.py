@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
     from enumsol.selections.solution import Codes
 
+#: The compiled module of the active-set method.
+COMPILED = "enumsol.relaxation._active_set"
 #: Largest violation of a row (rows of unit length in the norm of S^{-1}) that the QP takes for none.
 FEASIBILITY_TOLERANCE = 1e-11
 #: A leaf is pruned when its energy bound exceeds this; g' S^{-1} g lies in [1, 4), so it is relative to the data.

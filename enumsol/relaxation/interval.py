@@ -21,13 +21,14 @@ import numpy as np
 from enumsol.condensation.condensed import CondensedSystem, ScaledSystem
 from enumsol.errors import InvalidProblemError, MissingDependencyError
 from enumsol.relaxation.active_set import CompiledEngine
-from enumsol.relaxation.engine import BRANCHING_CANDIDATES
+from enumsol.relaxation.engine import BRANCHING_CANDIDATES, COMPILED
 from enumsol.relaxation.rows import EQUALITY, INEQUALITY, RowKind, row_terms, status_rows
 from enumsol.statuses import CONTACT, FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, UNDECIDED
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from enumsol.checks import Alpha
     from enumsol.condensation.condensed import CondensedProblem
 
 #: Part of the energy's unit (g' S^-1 g lies in [1, 4) at its larger end) that makes the form in (lambda, tau) definite.
@@ -97,18 +98,18 @@ class IntervalSystem:
     scaled: ScaledSystem = field(repr=False)
 
     @classmethod
-    def from_problem(cls, condensed: CondensedProblem, a: float, b: float, origin: float | None) -> IntervalSystem:
+    def from_problem(cls, condensed: CondensedProblem, a: Alpha, b: Alpha, origin: Alpha | None) -> IntervalSystem:
         """The interval [a, b]; ``origin`` is the alpha at which g vanishes, if it does in [a, b] (then a or b).
 
         With such an origin the solutions are alpha's distance from it times those of the load +-g1, so that this load,
         which does not vary, is searched in place of g(alpha).
         """
-        F = np.stack([condensed.F0 + alpha * condensed.F1 for alpha in (a, b)])
+        F = np.stack([condensed.F0 + float(alpha) * condensed.F1 for alpha in (a, b)])
         F_lo, F_hi = np.maximum(F.min(axis=0), 0.0), np.maximum(F.max(axis=0), 0.0)
         if origin is not None:
             ends = np.stack([condensed.g1 if b > origin else -condensed.g1] * 2)
         else:
-            ends = np.stack([condensed.g0 + alpha * condensed.g1 for alpha in (a, b)])
+            ends = np.stack([condensed.g0 + float(alpha) * condensed.g1 for alpha in (a, b)])
         first = ScaledSystem.from_system(CondensedSystem(condensed.S, ends[0], F_hi))
         with np.errstate(over="ignore", invalid="ignore"):
             energies = [np.linalg.norm(np.linalg.solve(first.cholesky, g / first.length)) for g in ends]
@@ -145,7 +146,7 @@ class IntervalEngine(CompiledEngine):
 
             raise MissingDependencyError(
                 "branch_graph needs the compiled active-set solver, which is not available: "
-                f"{why_missing(self.module, error)}"
+                f"{why_missing(COMPILED, error)}"
             ) from error
         p = system.p
         rule = _active_set.BranchingRule(system.F, *_slip_rows(system), BRANCHING_CANDIDATES)

@@ -17,7 +17,8 @@ from enumsol.checks import (
     optional_seconds,
     share,
 )
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import Interrupted, InvalidArgumentError, OutputError, WorkerError
+from enumsol.executors import WorkerLost
 from enumsol.problem import ContactProblem
 from enumsol.proof.proof_file import Proof, ProofWriter
 from enumsol.roots.at_rest import AtRest
@@ -105,6 +106,10 @@ def enumerate_roots(
         The exhaustive method or exact arithmetic would take too long; the message says how long.
     Interrupted
         On Ctrl-C; ``partial`` holds what was found.
+    WorkerError
+        A worker of the executor died; ``partial`` holds what was found.
+    OutputError
+        The proof could not be written to the end, for want of space; ``partial`` holds the result without a proof.
     """
     instance_of(problem, ContactProblem, "problem")
     value = alpha_value(alpha)
@@ -160,7 +165,13 @@ class _Enumeration:
             partial = self._result()
             message = f"enumerate_roots was interrupted; {len(partial)} roots so far"
             raise Interrupted(message, partial) from interruption
-        return self._result()
+        except WorkerLost as loss:
+            partial = self._result()
+            raise WorkerError(f"{loss}; {len(partial)} roots so far", partial) from loss
+        result = self._result()
+        if self.writer is not None and self.writer.failure is not None:
+            raise OutputError(self.writer.failure, result)
+        return result
 
     def _enough(self, stop_after: int | None) -> Callable[[list[SelectionSolution]], bool] | None:
         if stop_after is None:
@@ -275,7 +286,7 @@ class _Enumeration:
         )
 
     def _proof(self, roots: int, families: int) -> Proof | None:
-        """Close the proof. One that was interrupted stays without its end, and is none."""
+        """Close the proof. One that was interrupted or had no room stays without its end, and is none."""
         if self.writer is None or not isinstance(self.certifier, VerifiedCertifier):
             return None
         whole = self.outcome.stopped is None or "not examined" in self.outcome.stopped
@@ -284,7 +295,7 @@ class _Enumeration:
             footer = {"roots": roots, "families": families, "undecided": undecided, "leaves": self.certifier.leaves}
             self.writer.write(footer)
         proof = self.writer.close()
-        return proof if whole else None
+        return proof if whole and self.writer.failure is None else None
 
 
 def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None) -> None:

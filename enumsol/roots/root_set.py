@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from enumsol.search.certifiers.verified import Escalations
 
 _PRINTED_ROOTS = 20
+#: Contact nodes of a printed root; of larger ones the first are shown.
+_PRINTED_NODES = 20
 
 
 @dataclass(frozen=True)
@@ -144,6 +146,21 @@ class Root(Sealed):
                 if ContactStatus.SLIP_MINUS in holds and ContactStatus.STICK in holds:
                     signs[i, 2] = 0
         return signs
+
+    def __repr__(self) -> str:
+        index = "?" if self.index is None else f"{self.index:+d}"
+        regular = "regular" if self.regular else "not regular"
+        labels = self._condensed.problem.node_ids
+        shown = min(len(labels), _PRINTED_NODES)
+        width = max(4, *(len(str(label)) for label in labels[:shown]))
+        lines = [
+            f"Root at alpha = {float(self.alpha):g}: index {index}, {regular}, margin {self.margin:.2e}",
+            node_heading(width),
+            *(node_line(self, i, labels[i], width) for i in range(shown)),
+        ]
+        if shown < len(labels):
+            lines.append(f"... {len(labels) - shown} more nodes; all of them: {summary(self.statuses)}")
+        return "\n".join(lines)
 
 
 @dataclass(frozen=True)
@@ -393,6 +410,19 @@ class RootSet(Sequence[Root], Immutable):
         lines.append(f"index sum: {note}")
         lines.append(self.completeness())
         return "\n".join(lines)
+
+
+def node_heading(width: int) -> str:
+    """The heading of lines over contact nodes, whose labels take that width."""
+    return f"{'node':>{width}} {'status':<7} {'lambda_n':>12} {'lambda_t':>12} {'u_n':>12} {'u_t':>12}"
+
+
+def node_line(root: Root, i: int, label: object, width: int) -> str:
+    """Status, forces and displacements of a contact node, below `node_heading`."""
+    numbers = (root.lambda_n[i], root.lambda_t[i], root.u_n[i], root.u_t[i])
+    # + 0.0 turns a negative zero, which means nothing to a reader, into zero
+    text = " ".join(f"{number + 0.0:>12.6g}" for number in numbers)
+    return f"{label!s:>{width}} {root.statuses[i].value:<7} {text}"
 
 
 def _count(number: int, singular: str, plural: str | None = None) -> str:

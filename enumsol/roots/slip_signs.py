@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.statuses import FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
 
 if TYPE_CHECKING:
@@ -47,11 +48,11 @@ class SlipSigns:
     @cached_property
     def _exact(self) -> tuple[int, ...] | None:
         """All signs in rationals; None when the problem is too large for them."""
-        from enumsol.condensation.exact import EXACT_DOF_LIMIT, ExactSystem  # python-flint, not for fast arithmetic
-        from enumsol.selections.rationals import ExactSelections
-
         if self.problem.n > EXACT_DOF_LIMIT:
             return None
+        from enumsol.condensation.exact import ExactSystem  # python-flint, not for fast arithmetic
+        from enumsol.selections.rationals import ExactSelections
+
         solver = ExactSelections(ExactSystem.from_problem(self.problem, self.alpha))
         solution = solver.solve(self.codes)
         return None if solution is None else solver.slip_signs(solution.vertices[0])

@@ -290,8 +290,8 @@ class IntervalSearch:
         return self.stopped is not None
 
     def _system(self, piece: Piece) -> IntervalSystem:
-        origin = None if self._origin not in (piece.a, piece.b) else float(self._origin)
-        return IntervalSystem.from_problem(self._condensed, float(piece.a), float(piece.b), origin)
+        origin = self._origin if self._origin in (piece.a, piece.b) else None
+        return IntervalSystem.from_problem(self._condensed, piece.a, piece.b, origin)
 
     def _size_at(self, alpha: Fraction) -> int:
         """Nodes of the tree at one alpha."""

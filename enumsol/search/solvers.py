@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.proof.reading import rational_text
 from enumsol.search.certifiers.floats import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.selections.floats import FloatSelections
@@ -68,7 +70,7 @@ class Solvers:
             S is not positive definite, exactly: no bound on the energy would hold.
         """
         from enumsol.arithmetic.rationals import is_positive_definite
-        from enumsol.condensation.exact import EXACT_DOF_LIMIT, ExactSystem  # python-flint
+        from enumsol.condensation.exact import ExactSystem  # python-flint
         from enumsol.selections.rationals import ExactSelections  # python-flint
 
         if self.arithmetic != "exact" and self.problem.n > EXACT_DOF_LIMIT:
@@ -96,7 +98,7 @@ class Solvers:
                 return enclosed, "problem"
         except NotEnclosedError:
             pass
-        if self.problem.n <= _exact_limit():
+        if self.problem.n <= EXACT_DOF_LIMIT:
             return None, "problem"
         zero = np.zeros_like
         F_rad = 4 * np.spacing(system.F)
@@ -141,23 +143,23 @@ class Solvers:
         return self.problem.is_unloaded(self.alpha)
 
     def proof_header(self) -> dict[str, Any]:
-        """First record of a proof (see enumsol.proof.proof_file)."""
+        """First record of a proof (see enumsol.proof.proof_file).
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is a fraction of more digits than a proof may hold.
+        """
         return {
             "format": "enumsol-proof",
             "version": 1,
             "problem": self.problem.fingerprint,
-            "alpha": str(Fraction(self.alpha)),
+            "alpha": rational_text(Fraction(self.alpha), "alpha"),
             "p": self.problem.p,
             "data": self.data,
             "force": (np.frexp(self.scaled.force)[1] - 1).tolist(),
             "length": (np.frexp(self.scaled.length)[1] - 1).tolist(),
         }
-
-
-def _exact_limit() -> int:
-    from enumsol.condensation.exact import EXACT_DOF_LIMIT  # python-flint, not needed by fast arithmetic
-
-    return EXACT_DOF_LIMIT
 
 
 def _positive(system: EnclosedSystem) -> bool:

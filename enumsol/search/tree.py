@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from enumsol.errors import MissingDependencyError
 from enumsol.relaxation.active_set import ActiveSetEngine
-from enumsol.relaxation.engine import Engine, Relaxation
+from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.splitting import PlaneSplitting, Splitting
 from enumsol.selections.solution import Codes, SelectionSolution
@@ -141,7 +141,7 @@ def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
     except ImportError as error:
         from enumsol.compiled import why_missing  # seldom needed
 
-        missing = f"the compiled active-set solver is not available: {why_missing(ActiveSetEngine.module, error)}"
+        missing = f"the compiled active-set solver is not available: {why_missing(COMPILED, error)}"
         if name is not None:
             raise MissingDependencyError(missing) from error
         warnings.warn(f"{missing}; the much slower interior-point solver is used", RuntimeWarning, stacklevel=2)

@@ -1,6 +1,8 @@
 """Proofs of branch graphs: accepted as written, refused when tampered with, and right about which selections hold."""
 
 import json
+from collections import Counter
+from itertools import product
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from proof_tools import multipliers, proof_of, records_of, with_multipliers
 
 from enumsol import branch_graph, enumerate_roots, gallery, verify
 from enumsol.checker.graph import covers
+from enumsol.kernel.rows import children_of
 from enumsol.problem import ContactProblem
 
 
@@ -139,9 +142,51 @@ def test_junk_records_are_refused_without_a_traceback(junk):
         assert refused(problem, [*records[:k], json.dumps(junk), *records[k + 1 :]])
 
 
+def covered(roots, leaves, friction):
+    return covers(*(np.array(part, dtype=np.uint8).reshape(-1, len(friction)) for part in (roots, leaves)), friction)
+
+
 def test_cover_of_a_tree_by_its_leaves():
-    assert covers((6, 6), [(0, 6), (5, 0), (1, 5), (2, 5), (3, 5)], [True, True])
-    assert not covers((6, 6), [(0, 6), (5, 0), (1, 5), (2, 5)], [True, True])
-    assert covers((6,), [(0,), (4,)], [False])
-    assert not covers((6,), [(0,), (4,)], [True])
-    assert not covers((6,), [], [True])
+    assert covered([(6, 6)], [(0, 6), (5, 0), (1, 5), (2, 5), (3, 5)], [True, True])
+    assert not covered([(6, 6)], [(0, 6), (5, 0), (1, 5), (2, 5)], [True, True])
+    assert covered([(6,)], [(0,), (4,)], [False])
+    assert not covered([(6,)], [(0,), (4,)], [True])
+    assert not covered([(6,)], [], [True])
+    assert covered([(0, 6), (5, 0)], [(0, 6), (1, 0), (2, 0), (3, 0)], [True, True])
+    assert not covered([(0, 6), (5, 0)], [(0, 6), (1, 0), (2, 0)], [True, True])
+    # a leaf that is coarser than a root was not found below it
+    assert not covered([(0, 0)], [(0, 6)], [True, True])
+
+
+def selections_in(codes, friction):
+    """Complete selections of a partial assignment, one by one."""
+    final = {6: (0, 1, 2, 3), 5: (1, 2, 3)}
+    choices = [final.get(c, (c,)) if F or c < 5 else (0, 4) for c, F in zip(codes, friction, strict=True)]
+    return set(product(*choices))
+
+
+def test_covers_against_a_list_of_all_selections():
+    rng, outcomes = np.random.default_rng(3), Counter()
+    for _ in range(300):
+        friction = [bool(rng.random() < 0.8) for _ in range(int(rng.integers(1, 5)))]
+        roots = refined(rng, (6,) * len(friction), friction)
+        roots = [root for root in roots if rng.random() < 0.6] or roots[:1]
+        leaves = [leaf for root in roots for leaf in refined(rng, root, friction)]
+        if rng.random() < 0.5:
+            del leaves[int(rng.integers(len(leaves)))]
+        wanted = set().union(*(selections_in(root, friction) for root in roots))
+        had = set().union(*(selections_in(leaf, friction) for leaf in leaves))
+        found = covered(roots, leaves + leaves[:1], friction)
+        assert found == (wanted <= had)
+        outcomes[found] += 1
+    assert min(outcomes.values()) > 100
+
+
+def refined(rng, root, friction):
+    """Leaves of a random tree below a partial assignment."""
+    nodes = [i for i, code in enumerate(root) if children_of(code, friction=friction[i])]
+    if not nodes or rng.random() < 0.3:
+        return [root]
+    node = int(rng.choice(nodes))
+    children = children_of(root[node], friction=friction[node])
+    return [leaf for c in children for leaf in refined(rng, (*root[:node], c, *root[node + 1 :]), friction)]

@@ -160,6 +160,7 @@ TAKE = {
     "branch_graph to": lambda p, g, a, x: _end(enumsol.branch_graph(p, [1, a], "fast")),
     "roots_at": lambda p, g, a, x: _content(g.roots_at(a)),
     "multiplicity_at": lambda p, g, a, x: g.multiplicity_at(a),
+    "at_least": lambda p, g, a, x: g.at_least(a),
     "arcs_at": lambda p, g, a, x: [arc.number for arc in g.arcs_at(a)],
     "arc.values": lambda p, g, a, x: np.array(_one_arc(g, x).values(a)).tolist(),
     "arc.displacements": lambda p, g, a, x: np.array(_one_arc(g, x).displacements(a)).tolist(),

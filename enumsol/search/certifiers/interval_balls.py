@@ -6,14 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.rationals import to_fraction
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
-from enumsol.kernel.interval import (
-    EnclosedPiece,
-    as_computed,
-    interval_exclusion_margins,
-    vanishing_alpha,
-)
+from enumsol.kernel.interval import EnclosedPiece, as_computed, interval_exclusion_margins
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 
 if TYPE_CHECKING:
@@ -31,8 +25,7 @@ class VerifiedIntervalCertifier:
     """Accepts a leaf when the dual bounds of its multipliers are proven positive at both ends of the piece.
 
     A leaf that the balls cannot exclude is branched on. Only where there are no balls at all (S positive definite
-    within rounding, or an end of a piece at which g vanishes for reasons that balls do not show) do rationals decide,
-    if the path was condensed without rounding; there is no proof file then.
+    within rounding) do rationals decide, if the path was condensed without rounding; there is no proof file then.
 
     Parameters
     ----------
@@ -42,14 +35,9 @@ class VerifiedIntervalCertifier:
     """
 
     def __init__(self, problem: ContactProblem, path: ExactPath) -> None:
-        self._path = path
         self._enclosure = certified_enclosure(problem, exactly=path.condensed_exactly)
         self._exact = ExactIntervalCertifier(path) if path.condensed_exactly else None
-        origin = None if path.origin is None else to_fraction(path.origin)
-        self._origin = origin
-        # the enclosure may not know the origin that rationals know; pieces that end there then go to rationals
-        known = self._enclosure is not None and vanishing_alpha(problem, self._enclosure) == origin
-        self._origin_known = known or origin is None
+        self._zero = path.zero
         self.used_rationals = False
         self._piece: tuple[Piece, EnclosedPiece | None] | None = None
 
@@ -72,9 +60,9 @@ class VerifiedIntervalCertifier:
         return self._piece[1]
 
     def _make(self, piece: Piece, system: IntervalSystem) -> EnclosedPiece | None:
-        origin = self._origin if self._origin in (piece.a, piece.b) else None
-        if self._enclosure is None or (origin is not None and not self._origin_known):
+        if self._enclosure is None:
             return None
+        origin = self._zero if self._zero in (piece.a, piece.b) else None
         units = system.scaled
         try:
             enclosed = EnclosedPiece.from_enclosure(

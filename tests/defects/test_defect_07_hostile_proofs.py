@@ -1,0 +1,608 @@
+"""Line 7: what stands in a proof file is read within bounds, header first, and refused in words."""
+
+import base64
+import functools
+import gc
+import json
+import os
+import tracemalloc
+import zlib
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracles import exact_solutions
+from proof_fuzz import mutant, read
+from proof_tools import Judge, copied, leaves_of, multipliers, proof_of, records_of, sealed, with_multipliers
+
+from enumsol import ContactProblem, EnumsolError, Proof, ProofFormatError, gallery, verify, write_problem
+from enumsol.cli import main
+from enumsol.condensation.factorization import Factorization
+from enumsol.errors import InvalidArgumentError
+from enumsol.proof import proof_file as proof_module
+
+BEFORE = {item["name"]: item for item in json.loads(Path(__file__).with_name("proofs_written_before.json").read_text())}
+POINTS = [name for name in BEFORE if not name.startswith("graph")]
+GRAPHS = [name for name in BEFORE if name.startswith("graph")]
+
+
+@functools.cache
+def before(name):
+    """A problem and its proof as an earlier version wrote it."""
+    data = dict(BEFORE[name]["problem"])
+    data["friction"] = tuple(np.array(part, dtype=float) for part in data["friction"])
+    return ContactProblem(**data), Proof(base64.b64decode(BEFORE[name]["proof"]))
+
+
+def changed(name, k, **fields):
+    """The problem, and its proof with fields of record k replaced."""
+    problem, proof = before(name)
+    records = copied(records_of(proof))
+    records[k] = records[k] | fields
+    return problem, proof_of(records)
+
+
+class Effort:
+    """What a reader makes of a file: characters that it expands, and the most memory that it holds."""
+
+    def __init__(self, monkeypatch):
+        self.characters = 0
+        real = zlib.decompressobj
+        effort = self
+
+        class Counting:
+            def __init__(self):
+                self.inner = real()
+
+            def decompress(self, *arguments):
+                part = self.inner.decompress(*arguments)
+                effort.characters += len(part)
+                return part
+
+            def __getattr__(self, name):
+                return getattr(self.inner, name)
+
+        class Module:
+            decompressobj = Counting
+
+            def __getattr__(self, name):
+                return getattr(zlib, name)
+
+        monkeypatch.setattr(proof_module, "zlib", Module())
+
+    def of(self, problem, proof):
+        """The report on a proof, or the error."""
+        gc.collect()
+        tracemalloc.start()
+        try:
+            return verify(problem, proof)
+        except ProofFormatError as error:
+            return error
+        finally:
+            self.memory = tracemalloc.get_traced_memory()[1]
+            tracemalloc.stop()
+
+
+def refused(problem, proof):
+    """The report, which refuses and says why."""
+    report = verify(problem, proof)
+    assert not report.ok
+    assert not report.complete
+    assert report.failures
+    assert "REFUSED" in repr(report)
+    return report
+
+
+def bomb(first, line, megabytes):
+    """A small file of these records and then one line again and again."""
+    text = "".join(json.dumps(record) + "\n" for record in first).encode()
+    packer = zlib.compressobj(9)
+    parts = [packer.compress(text)]
+    block = (line + "\n").encode() * (1_000_000 // (len(line) + 1))
+    parts += [packer.compress(block) for _ in range(megabytes)]
+    return sealed(b"".join([*parts, packer.flush()]))
+
+
+# -- proofs of today ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", BEFORE)
+def test_proofs_of_the_version_before_are_accepted(name):
+    problem, proof = before(name)
+    report = verify(problem, proof)
+    assert report.ok, report
+    found = {key: getattr(report, key) for key in BEFORE[name]["claim"]}
+    if "selections" in found:
+        found["selections"] = len(found["selections"])
+    assert found == BEFORE[name]["claim"]
+    assert report.data == BEFORE[name]["data"]
+
+
+def test_those_proofs_hold_records_of_every_kind():
+    kinds = {record[0] for name in BEFORE for record in records_of(before(name)[1])[1:-1] if isinstance(record, list)}
+    assert kinds == set("bxXnrNDzusc")
+
+
+# -- memory and work ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["stopped", "graph in several pieces"])
+@pytest.mark.parametrize("line", ["[]", "null", '["u",""]', '["s","000"]', "{}"])
+def test_a_small_file_of_very_many_records(name, line, monkeypatch):
+    # the report of this defect: 58 KB, 94 s, 2.5 GB
+    problem, proof = before(name)
+    proof = bomb(records_of(proof)[:2], line, 60)
+    assert proof.size < 500_000
+    effort = Effort(monkeypatch)
+    outcome = effort.of(problem, proof)
+    assert isinstance(outcome, ProofFormatError) or not outcome.ok
+    assert effort.characters < 500_000
+    assert effort.memory < 20e6
+
+
+@pytest.mark.parametrize("name", ["stopped", "graph in several pieces"])
+@pytest.mark.parametrize("part", ["[],", '"",', "0,", '["0/1"],', "[" * 1000])
+def test_a_small_file_of_one_long_record(name, part, monkeypatch):
+    problem, proof = before(name)
+    text = json.dumps(records_of(proof)[0]) + "\n[" + part * (60_000_000 // len(part)) + "0]\n"
+    proof = sealed(zlib.compress(text.encode(), 9))
+    effort = Effort(monkeypatch)
+    outcome = effort.of(problem, proof)
+    assert isinstance(outcome, ProofFormatError)
+    assert effort.characters < 2 * (proof_module.RECORD_SHARE * proof.size + proof_module.SMALL)
+    assert effort.memory < 20e6
+
+
+def test_no_file_is_expanded_beyond_its_size(monkeypatch):
+    problem = gallery.chain(8)
+    header = {"format": "enumsol-proof", "version": 1, "problem": problem.fingerprint, "alpha": "5", "p": 8}
+    header |= {"data": "problem", "force": [0] * 16, "length": [0] * 16}
+    tree, waiting = [], [(6,) * 8]
+    while waiting:
+        codes = waiting.pop()
+        node = next((i for i, code in enumerate(codes) if code >= 5), None)
+        if node is None:
+            tree.append('["u",""]')
+            continue
+        children = [0, 5] if codes[node] == 6 else [1, 2, 3]
+        tree.append(f'["b",{node},{children}]')
+        waiting += [(*codes[:node], child, *codes[node + 1 :]) for child in reversed(children)]
+    text = json.dumps(header) + "\n" + "\n".join(tree) + "\n"
+    proof = sealed(zlib.compress(text.encode(), 9))
+    effort = Effort(monkeypatch)
+    outcome = effort.of(problem, proof)
+    assert outcome.failures == (f"the counts at the end are missing; the tree has {4**8} leaves",)
+    assert effort.characters <= len(text) + 2**17
+    assert effort.memory < 20e6
+    # the same file, were it not allowed to stand for as many characters
+    monkeypatch.setattr(proof_module, "EXPANSION", len(text) // proof.size // 2)
+    monkeypatch.setattr(proof_module, "SMALL", 0)
+    effort.characters = 0
+    outcome = effort.of(problem, proof)
+    assert isinstance(outcome, ProofFormatError)
+    assert "expand to more than" in str(outcome)
+    assert effort.characters < 0.5 * len(text) + 2**17
+
+
+def test_what_the_writer_writes_is_far_from_these_bounds():
+    # most compressible of all is one character
+    for text in (b"0" * 10**7, b'["n"]\n' * 10**6, b'["b",0,[0,5]]\n["u","stopped"]\n' * 10**6):
+        assert len(text) / len(zlib.compress(text, proof_module._LEVEL)) < proof_module.EXPANSION
+    for name in BEFORE:
+        data = before(name)[1]
+        text = zlib.decompress(data._source[16:-32])
+        assert len(text) < 0.1 * (proof_module.EXPANSION * data.size + proof_module.SMALL)
+        longest = max(map(len, text.splitlines()))
+        assert longest < 0.1 * (proof_module.RECORD_SHARE * data.size + proof_module.SMALL)
+
+
+def test_the_header_comes_first(monkeypatch):
+    other = gallery.clamped_block(8, 4)
+    for name in ("stopped", "graph in several pieces"):
+        records = records_of(before(name)[1])
+        for key, value in (("problem", "0" * 64), ("p", 10**9), ("version", 2), ("data", "both"), ("kind", "sheaf")):
+            first = [records[0] | {"problem": other.fingerprint, "p": other.p, key: value}]
+            effort = Effort(monkeypatch)
+            outcome = effort.of(other, bomb([*first, records[1]], "[]", 20))
+            assert not outcome.ok
+            assert effort.characters < 200_000
+            # nothing was condensed for it
+            assert not {"condensed", "enclosure"} & set(vars(other))
+
+
+def test_a_tree_is_walked_to_its_end_before_anything_is_computed(monkeypatch):
+    problem, proof = before("rational leaves")
+    records = records_of(proof)
+    fresh = ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f, friction=problem.friction)
+    assert fresh.fingerprint == problem.fingerprint
+    solves = []
+    fresh.factorization  # noqa: B018 (made here, so that only solves with it are counted)
+    with monkeypatch.context() as watched:
+        watched.setattr(Factorization, "solve", lambda *_, **__: solves.append(1))
+        for tampered in (
+            records[:-2],
+            records[:-1],
+            [*records, records[-1]],
+            [*records[:-1], records[-1] | {"leaves": 3}],
+        ):
+            refused(fresh, proof_of(tampered))
+            assert not solves
+    assert verify(fresh, proof).ok
+
+
+def test_the_check_ends_after_some_failures():
+    problem, proof = before("degenerate")
+    alike = [["x", "", ""] if record[0] in "Dn" else record for record in records_of(proof)[1:-1]]
+    records = [records_of(proof)[0], *alike, records_of(proof)[-1]]
+    assert 1 < len(refused(problem, proof_of(records)).failures) <= 21
+    wide = gallery.chain(4)
+    tree = _whole_tree(4)
+    header = {"format": "enumsol-proof", "version": 1, "problem": wide.fingerprint, "alpha": "5", "p": 4}
+    header |= {"data": "problem", "force": [0] * 8, "length": [0] * 8}
+    leaves = sum(record[0] == "x" for record in tree)
+    footer = {"roots": 0, "families": 0, "undecided": 0, "leaves": leaves}
+    report = refused(wide, proof_of([header, *tree, footer]))
+    assert len(report.failures) == 21
+    assert "the check ends after 20 failures" in report.failures
+    # leaves are checked in batches
+    assert report.leaves <= 256 + 20
+
+
+def _whole_tree(p):
+    """A tree of all selections whose leaves prove nothing."""
+    tree, waiting = [], [(6,) * p]
+    while waiting:
+        codes = waiting.pop()
+        node = next((i for i, code in enumerate(codes) if code >= 5), None)
+        children = () if node is None else (0, 5) if codes[node] == 6 else (1, 2, 3)
+        tree.append(["b", node, list(children)] if children else ["x", "", ""])
+        waiting += [(*codes[:node], child, *codes[node + 1 :]) for child in reversed(children)]
+    return tree
+
+
+def test_a_leaf_with_more_multipliers_than_there_are_rows():
+    for name in ("stopped", "graph in several pieces"):
+        problem, proof = before(name)
+        records = copied(records_of(proof))
+        k = next(k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "x")
+        rows, values = multipliers(["x", *records[k][-2:]])
+        records[k][-2:] = with_multipliers(["x", "", ""], rows * 100, [v / 100 for v in values * 100])[1:]
+        assert "multipliers, and there are" in refused(problem, proof_of(records)).failures[0]
+
+
+def test_rational_leaves_of_a_large_problem_are_not_tried(monkeypatch):
+    from enumsol.checker import rational
+
+    problem = gallery.clamped_block(10, 20, contact=1)
+    assert problem.n > 250
+    monkeypatch.setattr(rational, "fmpq_mat", None)
+    header = {"format": "enumsol-proof", "version": 1, "problem": problem.fingerprint, "alpha": "1", "p": 1}
+    header |= {"data": "problem", "force": [0, 0], "length": [0, 0]}
+    tree = [["b", 0, [0, 5]], ["N"], ["b", 0, [1, 2, 3]], ["N"], ["N"], ["N"]]
+    footer = {"roots": 0, "families": 0, "undecided": 0, "leaves": 4}
+    report = refused(problem, proof_of([header, *tree, footer]))
+    assert f"n = {problem.n} degrees of freedom; expected at most 250" in report.failures[0]
+
+
+def test_long_fractions_of_points_are_compared_and_not_computed():
+    problem, proof = before("degenerate")
+    records = records_of(proof)
+    k = next(k for k, record in enumerate(records[1:], start=1) if record[0] == "D")
+    point = records[k][1][0]
+    digits = np.random.default_rng(1).bytes(200_000).hex()
+    for text in (f"{digits}/1{digits}", "0/0", "-0/1", "0/2", "00/1", "1", "1/1/1", "1e9/1", " 0/1", ""):
+        tampered = copied(records)
+        tampered[k][1][0] = [text, *point[1:]] if point[0] != text else [*point[:-1], text]
+        assert "its roots are not those that are claimed" in refused(problem, proof_of(tampered)).failures[0]
+
+
+# -- numbers -----------------------------------------------------------------------------------------------------------
+
+NO_FRACTIONS = [
+    "1e4000000",
+    "1e400",
+    "-1e400",
+    "1" + "0" * 400,
+    "-1" + "0" * 400,
+    "9" * 4001,
+    "1/" + "9" * 4001,
+    "1/0",
+    "0/0",
+    "1/-3",
+    "nan",
+    "inf",
+    "-inf",
+    "1.5",
+    " 1",
+    "1_0",
+    "+1",
+    "\u0663",
+    "",
+    "1/",
+    "/2",
+    0,
+    1,
+    0.5,
+    None,
+    True,
+    [],
+    ["1"],
+    {},
+]
+
+
+@pytest.mark.parametrize("text", NO_FRACTIONS, ids=lambda text: repr(text)[:12])
+def test_what_is_no_fraction(text):
+    for name in GRAPHS:
+        ends = records_of(before(name)[1])[0]["interval"]
+        for interval in ([text, ends[1]], [ends[0], text]):
+            report = refused(*changed(name, 0, interval=interval))
+            assert report.interval is None
+            refused(*changed(name, 1, piece=interval))
+    for name in ("stopped", "unloaded"):
+        assert refused(*changed(name, 0, alpha=text)).alpha is None
+
+
+@pytest.mark.parametrize("text", ["1" + "0" * 308, "1/3", "9" * 4000 + "/" + "9" * 4000, "-1/" + "1" + "0" * 3999])
+def test_a_fraction_at_the_bounds_is_a_number(text):
+    for name in ("graph", "stopped"):
+        key, value = ("interval", sorted([text, "7"], key=Fraction)) if name == "graph" else ("alpha", text)
+        report = verify(*changed(name, 0, **{key: value}))
+        assert (report.interval if name == "graph" else report.alpha) is not None
+        assert repr(report)
+
+
+@pytest.mark.parametrize(
+    "interval", [["1"], ["0", "1", "2"], "01", {"0": "1"}, None, ["1", "1"], ["2", "1"], [["0"], "1"]]
+)
+def test_what_is_no_interval(interval):
+    refused(*changed("graph", 0, interval=interval))
+    refused(*changed("graph", 1, piece=interval))
+
+
+@pytest.mark.parametrize("value", [1e300, -1e300, 1.7e308, 5e-324, float("inf"), float("-inf"), float("nan")])
+def test_a_huge_multiplier(value):
+    # warnings are errors here
+    for name in BEFORE:
+        problem, proof = before(name)
+        records = records_of(proof)
+        places = [k for k, record in enumerate(records) if isinstance(record, list) and record[0] in ("x", "X")]
+        for k in places[:4]:
+            rows, values = multipliers(["x", *records[k][-2:]])
+            for altered in ([value] * len(values), [value, *values[1:]]):
+                tampered = copied(records)
+                tampered[k][-2:] = with_multipliers(["x", "", ""], rows, altered)[1:]
+                report = verify(problem, proof_of(tampered))
+                # a small one in place of another may still do
+                assert not report.ok or abs(value) < 1
+
+
+@pytest.mark.parametrize("literal", ["1e999", "-1e999", "Infinity", "-Infinity", "NaN", "1" + "0" * 400, "1E400"])
+def test_every_number_is_finite(literal):
+    for name in ("stopped", "candidates that fail", "graph in several pieces"):
+        problem, proof = before(name)
+        lines = [json.dumps(record) for record in records_of(proof)]
+        for k, line in enumerate(lines):
+            if line.startswith('["r"') or k in (0, len(lines) - 1):
+                record = json.loads(line)
+                if isinstance(record, list):
+                    record[2][0] = "HOLE"
+                else:
+                    record[next(key for key in record if isinstance(record[key], int))] = "HOLE"
+                tampered = [*lines[:k], json.dumps(record).replace('"HOLE"', literal), *lines[k + 1 :]]
+                with pytest.raises(ProofFormatError, match="cannot be decoded"):
+                    verify(problem, proof_of(tampered))
+
+
+def test_the_box_of_a_root():
+    problem, proof = before("stopped")
+    records = records_of(proof)
+    k = next(k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "r")
+    _, mid, rad, index = records[k]
+    size = len(mid)
+    wrong = [
+        ["r", mid[1:], rad[1:], index],
+        ["r", mid, rad[1:], index],
+        ["r", [*mid, 0.0], [*rad, 0.0], index],
+        ["r", mid, [str(r) for r in rad], index],
+        ["r", mid, [None] * size, index],
+        ["r", mid, [True] * size, index],
+        ["r", mid, {"0": 1}, index],
+        ["r", mid, rad, float(index)],
+        ["r", mid, rad, index == 1],
+        ["r", mid, rad],
+        ["r", mid, rad, index, index],
+        ["r", [mid], [rad], index],
+        ["r", mid, [-1e308] * size, index],
+        ["r", [1e308] * size, rad, index],
+    ]
+    for record in wrong:
+        refused(problem, proof_of([*records[:k], record, *records[k + 1 :]]))
+    # a large one holds the root, and says little
+    assert verify(problem, proof_of([*records[:k], ["r", mid, [1e308] * size, index], *records[k + 1 :]])).ok
+
+
+@pytest.mark.parametrize("key", ["force", "length"])
+@pytest.mark.parametrize("name", ["stopped", "graph"])
+def test_units(key, name):
+    k = 0 if name == "stopped" else 1
+    good = records_of(before(name)[1])[k][key]
+    wrong = [
+        good[1:],
+        [*good, 0],
+        [float(x) for x in good],
+        [str(x) for x in good],
+        [x + 0.5 for x in good],
+        [True] * len(good),
+    ]
+    for value in [*wrong, [10**17] * len(good), [901] * len(good), {}, None, 5, "0" * len(good), [[0]] * len(good)]:
+        refused(*changed(name, k, **{key: value}))
+    for exponent in (-900, 900):
+        refused(*changed(name, k, **{key: [exponent] * len(good)}))
+
+
+@pytest.mark.parametrize(
+    "codes", ["", "0", "00000", "777", "0\u0660\u0660", "-11", 0, None, [0, 0, 0], {"0": 0}, "abc", "\ud800" * 3]
+)
+def test_codes_of_a_graph(codes):
+    problem, proof = before("graph in several pieces")
+    records = records_of(proof)
+    for k, record in enumerate(records[2:9], start=2):
+        tampered = copied(records)
+        tampered[k] = [record[0], codes, *record[2:]]
+        refused(problem, proof_of(tampered))
+    for roots in ([codes], codes, [codes, "666"], ["666", "666"], []):
+        refused(*changed("graph in several pieces", 1, roots=roots))
+
+
+@pytest.mark.parametrize("name", POINTS)
+def test_every_record_has_its_entries(name):
+    problem, proof = before(name)
+    records = records_of(proof)
+    for k, _ in leaves_of(records)[:10]:
+        for record in ([*records[k], 0], [*records[k], []], records[k][:-1], [[records[k][0]], *records[k][1:]], [{}]):
+            refused(problem, proof_of([*records[:k], record, *records[k + 1 :]]))
+
+
+# -- the file ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["stopped", "graph"])
+def test_what_is_no_text_of_records(name):
+    problem, proof = before(name)
+    text = zlib.decompress(proof._source[16:-32])
+    record = text.splitlines()[1]
+    for other in (
+        text.replace(b'"version"', '"\u00e9":1,"version"'.encode()),
+        text.replace(b'"version":1', b'"version":1,"version":1'),
+        text.replace(b'"version":1', b'"version":01'),
+        text.replace(record, record.decode().encode("utf-16")),
+        text.replace(record, record + b" " + record),
+        text.replace(record, b"[" * 100_000),
+        text.replace(record, b"[" * 900 + b"]" * 900 + b"0"),
+        b"\xef\xbb\xbf" + text,
+        text[:-1],
+        text.replace(b"\n", b"\r"),
+        text + b"\n",
+        b"",
+        b"\n",
+    ):
+        assert other != text
+        try:
+            refused(problem, sealed(zlib.compress(other, 1)))
+        except ProofFormatError:
+            continue
+        assert other == b""
+
+
+@pytest.mark.parametrize("name", ["stopped", "graph"])
+def test_nothing_follows_the_content(name):
+    problem, proof = before(name)
+    body = proof._source[16:-32]
+    for more in (b"\0", b"more", body, bytes(200_000)):
+        with pytest.raises(ProofFormatError, match="ends in the middle of its file"):
+            verify(problem, sealed(body + more))
+    records = records_of(proof)
+    for tail in ([records[-1]], [[]], ["null"], ['""']):
+        try:
+            refused(problem, proof_of([*records, *tail]))
+        except ProofFormatError as error:
+            assert "cannot be decoded" in str(error)  # noqa: PT017
+
+
+def test_what_is_no_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path, tmp_path / "pipe", tmp_path / "missing", Path("/dev/null")):
+        with pytest.raises(ProofFormatError, match="cannot be read"):
+            Proof.load(path)
+    for path in (5, None, b"x", "a\0b"):
+        with pytest.raises(InvalidArgumentError, match="expected"):
+            Proof.load(path)
+    problem, proof = before("graph")
+    for path in (tmp_path, tmp_path / "no" / "such", "/dev/full"):
+        with pytest.raises(EnumsolError, match="cannot be written"):
+            proof.save(path)
+    with pytest.raises(InvalidArgumentError, match="a character that no name has"):
+        proof.save("a\0b")
+    file = tmp_path / "kept.proof"
+    proof.save(str(file))
+    loaded = Proof.load(str(file))
+    assert verify(problem, loaded).ok
+    assert f"{file.stat().st_size} bytes" in repr(loaded)
+    file.unlink()
+    for use in (lambda: verify(problem, loaded), lambda: loaded.size, lambda: loaded.save(tmp_path / "copy")):
+        with pytest.raises(ProofFormatError, match="cannot be read"):
+            use()
+    assert "cannot be read" in repr(loaded)
+    with pytest.raises(EnumsolError, match="proof is a list"):
+        Proof([])
+
+
+def test_the_command_line_answers_in_words(tmp_path, capsys):
+    hostile = {}
+    for name in ("stopped", "graph in several pieces"):
+        problem, proof = before(name)
+        write_problem(problem, tmp_path / f"{name}.npz")
+        key = "alpha" if name == "stopped" else "interval"
+        hostile[name, "fraction"] = changed(name, 0, **{key: "1e400" if key == "alpha" else ["0", "1e4000000"]})[1]
+        hostile[name, "bomb"] = bomb(records_of(proof)[:2], "[]", 20)
+        hostile[name, "deep"] = proof_of([records_of(proof)[0], "[" * 100_000])
+        hostile[name, "deep enough"] = proof_of([*records_of(proof)[:-1], "[" * 500 + "]" * 500])
+        hostile[name, "surrogates"] = proof_of([*records_of(proof)[:-1], ["\ud800", "\x1b[31m"]])
+        hostile[name, "junk"] = sealed(proof._source[16:-32] + b"junk")
+    for (name, what), proof in hostile.items():
+        proof.save(tmp_path / "hostile.proof")
+        assert main(["verify", str(tmp_path / f"{name}.npz"), str(tmp_path / "hostile.proof")]) == 2
+        out, err = capsys.readouterr()
+        text = out + err
+        assert text.startswith(("proof: REFUSED", "enumsol: error: ")), what
+        assert "Traceback" not in text
+        assert "\x1b" not in text
+        assert len(text) < 1500
+
+
+# -- fuzzing -----------------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def holding(name, alpha):
+    """Selections of the proof that hold at an alpha, in rationals."""
+    problem, proof = before(name)
+    handed = verify(problem, proof).selections
+    return {codes for solution in exact_solutions(problem, alpha) for codes, *_ in solution.parts} & handed
+
+
+def is_true(name, report, records):
+    """Whether what a report on changed records claims is true, by rational arithmetic."""
+    problem, proof = before(name)
+    if records == records_of(proof):
+        return True
+    if name in POINTS:
+        return Judge(problem).valid([{**records[0], "data": "problem"}, *records[1:]])
+    a, b = report.interval
+    return all(holding(name, a + (b - a) * Fraction(k, 4)) <= report.selections for k in range(5))
+
+
+@pytest.mark.parametrize("name", BEFORE)
+def test_mutants(name, monkeypatch):
+    """Every mutant is refused, is named malformed, or claims what is true; nothing else is raised or warned of."""
+    problem, proof = before(name)
+    records, rng = records_of(proof), np.random.default_rng([7, list(BEFORE).index(name)])
+    effort = Effort(monkeypatch)
+    outcomes = {"malformed": 0, "refused": 0, "true": 0}
+    for _ in range(250):
+        candidate, how = mutant(rng, records, proof._source)
+        effort.characters = 0
+        try:
+            report = verify(problem, candidate)
+        except ProofFormatError:
+            outcomes["malformed"] += 1
+        else:
+            assert repr(report)
+            assert report.ok == (not report.failures)
+            assert not report.ok or is_true(name, report, read(candidate)), how
+            outcomes["true" if report.ok else "refused"] += 1
+        # twice: the tree alone, then its leaves
+        assert effort.characters <= 2 * (proof_module.EXPANSION * candidate.size + proof_module.SMALL) + 2**17
+    assert min(outcomes["malformed"], outcomes["refused"]) > 50

@@ -1,0 +1,260 @@
+"""Line 10: `> /dev/full` and a closed pipe give one line, at every verb and every output option."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+from cli.test_cli import run
+
+import enumsol
+from enumsol import gallery
+
+FULL = "/dev/full"
+GALLERY = "gallery:one-node-6.1"
+pytestmark = pytest.mark.skipif(not os.path.exists(FULL), reason="this system has no device that is always full")
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A directory with a graph, a proof and points of the problem, and names of figures that lead to a full disk."""
+    place = tmp_path_factory.mktemp("outputs")
+    graph = enumsol.branch_graph(gallery.get("one-node-6.1").build(), (0.0, 5.0))
+    graph.save(place / "graph.json")
+    graph.proof.save(place / "graph.proof")
+    path = enumsol.follow(graph.problem, graph.starting_points()[0], interval=(0.0, 5.0))
+    path.to_frame().to_csv(place / "points.csv", index=False)
+    for name in ("full.png", "full.pdf", "full.svg", "full.npz"):
+        (place / name).symlink_to(FULL)
+    return place
+
+
+def enumsol_command(place, *arguments, **streams):
+    """The command in a process of its own; streams that are not given are read to their ends."""
+    options = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams}
+    command = [sys.executable, "-m", "enumsol", *map(str, arguments)]
+    return subprocess.run(command, cwd=place, text=True, check=False, timeout=300, **options)
+
+
+def assert_one_line(err, *parts):
+    assert err.startswith("enumsol: error: ")
+    assert err.count("\n") == 1, err
+    for part in parts:
+        assert part in err
+
+
+#: What each verb prints, one way or another.
+PRINTING = {
+    "nothing": (),
+    "help": ("--help",),
+    "version": ("--version",),
+    "roots": ("roots", GALLERY, "--alpha", 5),
+    "roots help": ("roots", "--help"),
+    "roots json": ("roots", GALLERY, "--alpha", 5, "--json", "-"),
+    "roots csv": ("roots", GALLERY, "--alpha", 5, "--csv", "-"),
+    "table": ("table", GALLERY, "--alphas", "1,2"),
+    "table json": ("table", GALLERY, "--alphas", "1,2", "--json", "-"),
+    "table csv": ("table", GALLERY, "--alphas", "1,2", "--csv", "-"),
+    "graph": ("graph", GALLERY, "--from", 0, "--to", 5),
+    "graph json": ("graph", GALLERY, "--from", 0, "--to", 5, "--json", "-"),
+    "graph csv": ("graph", GALLERY, "--from", 0, "--to", 5, "--csv", "-"),
+    "follow": ("follow", GALLERY, "--from", 0, "--to", 5, "--start", 1),
+    "follow json": ("follow", GALLERY, "--from", 0, "--to", 5, "--start", 1, "--json", "-"),
+    "follow csv": ("follow", GALLERY, "--from", 0, "--to", 5, "--start", 1, "--csv", "-"),
+    "audit": ("audit", GALLERY, "points.csv", "--graph", "graph.json"),
+    "audit json": ("audit", GALLERY, "points.csv", "--graph", "graph.json", "--json", "-"),
+    "audit csv": ("audit", GALLERY, "points.csv", "--graph", "graph.json", "--csv", "-"),
+    "verify": ("verify", GALLERY, "graph.proof"),
+    "gallery": ("gallery",),
+    "gallery list": ("gallery", "list"),
+    "gallery write": ("gallery", "write", "one-node-6.1", "problem.npz"),
+}
+
+
+#: Runs each command in a process of its own, which begins with the libraries loaded and ends as any process does.
+DRIVER = """
+import contextlib, io, json, os, sys
+import enumsol, pandas
+from enumsol.cli import main
+
+enumsol.branch_graph, enumsol.follow, enumsol.verify
+with contextlib.redirect_stdout(io.StringIO()):
+    main(["--help"])
+    main(["roots", "gallery:one-node-6.1", "--alpha", "5"])
+where, commands = sys.argv[1], json.loads(sys.argv[2])
+for name, arguments in commands.items():
+    reading, writing = os.pipe()
+    child = os.fork()
+    if not child:
+        break
+    os.close(writing)
+    with open(reading) as errors:
+        said = errors.read()
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    sys.stdout.write(json.dumps([name, status, said]) + chr(10))
+    sys.stdout.flush()
+else:
+    sys.exit()
+os.dup2(writing, 2)
+if where == "full":
+    os.dup2(os.open("/dev/full", os.O_WRONLY), 1)
+else:
+    unread, written = os.pipe()
+    os.close(unread)
+    os.dup2(written, 1)
+sys.exit(main(arguments))
+"""
+
+
+@pytest.fixture(scope="module")
+def outcomes(place):
+    """Statuses and what stderr got, by kind of stdout and name of the command."""
+
+    def run_all(where):
+        commands = {name: [str(part) for part in arguments] for name, arguments in PRINTING.items()}
+        environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        done = subprocess.run(
+            [sys.executable, "-c", DRIVER, where, json.dumps(commands)],
+            cwd=place,
+            env=environment,
+            text=True,
+            check=True,
+            capture_output=True,
+            timeout=600,
+        )
+        return {name: (status, said) for name, status, said in map(json.loads, done.stdout.splitlines())}
+
+    return {where: run_all(where) for where in ("full", "unread")}
+
+
+@pytest.mark.parametrize("name", PRINTING)
+def test_stdout_on_a_full_disk(outcomes, name):
+    status, err = outcomes["full"][name]
+    assert_one_line(err, "stdout cannot be written (No space left on device)")
+    assert status == 74
+
+
+@pytest.mark.parametrize("name", PRINTING)
+def test_stdout_that_nobody_reads(outcomes, name):
+    status, err = outcomes["unread"][name]
+    assert_one_line(err, "stdout was closed by its reader")
+    assert status == 141
+
+
+@pytest.mark.parametrize("name", ["help", "roots csv"])
+def test_stdout_on_a_full_disk_from_a_shell(place, name):
+    with open(FULL, "w") as full:
+        done = enumsol_command(place, *PRINTING[name], stdout=full)
+    assert_one_line(done.stderr, "stdout cannot be written (No space left on device)")
+    assert done.returncode == 74
+
+
+def closing(*streams):
+    """For a new process: some of its streams are closed before it begins."""
+
+    def close():
+        for stream in streams:
+            os.close(stream)
+
+    return {"preexec_fn": close, **{name: None for k, name in ((1, "stdout"), (2, "stderr")) if k in streams}}
+
+
+@pytest.mark.parametrize("name", ["nothing", "roots", "roots json", "gallery list"])
+def test_stdout_that_was_closed(place, name):
+    done = enumsol_command(place, *PRINTING[name], **closing(1))
+    assert_one_line(done.stderr, "stdout is closed")
+    assert done.returncode == 74
+
+
+@pytest.mark.parametrize("name", ["help", "roots", "graph", "verify"])
+def test_stderr_that_was_closed_or_is_full_is_not_missed(place, name):
+    expected = enumsol_command(place, *PRINTING[name])
+    without = enumsol_command(place, *PRINTING[name], **closing(2))
+    with open(FULL, "w") as full:
+        on_full = enumsol_command(place, *PRINTING[name], stderr=full)
+    assert (without.returncode, on_full.returncode) == (expected.returncode,) * 2
+    for done in (without, on_full):
+        lines = [line for line in done.stdout.splitlines() if "seconds" not in line]
+        assert lines == [line for line in expected.stdout.splitlines() if "seconds" not in line]
+
+
+@pytest.mark.parametrize("arguments", [("rots",), ("roots", "gallery:nothing", "--alpha", 5)])
+def test_a_mistake_keeps_its_status_when_there_is_nowhere_to_tell_it(place, arguments):
+    with open(FULL, "w") as full:
+        assert enumsol_command(place, *arguments, stdout=full, stderr=full).returncode == 2
+    assert enumsol_command(place, *arguments, **closing(1, 2)).returncode == 2
+
+
+#: Every option that writes a file, at every verb that has it.
+WRITING = [
+    (verb, option, file)
+    for verb, options in (
+        ("roots", ("--json", "--csv", "--proof")),
+        ("table", ("--json", "--csv")),
+        ("graph", ("--json", "--csv", "--proof", "--save", "--graphml", "--plot")),
+        ("follow", ("--json", "--csv", "--plot")),
+        ("audit", ("--json", "--csv")),
+    )
+    for option in options
+    for file in (("full.png", "full.pdf", "full.svg") if option == "--plot" else (FULL,))
+]
+
+
+@pytest.mark.parametrize(("verb", "option", "file"), WRITING)
+def test_a_file_on_a_full_disk(place, capsys, monkeypatch, verb, option, file):
+    monkeypatch.chdir(place)
+    _, expected, _ = run(capsys, *PRINTING[verb])
+    status, out, err = run(capsys, *PRINTING[verb], option, file)
+    assert_one_line(err, f"{file} cannot be written", "(No space left on device)")
+    assert status == 74
+    # the result was printed all the same
+    assert out.splitlines()[-1] == expected.splitlines()[-1]
+
+
+def test_gallery_write_on_a_full_disk(place, capsys, monkeypatch):
+    monkeypatch.chdir(place)
+    status, _, err = run(capsys, "gallery", "write", "one-node-6.1", "full.npz")
+    assert_one_line(err, "full.npz: it cannot be written (No space left on device)")
+    assert status == 2
+
+
+def test_one_output_that_fails_keeps_no_other_back(place, tmp_path):
+    good = {name: tmp_path / f"graph.{name}" for name in ("csv", "graphml", "proof", "png")}
+    with open(FULL, "w") as full:
+        done = enumsol_command(
+            place,
+            *(*PRINTING["graph"], "--json", FULL, "--csv", good["csv"], "--save", "full.png"),
+            *("--graphml", good["graphml"], "--proof", good["proof"], "--plot", good["png"]),
+            stdout=full,
+        )
+    assert done.returncode == 74
+    assert_one_line(done.stderr, "stdout cannot be written", f"{FULL} cannot be written", "full.png cannot be written")
+    assert all(file.stat().st_size > 0 for file in good.values())
+
+
+def test_json_is_written_when_nobody_reads_stdout(place, tmp_path):
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = enumsol_command(place, *PRINTING["roots"], "--json", tmp_path / "r.json", stdout=writing)
+    os.close(writing)
+    assert done.returncode == 141
+    assert json.loads((tmp_path / "r.json").read_text())["complete"] is True
+
+
+def test_a_proof_that_has_no_room_leaves_the_roots():
+    entry = gallery.get("wedge-8-5")
+    problem = entry.build()
+    with pytest.raises(enumsol.OutputError, match=r"proof_path /dev/full cannot be written to the end") as caught:
+        enumsol.enumerate_roots(problem, entry.alpha, proof_path=FULL)
+    partial = caught.value.partial
+    assert len(partial) == entry.roots
+    assert partial.complete
+    assert partial.proof is None
+
+
+def test_statuses_are_documented(capsys):
+    for verb in ("roots", "table", "graph", "follow", "audit", "verify"):
+        text = " ".join(run(capsys, verb, "--help")[1].split())
+        assert "74 when" in text, verb
+        assert "141 when nobody read it any more" in text, verb

@@ -1,0 +1,12 @@
+"""Line 12: bare `enumsol` prints help."""
+
+import pytest
+from cli.test_cli import call
+
+
+@pytest.mark.parametrize("group", [(), ("gallery",)])
+def test_it_is_the_help_on_stdout(group):
+    bare, asked = call(*group), call(*group, "--help")
+    assert (bare.returncode, bare.stderr) == (0, "")
+    assert bare.stdout.rstrip() == asked.stdout.rstrip()
+    assert "Usage: enumsol" in bare.stdout

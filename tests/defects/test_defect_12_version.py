@@ -1,0 +1,66 @@
+"""Line 12: `enumsol.__version__`."""
+
+import shutil
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+from cli.test_cli import run
+from test_imports import modules_after
+
+import enumsol
+
+PACKAGE = Path(enumsol.__file__).parent
+
+
+def version_of(place):
+    """What a package in this directory says of itself, in a new process."""
+    code = "import enumsol; print(enumsol.__version__, enumsol.__file__)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=place, check=True, capture_output=True, text=True)
+    found, file = done.stdout.split()
+    assert Path(file).is_relative_to(place)
+    return found
+
+
+@pytest.fixture
+def copied(tmp_path):
+    """The modules that `import enumsol` and its version need, without metadata."""
+    for name in ("__init__.py", "_version.py"):
+        (tmp_path / "enumsol").mkdir(exist_ok=True)
+        shutil.copy(PACKAGE / name, tmp_path / "enumsol" / name)
+    return tmp_path
+
+
+def test_it_is_that_of_the_package():
+    written = PACKAGE.with_name("pyproject.toml")
+    if written.exists():
+        assert enumsol.__version__ == tomllib.loads(written.read_text())["project"]["version"]
+    else:
+        assert enumsol.__version__ == version("enumsol")
+
+
+def test_a_checkout_tells_its_own_and_not_that_of_an_installed_one(copied):
+    (copied / "pyproject.toml").write_text('[project]\nname = "enumsol"\nversion = "7.8.9"\n')
+    assert version_of(copied) == "7.8.9"
+
+
+@pytest.mark.parametrize("text", ['[project]\nname = "another"\nversion = "7.8.9"\n', "no = toml = at all\n", ""])
+def test_a_file_of_something_else_is_not_believed(copied, text):
+    (copied / "pyproject.toml").write_text(text)
+    assert version_of(copied) != "7.8.9"
+
+
+def test_it_is_found_when_it_is_asked_for_and_then_kept():
+    needed = {"importlib.metadata", "tomllib", "enumsol._version"}
+    before, after = modules_after("import enumsol"), modules_after("import enumsol; enumsol.__version__")
+    assert not before & needed
+    assert "enumsol._version" in after
+    assert not after & {"numpy", "scipy"}
+    assert enumsol.__version__ is enumsol.__dict__["__version__"]
+
+
+def test_the_command_says_the_same(capsys):
+    assert run(capsys, "--version") == (0, f"enumsol {enumsol.__version__}\n", "")

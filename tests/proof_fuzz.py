@@ -1,0 +1,322 @@
+"""Mutants of real proofs: their bytes, their text, their JSON and their numbers changed, under a right checksum."""
+
+import base64
+import json
+import struct
+import zlib
+
+from proof_tools import MAGIC, bytes_of, copied, multipliers, sealed, with_multipliers
+
+HUGE = (
+    "1e4000000",
+    "1e400",
+    "-1e400",
+    "9" * 5000,
+    "9" * 3999,
+    "1/0",
+    "0/0",
+    "1/" + "3" * 4001,
+    "nan",
+    "inf",
+    " 1",
+    "1_0",
+)
+TEXTS = (
+    *HUGE,
+    "",
+    "0",
+    "-1",
+    "6" * 9,
+    "\ud800",
+    "\u0663",
+    "AAAA",
+    "AAAAAA==",
+    "x",
+    "s",
+    "c",
+    "graph",
+    "problem",
+    "condensed",
+)
+NUMBERS = (
+    0,
+    1,
+    -1,
+    2,
+    5,
+    6,
+    7,
+    10**9,
+    2**31,
+    2**63,
+    -(2**63),
+    10**17,
+    10**30,
+    10**400,
+    1e300,
+    -1e300,
+    1e308,
+    5e-324,
+    0.5,
+    True,
+)
+#: What JSON takes and a proof does not.
+LITERALS = (
+    "NaN",
+    "Infinity",
+    "-Infinity",
+    "1e999",
+    "-1e999",
+    "[" * 3000 + "]" * 3000,
+    "[" * 100_000,
+    '{"a":1,"a":1}',
+    "1E400",
+)
+FLOATS = (1e300, -1e300, 1.7e308, float("inf"), float("-inf"), float("nan"), 0.0, -0.0, 5e-324, 1e-300)
+_HOLE = "\u0001hole"
+
+
+def mutant(rng, records, data):
+    """One mutant of a proof, given by its records and its bytes, and the name of the mutation."""
+    how = str(rng.choice(list(_MUTATIONS)))
+    return _MUTATIONS[how](rng, records, data), how
+
+
+def _lines(records):
+    return [json.dumps(record, separators=(",", ":")) for record in records]
+
+
+def _sealed_lines(lines, level=1):
+    return sealed(zlib.compress("".join(line + "\n" for line in lines).encode("utf-8", "surrogatepass"), level))
+
+
+def _pick(rng, items):
+    return items[int(rng.integers(len(items)))]
+
+
+# -- bytes -------------------------------------------------------------------------------------------------------------
+
+
+def _file(rng, _, data):
+    """The file itself, checksum and all."""
+    from enumsol import Proof
+
+    changed = bytearray(data)
+    how = int(rng.integers(4))
+    if how == 0:
+        changed[int(rng.integers(len(changed)))] ^= 1 << int(rng.integers(8))
+    elif how == 1:
+        del changed[int(rng.integers(len(changed))) :]
+    elif how == 2:
+        changed += rng.bytes(int(rng.integers(1, 80)))
+    else:
+        changed *= 2
+    return Proof(bytes(changed))
+
+
+def _stream(rng, _, data):
+    """The compressed stream under a checksum that fits."""
+    body = bytearray(data[len(MAGIC) : -32])
+    how = int(rng.integers(5))
+    at = int(rng.integers(len(body)))
+    if how == 0:
+        body[at] ^= 1 << int(rng.integers(8))
+    elif how == 1:
+        del body[at:]
+    elif how == 2:
+        del body[at : at + int(rng.integers(1, 20))]
+    elif how == 3:
+        body *= 2
+    else:
+        body[at:at] = rng.bytes(int(rng.integers(1, 20)))
+    return sealed(bytes(body))
+
+
+# -- text --------------------------------------------------------------------------------------------------------------
+
+
+def _characters(rng, records, _):
+    """A few characters of the text."""
+    text = bytearray("".join(line + "\n" for line in _lines(records)).encode())
+    for _ in range(int(rng.integers(1, 4))):
+        at = int(rng.integers(len(text)))
+        how = int(rng.integers(4))
+        if how == 0:
+            text[at] = int(rng.integers(256))
+        elif how == 1:
+            text[at : at + 1] = bytes([_pick(rng, b'0123456789-+eE.,"[]{}:/ \n')])
+        elif how == 2:
+            del text[at : at + int(rng.integers(1, 12))]
+        else:
+            text[at:at] = text[at : at + int(rng.integers(1, 40))]
+    return sealed(zlib.compress(bytes(text), 1))
+
+
+def _order(rng, records, _):
+    """Lines left out, repeated, exchanged, cut off."""
+    lines = _lines(records)
+    at, other = (int(k) for k in rng.integers(len(lines), size=2))
+    how = int(rng.integers(6))
+    if how == 0:
+        del lines[at]
+    elif how == 1:
+        lines.insert(at, lines[other])
+    elif how == 2:
+        lines[at], lines[other] = lines[other], lines[at]
+    elif how == 3:
+        del lines[at:]
+    elif how == 4:
+        lines[at] = lines[other]
+    else:
+        lines += lines[at:]
+    return _sealed_lines(lines)
+
+
+# -- JSON --------------------------------------------------------------------------------------------------------------
+
+
+def _places(value, path=()):
+    """Paths to all values within a record."""
+    yield path
+    if isinstance(value, list | dict):
+        keys = range(len(value)) if isinstance(value, list) else value
+        for key in keys:
+            yield from _places(value[key], (*path, key))
+
+
+def _put(record, path, value):
+    if not path:
+        return value
+    inner = record
+    for key in path[:-1]:
+        inner = inner[key]
+    inner[path[-1]] = value
+    return record
+
+
+def _get(record, path):
+    for key in path:
+        record = record[key]
+    return record
+
+
+def _field(rng, records, _):
+    """One value anywhere in a record, by another of the same or of another kind."""
+    changed = copied(records)
+    # the header, the end and the records between them alike
+    at = _pick(rng, (0, -1, int(rng.integers(len(changed))), int(rng.integers(len(changed)))))
+    path = _pick(rng, list(_places(changed[at])))
+    old = _get(changed[at], path)
+    how = int(rng.integers(6))
+    if how == 0:
+        new = _pick(rng, NUMBERS)
+    elif how == 1:
+        new = _pick(rng, TEXTS)
+    elif how == 2:
+        new = _pick(rng, (None, [], {}, [old], {"a": old}, [old] * 3, [[]], [[[old]]], False))
+    elif how == 3:
+        new = _nudged(rng, old)
+    elif how == 4:
+        new = copied(_get(records[at], _pick(rng, list(_places(records[at])))))
+    else:
+        changed[at] = _put(changed[at], path, _HOLE)
+        lines = _lines(changed)
+        lines[at] = lines[at].replace(json.dumps(_HOLE), _pick(rng, LITERALS))
+        return _sealed_lines(lines)
+    changed[at] = _put(changed[at], path, new)
+    return _sealed_lines(_lines(changed))
+
+
+def _nudged(rng, old):
+    if isinstance(old, bool) or old is None:
+        return not old
+    if isinstance(old, int):
+        return old + int(rng.integers(-3, 4))
+    if isinstance(old, float):
+        return _pick(rng, (-old, 2 * old, old * 1e300, old / 2, 0.0, old * (1 + 1e-9), 1e308))
+    if isinstance(old, str):
+        at = int(rng.integers(len(old) + 1))
+        return _pick(
+            rng, (old[:at] + old[at + 1 :], old[:at] + "5" + old[at:], old + old, old[:at] + "0" + old[at + 1 :])
+        )
+    if isinstance(old, list):
+        at = int(rng.integers(len(old) + 1))
+        return _pick(rng, (old[:at], old + old, old[::-1], old[:at] + old[at + 1 :], old * 50))
+    keys = list(old)
+    return {key: old[key] for key in keys if key != _pick(rng, keys)}
+
+
+def _numbers(rng, records, _):
+    """Multipliers."""
+    changed = copied(records)
+    places = [k for k, record in enumerate(changed) if isinstance(record, list) and record and record[0] in ("x", "X")]
+    if not places:
+        return _field(rng, records, _)
+    at = _pick(rng, places)
+    head = changed[at][:-2]
+    rows, values = multipliers(["x", *changed[at][-2:]])
+    for _ in range(int(rng.integers(1, 3))):
+        how = int(rng.integers(7))
+        j = int(rng.integers(len(values))) if values else 0
+        if how == 0 and values:
+            values[j] = _pick(rng, FLOATS)
+        elif how == 1 and values:
+            values[j] *= float(_pick(rng, (-1.0, 0.5, 2.0, 1e6, 1e-6, 1 + 1e-9)))
+        elif how == 2 and rows:
+            rows[j] = int(_pick(rng, (0, 1, 7, 20, 10**6, 2**32 - 1)))
+        elif how == 3:
+            rows, values = rows * 40, values * 40
+        elif how == 4 and values:
+            del values[j], rows[j]
+        elif how == 5:
+            values = [v * 1e300 for v in values]
+        else:
+            values = [-v for v in values]
+    changed[at] = [*head, *with_multipliers(["x", "", ""], rows, values)[1:]]
+    if rng.random() < 0.1:
+        text = base64.b64encode(struct.pack("<3I", 1, 2, 3)).decode()
+        changed[at][-2] = _pick(rng, (text, text[:-1], text + "=", text + "\u00e9", 5, None))
+    return _sealed_lines(_lines(changed))
+
+
+# -- bombs -------------------------------------------------------------------------------------------------------------
+
+
+def _bomb(rng, records, _):
+    """A line or a part of one very often, compressed as far as it goes."""
+    lines = _lines(records)
+    at = int(rng.integers(len(lines)))
+    count = int(10 ** rng.uniform(2, 5.3))
+    how = int(rng.integers(6))
+    if how == 0:
+        lines[at:at] = [lines[int(rng.integers(len(lines)))]] * count
+    elif how == 1:
+        lines[at:at] = [
+            _pick(rng, ("[]", "{}", '["u",""]', '["n"]', '["c","6"]', '["b",0,[0,5]]', "null", "", " "))
+        ] * count
+    elif how == 2:
+        lines[at] = "[" + ",".join([_pick(rng, ("0", "[]", '""', "{}", '"0/1"'))] * count) + "]"
+    elif how == 3:
+        lines[at] = '["u","' + "a" * count + '"]'
+    elif how == 4:
+        lines[at] = lines[at].replace("[", "[" * min(count, 5000), 1)
+    else:
+        lines[at] += " " * count
+    return _sealed_lines(lines, level=9)
+
+
+_MUTATIONS = {
+    "file": _file,
+    "stream": _stream,
+    "characters": _characters,
+    "order": _order,
+    "field": _field,
+    "field again": _field,
+    "numbers": _numbers,
+    "bomb": _bomb,
+}
+
+
+def read(proof):
+    """The records of a mutant that was accepted."""
+    return [json.loads(line) for line in zlib.decompress(bytes_of(proof)[len(MAGIC) : -32]).splitlines()]
