@@ -6,22 +6,28 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from enumsol import arithmetic as arithmetic
     from enumsol import branches as branches
-    from enumsol import certification as certification
-    from enumsol import condensed as condensed
+    from enumsol import checker as checker
+    from enumsol import checks as checks
+    from enumsol import condensation as condensation
     from enumsol import continuation as continuation
-    from enumsol import enumeration as enumeration
+    from enumsol import equation as equation
     from enumsol import errors as errors
     from enumsol import fem as fem
     from enumsol import gallery
     from enumsol import io as io
+    from enumsol import kernel as kernel
     from enumsol import problem as problem
-    from enumsol import results as results
+    from enumsol import proof as proof
+    from enumsol import relaxation as relaxation
+    from enumsol import roots as roots
+    from enumsol import search as search
     from enumsol import selections as selections
+    from enumsol import statuses as statuses
     from enumsol.branches import BranchGraph, branch_graph, link_samples, multiplicity_table
-    from enumsol.certification.checker import verify
-    from enumsol.certification.proof import Proof, ProofFormatError
-    from enumsol.certification.reports import VerificationReport
+    from enumsol.checker.reports import VerificationReport
+    from enumsol.checker.verify import verify
     from enumsol.continuation import (
         ContinuationOptions,
         NotConverged,
@@ -33,7 +39,7 @@ if TYPE_CHECKING:
         local_branch_test,
         newton,
     )
-    from enumsol.enumeration import SearchProgress, enumerate_roots
+    from enumsol.equation import PiecewiseSmoothEquation
     from enumsol.errors import (
         EnumsolError,
         IncompleteGraphError,
@@ -47,8 +53,11 @@ if TYPE_CHECKING:
     )
     from enumsol.io import read_problem, write_problem
     from enumsol.problem import ContactProblem
-    from enumsol.results import Enclosure, Polytope, Root, RootFamily, RootSet, SearchStats, Undecided
-    from enumsol.selections import ContactStatus, PiecewiseSmoothEquation, sign_array
+    from enumsol.proof.proof_file import Proof, ProofFormatError
+    from enumsol.roots.enumerate import enumerate_roots
+    from enumsol.roots.root_set import Enclosure, Polytope, Root, RootFamily, RootSet, SearchStats, Undecided
+    from enumsol.search.tree import SearchProgress
+    from enumsol.statuses import ContactStatus, sign_array
 
     __version__: str
 
@@ -56,9 +65,9 @@ if TYPE_CHECKING:
 #: it works with and no more: sparse matrices come with a problem, networkx and rational arithmetic with a branch graph.
 _HOMES = {
     "enumsol.branches": ("BranchGraph", "branch_graph", "link_samples", "multiplicity_table"),
-    "enumsol.certification.checker": ("verify",),
-    "enumsol.certification.proof": ("Proof", "ProofFormatError"),
-    "enumsol.certification.reports": ("VerificationReport",),
+    "enumsol.checker.verify": ("verify",),
+    "enumsol.proof.proof_file": ("Proof", "ProofFormatError"),
+    "enumsol.checker.reports": ("VerificationReport",),
     "enumsol.continuation": (
         "ContinuationOptions",
         "NotConverged",
@@ -70,7 +79,8 @@ _HOMES = {
         "local_branch_test",
         "newton",
     ),
-    "enumsol.enumeration": ("SearchProgress", "enumerate_roots"),
+    "enumsol.roots.enumerate": ("enumerate_roots",),
+    "enumsol.search.tree": ("SearchProgress",),
     "enumsol.errors": (
         "EnumsolError",
         "IncompleteGraphError",
@@ -84,25 +94,33 @@ _HOMES = {
     ),
     "enumsol.io": ("read_problem", "write_problem"),
     "enumsol.problem": ("ContactProblem",),
-    "enumsol.results": ("Enclosure", "Polytope", "Root", "RootFamily", "RootSet", "SearchStats", "Undecided"),
-    "enumsol.selections": ("ContactStatus", "PiecewiseSmoothEquation", "sign_array"),
+    "enumsol.roots.root_set": ("Enclosure", "Polytope", "Root", "RootFamily", "RootSet", "SearchStats", "Undecided"),
+    "enumsol.equation": ("PiecewiseSmoothEquation",),
+    "enumsol.statuses": ("ContactStatus", "sign_array"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 #: Modules that are reached as attributes without an import of their own.
 _MODULES = frozenset(
     (
+        "arithmetic",
         "branches",
-        "certification",
-        "condensed",
+        "checker",
+        "checks",
+        "condensation",
         "continuation",
-        "enumeration",
+        "equation",
         "errors",
         "fem",
         "gallery",
         "io",
+        "kernel",
         "problem",
-        "results",
+        "proof",
+        "relaxation",
+        "roots",
+        "search",
         "selections",
+        "statuses",
     )
 )
 

@@ -34,8 +34,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.problem import Alpha
 
+#: What a value of alpha is kept as.
+Alpha = float | Fraction
 #: What is taken for alpha.
 AlphaLike = float | Fraction | Decimal | str | np.number[Any] | np.ndarray[Any, Any]
 #: Most binary digits of a numerator or denominator: four times those of any float64, so that nothing takes for ever.

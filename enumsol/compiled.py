@@ -26,7 +26,7 @@ def why_missing(module: str, error: ImportError) -> str:
     Parameters
     ----------
     module : str
-        Its full name, such as ``enumsol.enumeration._active_set``.
+        Its full name, such as ``enumsol.relaxation._active_set``.
     error : ImportError
         What the attempt to import it raised.
     """

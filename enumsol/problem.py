@@ -19,16 +19,15 @@ from enumsol.sealed import Immutable, SealedMatrix, sealed
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.certification.enclosure import CondensedEnclosure
     from enumsol.checks import AlphaLike
-    from enumsol.condensed import CondensedProblem, Factorization
+    from enumsol.condensation.condensed import CondensedProblem
+    from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.condensation.factorization import Factorization
 
 #: An asymmetry of A up to this fraction of max|A| is rounding of the user's assembly and is averaged away.
 ASYMMETRY_TOLERANCE = 1e-12
 #: Singular values of the row-normalised [Bn; Bt] below this fraction of the largest mean dependent rows.
 ROW_RANK_TOLERANCE = 1e-12
-
-Alpha = float | Fraction
 
 
 class ContactProblem(Immutable):
@@ -142,14 +141,14 @@ class ContactProblem(Immutable):
     @cached_property
     def factorization(self) -> Factorization:
         """One sparse factorization of A, shared by everything that solves with it."""
-        from enumsol.condensed import Factorization  # condensed imports this module's types
+        from enumsol.condensation.factorization import Factorization  # condensed imports this module's types
 
         return Factorization(self.A)
 
     @cached_property
     def condensed(self) -> CondensedProblem:
         """The problem condensed to its 2p contact forces (theory, section 4.1)."""
-        from enumsol.condensed import CondensedProblem  # as above
+        from enumsol.condensation.condensed import CondensedProblem  # as above
 
         return CondensedProblem.from_problem(self)
 
@@ -162,7 +161,7 @@ class ContactProblem(Immutable):
         NotEnclosedError
             A is positive definite only within rounding.
         """
-        from enumsol.certification.enclosure import CondensedEnclosure  # as above
+        from enumsol.condensation.enclosure import CondensedEnclosure  # as above
 
         return CondensedEnclosure.from_problem(self)
 

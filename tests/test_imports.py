@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import enumsol
-from enumsol.condensed import Factorization
+from enumsol.condensation.factorization import Factorization
 
 #: Libraries that only some problems, results or commands need.
 RARE = {"flint", "networkx", "pandas", "matplotlib", "cvxpy", "skfem", "typer", "rich", "scipy.optimize", "h5py"}
@@ -47,7 +47,7 @@ def test_no_rational_arithmetic_where_intervals_decide(problem, alpha, roots):
     code = GENERIC.format(problem=problem, alpha=alpha)
     code += f"assert roots.complete and len(roots) == {roots}; assert enumsol.verify(problem, roots.proof).complete"
     modules = modules_after(code)
-    assert "enumsol.enumeration.verified" in modules
+    assert "enumsol.search.certifiers.verified" in modules
     assert not modules & (RARE - {"skfem"} if "wedge" in problem else RARE)
 
 
@@ -57,7 +57,7 @@ def test_rational_arithmetic_where_a_sign_is_zero():
 
 def test_a_search_does_not_load_the_checker():
     modules = modules_after(GENERIC.format(problem="one_node_triangle()", alpha=5.0) + "pass")
-    assert not modules & {"enumsol.certification.checker", "enumsol.io", "enumsol.branches", "enumsol.continuation"}
+    assert not modules & {"enumsol.checker.verify", "enumsol.io", "enumsol.branches", "enumsol.continuation"}
 
 
 def test_a_branch_graph_loads_algebra_and_graphs_only():

@@ -6,17 +6,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from enumsol.branches.build import branch_graph
-    from enumsol.branches.graph import BranchGraph, GraphStats
-    from enumsol.branches.parts import Arc, Branch, Component, Vertex
+    from enumsol.branches.construction import branch_graph
+    from enumsol.branches.elements import Arc, Branch, Component, Vertex
+    from enumsol.branches.graph import BranchGraph
+    from enumsol.branches.graph_data import GraphStats
     from enumsol.branches.samples import Missed, SampledGraph, link_samples
     from enumsol.branches.table import multiplicity_table
 
 #: Modules of the public names, loaded when first used: a table needs neither networkx nor rational arithmetic.
 _HOMES = {
-    "build": ("branch_graph",),
-    "graph": ("BranchGraph", "GraphStats"),
-    "parts": ("Arc", "Branch", "Component", "Vertex"),
+    "construction": ("branch_graph",),
+    "graph": ("BranchGraph",),
+    "graph_data": ("GraphStats",),
+    "elements": ("Arc", "Branch", "Component", "Vertex"),
     "samples": ("Missed", "SampledGraph", "link_samples"),
     "table": ("multiplicity_table",),
 }

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.branches.parts import UNSETTLED
+from enumsol.branches.elements import UNSETTLED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.branches.parts import Arc, Vertex
+    from enumsol.branches.elements import Arc, Vertex
 
 
 class Standing(enum.Enum):

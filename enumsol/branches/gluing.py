@@ -12,20 +12,20 @@ from itertools import product
 from math import prod
 from typing import TYPE_CHECKING, Any
 
-from enumsol.branches.algebraic import CriticalAlpha, merge
-from enumsol.branches.arcs import SelectionArcs, active_sets, selection_arcs
-from enumsol.branches.fibers import FiberSelections
-from enumsol.branches.number_field import exact_value
+from enumsol.arithmetic.algebraic import CriticalAlpha, merge
+from enumsol.arithmetic.number_field import exact_value
+from enumsol.branches.selection_arcs import SelectionArcs, active_sets, selection_arcs
 from enumsol.branches.sheets import sheet_arcs
-from enumsol.enumeration.components import connected_components
-from enumsol.enumeration.solutions import SelectionSolution, VertexLimitError
+from enumsol.roots.components import connected_components
+from enumsol.selections.ordered_field import FiberSelections
+from enumsol.selections.solution import SelectionSolution, VertexLimitError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from enumsol.branches.path import ExactPath
-    from enumsol.enumeration.components import Component
-    from enumsol.enumeration.solutions import ActiveSets, Codes
+    from enumsol.condensation.exact import ExactPath
+    from enumsol.roots.components import RootComponent
+    from enumsol.selections.solution import ActiveSets, Codes
 
 Place = tuple["Codes", int]
 
@@ -387,11 +387,11 @@ class Gluing:
                     )
         self.edges = sorted(found, key=lambda e: (e.tail, e.head, e.codes))
 
-    def _knows(self, component: Component) -> bool:
+    def _knows(self, component: RootComponent) -> bool:
         """Whether all selections that hold on a component were found."""
         return component.whole and all(solution.codes in self.arcs for solution in component.solutions)
 
-    def _component(self, codes: Codes, sample: Any) -> Component | None:
+    def _component(self, codes: Codes, sample: Any) -> RootComponent | None:
         """The connected set of solutions that a degenerate selection belongs to at a point of its cell."""
         solver = FiberSelections(self.path, sample)
         solution = solver.solve(codes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from fractions import Fraction
 from functools import cached_property
 from types import MappingProxyType
@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.algebraic import CriticalAlpha
-from enumsol.branches.assembly import make_branches, make_components, multigraph
-from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps, Standing
-from enumsol.branches.fiber_roots import roots_of
-from enumsol.branches.parts import UNSETTLED
+from enumsol.arithmetic.algebraic import CriticalAlpha
+from enumsol.arithmetic.rationals import rational
+from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps
+from enumsol.branches.elements import UNSETTLED
+from enumsol.branches.make_elements import make_branches, make_components, multigraph
+from enumsol.branches.roots_at import roots_of
 from enumsol.checks import alpha_value
-from enumsol.enumeration.exact_selections import rational
 from enumsol.errors import IncompleteGraphError, InvalidArgumentError
 from enumsol.sealed import Immutable
 
@@ -27,36 +27,11 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from enumsol.branches.interval_search import SearchedPiece
-    from enumsol.branches.parts import Arc, Branch, Component, Vertex
-    from enumsol.branches.path import ExactPath
-    from enumsol.certification.proof import Proof
+    from enumsol.branches.elements import Arc, Branch, Component, Vertex
+    from enumsol.branches.graph_data import GraphData
     from enumsol.checks import AlphaLike
-    from enumsol.problem import ContactProblem
-    from enumsol.results import Root, RootFamily, RootSet
-
-
-@dataclass(frozen=True)
-class GraphStats:
-    """What the construction did.
-
-    Attributes
-    ----------
-    pieces : int
-        Parts of the interval, each searched by a tree of its own.
-    nodes : int
-        Nodes of all trees.
-    selections : int
-        Complete selections whose arcs were computed.
-    search_seconds, seconds : float
-        Wall time of the search, and of all.
-    """
-
-    pieces: int = 0
-    nodes: int = 0
-    selections: int = 0
-    search_seconds: float = 0.0
-    seconds: float = 0.0
+    from enumsol.roots.root_set import Root, RootFamily, RootSet
+    from enumsol.selections.solution import Codes
 
 
 class BranchGraph(Immutable):
@@ -66,6 +41,10 @@ class BranchGraph(Immutable):
     and a vertex has a kind only where everything that meets there is known (it is "unsettled" otherwise). What needs
     the whole graph (``multiplicity_at``, ``steps``, ``uniqueness_limit``) raises IncompleteGraphError then;
     ``at_least`` and ``claims`` tell what is known.
+
+    Parameters
+    ----------
+    data : GraphData
 
     Attributes
     ----------
@@ -88,69 +67,31 @@ class BranchGraph(Immutable):
         cut short, and where rationals had to decide about leaves).
     """
 
-    def __init__(
-        self,
-        problem: ContactProblem,
-        path: ExactPath,
-        interval: tuple[Fraction, Fraction],
-        arithmetic: str,
-        vertices: Sequence[Vertex],
-        arcs: Sequence[Arc],
-        reasons: Sequence[str],
-        stats: GraphStats,
-        pieces: Sequence[SearchedPiece] = (),
-        proof: Proof | None = None,
-    ) -> None:
-        self.problem = problem
-        self.path = path
-        self.exact_interval = interval
-        self.interval = (float(interval[0]), float(interval[1]))
-        self.arithmetic = arithmetic
-        self.vertices = tuple(vertices)
-        self.arcs = tuple(arcs)
-        self.stats = stats
-        self.pieces = tuple(pieces)
-        self.proof = proof
+    def __init__(self, data: GraphData) -> None:
+        self.data = data
+        self.problem = data.problem
+        self.path = data.path
+        self.exact_interval = data.interval
+        self.interval = (float(data.interval[0]), float(data.interval[1]))
+        self.arithmetic = data.arithmetic
+        self.vertices = data.vertices
+        self.arcs = data.arcs
+        self.stats = data.stats
+        self.pieces = data.pieces
+        self.proof = data.proof
         self.graph = multigraph(self.vertices, self.arcs)
-        self.search_reasons = tuple(reasons)
-        self.reasons = (*reasons, *self._gaps())
+        self.reasons = data.all_reasons
         self._freeze()
-
-    def _gaps(self) -> list[str]:
-        """Violations of the balance of degrees, and vertices that are not settled (theory, (7.3)).
-
-        Each of them proves that something is missing.
-        """
-        found = []
-        unsettled = sum(v.kind == UNSETTLED for v in self.vertices)
-        if unsettled and not self.search_reasons:
-            found.append(f"selections that were not examined hold at {unsettled} of {len(self.vertices)} vertices")
-        for v in self.vertices:
-            if v.kind == UNSETTLED:
-                continue
-            if v.index_left is None or v.index_right is None:
-                found.append(f"vertex {v.number} at alpha = {v.alpha:.17g}: the degree of an arc is not known")
-            elif not v.border and v.index_left != v.index_right:
-                found.append(
-                    f"vertex {v.number} at alpha = {v.alpha:.17g} ({v.kind}): degrees {v.index_left:+d} from the left "
-                    f"and {v.index_right:+d} to the right do not balance"
-                )
-        start = [v.index_right for v in self.vertices if v.border and v.alpha == self.interval[0]]
-        total = sum(k for k in start if k is not None)
-        if not self.search_reasons and None not in start and total != 1:
-            found.append(f"the degrees of all arcs at alpha = {self.interval[0]:g} sum to {total:+d} and not to +1")
-        return found
 
     @property
     def complete(self) -> bool:
         """Whether it is proven that no solution is missing: proven leaves, nothing undecided, degrees balanced."""
-        return self.arithmetic != "fast" and not self.reasons
+        return self.data.complete
 
-    @cached_property
+    @property
     def claims(self) -> Claims:
         """What may be said about the number of solutions: numbers of a graph without gaps, lower bounds otherwise."""
-        whole = Standing.PROVEN if self.complete else Standing.NOT_PROVEN
-        return Claims(self.vertices, self.arcs, self.interval, Standing.INCOMPLETE if self.reasons else whole)
+        return self.data.claims
 
     def _whole(self, name: str, instead: str) -> None:
         """Refuse a statement about all solutions unless nothing is known to be missing."""
@@ -252,7 +193,11 @@ class BranchGraph(Immutable):
         """
         arcs, vertices = self._located(alpha)
         codes = {c for arc in arcs for c in arc.selections} | {c for v in vertices for c in v.selections}
-        return roots_of(self, alpha_value(alpha), sorted(codes))
+        return self._roots(alpha, sorted(codes))
+
+    def _roots(self, alpha: AlphaLike, selections: Sequence[Codes]) -> RootSet:
+        stopped = None if not self.reasons else "the branch graph is not complete"
+        return roots_of(self.data, alpha_value(alpha), selections, stopped)
 
     def multiplicity_at(self, alpha: AlphaLike) -> int:
         """Number of isolated roots and of families at one alpha, together.
@@ -340,7 +285,7 @@ class BranchGraph(Immutable):
             alpha = 0.5 * (arc.lo + arc.hi)
             if arc.grazing or not arc.lo < alpha < arc.hi:
                 continue
-            roots = roots_of(self, alpha, arc.selections)
+            roots = self._roots(alpha, arc.selections)
             if len(roots) and roots[0].regular:
                 return roots[0]
         return None
@@ -354,57 +299,21 @@ class BranchGraph(Immutable):
 
     def to_frame(self) -> pd.DataFrame:
         """One row an arc: its branch, component, ends and their kinds, index, dimension and statuses (node by node)."""
-        import pandas as pd
+        from enumsol.branches.frames import arcs_frame  # pandas, slow to import
 
-        place = {arc.number: c.number for c in self.components for arc in c.arcs}
-        rows = [
-            {
-                "arc": arc.number,
-                "branch": self.branch_of[arc.number],
-                "component": place[arc.number],
-                "alpha_from": arc.lo,
-                "alpha_to": arc.hi,
-                "vertex_from": arc.tail,
-                "vertex_to": arc.head,
-                "kind_from": self.vertices[arc.tail].kind,
-                "kind_to": self.vertices[arc.head].kind,
-                "index": arc.index,
-                "dimension": arc.dimension,
-                "grazing": arc.grazing,
-                "statuses": " ".join(s.value for s in arc.statuses),
-            }
-            for arc in self.arcs
-        ]
-        return pd.DataFrame(rows)
+        return arcs_frame(self.data, self.components, self.branch_of)
 
     def vertices_frame(self) -> pd.DataFrame:
         """One row a vertex and contact node: alpha, kind, statuses that hold, and values."""
-        import pandas as pd
+        from enumsol.branches.frames import vertices_frame  # as above
 
-        rows = [
-            {
-                "vertex": v.number,
-                "alpha": v.alpha,
-                "kind": v.kind,
-                "node": node,
-                "active": " ".join(sorted(s.value for s in v.active[i])),
-                "lambda_n": v.lambda_n[i],
-                "lambda_t": v.lambda_t[i],
-                "u_n": v.u_n[i],
-                "u_t": v.u_t[i],
-                "index_left": v.index_left,
-                "index_right": v.index_right,
-            }
-            for v in self.vertices
-            for i, node in enumerate(self.problem.node_ids)
-        ]
-        return pd.DataFrame(rows)
+        return vertices_frame(self.data)
 
     def save(self, file: str | Path) -> None:
         """Write the graph with its problem to a JSON file, all numbers to the last bit; ``load`` reads it."""
         from enumsol.branches.storage import save_graph
 
-        save_graph(self, file)
+        save_graph(self.data, file)
 
     @classmethod
     def load(cls, file: str | Path) -> BranchGraph:
@@ -417,13 +326,13 @@ class BranchGraph(Immutable):
         """
         from enumsol.branches.storage import load_graph
 
-        return load_graph(file)
+        return cls(load_graph(file))
 
     def write_graphml(self, file: str | Path) -> None:
         """Write vertices and arcs as GraphML for other graph programs (values at the vertices, no functions)."""
         from enumsol.branches.storage import write_graphml
 
-        write_graphml(self, file)
+        write_graphml(self.data, self.branch_of, file)
 
     def plot(self, quantity: str = "lambda_n", nodes: Sequence[Any] | None = None, **options: Any) -> Any:
         """A figure of alpha against lambda_n, lambda_t, u_n or u_t of chosen nodes; see enumsol.branches.plots."""

@@ -5,22 +5,52 @@ Line styles follow the field's habit: solid where the node is open, dashed where
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.branches.parts import UNSETTLED
+from enumsol.branches.elements import UNSETTLED
 from enumsol.checks import one_of, positive_integer, shown
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
-from enumsol.selections import ContactStatus
+from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from enumsol.branches.graph import BranchGraph
-    from enumsol.branches.parts import Arc, Branch, Vertex
+    from enumsol.branches.claims import Claims
+    from enumsol.branches.elements import Arc, Branch, Vertex
+    from enumsol.problem import ContactProblem
+    from enumsol.roots.root_set import RootSet
+
+
+class DrawnGraph(Protocol):
+    """What a figure shows of a BranchGraph."""
+
+    problem: ContactProblem
+    interval: tuple[float, float]
+    vertices: tuple[Vertex, ...]
+    arcs: tuple[Arc, ...]
+
+    @property
+    def branches(self) -> tuple[Branch, ...]:
+        """Paths and closed loops of arcs, and sheets."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether it is proven that no solution is missing."""
+
+    @property
+    def claims(self) -> Claims:
+        """What may be said about the number of solutions."""
+
+    def completeness(self) -> str:
+        """One sentence about it."""
+
+    def roots_at(self, alpha: float) -> RootSet:
+        """All solutions at one alpha."""
+
 
 QUANTITIES = {
     "lambda_n": "normal force",
@@ -43,7 +73,7 @@ _SAMPLES = 33
 
 
 def plot_graph(
-    graph: BranchGraph,
+    graph: DrawnGraph,
     quantity: str = "lambda_n",
     nodes: Sequence[Any] | None = None,
     *,
@@ -127,7 +157,7 @@ def _curve(arc: Arc, quantity: str, samples: int) -> tuple[NDArray[np.float64], 
     return alphas, np.array([evaluate(float(alpha))[part] for alpha in alphas])
 
 
-def _nodes(graph: BranchGraph, nodes: Sequence[Any] | None, curves: dict[int, Any]) -> list[int]:
+def _nodes(graph: DrawnGraph, nodes: Sequence[Any] | None, curves: dict[int, Any]) -> list[int]:
     ids = list(graph.problem.node_ids)
     if nodes is not None:
         row = {label: k for k, label in enumerate(ids)}
@@ -145,7 +175,7 @@ def _nodes(graph: BranchGraph, nodes: Sequence[Any] | None, curves: dict[int, An
     return sorted(np.argsort(-spread, kind="stable")[:_MAX_PANELS].tolist())
 
 
-def _panel(axis: Any, graph: BranchGraph, quantity: str, node: int, curves: dict[int, Any]) -> None:
+def _panel(axis: Any, graph: DrawnGraph, quantity: str, node: int, curves: dict[int, Any]) -> None:
     for branch in graph.branches:
         colour = _COLOURS[branch.number % len(_COLOURS)]
         for arc in branch.arcs:
@@ -201,7 +231,7 @@ def _number(axis: Any, branch: Branch, node: int, curves: dict[int, Any], colour
     )
 
 
-def _family_range(graph: BranchGraph, v: Vertex, quantity: str, node: int) -> tuple[float, float]:
+def _family_range(graph: DrawnGraph, v: Vertex, quantity: str, node: int) -> tuple[float, float]:
     """Smallest and largest value of the quantity on a family."""
     family = v.family
     if family is None:
@@ -216,7 +246,7 @@ def _family_range(graph: BranchGraph, v: Vertex, quantity: str, node: int) -> tu
     return float(np.min(values)), float(np.max(values))
 
 
-def _sheet(axis: Any, graph: BranchGraph, arc: Arc, quantity: str, node: int) -> None:
+def _sheet(axis: Any, graph: DrawnGraph, arc: Arc, quantity: str, node: int) -> None:
     """The range of a sheet, shaded (forces only; displacements of a sheet are not drawn)."""
     if not quantity.startswith("lambda"):
         return
@@ -229,7 +259,7 @@ def _sheet(axis: Any, graph: BranchGraph, arc: Arc, quantity: str, node: int) ->
     axis.fill_between(alphas, low, high, color=_FAMILY, alpha=0.25, linewidth=0)
 
 
-def _steps(axis: Any, graph: BranchGraph) -> None:
+def _steps(axis: Any, graph: DrawnGraph) -> None:
     steps = graph.claims.steps()
     edges = [float(alpha) for alpha in steps.alphas]
     if steps.between:
@@ -246,7 +276,7 @@ def _steps(axis: Any, graph: BranchGraph) -> None:
     axis.yaxis.get_major_locator().set_params(integer=True)
 
 
-def _legend(figure: Any, graph: BranchGraph) -> None:
+def _legend(figure: Any, graph: DrawnGraph) -> None:
     from matplotlib.lines import Line2D
 
     handles = [

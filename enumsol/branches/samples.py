@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 import networkx as nx
 
 from enumsol.checks import alpha_list, instance_of, optional_callable
-from enumsol.enumeration import enumerate_roots
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
-from enumsol.selections import ContactStatus
+from enumsol.roots.enumerate import enumerate_roots
+from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from enumsol.branches.graph import BranchGraph
     from enumsol.checks import AlphaLike
-    from enumsol.condensed import CondensedProblem
-    from enumsol.results import Root, RootSet
+    from enumsol.condensation.condensed import CondensedProblem
+    from enumsol.roots.root_set import Root, RootSet
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq, fmpq_mat, fmpq_poly
 
-from enumsol.branches.algebraic import CriticalAlpha, integer_polynomial, merge, rational_between, real_roots
-from enumsol.branches.arcs import Cell, Event, SelectionArcs
-from enumsol.branches.fibers import FiberSelections, row_reduce
-from enumsol.branches.number_field import exact_value
-from enumsol.branches.path import SelectionFunctions
-from enumsol.enumeration.solutions import MAX_BASES, VertexLimitError
+from enumsol.arithmetic.algebraic import CriticalAlpha, integer_polynomial, merge, rational_between, real_roots
+from enumsol.arithmetic.number_field import exact_value
+from enumsol.branches.selection_arcs import Cell, Event, SelectionArcs
+from enumsol.selections.functions import SelectionFunctions
+from enumsol.selections.ordered_field import FiberSelections, row_reduce
+from enumsol.selections.solution import MAX_BASES, VertexLimitError
 
 if TYPE_CHECKING:
-    from enumsol.branches.path import ExactPath
-    from enumsol.enumeration.solutions import Codes
+    from enumsol.condensation.exact import ExactPath
+    from enumsol.selections.solution import Codes
 
 #: Bases whose vertex functions are followed over alpha; a sheet that needs more is refused.
 MAX_SHEET_BASES = min(2000, MAX_BASES)

@@ -13,18 +13,18 @@ import numpy as np
 import scipy.sparse as sp
 from flint import fmpq, fmpz, fmpz_poly
 
-from enumsol.branches.algebraic import CriticalAlpha
-from enumsol.branches.graph import BranchGraph, GraphStats
-from enumsol.branches.parts import Arc, Vertex
-from enumsol.branches.path import ExactPath
+from enumsol.arithmetic.algebraic import CriticalAlpha
+from enumsol.branches.elements import Arc, Vertex
+from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.checks import file_path, writing
+from enumsol.condensation.exact import ExactPath
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
-from enumsol.results import Polytope, RootFamily
-from enumsol.selections import ContactStatus
+from enumsol.roots.root_set import Polytope, RootFamily
+from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
 FORMAT, VERSION = "enumsol-branch-graph", 2
@@ -33,26 +33,26 @@ _READ = (1, 2)
 _FRACTION = re.compile(r"-?\d+(/\d+)?", re.ASCII)
 
 
-def save_graph(graph: BranchGraph, file: str | Path) -> None:
+def save_graph(data: GraphData, file: str | Path) -> None:
     """Write a graph and its problem as JSON (see BranchGraph.save)."""
     record = {
         "format": FORMAT,
         "version": VERSION,
-        "problem": _problem_record(graph.problem),
-        "condensed_exactly": graph.path.condensed_exactly,
-        "interval": [str(end) for end in graph.exact_interval],
-        "arithmetic": graph.arithmetic,
-        "reasons": list(graph.search_reasons),
-        "stats": asdict(graph.stats),
-        "vertices": [_vertex_record(v) for v in graph.vertices],
-        "arcs": [_arc_record(arc) for arc in graph.arcs],
+        "problem": _problem_record(data.problem),
+        "condensed_exactly": data.path.condensed_exactly,
+        "interval": [str(end) for end in data.interval],
+        "arithmetic": data.arithmetic,
+        "reasons": list(data.reasons),
+        "stats": asdict(data.stats),
+        "vertices": [_vertex_record(v) for v in data.vertices],
+        "arcs": [_arc_record(arc) for arc in data.arcs],
     }
     place = file_path(file, "file")
     with writing(place, "file"):
         place.write_text(json.dumps(record), encoding="utf-8")
 
 
-def load_graph(file: str | Path) -> BranchGraph:
+def load_graph(file: str | Path) -> GraphData:
     """Read a graph that save_graph wrote (see BranchGraph.load).
 
     Raises
@@ -80,14 +80,15 @@ def load_graph(file: str | Path) -> BranchGraph:
         raise InvalidArgumentError(f"graph {file} is damaged (at {error}); expected a saved graph") from error
 
 
-def _from_record(record: dict[str, Any]) -> BranchGraph:
+def _from_record(record: dict[str, Any]) -> GraphData:
     problem = _problem(record["problem"])
-    path = ExactPath.from_problem(problem, exact=record["condensed_exactly"])
+    exactly = record["condensed_exactly"]
+    path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
     first, last = (_fraction(end) for end in record["interval"])
-    vertices = [_vertex(k, item) for k, item in enumerate(record["vertices"])]
-    arcs = [_arc(k, item, vertices, path) for k, item in enumerate(record["arcs"])]
-    stats = GraphStats(**record["stats"])
-    return BranchGraph(problem, path, (first, last), record["arithmetic"], vertices, arcs, record["reasons"], stats)
+    vertices = tuple(_vertex(k, item) for k, item in enumerate(record["vertices"]))
+    arcs = tuple(_arc(k, item, vertices, path) for k, item in enumerate(record["arcs"]))
+    reasons, stats = tuple(record["reasons"]), GraphStats(**record["stats"])
+    return GraphData(problem, path, (first, last), record["arithmetic"], vertices, arcs, reasons, stats)
 
 
 # -- the problem -------------------------------------------------------------------------------------------------------
@@ -236,10 +237,10 @@ def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], path: Ex
 # -- other programs ----------------------------------------------------------------------------------------------------
 
 
-def write_graphml(graph: BranchGraph, file: str | Path) -> None:
+def write_graphml(data: GraphData, branch_of: Mapping[int, int], file: str | Path) -> None:
     """Write vertices and arcs as GraphML, arrays as text."""
-    plain = nx.MultiGraph(complete=graph.complete, standing=graph.claims.standing.value)
-    for v in graph.vertices:
+    plain = nx.MultiGraph(complete=data.complete, standing=data.claims.standing.value)
+    for v in data.vertices:
         plain.add_node(
             v.number,
             alpha=v.alpha,
@@ -247,7 +248,7 @@ def write_graphml(graph: BranchGraph, file: str | Path) -> None:
             statuses=" ".join(_names(v.statuses)),
             **{name: " ".join(map(repr, getattr(v, name).tolist())) for name in ("lambda_n", "lambda_t", "u_n", "u_t")},
         )
-    for arc in graph.arcs:
+    for arc in data.arcs:
         plain.add_edge(
             arc.tail,
             arc.head,
@@ -257,7 +258,7 @@ def write_graphml(graph: BranchGraph, file: str | Path) -> None:
             statuses=" ".join(_names(arc.statuses)),
             index="" if arc.index is None else str(arc.index),
             dimension=arc.dimension,
-            branch=graph.branch_of[arc.number],
+            branch=branch_of[arc.number],
         )
     place = file_path(file, "file")
     with writing(place, "file"):

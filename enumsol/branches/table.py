@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from enumsol.checks import alpha_list, instance_of, optional_callable, optional_executor
-from enumsol.enumeration import enumerate_roots
 from enumsol.errors import Interrupted, WorkerError
 from enumsol.executors import WorkerLost, has_result, result_of, submit
 from enumsol.problem import ContactProblem
-from enumsol.selections import STATUSES, ContactStatus
+from enumsol.roots.enumerate import enumerate_roots
+from enumsol.statuses import STATUSES, ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -20,9 +20,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from enumsol.checks import AlphaLike
-    from enumsol.problem import Alpha
-    from enumsol.results import RootSet
+    from enumsol.checks import Alpha, AlphaLike
+    from enumsol.roots.root_set import RootSet
 
 #: Tasks handed to an executor ahead of the one that is awaited; keeps an interruption from waiting for all of them.
 _AHEAD = 64

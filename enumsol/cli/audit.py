@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.branches import BranchGraph
+    from enumsol.checks import Alpha
     from enumsol.continuation import AuditReport, PointRun
-    from enumsol.problem import Alpha
 
 #: As of ``read_points``, which is not imported for --help.
 Columns = Literal["auto", "rows", "labels"]
@@ -97,7 +97,7 @@ def audit(
     """
     from enumsol.continuation import audit as check
     from enumsol.continuation import read_points
-    from enumsol.continuation.places import checked_tolerance
+    from enumsol.continuation.graph_map import checked_tolerance
 
     checked_tolerance(tolerance)
     check_outputs(json=json_file, csv=csv_file)

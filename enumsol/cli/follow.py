@@ -34,9 +34,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from enumsol.branches import BranchGraph
+    from enumsol.checks import Alpha
     from enumsol.continuation import ContinuationOptions, Path
-    from enumsol.problem import Alpha, ContactProblem
-    from enumsol.results import Root
+    from enumsol.problem import ContactProblem
+    from enumsol.roots.root_set import Root
 
 _STEPS = "Steps"
 #: Ends of a path at which nothing is left to follow.
@@ -143,24 +144,26 @@ def follow(
     body = load_problem(problem)
     row = node_row(body, node)
     over = None if graph_file is None else read_graph(graph_file, body)
-    tour = _Tour(body, (float(interval[0]), float(interval[1])), options, tangent)
+    followed = _Followed(body, (float(interval[0]), float(interval[1])), options, tangent)
     interrupted = False
     try:
-        tour.run(_starts(body, interval, alpha, arithmetic, root), signs, alone=root is not None)
+        followed.run(_starts(body, interval, alpha, arithmetic, root), signs, alone=root is not None)
     except KeyboardInterrupt:
         # wherever it came: the paths so far are kept
         interrupted = True
     about = {"problem": problem, "start": alpha, "interval": interval}
-    text = tour.as_text() + (" (interrupted)" if interrupted else "")
+    text = followed.as_text() + (" (interrupted)" if interrupted else "")
     deliver(
         None if "-" in (json_file, csv_file) else lambda: typer.echo(text),
-        None if json_file is None else lambda: write_text(json_file, as_json({**about, **tour.content()})),
-        None if csv_file is None else lambda: write_text(csv_file, tour.frame().to_csv(index=False)),
-        (lambda: write_figure(plot_file, _draw(tour.paths, over, row, quantity))) if plot_file and tour.paths else None,
+        None if json_file is None else lambda: write_text(json_file, as_json({**about, **followed.content()})),
+        None if csv_file is None else lambda: write_text(csv_file, followed.frame().to_csv(index=False)),
+        (lambda: write_figure(plot_file, _draw(followed.paths, over, row, quantity)))
+        if plot_file and followed.paths
+        else None,
     )
     if interrupted:
         raise typer.Exit(ExitStatus.INTERRUPTED)
-    raise typer.Exit(ExitStatus.DONE if tour.arrived else ExitStatus.INCOMPLETE)
+    raise typer.Exit(ExitStatus.DONE if followed.arrived else ExitStatus.INCOMPLETE)
 
 
 def _options(
@@ -193,7 +196,7 @@ def _starts(
     if not interval[0] <= alpha <= interval[1]:
         low, high = (float(end) for end in interval)
         raise InvalidArgumentError(f"--start is {float(alpha):g}; expected an alpha between {low:g} and {high:g}")
-    from enumsol.enumeration import enumerate_roots  # numpy and scipy: not for --help
+    from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help
 
     with SearchDisplay() as display:
         found = enumerate_roots(problem, alpha, arithmetic, progress=display)
@@ -212,7 +215,7 @@ def _starts(
 
 
 @dataclass
-class _Tour:
+class _Followed:
     """Paths from one root after the other."""
 
     problem: ContactProblem

@@ -25,8 +25,9 @@ from enumsol.cli.progress import SearchDisplay
 from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutputError, WorkerError
 
 if TYPE_CHECKING:
-    from enumsol.problem import Alpha, ContactProblem
-    from enumsol.results import RootSet
+    from enumsol.checks import Alpha
+    from enumsol.problem import ContactProblem
+    from enumsol.roots.root_set import RootSet
 
 Method = Literal["tree", "exhaustive"]
 
@@ -112,7 +113,7 @@ def _search(
     jobs: int,
     proof_file: str | None,
 ) -> RootSet:
-    from enumsol.enumeration import enumerate_roots  # numpy and scipy: not for --help
+    from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help
 
     with workers(jobs) as executor, SearchDisplay() as display:
         return enumerate_roots(

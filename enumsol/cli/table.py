@@ -27,7 +27,8 @@ from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, Work
 if TYPE_CHECKING:
     import pandas as pd
 
-    from enumsol.problem import Alpha, ContactProblem
+    from enumsol.checks import Alpha
+    from enumsol.problem import ContactProblem
 
 #: Names of the columns on the terminal, explained by `_CAPTION` underneath.
 _NAMES = {

@@ -5,13 +5,14 @@ from enumsol.continuation.audit_report import AuditedPoint, AuditReport, Jump, M
 from enumsol.continuation.errors import AmbiguousStart, NewtonIteration, NotConverged
 from enumsol.continuation.follow import follow, start_tangents
 from enumsol.continuation.follow_all import FollowAllResult, follow_all, follow_arc
-from enumsol.continuation.local_test import LocalBranchTest, local_branch_test
 from enumsol.continuation.newton import newton
 from enumsol.continuation.options import ContinuationOptions
 from enumsol.continuation.parameter_path import SmoothPath
-from enumsol.continuation.path import Path, PathPoint, PathStats, Transition
+from enumsol.continuation.path import Path
+from enumsol.continuation.path_data import PathPoint, PathStats, Transition
 from enumsol.continuation.points import PointRun, read_points
 from enumsol.continuation.tangents import Tangent
+from enumsol.roots.local_branch import LocalBranchTest, local_branch_test
 
 __all__ = [
     "AmbiguousStart",

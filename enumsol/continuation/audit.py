@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 from enumsol.checks import real_or_nan, shown
 from enumsol.continuation.audit_report import AuditedPoint, AuditReport, Jump, MissedArc
+from enumsol.continuation.graph_map import GraphLike, GraphMap, Place
 from enumsol.continuation.path import Path
-from enumsol.continuation.places import GraphLike, GraphMap, Place
 from enumsol.continuation.points import Columns, PointRun, read_points
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from enumsol.continuation.equation import Vector
+    from enumsol.continuation.condensed_equation import Vector
 
 #: A point further than this from every arc and vertex lies off the graph: ten times the tolerance of the corrections.
 POINT_TOLERANCE = 1e-5

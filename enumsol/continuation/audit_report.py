@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.results import summary
+from enumsol.roots.root_set import summary
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from enumsol.continuation.places import Place
-    from enumsol.selections import ContactStatus
+    from enumsol.continuation.graph_map import Place
+    from enumsol.statuses import ContactStatus
 
 #: How the rows of points are counted, for whoever reads a report.
 ROWS = "rows are counted from 0: in a file from the first row below the names of the columns, in a frame as by iloc"

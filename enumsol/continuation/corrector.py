@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from enumsol.continuation.equation import Codes, CondensedEquation, Vector
+    from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
     from enumsol.continuation.options import ContinuationOptions
 
 #: Smooth Newton iterations inside a selection; quadratic convergence needs about five.

@@ -2,37 +2,26 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from enumsol.array_checks import real_array
-from enumsol.checks import alpha_value, direction_value, instance_of, row_number, shown, unbounded_interval
-from enumsol.continuation.equation import CondensedEquation
+from enumsol.checks import direction_value, row_number, shown
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follower import Follower
-from enumsol.continuation.kinks import ACTIVE_TOLERANCE, CurvePoint
-from enumsol.continuation.options import ContinuationOptions
-from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
-from enumsol.continuation.path import Path
-from enumsol.continuation.tangents import Tangent, admissible_tangents, curve_tangent
+from enumsol.continuation.path import Path, finished
+from enumsol.continuation.start import Start
+from enumsol.continuation.tangents import Tangent, admissible_tangents
+from enumsol.continuation.transitions import ACTIVE_TOLERANCE, CurvePoint
 from enumsol.errors import InvalidArgumentError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from enumsol.checks import AlphaLike
-    from enumsol.continuation.equation import Vector
-    from enumsol.continuation.parameter_path import ParameterPath
-
-#: The default alpha scale is this fraction of the interval.
-ALPHA_FRACTION = 0.05
-#: A change of the problem over the whole interval that is too small to follow: conditions within STATUS_TOLERANCE of
-#: zero count as met with equality, and must not all be within it.
-RESOLUTION = 1e-6
-#: Norm of H above which a start is not a root.
-START_TOLERANCE = 1e-6
+    from enumsol.continuation.options import ContinuationOptions
+    from enumsol.continuation.parameter_path import SmoothPath
+    from enumsol.problem import ContactProblem
 
 
 def follow(
@@ -88,13 +77,13 @@ def follow(
         On Ctrl-C; ``partial`` holds the path so far.
     """
     direction = direction_value(direction)
-    setup = _Setup(problem, start, interval, options, smooth_path)
     if not isinstance(visited, (list, tuple)) or not all(isinstance(path, Path) for path in visited):
         raise InvalidArgumentError(f"visited is {shown(visited)}; expected a list of Path")
-    chosen = _choose(setup, direction, tangent)
-    first = CurvePoint(setup.x, chosen.codes, chosen.vector)
+    first = Start(problem, start, interval, options, smooth_path)
+    chosen = _choose(first, direction, tangent)
+    point = CurvePoint(first.x, chosen.codes, chosen.vector)
     sign = chosen.orientation or direction
-    return Follower(setup.equation, first, sign, setup.interval, setup.options, smooth_path, visited).run()
+    return finished(Follower(first.equation, point, sign, first.interval, first.options, smooth_path, visited))
 
 
 def start_tangents(
@@ -109,133 +98,12 @@ def start_tangents(
     Two at a regular root and at an ordinary transition point; more at a bifurcation point. ``tangent=k`` of `follow`
     takes the k-th. Parameters are those of `follow`.
     """
-    setup = _Setup(problem, start, interval, options, smooth_path)
-    return admissible_tangents(setup.equation, setup.x, ACTIVE_TOLERANCE)
+    first = Start(problem, start, interval, options, smooth_path)
+    return admissible_tangents(first.equation, first.x, ACTIVE_TOLERANCE)
 
 
-def resume_path(
-    path: Path,
-    problem: ContactProblem | None,
-    interval: tuple[AlphaLike, AlphaLike] | None,
-    options: ContinuationOptions | None,
-    smooth_path: SmoothPath | None,
-) -> Path:
-    """Go on from the end of a path; see Path.resume."""
-    if problem is None:
-        raise InvalidArgumentError("problem is missing; a path loaded from a file needs it: path.resume(problem)")
-    if path.status in ("closed", "dead end"):
-        raise InvalidArgumentError(f"the path cannot go on: {path.message}")
-    span = path.interval if interval is None else interval
-    setup = _Setup(problem, path[-1], span, path.options if options is None else options, smooth_path)
-    codes = tuple(int(code) for code in path.codes[-1])
-    vector = curve_tangent(setup.equation, codes, setup.x, path.orientation)
-    if vector is None:
-        raise InvalidArgumentError("the path ends where its tangent is not unique; start anew with follow(tangent=...)")
-    first = CurvePoint(setup.x, codes, vector)
-    follower = Follower(setup.equation, first, path.orientation, setup.interval, setup.options, smooth_path, ())
-    follower.h = min(max(path.next_step, setup.options.h_min), setup.options.h_max)
-    return path.joined(follower.run())
-
-
-class _Setup:
-    """Validated arguments: the equation, the start as a point of it, interval and options."""
-
-    def __init__(
-        self,
-        problem: ContactProblem,
-        start: Any,
-        interval: tuple[AlphaLike, AlphaLike] | None,
-        options: ContinuationOptions | None,
-        smooth_path: SmoothPath | None,
-    ) -> None:
-        instance_of(problem, ContactProblem, "problem")
-        if smooth_path is not None:
-            instance_of(smooth_path, SmoothPath, "smooth_path")
-        chosen = ContinuationOptions() if options is None else options
-        self.options = instance_of(chosen, ContinuationOptions, "options")
-        alpha, forces = _start_values(start, problem.p)
-        self.interval = _interval(problem, interval, alpha, smooth_path)
-        low, high = self.interval
-        scale = self.options.alpha_scale
-        if scale is None:
-            scale = ALPHA_FRACTION * (high - low) if math.isfinite(high - low) else 1.0
-        path: ParameterPath = AffinePath(problem) if smooth_path is None else CallablePath(problem, smooth_path, alpha)
-        self.equation = CondensedEquation(path, self.interval, alpha, self.options.r, scale)
-        if smooth_path is None and math.isfinite(high - low):
-            self._check_resolution(alpha, (high - low) / scale)
-        self.x = self._on_solution(alpha, forces)
-
-    def _check_resolution(self, alpha: float, width: float) -> None:
-        """Refuse an interval over which the problem changes by little more than what counts as equal."""
-        equation = self.equation
-        values = equation.at(equation.point(alpha, np.zeros(2 * equation.p)))
-        change = max(np.max(np.abs(values.dg)), np.max(np.abs(values.dF) / (1.0 + values.F))) * width
-        if 0 < change < RESOLUTION:
-            raise InvalidArgumentError(
-                f"interval is ({self.interval[0]:.17g}, {self.interval[1]:.17g}), over which friction and load change "
-                f"by {change:.1e} of their size; expected at least {RESOLUTION:g} (branch_graph works without rounding)"
-            )
-
-    def _on_solution(self, alpha: float, forces: Vector) -> Vector:
-        equation = self.equation
-        x = equation.point(alpha, forces)
-        with np.errstate(over="ignore", invalid="ignore"):
-            residual = float(np.linalg.norm(equation.residual(x)))
-        if not residual <= START_TOLERANCE:
-            raise InvalidArgumentError(
-                f"start is not a root at alpha = {alpha:g}: the residual of H is {residual:.2e} relative to the load; "
-                f"expected at most {START_TOLERANCE:g} (newton(problem, alpha, start) finds the root nearby)"
-            )
-        return x
-
-
-def _start_values(start: Any, p: int) -> tuple[float, Vector]:
-    if isinstance(start, tuple) and len(start) == 3:
-        alpha, lambda_n, lambda_t = start
-    elif all(hasattr(start, name) for name in ("alpha", "lambda_n", "lambda_t")) and not isinstance(start, Path):
-        alpha, lambda_n, lambda_t = start.alpha, start.lambda_n, start.lambda_t
-    else:
-        raise InvalidArgumentError(
-            f"start is a {type(start).__name__}; expected a Root, a PathPoint or (alpha, lambda_n, lambda_t)"
-        )
-    parts = []
-    for name, part in (("lambda_n", lambda_n), ("lambda_t", lambda_t)):
-        parts.append(np.atleast_1d(real_array(part, f"{name} of start", error=InvalidArgumentError)))
-        if parts[-1].shape != (p,):
-            raise InvalidArgumentError(f"{name} of start has shape {parts[-1].shape}; expected ({p},)")
-    return float(alpha_value(alpha, "alpha of start")), np.concatenate(parts)
-
-
-def _interval(
-    problem: ContactProblem, interval: tuple[AlphaLike, AlphaLike] | None, start: float, smooth_path: SmoothPath | None
-) -> tuple[float, float]:
-    affine = smooth_path is None or smooth_path.F is None
-    if interval is None:
-        return friction_domain(problem) if affine else (-math.inf, math.inf)
-    low, high = unbounded_interval(interval)
-    if not low <= start <= high:
-        raise InvalidArgumentError(f"start has alpha = {start:g}, outside the interval ({low:g}, {high:g})")
-    if affine:
-        for end in (low, high):
-            if math.isfinite(end):
-                problem.friction_at(end)
-        domain = friction_domain(problem)
-        low, high = max(low, domain[0]), min(high, domain[1])
-    return low, high
-
-
-def friction_domain(problem: ContactProblem) -> tuple[float, float]:
-    """The range of alpha in which no coefficient F0 + alpha F1 is negative."""
-    F0, F1 = problem.friction
-    with np.errstate(divide="ignore", invalid="ignore"):
-        zero = -F0 / F1
-    low = np.max(zero[F1 > 0], initial=-math.inf)
-    high = np.min(zero[F1 < 0], initial=math.inf)
-    return float(low), float(high)
-
-
-def _choose(setup: _Setup, direction: int, index: int | None) -> Tangent:
-    tangents = admissible_tangents(setup.equation, setup.x, ACTIVE_TOLERANCE)
+def _choose(first: Start, direction: int, index: int | None) -> Tangent:
+    tangents = admissible_tangents(first.equation, first.x, ACTIVE_TOLERANCE)
     if index is not None:
         count = len(tangents)
         return tangents[row_number(index, "tangent", count, f"an index below {count} of start_tangents")]

@@ -12,8 +12,9 @@ from enumsol.continuation.audit import DETOUR, POINT_TOLERANCE, audit_on
 from enumsol.continuation.audit_report import AuditReport
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follow import follow, start_tangents
-from enumsol.continuation.path import Path, PathStats
-from enumsol.continuation.places import GraphMap, checked_graph
+from enumsol.continuation.graph_map import GraphMap, checked_graph
+from enumsol.continuation.path import Path
+from enumsol.continuation.path_data import PathStats
 from enumsol.continuation.points import read_points
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.problem import ContactProblem
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from enumsol.checks import AlphaLike
+    from enumsol.continuation.graph_map import GraphLike
     from enumsol.continuation.options import ContinuationOptions
-    from enumsol.continuation.places import GraphLike
 
 #: Where on a missed arc it is started anew, as fractions of its interval; its ends are transition points.
 _SEEDS = (0.5, 0.25, 0.75)
@@ -115,17 +116,17 @@ def follow_all(
     chart = GraphMap(checked_graph(graph), POINT_TOLERANCE)
     if graph.problem is not problem and graph.problem.p != problem.p:
         raise InvalidArgumentError(f"graph has {graph.problem.p} contact nodes; expected the problem's {problem.p}")
-    crew = _Crew(problem, (float(ends[0]), float(ends[1])), options, chart, progress)
+    coverage = _Coverage(problem, (float(ends[0]), float(ends[1])), options, chart, progress)
     for start in graph.starting_points():
-        crew.start(start)
-    seeded = len(crew.paths)
-    for seed in crew.missed_seeds():
-        crew.start(seed)
-    report = audit_on(chart, read_points(crew.paths, graph.problem), DETOUR)
-    return FollowAllResult(tuple(crew.paths), report, tuple(crew.failures), len(crew.paths) - seeded, graph)
+        coverage.start(start)
+    seeded = len(coverage.paths)
+    for seed in coverage.missed_seeds():
+        coverage.start(seed)
+    report = audit_on(chart, read_points(coverage.paths, graph.problem), DETOUR)
+    return FollowAllResult(tuple(coverage.paths), report, tuple(coverage.failures), len(coverage.paths) - seeded, graph)
 
 
-class _Crew:
+class _Coverage:
     """Paths so far, and the arcs that they passed."""
 
     def __init__(

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
-from enumsol.continuation.equation import STATUS_TOLERANCE
-from enumsol.continuation.kinks import (
+from enumsol.continuation.recorder import PathRecorder
+from enumsol.continuation.tangents import curve_tangent, orientation
+from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
     CurvePoint,
     Kink,
@@ -20,17 +22,15 @@ from enumsol.continuation.kinks import (
     passed_kink,
     same_curve,
 )
-from enumsol.continuation.recorder import Recorder
-from enumsol.continuation.tangents import curve_tangent, orientation
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from enumsol.continuation.equation import Codes, CondensedEquation, Vector
+    from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
     from enumsol.continuation.options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
-    from enumsol.continuation.path import Path
+    from enumsol.continuation.path_data import PathData
     from enumsol.continuation.tangents import Tangent
 
 #: Conditions may be negative by this much at a point that is converged to rounding.
@@ -74,7 +74,7 @@ class Follower:
     options : ContinuationOptions
     smooth_path : SmoothPath or None
         Carried into the Path.
-    visited : sequence of Path
+    visited : sequence of PathData
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Follower:
         interval: tuple[float, float],
         options: ContinuationOptions,
         smooth_path: SmoothPath | None,
-        visited: Sequence[Path],
+        visited: Sequence[PathData],
     ) -> None:
         self.equation, self.options, self.interval = equation, options, interval
         self.current, self.sign = first, sign
@@ -98,10 +98,10 @@ class Follower:
         margin = options.overshoot
         self._low, self._high = (low - margin) / equation.alpha_scale, (high + margin) / equation.alpha_scale
         self._landmarks = list(_landmarks(equation, visited))
-        self.record = Recorder(equation)
+        self.record = PathRecorder(equation)
         self.record.add(first, "start")
 
-    def run(self) -> Path:
+    def run(self) -> PathData:
         """Follow until a stop condition is met."""
         try:
             stop = None
@@ -113,7 +113,7 @@ class Follower:
             raise Interrupted(f"follow was {message}", partial) from interruption
         return self._path(stop)
 
-    def _path(self, stop: _Stop) -> Path:
+    def _path(self, stop: _Stop) -> PathData:
         return self.record.path(
             stop.status,
             stop.message,
@@ -371,7 +371,7 @@ class Follower:
         )
 
 
-def _landmarks(equation: CondensedEquation, visited: Sequence[Path]) -> Iterator[tuple[Vector, Codes, bool]]:
+def _landmarks(equation: CondensedEquation, visited: Sequence[PathData]) -> Iterator[tuple[Vector, Codes, bool]]:
     """Starts, transition points and ends of other paths, with the statuses on both sides."""
     for path in visited:
         for k, kind in enumerate(path.kinds):

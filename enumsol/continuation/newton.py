@@ -8,21 +8,20 @@ import numpy as np
 
 from enumsol.array_checks import real_array
 from enumsol.checks import alpha_value, instance_of, positive_integer, positive_number
-from enumsol.continuation.equation import CondensedEquation
+from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.errors import NewtonIteration, NotConverged
 from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
-from enumsol.results import Root
-from enumsol.selections import FRICTIONLESS, STATUSES, STICK
+from enumsol.roots.root_set import Root
+from enumsol.statuses import FRICTIONLESS, STATUSES, STICK
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.checks import AlphaLike
-    from enumsol.continuation.equation import Vector
+    from enumsol.checks import Alpha, AlphaLike
+    from enumsol.continuation.condensed_equation import Vector
     from enumsol.continuation.parameter_path import ParameterPath
-    from enumsol.problem import Alpha
 
 #: Norm of H, relative to the load, at which an iterate is a root: well above rounding for any conditioning seen.
 RESIDUAL_TOLERANCE = 1e-10
@@ -156,9 +155,9 @@ def _fraction(equation: CondensedEquation, x: Vector, step: Vector) -> float:
 def build_root(problem: ContactProblem, alpha: Alpha, equation: CondensedEquation, x: Vector) -> Root:
     """The Root at a point x of the condensed equation, with its index, margin and derivative."""
     # the enumeration is not needed to follow paths, and slow to import
-    from enumsol.enumeration.assembly import RootBuilder
-    from enumsol.enumeration.components import connected_components
-    from enumsol.enumeration.float_selections import FloatSelections
+    from enumsol.roots.builder import RootBuilder
+    from enumsol.roots.components import connected_components
+    from enumsol.selections.floats import FloatSelections
 
     floats = FloatSelections(problem.condensed.at(alpha).scaled)
     solution = floats.solve(equation.codes(x))

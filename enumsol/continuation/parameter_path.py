@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from enumsol.array_checks import real_array
 from enumsol.checks import alpha_value, instance_of, optional_callable
-from enumsol.condensed import RHS_BLOCK
+from enumsol.condensation.condensed import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 

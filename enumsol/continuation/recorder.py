@@ -8,23 +8,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.continuation.local_test import coherent_orientation
-from enumsol.continuation.path import Path, PathStats, Transition
+from enumsol.continuation.path_data import PathData, PathStats, Transition
 from enumsol.errors import TooLargeError
+from enumsol.roots.local_branch import coherent_orientation
 
 if TYPE_CHECKING:
-    from enumsol.continuation.equation import CondensedEquation, Vector
-    from enumsol.continuation.kinks import CurvePoint, Kink
-    from enumsol.continuation.local_test import LocalBranchTest
+    from enumsol.continuation.condensed_equation import CondensedEquation, Vector
     from enumsol.continuation.options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
+    from enumsol.continuation.transitions import CurvePoint, Kink
+    from enumsol.roots.local_branch import LocalBranchTest
 
 #: Slip along a tangent, for the name of a frictionless node that starts to slip: any small step serves.
 _AHEAD = 1e-6
 
 
 @dataclass
-class Recorder:
+class PathRecorder:
     """The points and counts of a path while it is followed."""
 
     equation: CondensedEquation
@@ -79,12 +79,12 @@ class Recorder:
         options: ContinuationOptions,
         next_step: float,
         smooth_path: SmoothPath | None,
-    ) -> Path:
+    ) -> PathData:
         """The path so far."""
         equation, p = self.equation, self.equation.p
         forces = np.array([equation.forces(point.x) for point in self.points])
         w = np.array([equation.displacements(point.x) for point in self.points])
-        return Path(
+        return PathData(
             alpha=np.array([equation.alpha(point.x) for point in self.points]),
             lambda_n=forces[:, :p],
             lambda_t=forces[:, p:],
@@ -115,7 +115,9 @@ class Recorder:
         return self.equation.w(point.x + step * point.tangent)[self.equation.p :]
 
     def _local_test(self, x: Vector) -> LocalBranchTest | None:
+        equation = self.equation
+        F, slip = equation.at(x).F, equation.w(x)[equation.p :]
         try:
-            return coherent_orientation(self.equation, x)
+            return coherent_orientation(equation.S, F, equation.active(x), slip, equation.alpha(x))
         except TooLargeError:
             return None

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.continuation.equation import STATUS_TOLERANCE
+from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 
 if TYPE_CHECKING:
-    from enumsol.continuation.equation import Codes, CondensedEquation, Vector
+    from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
 
 #: Singular values of a selection's matrix below this fraction of the largest are zero: on a sheet they are so exactly.
 _RANK = 1e-10

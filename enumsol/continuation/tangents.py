@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.continuation.equation import STATUS_TOLERANCE
+from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.errors import TooLargeError
+from enumsol.roots.local_branch import MAX_SELECTIONS
 from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:
@@ -18,11 +19,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.continuation.equation import Codes, CondensedEquation, Vector
-    from enumsol.selections import ContactStatus
+    from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
+    from enumsol.statuses import ContactStatus
 
-#: Selections examined at one point (paper, Remark 5.1); six nodes in a corner of three statuses have 729.
-MAX_SELECTIONS = 4096
 #: A singular value of a selection's balanced gradient below this fraction of the largest counts as zero.
 RANK_TOLERANCE = 1e-10
 #: Sweeps that balance rows and columns of a gradient: each takes the root of what is left of their sizes.

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from flint import fmpq
 
 from enumsol import ContactProblem, InvalidProblemError, branch_graph, enumerate_roots, gallery
-from enumsol.branches.algebraic import merge
+from enumsol.arithmetic.algebraic import merge
 from shared.random_paths import integer_path, random_path
 
 if TYPE_CHECKING:

@@ -17,15 +17,10 @@ from functools import partial
 
 import numpy as np
 
-from enumsol.enumeration.relaxation import (
-    BRANCHING_CANDIDATES,
-    CONTACT,
-    PRUNE_MARGIN,
-    UNDECIDED,
-    ActiveSetEngine,
-    status_rows,
-)
-from enumsol.selections import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.relaxation.active_set import ActiveSetEngine
+from enumsol.relaxation.engine import BRANCHING_CANDIDATES, PRUNE_MARGIN
+from enumsol.relaxation.rows import status_rows
+from enumsol.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 #: Part of the gap below which a child's gain makes no difference, as in the package's rule.
 LEAST = 1e-3

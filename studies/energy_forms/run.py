@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol import gallery
-from enumsol.enumeration.relaxation import ActiveSetEngine
+from enumsol.relaxation.active_set import ActiveSetEngine
 from shared.loads import DRAGGED, PRESSED, STRAIGHT
 from shared.searches import search
 

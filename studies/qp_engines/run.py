@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.enumeration.relaxation import PRUNE_MARGIN
+from enumsol.relaxation.engine import PRUNE_MARGIN
 from qp_engines.solvers import INSTALLED, SOLVERS, Recording
 from shared.loads import DRAGGED, PRESSED, block, oblique_wedge, straight_wedge
 from shared.searches import search

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from enumsol.certification.proof import ProofWriter
-from enumsol.enumeration.float_selections import SIGN_TOLERANCE
-from enumsol.enumeration.tree import SearchLimits, TreeSearch
-from enumsol.enumeration.workbench import Workbench
+from enumsol.proof.proof_file import ProofWriter
+from enumsol.search.solvers import Solvers
+from enumsol.search.tree import SearchLimits, TreeSearch
+from enumsol.selections.floats import SIGN_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol import ContactProblem
-    from enumsol.condensed import ScaledSystem
-    from enumsol.enumeration.relaxation import Engine
-    from enumsol.enumeration.tree import SearchOutcome
+    from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.relaxation.engine import Engine
+    from enumsol.search.tree import SearchOutcome
 
 
 def search(
@@ -26,7 +26,7 @@ def search(
     max_nodes: int | None = None,
 ) -> SearchOutcome:
     """What the search finds: ``solutions``, ``nodes``, ``qps``, ``stopped`` and so on; no roots are made of it."""
-    bench = Workbench(problem, alpha, arithmetic, SIGN_TOLERANCE)
-    judge = bench.judge(ProofWriter() if arithmetic == "verified" else None)
-    engine = make_engine(bench.scaled)
-    return TreeSearch(bench.scaled, judge, engine=engine, limits=SearchLimits(max_nodes=max_nodes)).run()
+    solvers = Solvers(problem, alpha, arithmetic, SIGN_TOLERANCE)
+    certifier = solvers.certifier(ProofWriter() if arithmetic == "verified" else None)
+    engine = make_engine(solvers.scaled)
+    return TreeSearch(solvers.scaled, certifier, engine=engine, limits=SearchLimits(max_nodes=max_nodes)).run()

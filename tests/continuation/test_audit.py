@@ -8,7 +8,7 @@ import pytest
 import enumsol
 from enumsol import gallery
 from enumsol.continuation import ContinuationOptions, audit, follow, follow_all, follow_arc, newton
-from enumsol.continuation.places import GraphMap
+from enumsol.continuation.graph_map import GraphMap
 
 enumerate_roots = partial(enumsol.enumerate_roots, arithmetic="fast")
 
@@ -171,7 +171,7 @@ class TestBranchGraph:
 
     @pytest.fixture
     def branch_graph(self):
-        return pytest.importorskip("enumsol.branches.build").branch_graph
+        return pytest.importorskip("enumsol.branches.construction").branch_graph
 
     @pytest.mark.parametrize("loading", [False, True])
     @pytest.mark.parametrize("seed", range(15))

@@ -274,11 +274,11 @@ def test_point_where_four_selections_meet():
 
 
 def test_large_sparse_problem_is_factorised_once(monkeypatch):
-    from enumsol import condensed
+    from enumsol.condensation import factorization
 
     calls = []
-    splu = condensed.splu
-    monkeypatch.setattr(condensed, "splu", lambda *a, **k: calls.append(1) or splu(*a, **k))
+    splu = factorization.splu
+    monkeypatch.setattr(factorization, "splu", lambda *a, **k: calls.append(1) or splu(*a, **k))
     problem = gallery.clamped_block(200, 50, contact=40, traction=(-0.3, -1.0))
     assert problem.n > 20_000
     path = follow(problem, newton(problem, 0.5), -1, (0.2, 3.0))

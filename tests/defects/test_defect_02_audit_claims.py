@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from test_cli import assert_refused, run
+from cli.test_cli import assert_refused, run
 
 import enumsol
 from enumsol import BranchGraph, ContactProblem, audit, branch_graph, follow, follow_all, gallery, link_samples, newton

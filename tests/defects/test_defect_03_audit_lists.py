@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from test_cli import assert_refused, call, run
+from cli.test_cli import assert_refused, call, run
 
 import enumsol
 from enumsol import ContactProblem, audit, branch_graph, follow_all, gallery, write_problem
 from enumsol.continuation import read_points
-from enumsol.continuation.places import GraphMap
+from enumsol.continuation.graph_map import GraphMap
 
 EXAMPLE = "one-node-6.1"
 

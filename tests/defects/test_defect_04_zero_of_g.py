@@ -9,7 +9,7 @@ from oracles import exact_condense
 from proof_tools import records_of
 
 from enumsol import ContactProblem, branch_graph, verify
-from enumsol.certification.unloaded import vanishing_alpha
+from enumsol.condensation.unloaded import vanishing_alpha
 
 INTERVAL = (0.0, 10.0)
 ZEROS = [Fraction(0), Fraction(10), Fraction(4), Fraction(1, 3), Fraction(22, 7), Fraction(-3), Fraction(5, 2)]
@@ -91,8 +91,8 @@ def test_the_zero_is_that_of_an_independent_condensation():
 
 def test_search_and_checker_ask_one_place(monkeypatch):
     # told of another alpha, both cut there: neither decides anew
-    from enumsol.branches import path
-    from enumsol.certification import graph_checker
+    from enumsol.checker import graph as graph_checker
+    from enumsol.condensation import exact as path
 
     problem = ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1.0, 2.0], load_slope=[1.0, 1.0], friction=1.0)
     graph, report = assert_proven(problem)

@@ -17,10 +17,10 @@ from proof_fuzz import mutant, read
 from proof_tools import Judge, copied, leaves_of, multipliers, proof_of, records_of, sealed, with_multipliers
 
 from enumsol import ContactProblem, EnumsolError, Proof, ProofFormatError, gallery, verify, write_problem
-from enumsol.certification import proof as proof_module
 from enumsol.cli import main
-from enumsol.condensed import Factorization
+from enumsol.condensation.factorization import Factorization
 from enumsol.errors import InvalidArgumentError
+from enumsol.proof import proof_file as proof_module
 
 BEFORE = {item["name"]: item for item in json.loads(Path(__file__).with_name("proofs_written_before.json").read_text())}
 POINTS = [name for name in BEFORE if not name.startswith("graph")]
@@ -272,7 +272,7 @@ def test_a_leaf_with_more_multipliers_than_there_are_rows():
 
 
 def test_rational_leaves_of_a_large_problem_are_not_tried(monkeypatch):
-    from enumsol.certification import rational
+    from enumsol.checker import rational
 
     problem = gallery.clamped_block(10, 20, contact=1)
     assert problem.n > 250

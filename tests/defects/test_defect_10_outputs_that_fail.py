@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from test_cli import run
+from cli.test_cli import run
 
 import enumsol
 from enumsol import gallery

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from dying import DyingExecutor
-from test_cli import run
+from cli.test_cli import run
 
 import enumsol
 from enumsol import EnumsolError, enumerate_roots, gallery, multiplicity_table, verify, write_problem

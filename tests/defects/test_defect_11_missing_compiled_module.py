@@ -17,8 +17,8 @@ import enumsol
 from enumsol import MissingDependencyError, compiled, enumerate_roots, gallery
 
 PACKAGE = Path(enumsol.__file__).parent
-MODULE = "enumsol.enumeration._active_set"
-PLACE = Path("enumsol", "enumeration")
+MODULE = "enumsol.relaxation._active_set"
+PLACE = Path("enumsol", "relaxation")
 BUILT = f"_active_set{EXTENSION_SUFFIXES[0]}"
 CODE = """
 import sys, warnings
@@ -138,6 +138,6 @@ def test_a_module_that_cannot_be_loaded_says_why(place):
 
 def test_an_engine_that_was_asked_for_is_an_error_of_ours(monkeypatch):
     monkeypatch.setitem(sys.modules, MODULE, None)
-    monkeypatch.delattr(sys.modules["enumsol.enumeration"], "_active_set", raising=False)
+    monkeypatch.delattr(sys.modules["enumsol.relaxation"], "_active_set", raising=False)
     with pytest.raises(MissingDependencyError, match="cannot be loaded"):
         enumerate_roots(gallery.one_node_triangle(), 5.0, "fast", engine="active-set")

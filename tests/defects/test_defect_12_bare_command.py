@@ -1,7 +1,7 @@
 """Line 12: bare `enumsol` prints help."""
 
 import pytest
-from test_cli import call
+from cli.test_cli import call
 
 
 @pytest.mark.parametrize("group", [(), ("gallery",)])

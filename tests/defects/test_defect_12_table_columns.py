@@ -2,7 +2,7 @@
 
 import re
 
-from test_cli import run
+from cli.test_cli import run
 
 TABLE = ("table", "gallery:two-node-6.4", "--from", 0, "--to", 10)
 CAPTION = "open, stick, slip+, slip-: how many of the roots have a node in that status"

@@ -39,7 +39,7 @@ def uses(tree):
 @pytest.mark.parametrize(
     "line",
     [
-        "from enumsol.enumeration import _active_set",
+        "from enumsol.relaxation import _active_set",
         "from enumsol._private import name",
         "import enumsol._private",
         "engine._data = 1",

@@ -1,0 +1,1 @@
+"""Exact and enclosed numbers: rationals, real algebraic numbers, number fields, balls."""

@@ -1,0 +1,256 @@
+"""Real algebraic numbers: roots of integer polynomials, isolated and compared exactly (theory, section 7.2).
+
+A critical alpha is either a rational number or the only root of a polynomial in an open interval with rational ends.
+Signs of other polynomials there are decided without rounding: a common root is found by the greatest common divisor,
+and a polynomial that does not vanish has constant sign once the interval is narrow enough.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cmp_to_key
+from typing import TYPE_CHECKING, Any
+
+from flint import fmpq, fmpq_poly, fmpz_poly
+
+from enumsol.arithmetic.rationals import to_fraction
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+#: Width to which an isolating interval is narrowed before the greatest common divisor decides about a common root.
+_NARROW = fmpq(1, 2**64)
+#: Steps of bisection between two attempts to tell numbers apart.
+_STEPS = 16
+
+
+def sign(value: Any) -> int:
+    """-1, 0 or 1."""
+    return int(value > 0) - int(value < 0)
+
+
+def integer_polynomial(poly: Any) -> Any:
+    """The primitive integer polynomial that is a positive multiple of a rational or integer polynomial."""
+    numerator = poly.numer() if isinstance(poly, fmpq_poly) else poly
+    content = numerator.content()
+    return numerator if content in (0, 1) else fmpz_poly([c // content for c in numerator.coeffs()])
+
+
+def variations(poly: Any, lo: Any, hi: Any) -> int:
+    """Sign variations of ``poly`` over (lo, hi): no fewer than its roots there, and of equal parity."""
+    moved = poly(fmpq_poly([lo, hi - lo])).numer()
+    degree = poly.degree()
+    coefficients = moved.coeffs()
+    coefficients += [0] * (degree + 1 - len(coefficients))
+    count = last = 0
+    for c in fmpz_poly(coefficients[::-1])(fmpz_poly([1, 1])).coeffs():
+        if c != 0:
+            s = 1 if c > 0 else -1
+            count += int(s == -last)
+            last = s
+    return count
+
+
+class CriticalAlpha:
+    """A real algebraic number.
+
+    Attributes
+    ----------
+    poly : fmpz_poly or None
+        Vanishes at the number, with a sign change; None when the number is known to be rational.
+    lo, hi : fmpq
+        The number is the only root of ``poly`` in the open interval (lo, hi); lo = hi when it is rational. The interval
+        only ever shrinks.
+    """
+
+    __slots__ = ("_sign_hi", "hi", "lo", "poly")
+
+    def __init__(self, poly: Any, lo: Any, hi: Any) -> None:
+        self.poly, self.lo, self.hi = poly, lo, hi
+        self._sign_hi = 0 if poly is None else sign(poly(hi))
+        if poly is not None and poly.degree() == 1:
+            self._settle(fmpq(-poly[0], poly[1]))
+
+    @classmethod
+    def rational(cls, value: Any) -> CriticalAlpha:
+        """A rational number."""
+        return cls(None, value, value)
+
+    def _settle(self, value: Any) -> None:
+        self.poly, self.lo, self.hi = None, value, value
+
+    @property
+    def is_rational(self) -> bool:
+        """Whether the number is known to be rational."""
+        return self.poly is None
+
+    def __float__(self) -> float:
+        while self.poly is not None and float(to_fraction(self.lo)) != float(to_fraction(self.hi)):
+            if (self.hi - self.lo) * 2**1100 < 1:  # an interval around zero or around a tie of two floats
+                break
+            self.refine(_STEPS)
+        return float(to_fraction((self.lo + self.hi) / 2))
+
+    def __repr__(self) -> str:
+        return f"CriticalAlpha({float(self)!r})"
+
+    def enclosure(self) -> tuple[Fraction, Fraction]:
+        """Rational bounds, equal when the number is rational; narrower than a unit in the last place of its float."""
+        float(self)
+        return to_fraction(self.lo), to_fraction(self.hi)
+
+    def refine(self, steps: int = _STEPS) -> None:
+        """Halve the isolating interval a number of times."""
+        for _ in range(steps):
+            if self.poly is None:
+                return
+            middle = (self.lo + self.hi) / 2
+            s = sign(self.poly(middle))
+            if s == 0:
+                self._settle(middle)
+            elif s == self._sign_hi:
+                self.hi = middle
+            else:
+                self.lo = middle
+
+    def narrow(self, width: Any = _NARROW) -> None:
+        """Refine until the isolating interval is no wider than ``width``."""
+        while self.hi - self.lo > width:
+            self.refine()
+
+    def _shares_root(self, other: Any) -> bool:
+        """Whether ``other``, a polynomial, vanishes here; then the representation is simplified."""
+        common = self.poly.gcd(other)
+        # lo and hi are no roots of poly, hence none of the divisor, which has at most one root between them
+        if common.degree() == 0 or sign(common(self.lo)) == sign(common(self.hi)):
+            return False
+        if common.degree() < self.poly.degree():
+            self.poly = common
+            self._sign_hi = sign(common(self.hi))
+            if common.degree() == 1:
+                self._settle(fmpq(-common[0], common[1]))
+        return True
+
+    def sign_of(self, poly: Any) -> int:
+        """Exact sign of an integer polynomial at this number."""
+        if poly.degree() <= 0:
+            return sign(poly[0])
+        if self.poly is None:
+            return sign(poly(self.lo))
+        self.narrow()
+        checked = False
+        while self.poly is not None and variations(poly, self.lo, self.hi) > 0:
+            if not checked and self._shares_root(poly):
+                return 0
+            checked = True
+            self.refine()
+        return sign(poly((self.lo + self.hi) / 2))
+
+    def compare(self, other: CriticalAlpha) -> int:
+        """-1, 0 or 1 as this number is less than, equal to or greater than ``other``."""
+        if self is other:
+            return 0
+        checked = False
+        while True:
+            if self.poly is None and other.poly is None:
+                return sign(self.lo - other.lo)
+            if self.hi <= other.lo:
+                return -1
+            if other.hi <= self.lo:
+                return 1
+            if self.poly is None or other.poly is None:
+                point, root = (self, other) if self.poly is None else (other, self)
+                if root.poly(point.lo) == 0:
+                    root._settle(point.lo)
+                    return 0
+            elif not checked and max(self.hi - self.lo, other.hi - other.lo) <= _NARROW:
+                checked = True
+                if self._equals_irrational(other):
+                    return 0
+            self.refine()
+            other.refine()
+
+    def _equals_irrational(self, other: CriticalAlpha) -> bool:
+        common = self.poly.gcd(other.poly)
+        lo, hi = max(self.lo, other.lo), min(self.hi, other.hi)
+        if common.degree() == 0 or sign(common(lo)) == sign(common(hi)):
+            return False
+        for number in (self, other):
+            number.poly, number.lo, number.hi, number._sign_hi = common, lo, hi, sign(common(hi))
+            if common.degree() == 1:
+                number._settle(fmpq(-common[0], common[1]))
+        return True
+
+    def minimal_polynomial(self) -> Any:
+        """The irreducible integer polynomial of the number; a number found to be rational is settled as such."""
+        if self.poly is None:
+            return fmpz_poly([-self.lo.p, self.lo.q])
+        for factor, _ in self.poly.factor()[1]:
+            if sign(factor(self.lo)) != sign(factor(self.hi)):
+                self.poly, self._sign_hi = factor, sign(factor(self.hi))
+                if factor.degree() == 1:
+                    self._settle(fmpq(-factor[0], factor[1]))
+                return factor
+        raise AssertionError("an isolated root belongs to no factor")
+
+
+def real_roots(poly: Any, a: Any, b: Any) -> list[CriticalAlpha]:
+    """The distinct roots of a nonzero integer polynomial in the closed interval [a, b], in no particular order."""
+    found: list[CriticalAlpha] = []
+
+    def take_out(q: Any, value: Any) -> Any:
+        linear = fmpz_poly([-value.p, value.q])
+        found.append(CriticalAlpha.rational(value))
+        while q(value) == 0:
+            q = integer_polynomial(q // linear)
+        return q
+
+    for end in (a, b) if a != b else (a,):
+        if poly(end) == 0:
+            poly = take_out(poly, end)
+    if poly.degree() < 1 or a == b:
+        return found
+    count = variations(poly, a, b)
+    if count >= 2:
+        poly = integer_polynomial(poly // poly.gcd(poly.derivative()))
+    waiting = [(a, b, poly)] if count else []
+    while waiting:
+        lo, hi, q = waiting.pop()
+        count = variations(q, lo, hi)
+        if count == 1:
+            found.append(CriticalAlpha(q, lo, hi))
+        elif count > 1:
+            middle = (lo + hi) / 2
+            if q(middle) == 0:
+                q = take_out(q, middle)
+            waiting += [(lo, middle, q), (middle, hi, q)]
+    return found
+
+
+def merge(numbers: Iterable[CriticalAlpha]) -> list[list[CriticalAlpha]]:
+    """The numbers in increasing order, equal ones grouped."""
+    groups: list[list[CriticalAlpha]] = []
+    for number in sorted(numbers, key=cmp_to_key(CriticalAlpha.compare)):
+        if groups and groups[-1][0].compare(number) == 0:
+            groups[-1].append(number)
+        else:
+            groups.append([number])
+    return groups
+
+
+def rational_between(a: CriticalAlpha, b: CriticalAlpha) -> Any:
+    """A rational number of few digits strictly between two different numbers a < b."""
+    while not (
+        a.hi < b.lo or (a.hi == b.lo and not (a.is_rational and b.is_rational) and a.hi != a.lo and b.hi != b.lo)
+    ):
+        a.refine()
+        b.refine()
+    if a.hi == b.lo:
+        return a.hi
+    width = b.lo - a.hi
+    step = fmpq(1)
+    while step >= width / 2:
+        step /= 2
+    while step * 8 < width:
+        step *= 2
+    return (a.hi / step).floor() * step + step

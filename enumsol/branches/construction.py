@@ -1,0 +1,174 @@
+"""branch_graph: every solution for every alpha in an interval, as a graph of arcs (theory, section 7)."""
+
+from __future__ import annotations
+
+import time
+from fractions import Fraction
+from typing import TYPE_CHECKING, Literal
+
+from enumsol.arithmetic.rationals import rational
+from enumsol.branches.gluing import Gluing
+from enumsol.branches.graph import BranchGraph
+from enumsol.branches.graph_data import GraphData, GraphStats
+from enumsol.branches.make_elements import make_arcs, make_vertices
+from enumsol.branches.proof_records import write_graph_proof
+from enumsol.checks import (
+    alpha_interval,
+    instance_of,
+    one_of,
+    optional_callable,
+    optional_count,
+    optional_seconds,
+)
+from enumsol.condensation.exact import FAST_EXACT_DOF, ExactPath
+from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.problem import ContactProblem
+from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
+from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
+from enumsol.search.interval import FastIntervalCertifier, IntervalSearch
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from enumsol.checks import AlphaLike
+    from enumsol.search.interval import IntervalCertifier
+
+Arithmetic = Literal["fast", "verified", "exact"]
+
+
+def branch_graph(
+    problem: ContactProblem,
+    interval: tuple[AlphaLike, AlphaLike],
+    arithmetic: Arithmetic = "verified",
+    *,
+    progress: Callable[[str, float], object] | None = None,
+    max_nodes: int | None = None,
+    time_limit: float | None = None,
+) -> BranchGraph:
+    """All solutions over an interval of alpha, as arcs glued at vertices (theory, section 7).
+
+    A tree search over the interval gives the selections that may hold somewhere in it. For each of them all alpha at
+    which a condition or the determinant vanishes are isolated as roots of integer polynomials; where it holds between
+    them is an arc. Arcs are glued by the statuses that hold at their ends, decided without rounding.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    interval : pair of alphas
+        First and last alpha, the first less than the last: float, Fraction or whatever enumerate_roots takes for alpha.
+    arithmetic : {"verified", "fast", "exact"}
+        "verified": every leaf of the search is proven empty over its whole piece of the interval by rigorous error
+        bounds, and what follows is exact. Up to 24 degrees of freedom this is about the problem's own matrices, beyond
+        about S and g as computed in floats (``graph.certified_data`` says which). "fast": the same, but the search
+        believes floats; never claimed to be complete. "exact": everything in rationals, about the problem's own
+        matrices up to 250 degrees of freedom, and slow beyond some ten contact nodes.
+    progress : callable, optional
+        Called with the name of the stage ("search", "arcs") and the share of it that is done.
+    max_nodes : int, optional
+        Stop the search after so many nodes; the graph then is not complete and says so.
+    time_limit : float, optional
+        Stop the search after so many seconds.
+
+    Returns
+    -------
+    BranchGraph
+
+    Raises
+    ------
+    InvalidArgumentError
+        The interval or another argument is out of range, or friction is negative somewhere in the interval (the node
+        and the alpha are named).
+    TooLargeError
+        Exact arithmetic was asked for and the problem is too large for it.
+    MissingDependencyError
+        The compiled solver of the relaxations is not installed.
+    Interrupted
+        On Ctrl-C during the search, or while arcs are worked out; ``partial`` is the graph of what was found so far,
+        which is not complete.
+    """
+    instance_of(problem, ContactProblem, "problem")
+    a, b = (Fraction(end) for end in alpha_interval(interval))
+    one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
+    optional_callable(progress, "progress")
+    max_nodes, time_limit = optional_count(max_nodes, "max_nodes"), optional_seconds(time_limit)
+    _check_friction(problem, a, b)
+    started = time.perf_counter()
+    exactly = arithmetic == "exact" or problem.n <= FAST_EXACT_DOF
+    path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
+    deadline = None if time_limit is None else started + time_limit
+    certifier = _certifier(problem, path, arithmetic)
+    search = IntervalSearch(
+        problem.condensed,
+        (a, b),
+        path.zero,
+        certifier,
+        max_nodes=max_nodes,
+        deadline=deadline,
+        progress=_stage(progress, "search"),
+    )
+    interrupted = False
+    if path.unloaded:
+        # nothing but lambda = 0 for every alpha; every selection holds there, and one of them tells it all
+        candidates = {(0,) * path.p}
+    else:
+        try:
+            search.run()
+        except KeyboardInterrupt:
+            interrupted = True
+            search.stopped = f"interrupted after {search.nodes} nodes"
+        candidates = search.selections
+    searched = time.perf_counter()
+    tick = _stage(progress, "arcs")
+    gluing = Gluing(path, candidates, rational(a), rational(b), tick, cut_short=search.stopped is not None)
+    stats = GraphStats(
+        pieces=len(search.pieces),
+        nodes=search.nodes,
+        selections=len(candidates),
+        search_seconds=searched - started,
+        seconds=time.perf_counter() - started,
+    )
+    arcs = make_arcs(gluing)
+    cut = [reason for reason in (search.stopped, gluing.interrupted) if reason is not None]
+    vertices = make_vertices(gluing, arcs)
+    proof = None
+    if (
+        isinstance(certifier, VerifiedIntervalCertifier)
+        and search.pieces
+        and search.stopped is None
+        and not certifier.used_rationals
+    ):
+        data = "problem" if path.condensed_exactly else "condensed"
+        proof = write_graph_proof(problem, (a, b), data, search.pieces)
+    reasons = (*cut, *gluing.reasons)
+    pieces = tuple(search.pieces)
+    graph = BranchGraph(
+        GraphData(problem, path, (a, b), arithmetic, tuple(vertices), tuple(arcs), reasons, stats, pieces, proof)
+    )
+    if interrupted or gluing.interrupted is not None:
+        raise Interrupted("branch_graph was interrupted; its arcs so far are kept", graph)
+    return graph
+
+
+def _certifier(problem: ContactProblem, path: ExactPath, arithmetic: Arithmetic) -> IntervalCertifier:
+    if arithmetic == "exact":
+        return ExactIntervalCertifier(path)
+    return VerifiedIntervalCertifier(problem, path) if arithmetic == "verified" else FastIntervalCertifier()
+
+
+def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callable[[float], object] | None:
+    return None if progress is None else lambda share: progress(name, share)
+
+
+def _check_friction(problem: ContactProblem, a: Fraction, b: Fraction) -> None:
+    """Refuse negative and huge friction inside the interval; F is affine, so that both ends tell."""
+    for node, F0, F1 in zip(problem.node_ids, *(part.tolist() for part in problem.friction), strict=True):
+        for end in (a, b):
+            value = Fraction(F0) + end * Fraction(F1)
+            if value < 0:
+                zero = -Fraction(F0) / Fraction(F1) if F1 else end
+                raise InvalidArgumentError(
+                    f"friction at contact node {node} is negative in the interval: {float(value):g} at "
+                    f"alpha = {float(end):g} (it is zero at alpha = {float(zero):.17g}); expected F >= 0"
+                )
+    for end in (a, b):
+        problem.friction_at(end)

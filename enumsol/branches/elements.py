@@ -1,0 +1,242 @@
+"""What a branch graph is made of: vertices, arcs, components and branches (theory, section 7.11)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.rationals import rational
+from enumsol.checks import alpha_value
+from enumsol.errors import InvalidArgumentError
+from enumsol.sealed import Sealed
+from enumsol.selections.functions import SelectionFunctions
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.arithmetic.algebraic import CriticalAlpha
+    from enumsol.checks import AlphaLike
+    from enumsol.condensation.exact import ExactPath
+    from enumsol.roots.root_set import RootFamily
+    from enumsol.selections.solution import Codes
+    from enumsol.statuses import ContactStatus
+
+#: Kind of a vertex at which selections hold that the search did not reach: arcs that were not found may end there.
+UNSETTLED = "unsettled"
+#: Kinds of vertices at which branches are cut.
+CUTS = ("bifurcation", "family", "sheet", UNSETTLED)
+
+
+@dataclass(frozen=True, eq=False)
+class Vertex(Sealed):
+    """A connected set of solutions at one critical alpha, where arcs begin and end.
+
+    Attributes
+    ----------
+    number : int
+        Its place in ``graph.vertices``, which are in the order of alpha.
+    alpha : float
+        Rounded to the nearest float from ``exact``.
+    kind : str
+        "transition" (one arc from the left goes on as another to the right), "fold" (alpha turns back), "bifurcation"
+        (any other number of arcs), "touch" (a status is met and left again), "point" (no arc at all), "family" (a
+        continuum of solutions at one alpha: a vertical arc), "sheet" (the border of a sheet), "end" (on the interval's
+        border), "unsettled" (selections hold here that were not examined, because the search was cut short or a limit
+        was reached: arcs that were not found may end here, so that nothing is said about its kind), or "broken" (an arc
+        ends for no reason: something is missing, and the graph is not complete).
+    border : bool
+        It lies at the first or last alpha.
+    statuses : tuple of p ContactStatus
+        Where several hold, the first of OPEN, STICK, SLIP_PLUS, SLIP_MINUS.
+    active : tuple of p frozensets of ContactStatus
+        All statuses that hold at a node (somewhere on a family).
+    lambda_n, lambda_t, u_n, u_t : (p,) arrays
+        Values at the vertex; of a family, at one of its points [force, length].
+    family : RootFamily or None
+    index_left, index_right : int or None
+        Sums of the indices of the arcs that end and begin here; equal inside the interval (balance of degrees). None
+        where one is not known, or not all arcs.
+    selections : tuple of status codes that hold here
+    exact : CriticalAlpha
+    """
+
+    number: int
+    alpha: float
+    kind: str
+    border: bool
+    statuses: tuple[ContactStatus, ...]
+    active: tuple[frozenset[ContactStatus], ...]
+    lambda_n: NDArray[np.float64]
+    lambda_t: NDArray[np.float64]
+    u_n: NDArray[np.float64]
+    u_t: NDArray[np.float64]
+    family: RootFamily | None
+    index_left: int | None
+    index_right: int | None
+    selections: tuple[Codes, ...] = field(repr=False)
+    exact: CriticalAlpha = field(repr=False)
+
+    @property
+    def enclosure(self) -> tuple[Fraction, Fraction]:
+        """Rational bounds on alpha, less than a unit in its last place apart; equal where alpha is known exactly."""
+        return self.exact.enclosure()
+
+
+@dataclass(frozen=True, eq=False)
+class Arc:
+    """All solutions of one selection between two neighbouring critical alphas, one for every alpha (of a sheet: many).
+
+    Attributes
+    ----------
+    number : int
+        Its place in ``graph.arcs``.
+    statuses : tuple of p ContactStatus
+        Of several selections that coincide (grazing) those of the first. At a node in contact with F = 0 throughout the
+        sign of u_t at the middle of the arc names the slip.
+    lo, hi : float
+        Its ends.
+    tail, head : int
+        Numbers of the vertices at its lower and upper end.
+    index : int or None
+        Local degree of its roots.
+    dimension : int
+        0; of a sheet the dimension of its families.
+    grazing : bool
+        Several selections coincide on it, or it is a sheet: no root on it is regular.
+    selections : tuple of status codes
+    """
+
+    number: int
+    statuses: tuple[ContactStatus, ...]
+    lo: float
+    hi: float
+    tail: int
+    head: int
+    index: int | None
+    dimension: int
+    grazing: bool
+    selections: tuple[Codes, ...] = field(repr=False)
+    sample: Fraction = field(repr=False)
+    _path: ExactPath = field(repr=False)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """(lo, hi)."""
+        return self.lo, self.hi
+
+    @property
+    def length(self) -> float:
+        """hi - lo."""
+        return self.hi - self.lo
+
+    @cached_property
+    def _functions(self) -> SelectionFunctions:
+        return SelectionFunctions(self._path, self.selections[0])
+
+    def _point(self, alpha: AlphaLike) -> tuple[object, ...]:
+        exact = alpha_value(alpha)
+        value = float(exact)
+        if self.dimension:
+            raise InvalidArgumentError(
+                f"arc {self.number} is a sheet and has many solutions at one alpha; use roots_at(alpha).families"
+            )
+        if not self.lo <= value <= self.hi:
+            raise InvalidArgumentError(
+                f"alpha is {value:.17g}; expected a value on the arc, [{self.lo!r}, {self.hi!r}]"
+            )
+        point = self._functions.forces_at(rational(exact))
+        if point is None:  # bounded arcs have no poles, but a rounded end may lie beyond the exact one
+            point = self._functions.forces_at(rational(self.sample))
+        return point if point is not None else ()
+
+    def values(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(lambda_n, lambda_t) at an alpha of the arc, arrays of shape (p,) [force]; exact, then rounded.
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is outside the arc, or the arc is a sheet.
+        """
+        forces = np.array([float(Fraction(int(v.p), int(v.q))) for v in self._point(alpha)])  # type: ignore[attr-defined]
+        return forces[: self._path.p], forces[self._path.p :]
+
+    def displacements(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(u_n, u_t) at an alpha of the arc, two arrays of shape (p,) [length]; errors as ``values``."""
+        point = self._point(alpha)
+        g = self._path.at(rational(alpha_value(alpha)))[0]
+        w = [
+            a - sum((s * v for s, v in zip(row, point, strict=True)), rational(0))
+            for a, row in zip(g, self._path.rows, strict=True)
+        ]
+        moves = np.array([float(Fraction(int(v.p), int(v.q))) for v in w])
+        return moves[: self._path.p], moves[self._path.p :]
+
+    def sampled(self, count: int = 33) -> NDArray[np.float64]:
+        """Values of alpha along the arc, denser towards its ends (Chebyshev points), ends included."""
+        points = 0.5 * (1 - np.cos(np.linspace(0.0, np.pi, count)))
+        alphas = self.lo + points * (self.hi - self.lo)
+        alphas[-1] = self.hi
+        return np.unique(np.clip(alphas, self.lo, self.hi))
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """A connected component of the graph.
+
+    Attributes
+    ----------
+    number : int
+    vertices : tuple of Vertex
+    arcs : tuple of Arc
+    """
+
+    number: int
+    vertices: tuple[Vertex, ...]
+    arcs: tuple[Arc, ...]
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Smallest and largest alpha on it."""
+        return self.vertices[0].alpha, self.vertices[-1].alpha
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A path or closed loop of arcs: what is left of a component cut at bifurcations, families and sheets.
+
+    Attributes
+    ----------
+    number : int
+    arcs : tuple of Arc
+        In the order in which the branch runs through them.
+    vertices : tuple of Vertex
+        Passed on the way, ends included: one more than arcs, or as many when it is closed.
+    component : int
+        Number of its component.
+    closed : bool
+    """
+
+    number: int
+    arcs: tuple[Arc, ...]
+    vertices: tuple[Vertex, ...]
+    component: int
+    closed: bool
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Smallest and largest alpha on it."""
+        return min(arc.lo for arc in self.arcs), max(arc.hi for arc in self.arcs)
+
+    @property
+    def folds(self) -> tuple[Vertex, ...]:
+        """Its folds, in the order in which it runs through them."""
+        return tuple(vertex for vertex in self.vertices if vertex.kind == "fold")
+
+    @property
+    def sheet(self) -> bool:
+        """Whether it is a sheet."""
+        return any(arc.dimension for arc in self.arcs)

@@ -1,0 +1,276 @@
+"""Vertices, arcs, components and branches in the user's terms, made from a gluing (theory, section 7.11)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import networkx as nx
+import numpy as np
+from flint import fmpq
+
+from enumsol.arithmetic.rationals import to_fraction
+from enumsol.branches.elements import CUTS, UNSETTLED, Arc, Branch, Component, Vertex
+from enumsol.roots.root_set import Polytope, RootFamily
+from enumsol.roots.slip_signs import shown_status, sign_over, slip_names
+from enumsol.selections.ordered_field import FiberSelections, as_float
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from enumsol.branches.gluing import GluedArc, GluedVertex, Gluing
+    from enumsol.condensation.exact import ExactPath
+
+
+def make_arcs(gluing: Gluing) -> list[Arc]:
+    """The arcs of a gluing."""
+    path, arcs = gluing.path, []
+    for number, edge in enumerate(gluing.edges):
+        tail, head = (float(gluing.vertices[k].alpha) for k in (edge.tail, edge.head))
+        slips = _slips(path, edge) if any(path.frictionless) else (0,) * path.p
+        statuses = tuple(shown_status(c, s) for c, s in zip(edge.codes, slips, strict=True))
+        selections = (edge.codes, *(c for c in edge.selections if c != edge.codes))
+        grazing = gluing.arcs[edge.codes].grazing
+        sample = to_fraction(fmpq(edge.sample))
+        arcs.append(
+            Arc(
+                number,
+                statuses,
+                tail,
+                head,
+                edge.tail,
+                edge.head,
+                edge.index,
+                edge.dimension,
+                grazing,
+                selections,
+                sample,
+                path,
+            )
+        )
+    return arcs
+
+
+def _slips(path: ExactPath, edge: GluedArc) -> tuple[int, ...]:
+    """Signs of u_t in the middle of an arc."""
+    solver = FiberSelections(path, fmpq(edge.sample))
+    solution = solver.solve(edge.codes)
+    return (0,) * path.p if solution is None else solver.slip_signs(solution.vertices[0])
+
+
+def make_vertices(gluing: Gluing, arcs: Sequence[Arc]) -> list[Vertex]:
+    """The vertices of a gluing, with their kinds and degrees."""
+    left: list[list[Arc]] = [[] for _ in gluing.vertices]
+    right: list[list[Arc]] = [[] for _ in gluing.vertices]
+    for arc in arcs:
+        right[arc.tail].append(arc)
+        left[arc.head].append(arc)
+    made = []
+    for number, glued in enumerate(gluing.vertices):
+        border = glued.alpha.is_rational and glued.alpha.lo in (gluing.a, gluing.b)
+        p = gluing.path.p
+        degrees = (_sum(left[number]), _sum(right[number])) if glued.settled else (None, None)
+        # at the last alpha only the arcs from the left tell the degree
+        degree = degrees[0] if border and glued.alpha.lo == gluing.b else degrees[1]
+        family = _family(glued, degree, proven=gluing.path.condensed_exactly)
+        forces, w = _values(gluing, glued)
+        active = tuple(
+            frozenset(
+                name
+                for code in codes
+                for name in (slip_names(_slip_sign(gluing, glued, i)) if code == FRICTIONLESS else (STATUSES[code],))
+            )
+            for i, codes in enumerate(glued.active)
+        )
+        made.append(
+            Vertex(
+                number,
+                float(glued.alpha),
+                _kind(left[number], right[number], border=border, dimension=glued.dimension)
+                if glued.settled
+                else UNSETTLED,
+                border,
+                tuple(next(s for s in STATUSES if s in names) for names in active),
+                active,
+                forces[:p],
+                forces[p:],
+                w[:p],
+                w[p:],
+                family,
+                *degrees,
+                tuple(glued.members),
+                glued.alpha,
+            )
+        )
+    return made
+
+
+def _sum(arcs: Sequence[Arc]) -> int | None:
+    indices = [arc.index for arc in arcs]
+    return None if any(index is None for index in indices) else sum(index for index in indices if index is not None)
+
+
+def _kind(left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dimension: int) -> str:
+    if any(arc.dimension for arc in (*left, *right)):
+        return "sheet"
+    if dimension:
+        return "family"
+    if border:
+        return "end"
+    count = (len(left), len(right))
+    if count == (1, 1):
+        return "touch" if left[0].selections == right[0].selections else "transition"
+    if count in ((1, 0), (0, 1)):
+        return "broken"
+    return {(0, 0): "point", (2, 0): "fold", (0, 2): "fold"}.get(count, "bifurcation")
+
+
+def _slip_sign(gluing: Gluing, glued: GluedVertex, node: int) -> int:
+    """Sign of u_t of a node at a vertex, exactly; 0 on a continuum over which it changes."""
+    if glued.solver is not None:
+        signs = (glued.solver.slip_signs(v)[node] for s in glued.solutions for v in s.vertices)
+        return sign_over(signs)
+    for codes in glued.members:
+        functions = gluing.arcs[codes].functions
+        if not functions.singular and (det := glued.alpha.sign_of(functions.det)) != 0:
+            slip = functions.slip(node)
+            return 0 if slip.is_zero() else int(det * glued.alpha.sign_of(slip))
+    return 0  # the unloaded body at rest
+
+
+def _values(gluing: Gluing, glued: GluedVertex) -> tuple[Any, Any]:
+    """Forces and displacements at a vertex as floats, with exact zeros where the statuses say so."""
+    path, p = gluing.path, gluing.path.p
+    if glued.solutions and glued.solver is not None:
+        point = glued.solutions[0].vertices[0]
+        return glued.solver.forces(point) + 0.0, glued.solver.displacements(point) + 0.0
+    # an irrational alpha is replaced by a rational one that agrees with it to many more digits than a float has
+    glued.alpha.narrow(fmpq(1, 2**256))
+    alpha = (glued.alpha.lo + glued.alpha.hi) / 2
+    exact = next(
+        (
+            point
+            for c in glued.members
+            if not gluing.arcs[c].functions.singular
+            and (point := gluing.arcs[c].functions.forces_at(alpha)) is not None
+        ),
+        (fmpq(0),) * (2 * p),
+    )
+    g = path.at(alpha)[0]
+    S = path.rows
+    w = np.array(
+        [as_float(a - sum((s * v for s, v in zip(r, exact, strict=True)), fmpq(0))) for a, r in zip(g, S, strict=True)]
+    )
+    forces = np.array([as_float(v) for v in exact])
+    for i, active in enumerate(glued.active):
+        if OPEN in active:
+            forces[[i, p + i]] = 0.0
+        if active - {OPEN}:
+            w[i] = 0.0
+        if STICK in active or {SLIP_PLUS, SLIP_MINUS} <= active:
+            w[p + i] = 0.0
+    return forces + 0.0, w + 0.0
+
+
+def _family(glued: GluedVertex, index: int | None, *, proven: bool) -> RootFamily | None:
+    if not glued.dimension or glued.solver is None:
+        return None
+    solver, parts = glued.solver, []
+    largest = [s for s in glued.solutions if s.dimension > 0]
+    for solution in largest:
+        points = np.array([solver.forces(v) for v in solution.vertices])
+        slips = [solver.slip_signs(v) for v in solution.vertices]
+        order = np.lexsort(points.T[::-1])
+        statuses = tuple(shown_status(c, sign_over(s[i] for s in slips)) for i, c in enumerate(solution.codes))
+        parts.append(
+            Polytope(
+                statuses, np.stack([points[order, : solver.p], points[order, solver.p :]], axis=2), solution.dimension
+            )
+        )
+    return RootFamily(float(glued.alpha), tuple(_without_repetition(parts)), index, vertices_proven=proven)
+
+
+def _without_repetition(parts: Sequence[Polytope]) -> list[Polytope]:
+    """Polytopes whose vertices are not among those of another (of equal ones the first)."""
+    sets = [{tuple(v.ravel().tolist()) for v in part.vertices} for part in parts]
+    return [
+        part
+        for k, part in enumerate(parts)
+        if not any(sets[k] < other or (sets[k] == other and j < k) for j, other in enumerate(sets) if j != k)
+    ]
+
+
+def multigraph(vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> Any:
+    """The networkx.MultiGraph, frozen: vertices by number, arcs as edges keyed by their number."""
+    graph = nx.MultiGraph()
+    for v in vertices:
+        graph.add_node(
+            v.number,
+            alpha=v.alpha,
+            kind=v.kind,
+            border=v.border,
+            statuses=v.statuses,
+            active=v.active,
+            lambda_n=v.lambda_n,
+            lambda_t=v.lambda_t,
+            index_left=v.index_left,
+            index_right=v.index_right,
+            vertex=v,
+        )
+    for arc in arcs:
+        graph.add_edge(
+            arc.tail,
+            arc.head,
+            key=arc.number,
+            statuses=arc.statuses,
+            alpha=(arc.lo, arc.hi),
+            index=arc.index,
+            dimension=arc.dimension,
+            values=arc.values,
+            arc=arc,
+        )
+    return nx.freeze(graph)
+
+
+def make_components(graph: Any, vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> tuple[Component, ...]:
+    """Connected components in the order of their first vertex."""
+    groups = sorted((sorted(group) for group in nx.connected_components(graph)), key=lambda group: group[0])
+    place = {v: k for k, group in enumerate(groups) for v in group}
+    return tuple(
+        Component(k, tuple(vertices[v] for v in group), tuple(arc for arc in arcs if place[arc.tail] == k))
+        for k, group in enumerate(groups)
+    )
+
+
+def make_branches(components: Sequence[Component], vertices: Sequence[Vertex]) -> tuple[Branch, ...]:
+    """Components cut at bifurcations, families and sheets; every sheet is a branch of its own."""
+    found: list[Branch] = []
+    for component in components:
+        at: dict[int, list[Arc]] = {}
+        for arc in component.arcs:
+            at.setdefault(arc.tail, []).append(arc)
+            at.setdefault(arc.head, []).append(arc)
+
+        def cut(number: int, arcs_at: dict[int, list[Arc]] = at) -> bool:
+            return vertices[number].kind in CUTS or len(arcs_at[number]) != 2
+
+        left = set(component.arcs)
+        # open branches from their ends first, what then remains is closed
+        starts = [(v, arc) for v in at if cut(v) for arc in at[v]]
+        starts += [(arc.tail, arc) for arc in component.arcs]
+        for start, first in starts:
+            if first not in left:
+                continue
+            run, passed, here, arc = [], [start], start, first
+            while arc in left:
+                left.remove(arc)
+                run.append(arc)
+                here = arc.head if here == arc.tail else arc.tail
+                passed.append(here)
+                if cut(here):
+                    break
+                arc = next((other for other in at[here] if other in left), arc)
+            closed = passed[0] == passed[-1] and not cut(start)
+            along = tuple(vertices[v] for v in (passed[:-1] if closed else passed))
+            found.append(Branch(len(found), tuple(run), along, component.number, closed))
+    return tuple(found)

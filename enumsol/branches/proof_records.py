@@ -1,0 +1,64 @@
+"""The proof of a branch graph's search as a file (see enumsol.checker.graph for its records)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.proof.proof_file import Proof, ProofWriter, packed
+from enumsol.proof.reading import fits
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from fractions import Fraction
+
+    from enumsol.problem import ContactProblem
+    from enumsol.search.interval import SearchedPiece
+    from enumsol.selections.solution import Codes
+
+
+def write_graph_proof(
+    problem: ContactProblem, interval: tuple[Fraction, Fraction], data: str, pieces: Sequence[SearchedPiece]
+) -> Proof | None:
+    """The leaves of all pieces with their multipliers; None where an end of a piece is too long a fraction for it."""
+    if not all(fits(end) for found in pieces for end in (found.piece.a, found.piece.b)):
+        return None
+    writer = ProofWriter()
+    ends = [str(end) for end in interval]
+    writer.write(
+        {
+            "format": "enumsol-proof",
+            "version": 1,
+            "kind": "graph",
+            "problem": problem.fingerprint,
+            "interval": ends,
+            "p": problem.p,
+            "data": data,
+        }
+    )
+    selections = set()
+    leaves = 0
+    for found in pieces:
+        units = found.system.scaled
+        writer.write(
+            {
+                "piece": [str(found.piece.a), str(found.piece.b)],
+                "force": (np.frexp(units.force)[1] - 1).tolist(),
+                "length": (np.frexp(units.length)[1] - 1).tolist(),
+                "roots": [_text(codes) for codes in found.roots],
+            }
+        )
+        for leaf in found.empty:
+            writer.write(["x", _text(leaf.codes), *packed(leaf.rows, leaf.values)])
+        for kind, kept in (("s", found.selections), ("c", found.cut)):
+            for codes in kept:
+                writer.write([kind, _text(codes)])
+        leaves += len(found.empty)
+        selections |= set(found.selections)
+    writer.write({"pieces": len(pieces), "leaves": leaves, "selections": len(selections)})
+    return writer.close()
+
+
+def _text(codes: Codes) -> str:
+    return "".join(map(str, codes))

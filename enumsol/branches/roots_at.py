@@ -1,0 +1,71 @@
+"""The RootSet of given selections at one alpha, as enumerate_roots builds it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from enumsol.arithmetic.rationals import rational
+from enumsol.roots.builder import RootBuilder
+from enumsol.roots.components import connected_components
+from enumsol.roots.local_degree import perturbed_degree
+from enumsol.roots.root_set import RootSet, SearchStats
+from enumsol.selections.floats import FloatSelections
+from enumsol.selections.rationals import ExactSelections
+from enumsol.statuses import FRICTIONLESS, OPEN
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from enumsol.branches.graph_data import GraphData
+    from enumsol.checks import Alpha
+    from enumsol.selections.solution import Codes, SelectionSolution
+
+
+def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes], stopped: str | None) -> RootSet:
+    """Roots and families that the selections have at ``alpha``; in floats where these find all of them.
+
+    ``stopped`` says why the list may lack some, None that it does not.
+    """
+    problem = data.problem
+    floats = FloatSelections(problem.condensed.at(alpha).scaled)
+    solver: Any = floats
+    exact = data.arithmetic != "fast"
+    solutions: list[SelectionSolution | None] = []
+    if not exact:
+        solutions = [solver.solve(codes) for codes in _codes_at(selections, floats.F_positive)]
+        exact = any(solution is None for solution in solutions)
+    if exact:
+        solver = ExactSelections(data.path.system(rational(alpha)))
+        solutions = [solver.solve(codes) for codes in _codes_at(selections, solver.F_positive)]
+    components = connected_components(
+        [solution for solution in solutions if solution is not None],
+        solver,
+        lambda active: perturbed_degree(floats, active),
+    )
+    builder = RootBuilder(problem, alpha, solver, floats, {})
+    roots = [builder.root(c) for c in components if c.dimension == 0]
+    families = [builder.family(c, proven=exact) for c in components if c.dimension > 0]
+    roots.sort(key=lambda root: ([s.value for s in root.statuses], root.lambda_n.tolist(), root.lambda_t.tolist()))
+    families.sort(key=lambda family: family.vertices.tolist())
+    whole = sum(c.whole for c in components)
+    return RootSet(
+        alpha=alpha,
+        roots=roots,
+        families=families,
+        undecided=(),
+        arithmetic=data.arithmetic,
+        method="graph",
+        stopped=stopped,
+        stats=SearchStats(selections=len(selections)),
+        node_ids=problem.node_ids,
+        at_least=whole + int(whole < len(components)) if stopped is not None else None,
+    )
+
+
+def _codes_at(selections: Sequence[Codes], F_positive: tuple[bool, ...]) -> list[Codes]:
+    """The selections' codes at one alpha, where a node without friction has one status in contact."""
+    found = {
+        tuple(c if c == OPEN or positive else FRICTIONLESS for c, positive in zip(codes, F_positive, strict=True))
+        for codes in selections
+    }
+    return sorted(found)

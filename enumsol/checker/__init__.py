@@ -1,0 +1,56 @@
+"""The checkers of proofs, which import nothing of the search.
+
+What a verified proof says
+    For the problem's own A, Bn, Bt, f, gap, slip offset and friction, read as exact numbers (or, where the report says
+    "S and g as computed", for the condensed data), and for alpha as an exact fraction: the listed roots and families
+    solve the problem, and nothing else does. It rests on the energy bound (theory, (5.2)), on branchings that cover
+    (``kernel.rows.children_of``), on the a-priori error bounds of IEEE double arithmetic with rounding to nearest in
+    ``arithmetic.balls``, ``condensation.enclosure`` and ``kernel``, and on rational arithmetic in ``checker.rational``
+    and ``checker.hull``. Linear algebra kernels may sum in any order and fuse multiplications and additions; fast
+    matrix multiplication of Strassen's kind and changed rounding modes are excluded.
+
+What checker and search share
+    ``checker.verify`` and ``checker.graph`` import nothing of the search, neither its trees and relaxations nor its
+    arcs and results, and a test guards that. They are not independent of all that it uses. These serve both, and an
+    error in one of them may write a false proof and accept it:
+
+    - ``kernel.rows``: the codes, the rows and the branchings that cover, on which writer and reader have to agree;
+    - ``condensation.enclosure`` and ``arithmetic.balls``: balls for S, g and F, and the proofs that A and S are
+      positive definite;
+    - ``kernel.point`` and ``kernel.interval``: the exclusion inequality, the verified solve of a selection and the
+      contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled copy of
+      the inequality at one alpha);
+    - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes; of
+      ``arithmetic.rationals`` the pivots of a definite matrix, and floats as rationals;
+    - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file;
+    - ``problem``, ``condensation.data``, ``condensation.condensed``, ``condensation.factorization``, ``sealed``,
+      ``checks``, ``array_checks`` and ``errors``: the data, their checks and their fingerprint, the factorization of A
+      (no bound assumes that it is accurate), S and g as computed;
+    - numpy, scipy and python-flint.
+
+    They are shared because the two must agree. A leaf is written when its inequality is proven positive, and a second
+    set of bounds, right but not the same, would refuse true proofs near a degeneracy; whether a number is zero has to
+    be decided alike. What is shared knows nothing of a search, and the tests hold it against rational arithmetic that
+    uses none of it. The checker's own are what a search gets wrong: the strict reading of the file, that the leaves
+    cover all selections and the pieces the interval, which leaf proves what, the counts, the joining of root sets, and
+    for degenerate leaves the condensation and the root sets in rationals.
+
+What counts as one root
+    A root at which every condition holds strictly solves one selection only, and so two such roots of two leaves are
+    two. Roots on the border of several selections are decided in rationals and joined where they meet, as are the
+    polytopes of a family; none of them can meet a strict root.
+
+Cross-checks
+    They use nothing of the proof and are printed with the result. The indices of all roots and families add up to +1,
+    the degree of the problem without friction: ``RootSet.index_sum``. Where all roots are regular, their number is odd.
+
+    - Complete and +1: what has to be.
+    - None and not whole: the sum is not known. What was left undecided, or was not reached, holds roots whose indices
+      make up what those found lack of +1; a lack of nothing says nothing, since roots may be missing in pairs.
+    - None otherwise: the index of a degenerate root or family could not be found within the limits of the local
+      analysis (very many selections hold there). The count of roots does not depend on it.
+    - Complete, and another sum or an even number of regular roots: a contradiction. Either the program or the machine
+      is wrong; please report it with the problem and the proof.
+
+How far the data may change before the list of roots does: ``checker.stability.stability_radius``.
+"""

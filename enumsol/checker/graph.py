@@ -1,0 +1,324 @@
+"""Checker of a branch graph's search: every solution in the interval lies in one of the selections handed on.
+
+Records (see enumsol.proof.proof_file for the file and the reader): a header ``{"format": "enumsol-proof",
+"version": 1, "kind": "graph", "problem": <fingerprint>, "interval": [a, b], "p": p, "data": "problem" | "condensed"}``;
+for every piece ``{"piece": [a, b], "force", "length", "roots"}``, then its leaves ``["x", codes, rows, multipliers]``
+(no solution anywhere in the piece), ``["s", codes]`` (a selection handed on) and ``["c", codes]`` (left to both halves
+of the piece); at the end ``{"pieces", "leaves", "selections"}``. Codes are strings of p digits; ends of pieces are
+fractions ``"a/b"`` in decimal digits.
+
+What is checked: pieces partition the interval (it is cut first where g vanishes, see ``unloaded``), with the subtrees
+left by a piece searched in both its halves; the leaves of every piece cover all selections of its roots; every
+exclusion is proven at both ends of the piece. What is not: that the arcs of the selections handed on are all there.
+They follow from these selections by exact algebra, and the balance of degrees checks them (theory, section 7.7).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
+from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.condensation.unloaded import vanishing_alpha
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.kernel.interval import (
+    KINDS,
+    EnclosedPiece,
+    as_computed,
+    interval_exclusion_margins,
+)
+from enumsol.kernel.rows import CONTACT, SLIP_MINUS, STICK, UNDECIDED, children_of
+from enumsol.proof.reading import (
+    RefusedError,
+    codes_from,
+    data_of,
+    friction_at,
+    multipliers_from,
+    rational_from,
+    shown,
+    units_from,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from fractions import Fraction
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.data import Data
+    from enumsol.problem import ContactProblem
+
+    Array = NDArray[np.float64]
+    Codes = NDArray[np.uint8]
+
+#: Leaves read and checked together.
+_BATCH = 256
+#: Leaves of a piece after which they are first looked at for repetitions; then whenever they have doubled.
+_LOOK = 1024
+#: Entries of a leaf's record, by its kind.
+_ENTRIES = {"x": 4, "s": 2, "c": 2}
+_END = object()
+
+
+@dataclass
+class _Piece:
+    """A piece whose leaves are being read."""
+
+    a: Fraction
+    b: Fraction
+    force: Array
+    length: Array
+    roots: Codes
+    #: of every leaf its kind, and its p codes as bytes
+    kinds: bytearray = field(default_factory=bytearray)
+    codes: bytearray = field(default_factory=bytearray)
+    look: int = _LOOK
+    #: made when there is something to exclude
+    enclosed: EnclosedPiece | None = None
+
+    def leaves(self, *kinds: str) -> Codes:
+        """Codes of the leaves of these kinds, shape (k, p); all without a kind."""
+        codes = np.frombuffer(bytes(self.codes), dtype=np.uint8).reshape(-1, self.roots.shape[1])
+        of_kind = np.isin(np.frombuffer(bytes(self.kinds), dtype=np.uint8), [ord(kind) for kind in kinds])
+        return codes[of_kind] if kinds else codes
+
+
+class GraphChecker:
+    """Checks the records of a graph's proof.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    header : the proof's first record
+    progress : callable, optional
+        Called with the number of leaves checked after every piece.
+    """
+
+    def __init__(
+        self, problem: ContactProblem, header: dict[str, Any], progress: Callable[[int], object] | None
+    ) -> None:
+        self.problem, self.header, self.progress = problem, header, progress
+        self.failures: list[str] = []
+        self.pieces = self.leaves = 0
+        self.selections: set[bytes] = set()
+        self.interval: tuple[Fraction, Fraction] | None = None
+        self.data: Data = "problem"
+        self._friction: list[bool] = []
+        self._zero: Fraction | None = None
+
+    def run(self, records: Iterator[Any]) -> GraphVerificationReport:
+        """Check all records after the header."""
+        try:
+            self._check(self._read_header(), records)
+        except RefusedError as refusal:
+            self.failures.append(str(refusal))
+        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
+            self.failures.append(f"the problem's data cannot be enclosed: {error}")
+        failures = tuple(self.failures)
+        selections = frozenset() if failures else frozenset(map(tuple, self.selections))
+        return GraphVerificationReport(
+            not failures, failures, self.interval, self.pieces, self.leaves, selections, self.data
+        )
+
+    def _check(self, interval: tuple[Fraction, Fraction], records: Iterator[Any]) -> None:
+        a, b = interval
+        self._zero = vanishing_alpha(self.problem, self.data)
+        ends = [a, self._zero, b] if self._zero is not None and a < self._zero < b else [a, b]
+        everything = np.full((1, self.problem.p), UNDECIDED, dtype=np.uint8)
+        # pieces in the order in which they are searched, the next one last: halves come directly after what was cut
+        waiting = [(x, y, everything) for x, y in pairwise(ends)][::-1]
+        record = next(records, _END)
+        while waiting:
+            x, y, roots = waiting.pop()
+            cut, record = self._piece(record, records, (x, y, roots))
+            if len(cut):
+                waiting += [((x + y) / 2, y, cut), (x, (x + y) / 2, cut)]
+        claim = {"pieces": self.pieces, "leaves": self.leaves, "selections": len(self.selections)}
+        if record != claim:
+            found = "missing" if record is _END else shown(record)
+            self._fail(f"the counts at the end are {found}; the pieces give {claim!r}")
+        if next(records, _END) is not _END:
+            self._fail("records follow after the end of the proof")
+
+    @cached_property
+    def enclosure(self) -> CondensedEnclosure:
+        """Balls for what is certified; only exclusions ask for it."""
+        return as_computed(self.problem) if self.data == "condensed" else CondensedEnclosure.from_problem(self.problem)
+
+    def _read_header(self) -> tuple[Fraction, Fraction]:
+        self.data = data_of(self.header, self.problem, "graph")
+        try:
+            a, b = _interval_from(self.header.get("interval"))
+            ends = [friction_at(self.problem, end) for end in (a, b)]
+        except ValueError as error:
+            raise RefusedError(f"the header cannot be read: {error}") from None
+        self.interval = (a, b)
+        self._friction = [max(pair) > 0 for pair in zip(*ends, strict=True)]
+        return a, b
+
+    def _fail(self, message: str) -> None:
+        self.failures.append(message)
+        if len(self.failures) == MAX_FAILURES:
+            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
+
+    # -- pieces ----------------------------------------------------------------------------------------------------
+
+    def _piece(self, record: Any, records: Iterator[Any], due: tuple[Fraction, Fraction, Codes]) -> tuple[Codes, Any]:
+        """Check the piece that begins with this record; gives what it leaves to its halves, and the record after it."""
+        number = self.pieces + 1
+        try:
+            piece = self._begin(record)
+        except ValueError as error:
+            raise RefusedError(f"piece {number} is missing or cannot be read: {error}") from None
+        if (piece.a, piece.b) != due[:2] or not np.array_equal(_sorted(piece.roots), _sorted(due[2])):
+            raise RefusedError(f"piece {number} is not the one that is due: the interval is not covered")
+        self.pieces = number
+        record = next(records, _END)
+        while isinstance(record, list):
+            batch: list[list[Any]] = []
+            while isinstance(record, list) and len(batch) < _BATCH:
+                batch.append(record)
+                record = next(records, _END)
+            try:
+                self._read_leaves(piece, batch)
+            except ValueError as error:
+                raise RefusedError(f"a leaf of piece {number} cannot be read: {error}") from None
+        _check_repetitions(piece)
+        handed = piece.leaves("s")
+        if np.any(handed >= CONTACT):
+            self._fail(f"piece {number}: a selection handed on is not complete")
+        if not covers(piece.roots, piece.leaves(), self._friction):
+            self._fail(f"piece {number}: its leaves do not cover all selections")
+        self.selections.update(row.tobytes() for row in handed)
+        if self.progress is not None:
+            self.progress(self.leaves)
+        return piece.leaves("c"), record
+
+    def _begin(self, record: Any) -> _Piece:
+        if not isinstance(record, dict):
+            raise ValueError("no piece begins here")  # noqa: TRY004 (as in reading)
+        a, b = _interval_from(record.get("piece"))
+        units = units_from(record, self.problem.p)
+        return _Piece(a, b, *units, codes_from(record.get("roots"), self.problem.p))
+
+    def _read_leaves(self, piece: _Piece, batch: list[list[Any]]) -> None:
+        """Take note of some leaves, and check the dual inequalities of those that are said to be empty."""
+        for record in batch:
+            kind = record[0] if record else None
+            if not isinstance(kind, str) or kind not in _ENTRIES:
+                raise ValueError(f"unknown kind of record {shown(kind)}")
+            if len(record) != _ENTRIES[kind]:
+                raise ValueError(f"a record of kind {kind!r} has {len(record)} entries; expected {_ENTRIES[kind]}")
+        codes = codes_from([record[1] for record in batch], self.problem.p)
+        piece.codes += codes.tobytes()
+        piece.kinds += "".join(record[0] for record in batch).encode()
+        if len(piece.kinds) >= piece.look:
+            _check_repetitions(piece)
+            piece.look = 2 * len(piece.kinds)
+        empty = [k for k, record in enumerate(batch) if record[0] == "x"]
+        if empty:
+            texts = (batch[k][2:] for k in empty)
+            pairs = [multipliers_from(text, KINDS * self.problem.p) for text in texts]
+            self._exclusions(self._enclosed(piece), codes[empty].astype(np.intp), pairs)
+
+    def _exclusions(
+        self, enclosed: EnclosedPiece, codes: NDArray[np.intp], pairs: list[tuple[NDArray[np.intp], Array]]
+    ) -> None:
+        rows, values = zip(*pairs, strict=True)
+        leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
+        margins = interval_exclusion_margins(enclosed, codes, leaf, np.concatenate(rows), np.concatenate(values))
+        for number in np.flatnonzero(~(margins > 0)):
+            # alone it is added up in another order, that of the search: for a nearly singular S that may decide
+            alone = codes[number : number + 1], np.zeros(len(rows[number]), dtype=np.intp)
+            if not interval_exclusion_margins(enclosed, *alone, rows[number], values[number])[0] > 0:
+                self._fail(f"leaf {self.leaves + number + 1}: its multipliers do not exclude it")
+        self.leaves += len(rows)
+
+    def _enclosed(self, piece: _Piece) -> EnclosedPiece:
+        """The data at both ends of the piece, with S proven positive definite."""
+        if piece.enclosed is None:
+            origin = self._zero if self._zero in (piece.a, piece.b) else None
+            piece.enclosed = EnclosedPiece.from_enclosure(
+                self.enclosure, piece.a, piece.b, piece.force, piece.length, origin
+            )
+            if not all(end.smallest_eigenvalue > 0 for end in piece.enclosed.ends):
+                raise RefusedError("S is not proven positive definite")
+        return piece.enclosed
+
+
+def _interval_from(ends: Any) -> tuple[Fraction, Fraction]:
+    if not isinstance(ends, list) or len(ends) != 2:
+        raise ValueError(f"{shown(ends)} is no interval")
+    a, b = (rational_from(end) for end in ends)
+    if not a < b:
+        raise ValueError("an interval is empty")
+    return a, b
+
+
+def _check_repetitions(piece: _Piece) -> None:
+    """Refuse a piece that gives a leaf twice: the leaves of a tree are different, and so bounded in number."""
+    leaves = piece.leaves()
+    if len(np.unique(leaves, axis=0)) < len(leaves):
+        raise RefusedError("a piece has a leaf twice")
+
+
+def _sorted(codes: Codes) -> Codes:
+    return codes[np.lexsort(codes.T)]
+
+
+def covers(roots: Codes, leaves: Codes, friction: Sequence[bool]) -> bool:
+    """Whether the leaves that refine one of the roots together cover every selection in the roots.
+
+    Both are sets of partial assignments, (k, p) arrays of codes. They come from trees, so that in every cell that holds
+    some of them there is a node at which all of them refine it; splitting there gives smaller cells. A list that is no
+    tree is refused even if it covers.
+    """
+    cell = np.full(len(friction), UNDECIDED, dtype=np.uint8)
+    # a cell, the roots in it (None: the whole cell is to be covered), and the leaves in it
+    cells: list[tuple[Codes, Codes | None, Codes]] = [(cell, np.unique(roots, axis=0), np.unique(leaves, axis=0))]
+    while cells:
+        cell, targets, found = cells.pop()
+        if targets is not None and len(targets) == 1:
+            cell, found, targets = targets[0], found[_within(found, targets[0])], None
+        elif targets is not None and np.any(np.all(targets == cell, axis=1)):
+            targets = None
+        if targets is None and np.any(np.all(found == cell, axis=1)):
+            continue
+        node = _split(cell, found if targets is None else targets, friction)
+        if node is None:
+            return False
+        for child in children_of(int(cell[node]), friction=friction[node]):
+            smaller = cell.copy()
+            smaller[node] = child
+            part = found[_refines(found[:, node], child)]
+            inside = None if targets is None else targets[_refines(targets[:, node], child)]
+            if inside is None or len(inside):
+                cells.append((smaller, inside, part))
+    return True
+
+
+def _split(cell: Codes, refinements: Codes, friction: Sequence[bool]) -> int | None:
+    """A node of the cell with alternatives at which all of its refinements are finer than the cell itself."""
+    if not len(refinements):
+        return None
+    for node in np.flatnonzero(np.all(refinements != cell, axis=0)).tolist():
+        if children_of(int(cell[node]), friction=friction[node]):
+            return int(node)
+    return None
+
+
+def _within(leaves: Codes, root: Codes) -> NDArray[np.bool_]:
+    """Which assignments are ``root`` or refine it."""
+    held = (root == CONTACT) & (leaves >= STICK) & (leaves <= SLIP_MINUS)
+    return np.asarray(np.all((leaves == root) | (root == UNDECIDED) | held, axis=1))
+
+
+def _refines(codes: Codes, child: int) -> NDArray[np.bool_]:
+    """Which codes of a node are ``child`` or refine it, where none is coarser."""
+    held = (codes >= STICK) & (codes <= SLIP_MINUS) & (child == CONTACT)
+    return np.asarray((codes == child) | held)

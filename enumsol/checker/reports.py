@@ -1,0 +1,121 @@
+"""What the checkers report: what a proof was found to show, or why it was refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from enumsol.proof.reading import shown_alpha
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+#: Failures after which a checker reads no further.
+MAX_FAILURES = 20
+
+
+@dataclass(frozen=True)
+class VerificationReport:
+    """What the checker found.
+
+    Attributes
+    ----------
+    ok : bool
+        Every leaf was checked and the counts agree; with ``undecided`` 0 the list of roots is proven complete.
+    failures : tuple of str
+        Why the proof was refused. The check ends where the records cease to make sense, and after MAX_FAILURES.
+    roots, families, undecided, leaves : int
+        Counts that were checked: isolated roots, families, undecided leaves, all leaves. Of a refused proof they only
+        tell how far the check went.
+    data : str
+        "problem": the theorem holds for the problem's own matrices; "condensed": for S, g and F as computed.
+    alpha : Fraction or None
+        The parameter that the proof is about; None when its header cannot be read.
+    """
+
+    ok: bool
+    failures: tuple[str, ...]
+    roots: int
+    families: int
+    undecided: int
+    leaves: int
+    data: str
+    alpha: Fraction | None
+
+    @property
+    def complete(self) -> bool:
+        """The proof shows that nothing but the listed roots and families solves the problem."""
+        return self.ok and self.undecided == 0
+
+    def __repr__(self) -> str:
+        where = "" if self.alpha is None else f" at alpha = {shown_alpha(self.alpha)}"
+        if not self.ok:
+            return _refusal(where, self.failures, _count(self.leaves, "leaf", "leaves"))
+        return "\n".join(
+            (
+                f"proof: verified{where}",
+                f"  {_count(self.leaves, 'leaf covers', 'leaves cover')} all selections, {self.undecided} of them "
+                "undecided",
+                f"  {_count(self.roots, 'isolated root')}, {_count(self.families, 'family', 'families')}",
+                f"  certified data: {_DATA[self.data]}",
+                f"  complete: {'yes' if self.complete else 'no'}",
+            )
+        )
+
+
+@dataclass(frozen=True)
+class GraphVerificationReport:
+    """What the checker found about a branch graph's search.
+
+    Attributes
+    ----------
+    ok : bool
+        Every solution for every alpha in the interval lies in one of ``selections``.
+    failures : tuple of str
+        Why the proof was refused. The check ends where the records cease to make sense, and after MAX_FAILURES.
+    interval : (Fraction, Fraction) or None
+    pieces, leaves : int
+        Of a refused proof they only tell how far the check went; so do the selections.
+    selections : frozenset of tuples of status codes
+    data : str
+        "problem": about the problem's own matrices; "condensed": about S and g as computed.
+    """
+
+    ok: bool
+    failures: tuple[str, ...]
+    interval: tuple[Fraction, Fraction] | None
+    pieces: int
+    leaves: int
+    selections: frozenset[tuple[int, ...]]
+    data: str
+
+    @property
+    def complete(self) -> bool:
+        """Same as ok: a search that was cut short has no proof."""
+        return self.ok
+
+    def __repr__(self) -> str:
+        ends = () if self.interval is None else tuple(float(end) for end in self.interval)
+        where = f" for alpha in [{ends[0]:g}, {ends[1]:g}]" if ends else ""
+        found = f"{_count(self.leaves, 'leaf', 'leaves')} in {_count(self.pieces, 'piece')}"
+        if not self.ok:
+            return _refusal(where, self.failures, found)
+        return "\n".join(
+            (
+                f"proof: verified{where}",
+                f"  {found}; every solution lies in one of {_count(len(self.selections), 'selection')}",
+                f"  certified data: {_DATA[self.data]}",
+            )
+        )
+
+
+_DATA = {"problem": "A, Bn, Bt, f as given", "condensed": "S and g as computed"}
+
+
+def _refusal(where: str, failures: tuple[str, ...], read: str) -> str:
+    lines = [f"proof: REFUSED{where}", *(f"  failure: {failure}" for failure in failures)]
+    return "\n".join([*lines, f"  checked until then: {read}, which show nothing", "  complete: no"])
+
+
+def _count(number: int, singular: str, plural: str | None = None) -> str:
+    return f"{number} {singular if number == 1 else plural or singular + 's'}"

@@ -1,0 +1,192 @@
+"""How far the data may change before the proven list of roots may: the proof evaluated on wider balls.
+
+A certificate that holds for a ball of data holds for all data in it. So the multipliers and selections of a proof are
+checked again with the balls of S, g and F widened, and the widening is enlarged as long as every leaf passes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE
+from enumsol.checker.verify import Checker, verify
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
+from enumsol.kernel.point import exclusion_margins, solve_selection
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from enumsol.problem import ContactProblem
+    from enumsol.proof.proof_file import Proof
+
+#: Largest radius that is tried; below 1 a positive friction coefficient stays positive.
+LARGEST = 0.5
+#: Below this a radius is no better than rounding, and 0 is returned.
+SMALLEST = 2.0**-50
+#: Multipliers are stretched or shrunk by at most this.
+_STRETCH = 1e9
+#: The radius is found to within this factor.
+_RATIO = 1.05
+
+
+def stability_radius(problem: ContactProblem, proof: Proof) -> float:
+    """A radius within which the condensed data may change and the roots stay the same in number, status and index.
+
+    For every symmetric S', every g' and F' with, componentwise,
+
+        |S'_ij - S_ij| <= r sqrt(S_ii S_jj)
+        |g'_i - g_i|   <= r sqrt(S_ii) max_j |g_j| / sqrt(S_jj)
+        |F'_i - F_i|   <= r F_i
+
+    the problem has as many roots as the proof lists, all of them regular, in the same selections and with the same
+    indices, and no families. (For the units: sqrt(S_ii S_jj) bounds |S_ij|, and a displacement is measured by the root
+    of its own compliance.) A change of load, gap, slip offset, friction or alpha is such a change of g and F. The
+    largest radius is larger: only the multipliers of this proof are tried. It costs some checks of the proof.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    proof : Proof
+
+    Returns
+    -------
+    float
+        r, found to within 5 per cent; at most LARGEST. 0 when the proof does not verify or leaves selections undecided,
+        when a root is degenerate or part of a family, and when the margins are no larger than rounding.
+
+    Raises
+    ------
+    ProofFormatError
+        The file is damaged or of another version.
+    """
+    if not verify(problem, proof).complete:
+        return 0.0
+    search = _WidenedChecker(problem, None, radius=LARGEST, adjust=True)
+    search.run(proof)
+    radius = search.radius
+    # what was found leaf by leaf is proven for all leaves at once
+    while radius >= SMALLEST:
+        check = _WidenedChecker(problem, None, radius=radius, adjust=False)
+        if check.run(proof).complete and not check.polytopes:
+            return radius
+        radius *= 0.5
+    return 0.0
+
+
+@dataclass
+class _WidenedChecker(Checker):
+    """A checker whose balls are wider; ``adjust`` lowers the radius to what every leaf bears."""
+
+    radius: float = LARGEST
+    adjust: bool = False
+    _systems: dict[float, EnclosedSystem | None] = field(default_factory=dict)
+
+    @cached_property
+    def _sizes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Upper bounds of what changes of S and g are measured by."""
+        system = self.system
+        root = np.sqrt(np.diagonal(system.S) + np.diagonal(system.S_rad)) * SAFE
+        lower = np.sqrt(np.diagonal(system.S) - np.diagonal(system.S_rad)) / SAFE
+        largest = np.max((np.abs(system.g) + system.g_rad) / lower) * SAFE
+        return np.outer(root, root) * SAFE, root * largest * SAFE
+
+    def _widened(self, radius: float) -> EnclosedSystem | None:
+        """The balls of this radius; None when S is not positive definite in all of them."""
+        if radius not in self._systems:
+            self._systems.clear()
+            system = self.system
+            S_size, g_size = self._sizes
+            wide = EnclosedSystem(
+                system.S,
+                (system.S_rad + radius * S_size) * SAFE,
+                system.g,
+                (system.g_rad + radius * g_size) * SAFE,
+                system.F,
+                (system.F_rad + radius * (system.F + system.F_rad)) * SAFE,
+            )
+            # the midpoint is the same
+            wide.__dict__["inverse"] = system.inverse
+            try:
+                self._systems[radius] = wide if wide.smallest_eigenvalue > 0 else None
+            except NotEnclosedError:
+                self._systems[radius] = None
+        return self._systems[radius]
+
+    def _passes(self, holds: Callable[[EnclosedSystem], bool]) -> bool:
+        """Whether a leaf holds at the radius, which is lowered until it does if that is allowed."""
+
+        def at(radius: float) -> bool:
+            wide = self._widened(radius)
+            return wide is not None and holds(wide)
+
+        if self.radius >= SMALLEST and at(self.radius):
+            return True
+        if not self.adjust:
+            return False
+        good, bad = self.radius, self.radius
+        while good >= SMALLEST and not at(good):
+            bad, good = good, good / 4
+        while good >= SMALLEST and bad / good > _RATIO:
+            middle = float(np.sqrt(good * bad))
+            good, bad = (middle, bad) if at(middle) else (good, middle)
+        self.radius = good if good >= SMALLEST else 0.0
+        return self.radius > 0
+
+    def _exclusions(self) -> None:
+        if not self._waiting:
+            return
+        numbers, codes, rows, values = zip(*self._waiting, strict=True)
+        self._waiting.clear()
+        leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
+        arrays = (np.array(codes, dtype=np.intp), leaf, np.concatenate(rows))
+        given = np.concatenate(values)
+        sturdy = given * _sturdiest(self.system, *arrays, given)[leaf]
+
+        def excluded(system: EnclosedSystem) -> bool:
+            bounds = [exclusion_margins(system, *arrays, multipliers) for multipliers in (given, sturdy)]
+            return bool(np.all(np.maximum(*bounds) > 0))
+
+        if not self._passes(excluded):
+            self.fail(f"leaves {numbers[0]} to {numbers[-1]}: the multipliers do not exclude them")
+
+    def _solved(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        self.regular += record[0] == "r"
+
+        def holds(system: EnclosedSystem) -> bool:
+            ball = solve_selection(system, codes)
+            return ball is not None and (ball.is_root if record[0] == "r" else ball.is_excluded)
+
+        return None if self._passes(holds) else "it does not hold for all data"
+
+    def _rational_exclusion(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        self.radius = 0.0
+        return "it was proven for the given data alone"
+
+    def _rational_selection(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        self.radius = 0.0
+        return "it was proven for the given data alone"
+
+
+def _sturdiest(
+    system: EnclosedSystem,
+    codes: NDArray[np.intp],
+    leaf: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    values: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Positive factors of the leaves' multipliers that make their bounds large against their errors.
+
+    With multipliers stretched by t the bound is -a + b t - c t^2, known from three points, and its error grows like
+    t^2: their quotient is largest at t = 2 a / b. The multipliers of infeasible leaves may be far from that.
+    """
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        zero, one, two = (exclusion_margins(system, codes, leaf, rows, t * values) for t in (0.0, 1.0, 2.0))
+        slope = one - zero - 0.5 * (two - 2 * one + zero)
+        best = -2 * zero / slope
+    return np.where((slope > 0) & np.isfinite(best), np.clip(best, 1 / _STRETCH, _STRETCH), 1.0)

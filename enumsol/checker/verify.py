@@ -1,0 +1,370 @@
+"""The checker of root sets: whether a proof shows that its list of roots is complete.
+
+It imports nothing of the search; what both rest on is said in ``enumsol.checker``. It recomputes S, g and F (or
+their enclosures) from the problem, proves S positive definite, walks the tree from its root, so that the leaves cover
+all selections by construction, and checks every leaf.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE
+from enumsol.checker.graph import GraphChecker
+from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport, VerificationReport
+from enumsol.checks import optional_callable
+from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
+from enumsol.kernel.rows import FRICTIONLESS, UNDECIDED, children_of, row_signs
+from enumsol.problem import ContactProblem
+from enumsol.proof.proof_file import Proof, fraction_text
+from enumsol.proof.reading import (
+    RefusedError,
+    data_of,
+    friction_at,
+    multipliers_from,
+    numbers_from,
+    rational_from,
+    shown,
+    units_from,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from enumsol.checker.rational import RationalSystem
+    from enumsol.condensation.data import Data
+
+    #: codes of a selection, the vertices of its root set, and its dimension
+    Polytope = tuple[tuple[int, ...], list[Any], int]
+
+_REPORT_EVERY = 256
+#: Exclusion leaves checked together.
+_BATCH = 256
+#: Entries of a leaf's record, by its kind.
+_ENTRIES = {"x": 3, "X": 3, "n": 1, "r": 4, "N": 1, "D": 3, "z": 1, "u": 2}
+#: Covers underflow of one product.
+_SUBNORMAL = 2.0**-1070
+_END = object()
+
+
+def verify(
+    problem: ContactProblem, proof: Proof, progress: Callable[[int], object] | None = None
+) -> VerificationReport | GraphVerificationReport:
+    """Check a proof, of a root set or of a branch graph's search, against a problem.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    proof : Proof
+    progress : callable, optional
+        Called now and then with the number of leaves checked.
+
+    Returns
+    -------
+    VerificationReport or GraphVerificationReport
+
+    Raises
+    ------
+    ProofFormatError
+        The file is damaged (its checksum does not agree), of another version, or holds no sequence of records. Records
+        that make no sense, or prove nothing, are a reason to refuse the proof: the report says so.
+    InvalidArgumentError
+        An argument is of another type.
+    """
+    for name, value, kind in (("problem", problem, ContactProblem), ("proof", proof, Proof)):
+        if not isinstance(value, kind):
+            raise InvalidArgumentError(f"{name} is a {type(value).__name__}; expected a {kind.__name__}")
+    optional_callable(progress, "progress")
+    proof.check_integrity()
+    records = proof.records()
+    header = next(records, None)
+    if isinstance(header, dict) and header.get("kind") == "graph":
+        return GraphChecker(problem, header, progress).run(records)
+    return Checker(problem, progress).run(proof)
+
+
+@dataclass
+class Checker:
+    """Checks one proof: its header, then the tree alone, then every leaf.
+
+    Whatever does not fit together is found before anything is computed, which may take long.
+    """
+
+    problem: ContactProblem
+    progress: Callable[[int], object] | None
+    alpha: Fraction = field(init=False)
+    failures: list[str] = field(default_factory=list)
+    regular: int = 0
+    undecided: int = 0
+    leaves: int = 0
+    polytopes: list[Polytope] = field(default_factory=list)
+    data: Data = "problem"
+    _waiting: list[tuple[int, tuple[int, ...], Any, Any]] = field(default_factory=list)
+
+    def run(self, proof: Proof) -> VerificationReport:
+        """Check all records.
+
+        Raises
+        ------
+        ProofFormatError
+            The content is not a sequence of records.
+        """
+        families = isolated = 0
+        try:
+            records = proof.records()
+            self._read_header(next(records, None))
+            footer = self._survey(records)
+            records = proof.records()
+            next(records, None)
+            self._walk(records)
+            isolated, families = self._count()
+            claim = {
+                "roots": self.regular + isolated,
+                "families": families,
+                "undecided": self.undecided,
+                "leaves": self.leaves,
+            }
+            if footer != claim:
+                self.fail(f"the counts at the end are {shown(footer)}; the leaves give {claim}")
+        except RefusedError as refusal:
+            self.failures.append(str(refusal))
+        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
+            self.failures.append(f"the problem's data cannot be enclosed: {error}")
+        return VerificationReport(
+            not self.failures,
+            tuple(self.failures),
+            self.regular + isolated,
+            families,
+            self.undecided,
+            self.leaves,
+            self.data,
+            getattr(self, "alpha", None),
+        )
+
+    # -- header and tree -------------------------------------------------------------------------------------------
+
+    def _read_header(self, header: Any) -> None:
+        self.data = data_of(header, self.problem, None)
+        try:
+            self.force, self.length = units_from(header, self.problem.p)
+            self.alpha = rational_from(header.get("alpha"))
+            self.friction = [F > 0 for F in friction_at(self.problem, self.alpha)]
+        except ValueError as error:
+            raise RefusedError(f"the header cannot be read: {error}") from None
+
+    @cached_property
+    def system(self) -> EnclosedSystem:
+        """Balls for S, g and F in the proof's units."""
+        if self.data == "condensed":
+            scaled = self.problem.condensed.at(self.alpha)
+            zero = np.zeros_like
+            with np.errstate(over="ignore", invalid="ignore"):
+                pair = self.force[:, None] / self.length[None, :]
+                S, g = scaled.S * pair, scaled.g / self.length
+            finite = np.all(np.isfinite(S)) and np.all(np.isfinite(g))
+            if not finite or np.any(np.array(self.friction) & (scaled.F == 0)):
+                raise RefusedError("S, g or F over- or underflow in the proof's units")
+            enclosed = EnclosedSystem(S, zero(S), g, zero(g), scaled.F, 4 * np.spacing(scaled.F))
+        else:
+            enclosed = CondensedEnclosure.from_problem(self.problem).at(self.alpha, self.force, self.length)
+        if not enclosed.smallest_eigenvalue > 0:
+            raise RefusedError("S is not proven positive definite")
+        return enclosed
+
+    @cached_property
+    def rational(self) -> RationalSystem:
+        """The condensed problem in rationals; only leaves that need it ask for it."""
+        if self.data == "condensed":
+            raise RefusedError("a rational leaf in a proof about S and g as computed")
+        from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
+
+        return RationalSystem(self.problem, self.alpha)
+
+    def _leaves(self, records: Iterator[Any]) -> Iterator[tuple[tuple[int, ...], list[Any]]]:
+        """The tree's leaves with the assignments that they stand for, which together cover all selections."""
+        stack: list[tuple[int, ...]] = [(UNDECIDED,) * self.problem.p]
+        while stack:
+            codes = stack.pop()
+            record = next(records, _END)
+            if not isinstance(record, list) or not record:
+                raise RefusedError(f"{len(stack) + 1} subtrees are not accounted for: the tree breaks off")
+            if record[0] == "b":
+                stack.extend(reversed(self._children(codes, record)))
+            else:
+                yield codes, record
+
+    def _survey(self, records: Iterator[Any]) -> Any:
+        """Walk the tree without a look at its leaves; gives the counts at the end."""
+        leaves = sum(1 for _ in self._leaves(records))
+        footer = next(records, _END)
+        if not isinstance(footer, dict) or footer.get("leaves") != leaves:
+            found = "missing" if footer is _END else shown(footer)
+            raise RefusedError(f"the counts at the end are {found}; the tree has {leaves} leaves")
+        if next(records, _END) is not _END:
+            raise RefusedError("records follow after the end of the proof")
+        return footer
+
+    def _walk(self, records: Iterator[Any]) -> None:
+        for codes, record in self._leaves(records):
+            self.leaves += 1
+            try:
+                problem = self._leaf(codes, record)
+            except ValueError as error:
+                problem = f"its record cannot be followed ({error})"
+            if problem is not None:
+                self.fail(f"leaf {self.leaves}: {problem}")
+            if len(self._waiting) >= _BATCH:
+                self._exclusions()
+            if self.progress is not None and self.leaves % _REPORT_EVERY == 0:
+                self.progress(self.leaves)
+        self._exclusions()
+
+    def _exclusions(self) -> None:
+        """Check the dual inequalities of the waiting leaves together."""
+        if not self._waiting:
+            return
+        numbers, codes, rows, values = zip(*self._waiting, strict=True)
+        self._waiting.clear()
+        leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
+        margins = exclusion_margins(
+            self.system, np.array(codes, dtype=np.intp), leaf, np.concatenate(rows), np.concatenate(values)
+        )
+        for number in np.array(numbers)[~(margins > 0)]:
+            self.fail(f"leaf {number}: its multipliers do not exclude it")
+
+    def _children(self, codes: tuple[int, ...], record: list[Any]) -> list[tuple[int, ...]]:
+        _, node, children = record if len(record) == 3 else (None, None, None)
+        if type(node) is int and 0 <= node < self.problem.p and isinstance(children, list):
+            expected = children_of(codes[node], friction=self.friction[node])
+            if expected and all(type(code) is int for code in children) and sorted(children) == sorted(expected):
+                return [(*codes[:node], code, *codes[node + 1 :]) for code in children]
+        raise RefusedError(f"a branching {shown(record)} does not cover the assignment that it splits")
+
+    def fail(self, message: str) -> None:
+        """Take note of a failure.
+
+        Raises
+        ------
+        RefusedError
+            There have been MAX_FAILURES: whoever wrote this may have written any number of such leaves.
+        """
+        self.failures.append(message)
+        if len(self.failures) == MAX_FAILURES:
+            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
+
+    # -- leaves ----------------------------------------------------------------------------------------------------
+
+    def _leaf(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        """Check one leaf; the reason when it proves nothing."""
+        kind = record[0]
+        if not isinstance(kind, str) or kind not in _ENTRIES:
+            return f"unknown kind of record {shown(kind)}"
+        if len(record) != _ENTRIES[kind]:
+            return f"its record has {len(record)} entries; expected {_ENTRIES[kind]}"
+        if kind == "x":
+            self._waiting.append((self.leaves, codes, *multipliers_from(record[1:], 7 * self.problem.p)))
+            return None
+        if kind == "X":
+            return self._rational_exclusion(codes, record)
+        if kind == "u":
+            self.undecided += 1
+            return None if isinstance(record[1], str) else "its reason is no text"
+        if kind == "z":
+            unloaded = all(c == UNDECIDED for c in codes) and self.problem.is_unloaded(self.alpha)
+            # g = 0: the energy bound reads lambda' S lambda <= 0
+            self.polytopes.append(((0,) * self.problem.p, [tuple([Fraction(0)] * (2 * self.problem.p))], 0))
+            return None if unloaded else "the problem is not unloaded"
+        if any(code > FRICTIONLESS for code in codes):
+            return "a root or a solved selection is claimed where statuses are still open"
+        return self._solved(codes, record) if kind in ("n", "r") else self._rational_selection(codes, record)
+
+    def _solved(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        ball = solve_selection(self.system, codes)
+        if record[0] == "n":
+            if holds_no_root(self.system, codes, ball):
+                return None
+            return "its candidate does not break a condition strictly, nor do its equations contradict each other"
+        if ball is None:
+            return "its selection is not proven regular"
+        if not ball.is_root:
+            return "its candidate is not proven to be a root"
+        self.regular += 1
+        _, mid, rad, index = record
+        centre, radius = (numbers_from(values, len(ball.force)) for values in (mid, rad))
+        with np.errstate(over="ignore", invalid="ignore"):
+            reach = np.abs(centre - ball.force * self.force) + ball.force_rad * self.force
+            inside = reach * SAFE + np.where(ball.force_rad > 0, _SUBNORMAL, 0.0) <= radius
+        if not np.all(inside):
+            return "its enclosure does not hold the root"
+        return None if type(index) is int and index == ball.det_sign else "its index is wrong"
+
+    def _rational_exclusion(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        p = self.problem.p
+        rows, values = multipliers_from(record[1:], 7 * p)
+        signs = row_signs(np.array(codes), np.array(self.friction, dtype=float))
+        units = [Fraction(self.length[r % p] if r // p < 4 else self.force[r % p]) for r in range(7 * p)]
+        positive = self.rational.energy_bound_positive(signs, rows.tolist(), values.tolist(), units)
+        return None if positive else "its multipliers do not exclude it in rational arithmetic"
+
+    def _rational_selection(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        from enumsol.checker.hull import hull_of_selections
+
+        if record[0] == "N":
+            return "it holds a root" if hull_of_selections(self.rational, codes).points else None
+        _, points, dimension = record
+        _check_points(points, 2 * self.problem.p)
+        hull = hull_of_selections(self.rational, codes)
+        # in lowest terms a number has one text: there is no need to make numbers of the texts in a file
+        found = [[fraction_text(x.numerator, x.denominator) for x in point] for point in hull.points]
+        if not found or sorted(points) != sorted(found) or type(dimension) is not int or dimension != hull.dimension:
+            return "its roots are not those that are claimed"
+        self.polytopes.append((codes, hull.points, hull.dimension))
+        return None
+
+    # -- counting --------------------------------------------------------------------------------------------------
+
+    def _count(self) -> tuple[int, int]:
+        """Isolated degenerate roots and families: rational solutions joined where they have a point in common.
+
+        A strict root solves no second selection, so it is none of these, and strict roots of two leaves are two.
+        """
+        groups = list(range(len(self.polytopes)))
+
+        def group_of(k: int) -> int:
+            while groups[k] != k:
+                groups[k] = k = groups[groups[k]]
+            return k
+
+        owner: dict[Any, int] = {}
+        for k, (_, points, _) in enumerate(self.polytopes):
+            for point in points:
+                groups[group_of(k)] = group_of(owner.setdefault(point, k))
+        # two points are one or have nothing in common; larger polytopes may meet elsewhere than in their vertices
+        for k in [k for k, polytope in enumerate(self.polytopes) if polytope[2] > 0]:
+            for m in range(len(self.polytopes)):
+                if group_of(k) != group_of(m) and self._meet(k, m):
+                    groups[group_of(k)] = group_of(m)
+        found = {group_of(k) for k in range(len(groups))}
+        families = {group_of(k) for k, polytope in enumerate(self.polytopes) if polytope[2] > 0}
+        return len(found) - len(families), len(families)
+
+    def _meet(self, k: int, m: int) -> bool:
+        """Whether two root sets have a point in common."""
+        from enumsol.checker.hull import hull_of_selections
+
+        return bool(hull_of_selections(self.rational, self.polytopes[k][0], self.polytopes[m][0]).points)
+
+
+def _check_points(points: Any, size: int) -> None:
+    """Raise ValueError unless it is a list of points, each a list of that many texts."""
+    if not isinstance(points, list) or not all(isinstance(point, list) and len(point) == size for point in points):
+        raise ValueError(f"expected points of {size} fractions")
+    if not all(isinstance(x, str) for point in points for x in point):
+        raise ValueError("a coordinate is no text")

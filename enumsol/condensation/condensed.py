@@ -1,0 +1,204 @@
+"""Condensation to the contact nodes: S = B A^{-1} B', g(alpha) and F(alpha) (theory, section 4.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.checks import Alpha, alpha_value
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.sealed import Sealed, sealed
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.checks import AlphaLike
+    from enumsol.condensation.data import ProblemData
+
+#: Units of force and length lie between 2^-900 and 2^900; products and quotients of two of them and proofs need that.
+UNIT_EXPONENT = 900
+#: Squares of friction coefficients, times contact forces, must not overflow.
+LARGEST_FRICTION = 1e100
+#: Right-hand sides solved at once; bounds the dense memory of a condensation to this many vectors of length n.
+RHS_BLOCK = 16
+
+
+@dataclass(frozen=True)
+class CondensedSystem:
+    """The condensed problem at one alpha: w = g - S lambda, with lambda and w stacked as (normal, tangential).
+
+    Attributes
+    ----------
+    S : (2p, 2p) symmetric positive definite compliance [length / force]
+    g : (2p,) free displacements relative to gap and slip offset [length]
+    F : (p,) friction coefficients [-]
+    """
+
+    S: NDArray[np.float64]
+    g: NDArray[np.float64]
+    F: NDArray[np.float64]
+
+    @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+        return len(self.F)
+
+    @cached_property
+    def scaled(self) -> ScaledSystem:
+        """The same problem without units (see ScaledSystem)."""
+        return ScaledSystem.from_system(self)
+
+
+@dataclass(frozen=True)
+class ScaledSystem:
+    """A CondensedSystem without units, on which all tolerances of float arithmetic act.
+
+    Forces are ``lambda = force * lambda_scaled`` and displacements ``w = length * w_scaled``, one factor a node for
+    each, so that friction coefficients are unchanged, the compliance has a diagonal near one, and
+    ``g' S^{-1} g`` lies in [1, 4) unless g = 0. All factors are powers of two: scaling makes no rounding error.
+
+    Attributes
+    ----------
+    S : (2p, 2p) array
+    g : (2p,) array
+    F : (p,) array
+    force, length : (2p,) arrays
+        Factors of forces and displacements.
+    """
+
+    S: NDArray[np.float64]
+    g: NDArray[np.float64]
+    F: NDArray[np.float64]
+    force: NDArray[np.float64]
+    length: NDArray[np.float64]
+    cholesky: NDArray[np.float64] = field(repr=False)
+
+    @classmethod
+    def from_system(cls, system: CondensedSystem) -> ScaledSystem:
+        """Scale a condensed system."""
+        p = system.p
+        diagonal = np.log2(np.diagonal(system.S))
+        node = np.exp2(-np.round(0.25 * (diagonal[:p] + diagonal[p:])))
+        factor = np.concatenate([node, node])
+        S = system.S * factor[:, None] * factor[None, :]
+        g = system.g * factor
+        cholesky = _cholesky(S)
+        largest = float(np.max(np.abs(g)))
+        size = 1.0
+        if largest > 0:
+            # two steps, so that squaring neither overflows nor underflows
+            first = np.exp2(np.floor(np.log2(largest)))
+            energy = float(np.linalg.norm(np.linalg.solve(cholesky, g / first)))
+            size = float(first * np.exp2(np.floor(np.log2(energy))))
+        with np.errstate(over="ignore", divide="ignore"):
+            units = np.concatenate([factor * size, size / factor])
+        if not np.all((units >= 2.0**-UNIT_EXPONENT) & (units <= 2.0**UNIT_EXPONENT)):
+            raise InvalidProblemError(
+                f"the load makes contact forces and displacements of size {np.min(units):.1e} to {np.max(units):.1e}, "
+                f"where float64 over- or underflows; expected data in other units"
+            )
+        if np.max(system.F) > LARGEST_FRICTION:
+            raise InvalidProblemError(
+                f"a friction coefficient is {np.max(system.F):g}, where float64 overflows; expected at most "
+                f"{LARGEST_FRICTION:g}"
+            )
+        return cls(S, g / size, system.F, factor * size, size / factor, cholesky)
+
+    @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+        return len(self.F)
+
+
+def _cholesky(S: NDArray[np.float64]) -> NDArray[np.float64]:
+    try:
+        # a pivot of the size of rounding may be positive by accident: the relaxations factorize 2 S, and would fail
+        np.linalg.cholesky(2.0 * S)
+        return np.asarray(np.linalg.cholesky(S))
+    except np.linalg.LinAlgError as error:
+        raise InvalidProblemError(
+            "the condensed compliance S = B A^-1 B' is not positive definite to working precision; expected contact "
+            "rows [Bn; Bt] that are independent beyond rounding (are two contact nodes almost the same point?)"
+        ) from error
+
+
+@dataclass(frozen=True)
+class CondensedProblem(Sealed):
+    """The problem condensed for all alpha: S, g(alpha) = g0 + alpha g1, F(alpha) = F0 + alpha F1.
+
+    Attributes
+    ----------
+    S : (2p, 2p) array
+        B A^{-1} B' with B stacking Bn and Bt [length / force].
+    g0, g1 : (2p,) arrays
+        B A^{-1} f - (gap, slip_offset), and B A^{-1} load_slope [length].
+    F0, F1 : (p,) arrays
+        Friction coefficients and their slopes [-].
+    """
+
+    S: NDArray[np.float64]
+    g0: NDArray[np.float64]
+    g1: NDArray[np.float64]
+    F0: NDArray[np.float64]
+    F1: NDArray[np.float64]
+    problem: ProblemData = field(repr=False)
+
+    @classmethod
+    def from_problem(cls, problem: ProblemData) -> CondensedProblem:
+        """Condense with one sparse factorization; dense memory stays at RHS_BLOCK vectors of length n."""
+        B = sp.csr_array(sp.vstack([problem.Bn, problem.Bt], format="csr"))
+        size = B.shape[0]
+        offset = np.concatenate([problem.gap, problem.slip_offset])
+        slope = problem.load_slope
+        S = np.empty((size, size))
+        # what overflows is found and named below
+        with np.errstate(over="ignore", invalid="ignore"):
+            for start in range(0, size, RHS_BLOCK):
+                stop = min(start + RHS_BLOCK, size)
+                S[:, start:stop] = B @ problem.factorization.solve(B[start:stop].T.toarray())
+            S = 0.5 * (S + S.T)
+            g0 = B @ problem.factorization.solve(problem.f) - offset
+            g1 = np.zeros(size) if slope is None else B @ problem.factorization.solve(slope)
+        F0, F1 = problem.friction
+        if not (np.all(np.isfinite(S)) and np.all(np.isfinite(g0)) and np.all(np.isfinite(g1))):
+            raise InvalidProblemError("A, f: the condensed problem overflows float64; expected data in smaller units")
+        return cls(S, g0, g1, F0, F1, problem)
+
+    @cached_property
+    def node_scale(self) -> NDArray[np.float64]:
+        """Roots of the geometric means of every node's normal and tangential compliance, twice over, shape (2p,)."""
+        p, diagonal = len(self.F0), np.diagonal(self.S)
+        node = (diagonal[:p] * diagonal[p:]) ** 0.25
+        return sealed(np.concatenate([node, node]))
+
+    @cached_property
+    def balanced(self) -> NDArray[np.float64]:
+        """S in units in which every node has compliance one, shape (2p, 2p)."""
+        scale = self.node_scale
+        return sealed(np.asarray(self.S / scale[:, None] / scale[None, :]))
+
+    def at(self, alpha: Alpha) -> CondensedSystem:
+        """The condensed system at one alpha.
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is not finite or makes a friction coefficient negative.
+        """
+        value = float(alpha_value(alpha))
+        F = self.problem.friction_at(alpha)
+        with np.errstate(over="ignore", invalid="ignore"):
+            g = self.g0 + value * self.g1
+        if not np.all(np.isfinite(g)):
+            raise InvalidArgumentError(f"alpha = {value:g} makes the load overflow float64; expected a smaller value")
+        return CondensedSystem(self.S, g, F)
+
+    def displacement(self, alpha: AlphaLike, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+        """u = A^{-1} (f(alpha) - B' lambda), shape (n,), for forces of shape (2p,)."""
+        problem, p = self.problem, self.problem.p
+        rhs = problem.load_at(alpha) - problem.Bn.T @ forces[:p] - problem.Bt.T @ forces[p:]
+        return problem.factorization.solve(np.asarray(rhs))

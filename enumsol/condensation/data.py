@@ -1,0 +1,73 @@
+"""What condensing asks of a contact problem; ``enumsol.problem.ContactProblem`` is one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+    import scipy.sparse as sp
+    from numpy.typing import NDArray
+
+    from enumsol.checks import AlphaLike
+    from enumsol.condensation.factorization import Factorization
+
+    Vector = NDArray[np.float64]
+
+#: What a proof is about: A, Bn, Bt, f as given, or S and g as computed from them in floats.
+Data = Literal["problem", "condensed"]
+#: Most degrees of freedom of a problem of which A, Bn, Bt and f are condensed in rationals; proofs about larger ones
+#: hold no rational leaves.
+EXACT_DOF_LIMIT = 250
+
+
+class ProblemData(Protocol):
+    """Matrices and vectors of a contact problem, and the paths of friction and load over alpha.
+
+    Attributes
+    ----------
+    A : (n, n) csc_array, symmetric positive definite [force / length]
+    Bn, Bt : (p, n) csr_arrays
+    f : (n,) array, load at alpha = 0 [force]
+    load_slope : (n,) array or None
+    gap, slip_offset : (p,) arrays [length]
+    friction : pair of (p,) arrays, F(alpha) = F0 + alpha F1
+    node_ids : tuple of p labels
+    """
+
+    f: Vector
+    load_slope: Vector | None
+    gap: Vector
+    slip_offset: Vector
+    friction: tuple[Vector, Vector]
+    node_ids: tuple[Any, ...]
+
+    @property
+    def A(self) -> sp.csc_array:  # noqa: N802 (the field's letter)
+        """Stiffness."""
+
+    @property
+    def Bn(self) -> sp.csr_array:  # noqa: N802 (as above)
+        """Normal displacement of the contact nodes."""
+
+    @property
+    def Bt(self) -> sp.csr_array:  # noqa: N802 (as above)
+        """Tangential displacement of the contact nodes."""
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+
+    @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+
+    @property
+    def factorization(self) -> Factorization:
+        """Factors of A."""
+
+    def friction_at(self, alpha: AlphaLike) -> Vector:
+        """F(alpha), shape (p,)."""
+
+    def load_at(self, alpha: AlphaLike) -> Vector:
+        """f(alpha), shape (n,)."""

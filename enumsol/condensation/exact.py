@@ -1,0 +1,210 @@
+"""The condensed problem in rationals, at one alpha and for all of them (theory, sections 4 and 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import lcm
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+
+from enumsol.arithmetic.rationals import rational, rational_matrix
+from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.condensation.unloaded import vanishing_alpha
+from enumsol.errors import TooLargeError
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from enumsol.checks import Alpha
+    from enumsol.condensation.data import ProblemData
+    from enumsol.condensation.unloaded import CondensedData
+
+#: Most degrees of freedom for which "fast" condenses without rounding; beyond, S and g as computed in floats are used.
+FAST_EXACT_DOF = 24
+
+
+@dataclass(frozen=True)
+class ExactSystem:
+    """The condensed problem at one alpha in rationals: w = g - S lambda.
+
+    Attributes
+    ----------
+    S : fmpq_mat (2p, 2p)
+    g, F : tuples of fmpq
+    """
+
+    S: Any
+    g: tuple[Any, ...]
+    F: tuple[Any, ...]
+
+    @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+        return len(self.F)
+
+    @classmethod
+    def from_problem(cls, problem: ProblemData, alpha: Alpha) -> ExactSystem:
+        """Condense at one alpha without any rounding.
+
+        Raises
+        ------
+        InvalidArgumentError
+            Friction is negative there.
+        TooLargeError
+            The problem has more than EXACT_DOF_LIMIT degrees of freedom.
+        """
+        problem.friction_at(alpha)
+        a = rational(alpha)
+        rows, g0, g1, F0, F1 = _condensed(problem)
+        g, F = (tuple(x + a * y for x, y in zip(*parts, strict=True)) for parts in ((g0, g1), (F0, F1)))
+        return cls(fmpq_mat(list(map(list, rows))), g, F)
+
+
+@dataclass(frozen=True)
+class ExactPath:
+    """The condensed problem in rationals: w = g0 + alpha g1 - S lambda, F = F0 + alpha F1.
+
+    Attributes
+    ----------
+    rows : tuple of 2p tuples of 2p fmpq
+        S, in tuples: what a graph answers is computed from it again and again, and a matrix of flint can be written to.
+    g0, g1 : tuples of 2p fmpq
+    F0, F1 : tuples of p fmpq
+    condensed_exactly : bool
+        S and g follow from A, Bn, Bt, f without rounding; otherwise they are the floats computed in CondensedProblem.
+    zero : Fraction or None
+        The alpha at which g(alpha) = 0, where lambda = 0 is the only solution and every selection holds; found where
+        the checker finds it.
+    """
+
+    rows: tuple[tuple[Any, ...], ...]
+    g0: tuple[Any, ...]
+    g1: tuple[Any, ...]
+    F0: tuple[Any, ...]
+    F1: tuple[Any, ...]
+    condensed_exactly: bool
+    zero: Fraction | None
+
+    @classmethod
+    def from_problem(cls, problem: CondensedData) -> ExactPath:
+        """Condense A, Bn, Bt, f, load_slope, gap, slip_offset and friction without any rounding.
+
+        Raises
+        ------
+        TooLargeError
+            The problem has more than EXACT_DOF_LIMIT degrees of freedom.
+        """
+        rows, g0, g1, F0, F1 = _condensed(problem)
+        return cls(rows, g0, g1, F0, F1, condensed_exactly=True, zero=vanishing_alpha(problem, "problem"))
+
+    @property
+    def S(self) -> Any:  # noqa: N802 (the field's letter)
+        """S as a new fmpq_mat (2p, 2p)."""
+        return fmpq_mat([list(row) for row in self.rows])
+
+    @classmethod
+    def from_condensed(cls, problem: CondensedData) -> ExactPath:
+        """The exact values of S, g and F as computed in floats."""
+        condensed = problem.condensed
+        vectors = (condensed.g0, condensed.g1, condensed.F0, condensed.F1)
+        g0, g1, F0, F1 = (tuple(rational(v) for v in part) for part in vectors)
+        rows = tuple(map(tuple, rational_matrix(condensed.S).tolist()))
+        zero = vanishing_alpha(problem, "condensed")
+        return cls(rows, g0, g1, F0, F1, condensed_exactly=False, zero=zero)
+
+    @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+        return len(self.F0)
+
+    @cached_property
+    def loaded(self) -> bool:
+        """Whether g depends on alpha."""
+        return any(v != 0 for v in self.g1)
+
+    @cached_property
+    def unloaded(self) -> bool:
+        """Whether g = 0 for every alpha."""
+        return not self.loaded and all(v == 0 for v in self.g0)
+
+    @cached_property
+    def frictionless(self) -> tuple[bool, ...]:
+        """Nodes with F = 0 for every alpha."""
+        return tuple(a == 0 and b == 0 for a, b in zip(self.F0, self.F1, strict=True))
+
+    @cached_property
+    def origin(self) -> Any:
+        """``zero`` as fmpq, or None."""
+        return None if self.zero is None else rational(self.zero)
+
+    @cached_property
+    def integers(self) -> _Integers:
+        """The same data as integers over common denominators."""
+        dS = lcm(*(int(v.q) for row in self.rows for v in row))
+        dg = lcm(*(int(v.q) for v in (*self.g0, *self.g1)))
+        dF = lcm(*(int(v.q) for v in (*self.F0, *self.F1)))
+        return _Integers(
+            tuple(tuple(_times(v, dS) for v in row) for row in self.rows),
+            tuple(_times(v, dg) for v in self.g0),
+            tuple(_times(v, dg) for v in self.g1),
+            tuple(_times(v, dF) for v in self.F0),
+            tuple(_times(v, dF) for v in self.F1),
+            dF,
+            fmpq(dS, dg),
+        )
+
+    def at(self, alpha: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """g and F at an alpha of any exact field."""
+        g = tuple(a + b * alpha for a, b in zip(self.g0, self.g1, strict=True))
+        F = tuple(a + b * alpha for a, b in zip(self.F0, self.F1, strict=True))
+        return g, F
+
+    def system(self, alpha: Any) -> ExactSystem:
+        """The condensed problem at an alpha of any exact field."""
+        return ExactSystem(self.S, *self.at(alpha))
+
+
+@dataclass(frozen=True)
+class _Integers:
+    """Integer data: S = S_int / dS, g = g_int / dg, F = F_int / dF."""
+
+    S: tuple[tuple[Any, ...], ...]
+    g0: tuple[Any, ...]
+    g1: tuple[Any, ...]
+    F0: tuple[Any, ...]
+    F1: tuple[Any, ...]
+    friction_unit: int  # dF
+    force: Any  # dS / dg
+
+
+def _times(value: Any, factor: int) -> Any:
+    return value.p * (factor // value.q)
+
+
+def _condensed(problem: ProblemData) -> tuple[tuple[Any, ...], ...]:
+    """S as a tuple of rows, g0, g1, F0 and F1 without any rounding.
+
+    Raises
+    ------
+    TooLargeError
+        The problem has more than EXACT_DOF_LIMIT degrees of freedom.
+    """
+    n, p = problem.n, problem.p
+    if n > EXACT_DOF_LIMIT:
+        raise TooLargeError(
+            f'arithmetic="exact" condenses at most n = {EXACT_DOF_LIMIT} degrees of freedom in rationals and the '
+            f"problem has n = {n}; use another arithmetic, or condense the body to its contact nodes first"
+        )
+    B = rational_matrix(np.vstack([problem.Bn.toarray(), problem.Bt.toarray()]))
+    slope = np.zeros(n) if problem.load_slope is None else problem.load_slope
+    loads = rational_matrix(np.column_stack([problem.f, slope]))
+    rhs = [[*row, *load] for row, load in zip(B.transpose().tolist(), loads.tolist(), strict=True)]
+    table = (B * rational_matrix(problem.A.toarray()).solve(fmpq_mat(rhs))).tolist()
+    offset = [rational(v) for v in (*problem.gap, *problem.slip_offset)]
+    g0 = tuple(row[2 * p] - o for row, o in zip(table, offset, strict=True))
+    g1 = tuple(row[2 * p + 1] for row in table)
+    F0, F1 = (tuple(rational(v) for v in part) for part in problem.friction)
+    return tuple(tuple(row[: 2 * p]) for row in table), g0, g1, F0, F1

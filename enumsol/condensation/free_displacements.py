@@ -1,0 +1,65 @@
+"""The problem's matrices in rationals, and g solved from them: for the checker, and for the alpha at which g vanishes.
+
+The search condenses by code of its own (``condensation.exact``).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from flint import fmpq_mat
+
+from enumsol.arithmetic.rationals import rational, rational_matrix
+from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.condensation.enclosure import NotEnclosedError
+
+if TYPE_CHECKING:
+    from enumsol.condensation.data import ProblemData
+
+
+def free_displacements(problem: ProblemData) -> tuple[list[Any], list[Any]]:
+    """g0 = B A^-1 f - (gap, slip_offset) and g1 = B A^-1 load_slope, 2p fmpq each.
+
+    Raises
+    ------
+    NotEnclosedError
+        A is singular, or has more than EXACT_DOF_LIMIT degrees of freedom.
+    """
+    A, B = exact_matrices(problem)
+    slope = [0.0] * problem.n if problem.load_slope is None else problem.load_slope.tolist()
+    loads = fmpq_mat([[rational(x), rational(y)] for x, y in zip(problem.f.tolist(), slope, strict=True)])
+    moved = (B * solved(A, loads)).tolist()
+    offset = problem.gap.tolist() + problem.slip_offset.tolist()
+    return [row[0] - rational(o) for row, o in zip(moved, offset, strict=True)], [row[1] for row in moved]
+
+
+def exact_matrices(problem: ProblemData) -> tuple[Any, Any]:
+    """A and B = [Bn; Bt] as fmpq_mat.
+
+    Raises
+    ------
+    NotEnclosedError
+        A has more than EXACT_DOF_LIMIT degrees of freedom.
+    """
+    if problem.n > EXACT_DOF_LIMIT:
+        raise NotEnclosedError(
+            f"the problem has n = {problem.n} degrees of freedom; expected at most {EXACT_DOF_LIMIT} for rational "
+            "arithmetic"
+        )
+    B = np.vstack([problem.Bn.toarray(), problem.Bt.toarray()])
+    return rational_matrix(problem.A.toarray()), rational_matrix(B)
+
+
+def solved(A: Any, rhs: Any) -> Any:
+    """A^-1 rhs.
+
+    Raises
+    ------
+    NotEnclosedError
+        A is singular.
+    """
+    try:
+        return A.solve(rhs)
+    except ZeroDivisionError:
+        raise NotEnclosedError("A is singular in rational arithmetic") from None

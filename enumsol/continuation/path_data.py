@@ -1,0 +1,260 @@
+"""What a continuation path is made of: its points, transition points and folds, and how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.roots.root_set import summary
+from enumsol.sealed import Sealed
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from enumsol.continuation.options import ContinuationOptions
+    from enumsol.continuation.parameter_path import SmoothPath
+    from enumsol.continuation.tangents import Tangent
+    from enumsol.problem import ContactProblem
+    from enumsol.roots.local_branch import LocalBranchTest
+    from enumsol.statuses import ContactStatus
+
+#: |d alpha / ds| below this is a vertical piece of the path: at a regular point it is well above rounding.
+VERTICAL_TOLERANCE = 1e-9
+_PRINTED_TRANSITIONS = 12
+#: The arrays of a path, one row a point.
+ARRAYS = ("alpha", "lambda_n", "lambda_t", "u_n", "u_t", "codes", "steps", "corrections", "arclength")
+KINDS = ("start", "step", "transition", "end")
+
+
+@dataclass(frozen=True)
+class PathPoint(Sealed):
+    """One point of a path.
+
+    Attributes
+    ----------
+    alpha : float
+    lambda_n, lambda_t, u_n, u_t : (p,) arrays
+        As in Root.
+    statuses : tuple of p ContactStatus
+        The selection on which the path leaves the point.
+    kind : {"start", "step", "transition", "end"}
+        "step" is an accepted step of the paper's Algorithm 5.1; the others were located.
+    """
+
+    alpha: float
+    lambda_n: NDArray[np.float64]
+    lambda_t: NDArray[np.float64]
+    u_n: NDArray[np.float64]
+    u_t: NDArray[np.float64]
+    statuses: tuple[ContactStatus, ...]
+    kind: str
+
+
+@dataclass(frozen=True)
+class Transition:
+    """A point at which the path changes its selection.
+
+    Attributes
+    ----------
+    point : int
+        Its index among the points of the path.
+    alpha : float
+    before, after : tuple of p ContactStatus
+    nodes : tuple of int
+        Contact nodes (row numbers) whose status changes.
+    dalpha_before, dalpha_after : float
+        Derivative of alpha with respect to the arclength on both sides; a change of sign is a fold.
+    local_test : LocalBranchTest or None
+        Whether a local Lipschitz branch exists there; None when too many selections hold to tell.
+    alternatives : tuple of Tangent
+        Further directions in which solutions leave the point (paper, Remark 5.1); not kept in files.
+    """
+
+    point: int
+    alpha: float
+    before: tuple[ContactStatus, ...]
+    after: tuple[ContactStatus, ...]
+    nodes: tuple[int, ...]
+    dalpha_before: float
+    dalpha_after: float
+    local_test: LocalBranchTest | None
+    alternatives: tuple[Tangent, ...] = field(default=(), repr=False)
+
+
+@dataclass(frozen=True)
+class PathStats:
+    """What the step control did.
+
+    Attributes
+    ----------
+    accepted : int
+        Accepted steps.
+    not_converged : int
+        Steps rejected because the corrections did not converge.
+    refused : int
+        Steps rejected because their end was not the continuation of their start.
+    corrections : int
+        Corrections in all, those of rejected steps included.
+    selection_changes : int
+        Times that Step 8 changed the selection.
+    seconds : float
+    """
+
+    accepted: int = 0
+    not_converged: int = 0
+    refused: int = 0
+    corrections: int = 0
+    selection_changes: int = 0
+    seconds: float = 0.0
+
+    @property
+    def rejected(self) -> int:
+        """Rejected steps."""
+        return self.not_converged + self.refused
+
+    def __add__(self, other: PathStats) -> PathStats:
+        return PathStats(*(a + b for a, b in zip(_values(self), _values(other), strict=True)))
+
+
+def _values(stats: PathStats) -> tuple[Any, ...]:
+    return tuple(stats.__dict__.values())
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PathData(Sequence[PathPoint], Sealed):
+    """The points of a path, its transition points and how it ended; for its attributes see Path."""
+
+    alpha: NDArray[np.float64]
+    lambda_n: NDArray[np.float64]
+    lambda_t: NDArray[np.float64]
+    u_n: NDArray[np.float64]
+    u_t: NDArray[np.float64]
+    codes: NDArray[np.int8]
+    kinds: tuple[str, ...]
+    steps: NDArray[np.float64]
+    corrections: NDArray[np.int64]
+    arclength: NDArray[np.float64]
+    transitions: tuple[Transition, ...]
+    status: str
+    message: str
+    orientation: int
+    interval: tuple[float, float]
+    options: ContinuationOptions
+    next_step: float
+    stats: PathStats
+    node_ids: tuple[Any, ...]
+    _names: tuple[tuple[ContactStatus, ...], ...] = field(repr=False)
+    _problem: ContactProblem | None = field(default=None, repr=False, compare=False)
+    _smooth_path: SmoothPath | None = field(default=None, repr=False, compare=False)
+
+    # -- a sequence of points ----------------------------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        return len(self.alpha)
+
+    def __getitem__(self, item: Any) -> Any:
+        if isinstance(item, slice):
+            return tuple(self[k] for k in range(*item.indices(len(self))))
+        k = range(len(self))[item]
+        return PathPoint(
+            alpha=float(self.alpha[k]),
+            lambda_n=self.lambda_n[k],
+            lambda_t=self.lambda_t[k],
+            u_n=self.u_n[k],
+            u_t=self.u_t[k],
+            statuses=self._names[k],
+            kind=self.kinds[k],
+        )
+
+    @property
+    def points(self) -> tuple[PathPoint, ...]:
+        """All points."""
+        return tuple(self[:])
+
+    @property
+    def selections(self) -> tuple[tuple[ContactStatus, ...], ...]:
+        """The statuses along the path, one entry a piece between transitions."""
+        return tuple(name for k, name in enumerate(self._names) if k == 0 or name != self._names[k - 1])
+
+    @cached_property
+    def folds(self) -> tuple[Transition, ...]:
+        """The transitions at which alpha turns back (after a vertical piece: its end)."""
+        found, direction = [], 0
+        for transition in self.transitions:
+            for value in (transition.dalpha_before, transition.dalpha_after):
+                sign = 0 if abs(value) <= VERTICAL_TOLERANCE * self._alpha_scale else int(np.sign(value))
+                if sign and direction and sign != direction:
+                    found.append(transition)
+                direction = sign or direction
+        return tuple(found)
+
+    @property
+    def _alpha_scale(self) -> float:
+        return self.options.alpha_scale or 1.0
+
+    @property
+    def closed(self) -> bool:
+        """The path returned to its start."""
+        return self.status == "closed"
+
+    # -- output ------------------------------------------------------------------------------------------------------
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a point: alpha, kind, step, corrections, arclength; per node i lambda_n_i, .., status_i."""
+        import pandas as pd
+
+        columns: dict[str, Any] = {
+            "alpha": self.alpha,
+            "kind": list(self.kinds),
+            "step": self.steps,
+            "corrections": self.corrections,
+            "arclength": self.arclength,
+        }
+        for name in ("lambda_n", "lambda_t", "u_n", "u_t"):
+            values = getattr(self, name)
+            columns |= {f"{name}_{i}": values[:, i] for i in range(values.shape[1])}
+        columns |= {f"status_{i}": [names[i].value for names in self._names] for i in range(self.lambda_n.shape[1])}
+        return pd.DataFrame(columns)
+
+    def joined(self, more: PathData) -> PathData:
+        """The path followed by one that starts at its end."""
+        shift = len(self) - 1
+        arrays: dict[str, Any] = {
+            name: np.concatenate([getattr(self, name), getattr(more, name)[1:]])
+            for name in ARRAYS
+            if name != "arclength"
+        }
+        arclength = np.concatenate([self.arclength, self.arclength[-1] + more.arclength[1:]])
+        transitions = tuple(replace(item, point=item.point + shift) for item in more.transitions)
+        return replace(
+            more,
+            **arrays,
+            arclength=arclength,
+            kinds=self.kinds + more.kinds[1:],
+            transitions=self.transitions + transitions,
+            stats=self.stats + more.stats,
+            _names=self._names[:-1] + more._names,
+        )
+
+    def __repr__(self) -> str:
+        stats = self.stats
+        low, high = float(np.min(self.alpha)), float(np.max(self.alpha))
+        lines = [
+            f"Path with {len(self)} points, alpha from {low:.6g} to {high:.6g}",
+            f"  steps        {stats.accepted} accepted, {stats.rejected} rejected "
+            f"({stats.not_converged} not converged, {stats.refused} refused), {stats.corrections} corrections",
+            f"  transitions  {len(self.transitions)}, of them {len(self.folds)} folds",
+        ]
+        for item in self.transitions[:_PRINTED_TRANSITIONS]:
+            test = "" if item.local_test is None or item.local_test.exists else ", no local branch"
+            fold = ", fold" if item in self.folds else ""
+            lines.append(f"    alpha = {item.alpha:<12.8g} {summary(item.before)} -> {summary(item.after)}{fold}{test}")
+        if len(self.transitions) > _PRINTED_TRANSITIONS:
+            lines.append(f"    ... {len(self.transitions) - _PRINTED_TRANSITIONS} more")
+        lines.append(f"  ended        {self.message}")
+        return "\n".join(lines)

@@ -1,0 +1,57 @@
+"""Paths drawn over branch graphs; matplotlib is imported when a path is drawn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from enumsol.checks import one_of, row_number
+from enumsol.errors import InvalidArgumentError, MissingDependencyError
+
+if TYPE_CHECKING:
+    from enumsol.continuation.path_data import PathData
+
+_QUANTITIES = ("lambda_n", "lambda_t", "u_n", "u_t")
+
+
+def draw_path(path: PathData, graph: Any, node: int, quantity: str, ax: Any, graph_options: dict[str, Any]) -> Any:
+    """See Path.plot."""
+    one_of(quantity, "quantity", _QUANTITIES)
+    node = row_number(node, "node", path.lambda_n.shape[1])
+    if graph is not None and ax is not None:
+        raise InvalidArgumentError("graph and ax are both given; draw further paths with path.plot(ax=...) alone")
+    if graph is not None:
+        # the graph draws a figure of its own; its first panel is this node's
+        ax = graph.plot(quantity, [path.node_ids[node]], **graph_options).axes[0]
+    elif ax is None:
+        ax = _axes()
+    values = getattr(path, quantity)[:, node]
+    dots = [k for k, kind in enumerate(path.kinds) if kind in ("step", "end")]
+    ax.plot(path.alpha[dots], values[dots], ".", color="black", markersize=3, label="steps", zorder=3)
+    folds = {item.point for item in path.folds}
+    for marker, label, chosen in (
+        ("o", "transitions", [item.point for item in path.transitions if item.point not in folds]),
+        ("s", "folds", sorted(folds)),
+    ):
+        if chosen:
+            ax.plot(
+                path.alpha[chosen], values[chosen], marker, color="black", markerfacecolor="none", label=label, zorder=4
+            )
+    ax.plot(path.alpha[:1], values[:1], "*", color="tab:red", markersize=10, label="start", zorder=5)
+    if not ax.get_ylabel():
+        ax.set_xlabel("alpha")
+        ax.set_ylabel(f"{quantity} of node {path.node_ids[node]}")
+    return ax
+
+
+def _axes() -> Any:
+    """Axes of a new figure that pyplot does not keep."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingDependencyError(
+            'plots need matplotlib, which is not installed; install it with: pip install "enumsol[plots]"'
+        ) from error
+    figure = Figure(layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure.subplots()

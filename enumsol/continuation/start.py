@@ -1,0 +1,127 @@
+"""Where a continuation starts: its arguments checked, and the equation with the start as a point of it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.array_checks import real_array
+from enumsol.checks import alpha_value, instance_of, unbounded_interval
+from enumsol.continuation.condensed_equation import CondensedEquation
+from enumsol.continuation.options import ContinuationOptions
+from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
+from enumsol.continuation.path_data import PathData
+from enumsol.errors import InvalidArgumentError
+from enumsol.problem import ContactProblem
+
+if TYPE_CHECKING:
+    from enumsol.checks import AlphaLike
+    from enumsol.continuation.condensed_equation import Vector
+    from enumsol.continuation.parameter_path import ParameterPath
+
+#: The default alpha scale is this fraction of the interval.
+ALPHA_FRACTION = 0.05
+#: A change of the problem over the whole interval that is too small to follow: conditions within STATUS_TOLERANCE of
+#: zero count as met with equality, and must not all be within it.
+RESOLUTION = 1e-6
+#: Norm of H above which a start is not a root.
+START_TOLERANCE = 1e-6
+
+
+class Start:
+    """Validated arguments: the equation, the start as a point of it, interval and options."""
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        start: Any,
+        interval: tuple[AlphaLike, AlphaLike] | None,
+        options: ContinuationOptions | None,
+        smooth_path: SmoothPath | None,
+    ) -> None:
+        instance_of(problem, ContactProblem, "problem")
+        if smooth_path is not None:
+            instance_of(smooth_path, SmoothPath, "smooth_path")
+        chosen = ContinuationOptions() if options is None else options
+        self.options = instance_of(chosen, ContinuationOptions, "options")
+        alpha, forces = _start_values(start, problem.p)
+        self.interval = _interval(problem, interval, alpha, smooth_path)
+        low, high = self.interval
+        scale = self.options.alpha_scale
+        if scale is None:
+            scale = ALPHA_FRACTION * (high - low) if math.isfinite(high - low) else 1.0
+        path: ParameterPath = AffinePath(problem) if smooth_path is None else CallablePath(problem, smooth_path, alpha)
+        self.equation = CondensedEquation(path, self.interval, alpha, self.options.r, scale)
+        if smooth_path is None and math.isfinite(high - low):
+            self._check_resolution(alpha, (high - low) / scale)
+        self.x = self._on_solution(alpha, forces)
+
+    def _check_resolution(self, alpha: float, width: float) -> None:
+        """Refuse an interval over which the problem changes by little more than what counts as equal."""
+        equation = self.equation
+        values = equation.at(equation.point(alpha, np.zeros(2 * equation.p)))
+        change = max(np.max(np.abs(values.dg)), np.max(np.abs(values.dF) / (1.0 + values.F))) * width
+        if 0 < change < RESOLUTION:
+            raise InvalidArgumentError(
+                f"interval is ({self.interval[0]:.17g}, {self.interval[1]:.17g}), over which friction and load change "
+                f"by {change:.1e} of their size; expected at least {RESOLUTION:g} (branch_graph works without rounding)"
+            )
+
+    def _on_solution(self, alpha: float, forces: Vector) -> Vector:
+        equation = self.equation
+        x = equation.point(alpha, forces)
+        with np.errstate(over="ignore", invalid="ignore"):
+            residual = float(np.linalg.norm(equation.residual(x)))
+        if not residual <= START_TOLERANCE:
+            raise InvalidArgumentError(
+                f"start is not a root at alpha = {alpha:g}: the residual of H is {residual:.2e} relative to the load; "
+                f"expected at most {START_TOLERANCE:g} (newton(problem, alpha, start) finds the root nearby)"
+            )
+        return x
+
+
+def _start_values(start: Any, p: int) -> tuple[float, Vector]:
+    if isinstance(start, tuple) and len(start) == 3:
+        alpha, lambda_n, lambda_t = start
+    elif all(hasattr(start, name) for name in ("alpha", "lambda_n", "lambda_t")) and not isinstance(start, PathData):
+        alpha, lambda_n, lambda_t = start.alpha, start.lambda_n, start.lambda_t
+    else:
+        raise InvalidArgumentError(
+            f"start is a {type(start).__name__}; expected a Root, a PathPoint or (alpha, lambda_n, lambda_t)"
+        )
+    parts = []
+    for name, part in (("lambda_n", lambda_n), ("lambda_t", lambda_t)):
+        parts.append(np.atleast_1d(real_array(part, f"{name} of start", error=InvalidArgumentError)))
+        if parts[-1].shape != (p,):
+            raise InvalidArgumentError(f"{name} of start has shape {parts[-1].shape}; expected ({p},)")
+    return float(alpha_value(alpha, "alpha of start")), np.concatenate(parts)
+
+
+def _interval(
+    problem: ContactProblem, interval: tuple[AlphaLike, AlphaLike] | None, start: float, smooth_path: SmoothPath | None
+) -> tuple[float, float]:
+    affine = smooth_path is None or smooth_path.F is None
+    if interval is None:
+        return friction_domain(problem) if affine else (-math.inf, math.inf)
+    low, high = unbounded_interval(interval)
+    if not low <= start <= high:
+        raise InvalidArgumentError(f"start has alpha = {start:g}, outside the interval ({low:g}, {high:g})")
+    if affine:
+        for end in (low, high):
+            if math.isfinite(end):
+                problem.friction_at(end)
+        domain = friction_domain(problem)
+        low, high = max(low, domain[0]), min(high, domain[1])
+    return low, high
+
+
+def friction_domain(problem: ContactProblem) -> tuple[float, float]:
+    """The range of alpha in which no coefficient F0 + alpha F1 is negative."""
+    F0, F1 = problem.friction
+    with np.errstate(divide="ignore", invalid="ignore"):
+        zero = -F0 / F1
+    low = np.max(zero[F1 > 0], initial=-math.inf)
+    high = np.min(zero[F1 < 0], initial=math.inf)
+    return float(low), float(high)

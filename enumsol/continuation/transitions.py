@@ -1,0 +1,217 @@
+"""Transition points: located by the sign changes of the test functions, and passed (theory, sections 8.7 and 8.8).
+
+Within one selection a solution curve is smooth, and the conditions of its statuses are smooth functions along it. The
+point at which the first of them vanishes is found by Newton's method, and checked: nothing else may have vanished
+before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.continuation.corrector import smooth_newton
+from enumsol.continuation.tangents import (
+    RATE_TOLERANCE,
+    SAME_TANGENT,
+    Tangent,
+    admissible_tangents,
+    curve_tangent,
+)
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+
+if TYPE_CHECKING:
+    from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
+
+#: Conditions within this of zero hold with equality at a located transition point.
+ACTIVE_TOLERANCE = 1e-8
+#: Lengths along the path that should be positive may be negative by this much: a condition accepted at -ROUNDING lies
+#: behind its zero by that over its rate, which may be small.
+FORWARD_TOLERANCE = 1e-7
+#: Cosine of the largest turn of the tangent along an accepted piece of one selection's curve (60 degrees).
+LEAST_COSINE = 0.5
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """A point of a selection's solution curve with the curve's tangent in the direction of travel."""
+
+    x: Vector
+    codes: Codes
+    tangent: Vector
+
+
+@dataclass(frozen=True)
+class Kink:
+    """A transition point: where a curve ends, and the curve on which the path goes on.
+
+    Attributes
+    ----------
+    before, after : CurvePoint
+        The same point on the two curves.
+    alternatives : tuple of Tangent
+        All other directions, apart from the one of arrival, in which solutions leave the point.
+    """
+
+    before: CurvePoint
+    after: CurvePoint
+    alternatives: tuple[Tangent, ...] = ()
+
+
+def same_curve(equation: CondensedEquation, start: CurvePoint, end: CurvePoint, *, sharp: bool = False) -> bool:
+    """Whether ``end`` lies ahead of ``start`` on one smooth piece of a selection's curve, all of it admissible.
+
+    The piece is judged by both tangents and by the cubic Hermite interpolants of all conditions: one that dips below
+    zero in between tells that the curve was left and entered again. ``sharp`` allows turns up to a right angle.
+    """
+    chord = end.x - start.x
+    length = equation.norm(chord)
+    if equation.dot(chord, start.tangent) < -FORWARD_TOLERANCE or equation.dot(chord, end.tangent) < -FORWARD_TOLERANCE:
+        return False
+    if length <= FORWARD_TOLERANCE:
+        return True
+    if equation.dot(start.tangent, end.tangent) < (0.0 if sharp else LEAST_COSINE):
+        return False
+    s0, s1 = equation.slacks(start.codes, start.x), equation.slacks(start.codes, end.x)
+    finite = np.isfinite(s0)
+    d0 = length * equation.slack_rates(start.codes, start.x, start.tangent)
+    d1 = length * equation.slack_rates(start.codes, end.x, end.tangent)
+    least = _hermite_minimum(s0[finite], s1[finite], d0[finite], d1[finite])
+    return bool(np.min(least, initial=0.0) >= -ACTIVE_TOLERANCE)
+
+
+def _hermite_minimum(s0: Vector, s1: Vector, d0: Vector, d1: Vector) -> Vector:
+    """Minima over [0, 1] of the cubics with these end values and derivatives."""
+    a, b = 2 * (s0 - s1) + d0 + d1, 3 * (s1 - s0) - 2 * d0 - d1
+    least = np.minimum(s0, s1)
+    # zeros of 3 a t^2 + 2 b t + d0, in the form that does not cancel
+    root = np.sqrt(np.maximum(b * b - 3 * a * d0, 0.0))
+    q = -(b + np.copysign(root, b))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        candidates = (q / (3 * a), d0 / q)
+    for t in candidates:
+        inside = np.where(np.isfinite(t), np.clip(t, 0.0, 1.0), 0.0)
+        least = np.minimum(least, ((a * inside + b) * inside + d0) * inside + s0)
+    return least
+
+
+def locate(
+    equation: CondensedEquation, start: CurvePoint, which: tuple[int, int], sign: int, tolerance: float
+) -> CurvePoint | None:
+    """The point ahead on the curve of ``start`` at which this slack vanishes and every other condition still holds."""
+    x = smooth_newton(equation, start.codes, start.x, which, 0.0, tolerance)
+    if x is None or np.min(equation.slacks(start.codes, x)) < -ACTIVE_TOLERANCE:
+        return None
+    tangent = curve_tangent(equation, start.codes, x, sign)
+    if tangent is None:
+        # a vertical segment may end where its own tangent is not unique: it came in a straight line
+        chord = x - start.x
+        length = equation.norm(chord)
+        tangent = start.tangent if length <= FORWARD_TOLERANCE else chord / length
+    point = CurvePoint(x, start.codes, tangent)
+    return point if same_curve(equation, start, point) else None
+
+
+def flip(equation: CondensedEquation, codes: Codes, x: Vector, which: tuple[int, int]) -> Codes:
+    """Statuses after one slack vanished: the selection whose sign row has that one sign changed."""
+    i, k = which
+    code = codes[i]
+    if code == OPEN:
+        slip = equation.w(x)[equation.p + i]
+        new = FRICTIONLESS if equation.frictionless[i] else (SLIP_PLUS if slip > 0 else SLIP_MINUS)
+    elif code == STICK:
+        new = SLIP_MINUS if k else SLIP_PLUS
+    else:
+        new = STICK if k else OPEN
+    return (*codes[:i], new, *codes[i + 1 :])
+
+
+def single_flip(before: Codes, after: Codes) -> tuple[int, int] | None:
+    """The slack of ``before`` that vanishes when one node changes to a neighbouring status; None for other changes."""
+    changed = [i for i in range(len(before)) if before[i] != after[i]]
+    if len(changed) != 1:
+        return None
+    i = changed[0]
+    old, new = before[i], after[i]
+    if OPEN in (old, new):
+        return None if STICK in (old, new) else (i, 0)
+    if old == STICK:
+        return i, int(new == SLIP_MINUS)
+    return (i, 1) if new == STICK else None
+
+
+def confirm(
+    equation: CondensedEquation, start: CurvePoint, end: CurvePoint, sign: int, tolerance: float
+) -> Kink | None:
+    """The one transition point between two points whose selections differ in one status; None if it is not between."""
+    which = single_flip(start.codes, end.codes)
+    if which is None:
+        return None
+    before = locate(equation, start, which, sign, tolerance)
+    if before is None or flip(equation, start.codes, before.x, which) != end.codes:
+        return None
+    tangent = curve_tangent(equation, end.codes, before.x, sign)
+    if tangent is None or np.min(equation.slacks(end.codes, before.x)) < -ACTIVE_TOLERANCE:
+        return None
+    after = CurvePoint(before.x, end.codes, tangent)
+    return Kink(before, after) if same_curve(equation, after, end) else None
+
+
+def next_kink(equation: CondensedEquation, start: CurvePoint, sign: int, tolerance: float) -> CurvePoint | None:
+    """The nearest point ahead at which the curve of ``start`` stops being admissible; near zeros are tried first."""
+    slacks = equation.slacks(start.codes, start.x)
+    rates = equation.slack_rates(start.codes, start.x, start.tangent)
+    distances = np.full(slacks.shape, np.inf)
+    falling = rates < -RATE_TOLERANCE
+    distances[falling] = np.maximum(slacks[falling], 0.0) / -rates[falling]
+    order = np.argsort(distances, axis=None, kind="stable")
+    for flat in order[: int(np.sum(falling))]:
+        i, k = np.unravel_index(flat, slacks.shape)
+        point = locate(equation, start, (int(i), int(k)), sign, tolerance)
+        if point is not None:
+            return point
+    return None
+
+
+def passed_kink(
+    equation: CondensedEquation, start: CurvePoint, sign: int, tolerance: float, reach: float
+) -> CurvePoint | None:
+    """The nearest transition point of the curve of ``start`` within ``reach``, be it ahead or just behind.
+
+    Corrections that stop at eps may end a little beyond a fold, where H is small and no solution is.
+    """
+    slacks = equation.slacks(start.codes, start.x)
+    rates = equation.slack_rates(start.codes, start.x, start.tangent)
+    distances = np.full(slacks.shape, np.inf)
+    falling = rates < -RATE_TOLERANCE
+    distances[falling] = np.abs(slacks[falling] / rates[falling])
+    order = np.argsort(distances, axis=None, kind="stable")
+    for flat in order[: int(np.sum(falling))]:
+        i, k = np.unravel_index(flat, slacks.shape)
+        x = smooth_newton(equation, start.codes, start.x, (int(i), int(k)), 0.0, tolerance)
+        if x is None or equation.norm(x - start.x) > reach:
+            continue
+        if np.min(equation.slacks(start.codes, x)) >= -ACTIVE_TOLERANCE:
+            tangent = curve_tangent(equation, start.codes, x, sign)
+            return CurvePoint(x, start.codes, start.tangent if tangent is None else tangent)
+    return None
+
+
+def continuations(equation: CondensedEquation, arrival: CurvePoint, sign: int) -> tuple[list[Tangent], list[Tangent]]:
+    """Directions that leave a transition point: those that keep the orientation, and all others but the arrival's.
+
+    The balance of degrees at a vertex (theory, (7.3)) leaves at least one of the first kind where all solutions
+    near the point are curves.
+    """
+    tangents = admissible_tangents(equation, arrival.x, ACTIVE_TOLERANCE)
+    back = -arrival.tangent
+    others = [t for t in tangents if not _same(equation, t.vector, back)]
+    keep = [t for t in others if t.orientation == sign]
+    keep.sort(key=lambda t: -equation.dot(t.vector, arrival.tangent))
+    return keep, [t for t in others if t.orientation != sign]
+
+
+def _same(equation: CondensedEquation, a: Vector, b: Vector) -> bool:
+    return equation.norm(a - b) <= SAME_TANGENT

@@ -1,0 +1,168 @@
+"""Exclusion inequalities over an interval of alpha (theory, section 7.9).
+
+With fixed multipliers the dual bound is concave in alpha: constraint normals are constant (friction enters by its
+extreme values) and right-hand sides affine. Positive at both ends, it is positive in between, and a partial assignment
+holds no solution anywhere in the interval.
+
+Rows 7 and 8 of node i, beyond those of ``enumsol.kernel.rows``: lambda_t - F_lo lambda_n and
+-lambda_t - F_lo lambda_n; rows 2 and 3 have F_hi in place of F.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE, gamma
+from enumsol.condensation.enclosure import CondensedEnclosure
+from enumsol.kernel.point import energy_bounds
+from enumsol.kernel.rows import FORBIDDEN, NONNEGATIVE, UNDECIDED, row_table
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.arithmetic.balls import Array
+    from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.problem import ContactProblem
+
+KINDS = 9
+#: Table of rows.row_table with kinds 7 and 8; then slip+ and slip- at a node whose friction varies.
+_CONSTANT = np.hstack([row_table(), np.zeros((8, 2), dtype=np.int8)])
+_VARYING = _CONSTANT.copy()
+_VARYING[2] = [1, 0, 1, 1, 2, 1, 0, 1, 0]
+_VARYING[3] = [1, 0, 1, 1, 2, 0, 1, 0, 1]
+
+
+@dataclass(frozen=True)
+class EnclosedPiece:
+    """The condensed problem at both ends of a piece of the interval, in common units.
+
+    Attributes
+    ----------
+    ends : tuple of EnclosedSystem
+        At both ends; one where g does not vary.
+    low, high : (p,) arrays
+        Bounds of the friction coefficients over the piece; equal exactly where friction is constant.
+    """
+
+    ends: tuple[EnclosedSystem, ...]
+    low: Array
+    high: Array
+
+    @classmethod
+    def from_enclosure(
+        cls,
+        enclosure: CondensedEnclosure,
+        a: Fraction,
+        b: Fraction,
+        force: Array,
+        length: Array,
+        origin: Fraction | None,
+    ) -> EnclosedPiece:
+        """A piece [a, b]; with ``origin`` (the alpha at one of its ends where g vanishes) for the load +-g1.
+
+        Solutions at alpha are then alpha's distance from the origin times those of that constant load.
+        """
+        systems = [enclosure.at(alpha, force, length) for alpha in (a, b)]
+        constant = np.array(enclosure.problem.friction[1]) == 0
+        # a coefficient near the largest float has no upper bound, and what it multiplies gives none
+        with np.errstate(over="ignore"):
+            low = np.min([s.F - s.F_rad * SAFE for s in systems], axis=0)
+            high = np.max([s.F + s.F_rad * SAFE for s in systems], axis=0)
+            low = np.where(constant, systems[0].F, np.maximum(np.nextafter(low, -np.inf), 0.0))
+            high = np.where(constant, systems[0].F, np.nextafter(high, np.inf))
+        if origin is not None:
+            direction = 1.0 if b > origin else -1.0
+            zero = np.zeros_like(enclosure.g1)
+            still = CondensedEnclosure(
+                enclosure.S,
+                enclosure.S_rad,
+                direction * enclosure.g1,
+                enclosure.g1_rad,
+                zero,
+                zero,
+                enclosure.stiffness_bound,
+                enclosure.problem,
+            )
+            systems = [still.at(a, force, length)]
+        elif enclosure.problem.load_slope is None:
+            systems = systems[:1]
+        return cls(tuple(systems), low, high)
+
+
+def as_computed(problem: ContactProblem) -> CondensedEnclosure:
+    """S and g as computed in floats, as balls of radius zero."""
+    c = problem.condensed
+    zero, none = np.zeros_like(c.S), np.zeros_like(c.g0)
+    return CondensedEnclosure(c.S, zero, c.g0, none, c.g1, none, 0.0, problem)
+
+
+def interval_exclusion_margins(
+    piece: EnclosedPiece,
+    codes: NDArray[np.intp],
+    leaf: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    values: Array,
+    errors: float = 1.0,
+) -> Array:
+    """Proven lower bounds on the energy over partial assignments and all alpha of a piece; positive excludes.
+
+    Parameters
+    ----------
+    piece : EnclosedPiece
+    codes : (m, p) array of (partial) status codes
+    leaf : (k,) array, the assignment to which each multiplier belongs
+    rows, values : (k,) arrays of row numbers (kind * p + node, nine kinds) and multipliers
+    errors : how often the error bound is subtracted (see energy_bounds)
+
+    Returns
+    -------
+    (m,) array
+    """
+    # what overflows gives no bound
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _margins(piece, codes, leaf, rows, values, errors)
+
+
+def _margins(
+    piece: EnclosedPiece,
+    codes: NDArray[np.intp],
+    leaf: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    values: Array,
+    errors: float,
+) -> Array:
+    m, p = codes.shape
+    low, high = piece.low, piece.high
+    bad = (rows < 0) | (rows >= KINDS * p) | ~np.isfinite(values)
+    rows, values = np.where(bad, 0, rows), np.where(bad, 0.0, values)
+    kind, node = np.divmod(rows, p)
+    code = np.where((codes == UNDECIDED) & (high == 0), 7, codes)
+    signs = np.where((low == high)[:, None], _CONSTANT[code], _VARYING[code])[leaf, node, kind]
+    bad |= (signs == FORBIDDEN) | ((signs == NONNEGATIVE) & (values < 0))
+    refused = np.bincount(leaf[bad], minlength=m) > 0
+    place = leaf * (KINDS * p) + rows
+    size = KINDS * p * m
+    table = np.bincount(place, values, minlength=size).reshape(m, KINDS, p)
+    reach = np.bincount(place, np.abs(values), minlength=size).reshape(m, KINDS, p)
+    y = np.hstack([table[:, 4], table[:, 6] - table[:, 5]])
+    normal = table[:, 0] + high * (table[:, 2] + table[:, 3]) - low * (table[:, 7] + table[:, 8])
+    tangential = table[:, 1] - table[:, 2] + table[:, 3] + table[:, 7] - table[:, 8]
+    c = np.hstack([normal, tangential])
+    c_size = np.hstack(
+        [
+            reach[:, 0] + high * (reach[:, 2] + reach[:, 3]) + low * (reach[:, 7] + reach[:, 8]),
+            reach[:, 1] + reach[:, 2] + reach[:, 3] + reach[:, 7] + reach[:, 8],
+        ]
+    )
+    # a component of c is a sum over at most five kinds of rows, each repeated at most so often
+    repeated = int(np.bincount(place, minlength=1).max())
+    c_rad = gamma(5 * repeated + 8) * c_size
+    # where friction is constant a cone row may be an equation, and its coefficient must be the exact one
+    constant_rad = np.max([end.F_rad for end in piece.ends], axis=0) * (low == high)
+    c_rad[:, :p] += constant_rad * (reach[:, 2] + reach[:, 3])
+    bounds = np.min([energy_bounds(end, y, c, c_rad * SAFE, errors) for end in piece.ends], axis=0)
+    return np.where(refused | ~np.isfinite(bounds), -np.inf, bounds)

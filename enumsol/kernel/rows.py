@@ -1,0 +1,59 @@
+"""The proof's vocabulary: status codes, rows, which multipliers are allowed, and how branchings split an assignment.
+
+This module states the mathematics that a reader of a proof has to agree with (theory, sections 5.2, 5.4); it holds no
+algorithm.
+
+Status codes: 0 open, 1 stick, 2 slip+, 3 slip-, 4 in contact at a node with F = 0, 5 in contact, 6 undecided.
+
+Rows of node i, row number kind * p + i, as expressions that are nonnegative (or zero):
+0 lambda_n; 1 lambda_t; 2 F lambda_n - lambda_t; 3 F lambda_n + lambda_t; 4 -w_n; 5 w_t; 6 -w_t.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
+
+#: What a multiplier of a row may be: the row is not imposed; it holds as an inequality; it holds as an equation.
+FORBIDDEN, NONNEGATIVE, FREE = 0, 1, 2
+
+# columns are the kinds of rows 0..6, rows the status codes; last: undecided at a node with F = 0
+_ROWS = np.array(
+    [
+        [2, 2, 2, 2, 1, 0, 0],  # open: lambda = 0, w_n <= 0
+        [1, 0, 1, 1, 2, 2, 2],  # stick: w = 0
+        [1, 0, 2, 1, 2, 1, 0],  # slip+: w_n = 0, lambda_t = F lambda_n, w_t >= 0
+        [1, 0, 1, 2, 2, 0, 1],  # slip-: w_n = 0, lambda_t = -F lambda_n, w_t <= 0
+        [1, 2, 2, 2, 2, 0, 0],  # frictionless contact: w_n = 0, lambda_t = 0 and F = 0
+        [1, 0, 1, 1, 2, 0, 0],  # contact: w_n = 0, |lambda_t| <= F lambda_n
+        [1, 0, 1, 1, 1, 0, 0],  # undecided: lambda_n >= 0, w_n <= 0, |lambda_t| <= F lambda_n
+        [1, 2, 1, 1, 1, 0, 0],  # undecided with F = 0: lambda_t = 0
+    ],
+    dtype=np.int8,
+)
+
+
+def row_table() -> NDArray[np.int8]:
+    """What the multipliers may be, by status code (7: undecided with F = 0) and kind of row, shape (8, 7)."""
+    return _ROWS.copy()
+
+
+def row_signs(codes: NDArray[np.intp], F: NDArray[np.float64]) -> NDArray[np.int8]:
+    """What the multipliers of all rows may be, shape (..., p, 7), for (partial) status codes of shape (..., p)."""
+    return np.asarray(_ROWS[np.where((codes == UNDECIDED) & (F == 0), 7, codes)])
+
+
+def children_of(code: int, *, friction: bool) -> tuple[int, ...]:
+    """The codes that together cover a partial status; empty for a final one.
+
+    Every root in the parent lies in at least one child: open or in contact; stick, slip+ or slip-.
+    """
+    if code == UNDECIDED:
+        return (OPEN, CONTACT) if friction else (OPEN, FRICTIONLESS)
+    return (STICK, SLIP_PLUS, SLIP_MINUS) if code == CONTACT else ()

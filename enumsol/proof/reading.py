@@ -1,0 +1,177 @@
+"""The parts of a proof's records, read strictly: for both checkers, which trust nothing that stands in a file.
+
+Every function gives what it says it gives, of the stated size, bounded and finite, or raises ValueError. Numbers of a
+record are finite and whole numbers have at most 18 digits before they come here (``Proof.records``).
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+import reprlib
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.errors import InvalidArgumentError
+from enumsol.kernel.rows import UNDECIDED
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.data import Data
+    from enumsol.problem import ContactProblem
+
+    Array = NDArray[np.float64]
+
+#: Most digits of the numerator and of the denominator of a fraction.
+MOST_DIGITS = 4000
+#: Least and largest binary exponent of a unit.
+LEAST_EXPONENT, LARGEST_EXPONENT = -900, 900
+
+_RATIONAL = re.compile(rf"-?[0-9]{{1,{MOST_DIGITS}}}(/[0-9]{{1,{MOST_DIGITS}}})?", re.ASCII)
+_BEYOND: int = 10**MOST_DIGITS
+_SHORT = reprlib.Repr()
+_SHORT.maxlevel = 3
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 40
+_SHORT.maxlist = _SHORT.maxdict = 5
+
+
+class RefusedError(Exception):
+    """A proof cannot be followed any further; it never leaves the checkers."""
+
+
+def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
+    """What a header says that is certified, "problem" or "condensed", once it fits the problem and the kind of proof.
+
+    Raises
+    ------
+    RefusedError
+        It does not.
+    """
+    if not isinstance(header, dict) or header.get("format") != "enumsol-proof" or header.get("version") != 1:
+        raise RefusedError("the first record is no header of an enumsol-proof of version 1")
+    if header.get("problem") != problem.fingerprint:
+        raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
+    if header.get("p") != problem.p or header.get("data") not in ("problem", "condensed"):
+        raise RefusedError("the header does not fit the problem")
+    if header.get("kind") != kind:
+        raise RefusedError(f"the header names an unknown kind of proof, {shown(header.get('kind'))}")
+    return "problem" if header["data"] == "problem" else "condensed"
+
+
+def rational_text(value: Fraction, name: str) -> str:
+    """An alpha as text that ``rational_from`` reads.
+
+    Raises
+    ------
+    InvalidArgumentError
+        Its numerator or denominator has more than MOST_DIGITS digits; ``name`` says which number it is.
+    """
+    if not fits(value):
+        raise InvalidArgumentError(f"{name} is a fraction of more than {MOST_DIGITS} digits; expected a shorter one")
+    return str(value)
+
+
+def fits(value: Fraction) -> bool:
+    """Whether a proof can hold this fraction."""
+    return max(abs(value.numerator), value.denominator) < _BEYOND
+
+
+def rational_from(text: Any) -> Fraction:
+    """An alpha from its text: digits, or digits / digits, with a sign before them.
+
+    The one way in which a fraction of a proof becomes a number. Numerator and denominator have at most MOST_DIGITS
+    digits each, there is no exponent, and the value is within the range of float64.
+    """
+    if not isinstance(text, str) or _RATIONAL.fullmatch(text) is None:
+        raise ValueError(f"{shown(text)} is no fraction of at most {MOST_DIGITS} digits")
+    numerator, _, denominator = text.partition("/")
+    if denominator and not int(denominator):
+        raise ValueError("a fraction's denominator is zero")
+    value = Fraction(int(numerator), int(denominator or 1))
+    try:
+        float(value)
+    except OverflowError:
+        raise ValueError("a fraction is beyond the range of float64") from None
+    return value
+
+
+def units_from(header: dict[str, Any], p: int) -> tuple[Array, Array]:
+    """Units of forces and displacements, (2p,) powers of two, whose binary exponents a record gives."""
+    force, length = (_exponents(header.get(key), 2 * p) for key in ("force", "length"))
+    if len({a + b for a, b in zip(force, length, strict=True)}) != 1 or force[:p] != force[p:]:
+        raise ValueError("the units are no common scaling of energy and of the two directions of a node")
+    return np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))
+
+
+def _exponents(value: Any, size: int) -> list[int]:
+    if not (
+        isinstance(value, list)
+        and len(value) == size
+        and all(type(x) is int and LEAST_EXPONENT <= x <= LARGEST_EXPONENT for x in value)
+    ):
+        raise ValueError(f"the units are no {size} binary exponents")
+    return value
+
+
+def multipliers_from(texts: list[Any], most: int) -> tuple[NDArray[np.intp], Array]:
+    """Rows, whole numbers below ``most``, and their multipliers, as many and at most ``most`` of them, from base64."""
+    if len(texts) != 2 or not all(isinstance(text, str) for text in texts):
+        raise ValueError("its multipliers are no two texts")
+    rows, values = texts
+    row = np.frombuffer(base64.b64decode(rows, validate=True), dtype="<u4").astype(np.intp)
+    value = np.frombuffer(base64.b64decode(values, validate=True), dtype="<f8").astype(np.float64)
+    if len(row) != len(value):
+        raise ValueError(f"{len(row)} rows and {len(value)} multipliers")
+    if len(row) > most:
+        raise ValueError(f"it has {len(row)} multipliers, and there are {most} rows")
+    if np.any(row >= most):
+        raise ValueError(f"row {np.max(row)} does not exist; there are {most}")
+    if not np.all(np.isfinite(value)):
+        raise ValueError("a multiplier is not finite")
+    return row, value
+
+
+def numbers_from(values: Any, size: int) -> Array:
+    """``size`` finite numbers."""
+    if not isinstance(values, list) or len(values) != size or not all(type(x) in (int, float) for x in values):
+        raise ValueError(f"expected {size} numbers")
+    numbers = np.array(values, dtype=np.float64)
+    if not np.all(np.isfinite(numbers)):
+        raise ValueError("a number is not finite")
+    return numbers
+
+
+def codes_from(texts: Any, p: int) -> NDArray[np.uint8]:
+    """Status codes, (k, p), from k texts of p digits each."""
+    if not isinstance(texts, list) or not all(isinstance(text, str) and len(text) == p for text in texts):
+        raise ValueError(f"expected status codes as texts of {p} digits")
+    joined = "".join(texts)
+    if not joined.isascii():
+        raise ValueError("a status code is no digit")
+    codes = np.frombuffer(joined.encode("ascii"), dtype=np.uint8) - np.uint8(ord("0"))
+    if np.any(codes > UNDECIDED):
+        raise ValueError(f"a status code is not among 0 to {UNDECIDED}")
+    return codes.reshape(-1, p)
+
+
+def friction_at(problem: ContactProblem, alpha: Fraction) -> list[Fraction]:
+    """The friction coefficients at an alpha, exactly; ValueError where one is negative."""
+    F0, F1 = problem.friction
+    exact = [Fraction(x) + alpha * Fraction(y) for x, y in zip(F0.tolist(), F1.tolist(), strict=True)]
+    if min(exact) < 0:
+        raise ValueError(f"friction is negative at alpha = {shown_alpha(alpha)}")
+    return exact
+
+
+def shown(value: Any) -> str:
+    """Something out of a proof as a short text, whatever it is."""
+    return _SHORT.repr(value)
+
+
+def shown_alpha(alpha: Fraction) -> str:
+    """A short text: the float where it is the same number, or else the fraction or its beginning."""
+    exact = abs(alpha) < 10**300 and Fraction(float(alpha)) == alpha
+    return str(float(alpha)) if exact else str(alpha)[:40]

@@ -1,0 +1,1 @@
+"""The convex relaxation of a partial assignment, and the engines that solve it."""

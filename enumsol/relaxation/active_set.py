@@ -1,0 +1,133 @@
+"""Relaxations by a dual active-set method, warm-started from the parent (compiled; see ``_active_set.pyx``)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.relaxation.engine import BRANCHING_CANDIDATES, FEASIBILITY_TOLERANCE, PRUNE_MARGIN, Relaxation
+from enumsol.relaxation.rows import EQUALITY, INEQUALITY, RowKind, row_terms
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.relaxation._active_set import BranchingRule, QPData, QPState
+    from enumsol.selections.solution import Codes
+
+
+class CompiledEngine:
+    """A quadratic program whose rows are switched on and off, and the compiled method that solves it.
+
+    Parameters
+    ----------
+    data : QPData
+        The program.
+    rule : BranchingRule
+    size : int
+        The first unknowns, 2p of them, are lambda.
+    offset : float
+        What is subtracted from the program's bound to have that on the energy.
+    always : rows beyond those of the statuses, inequalities that are always on
+    """
+
+    name = "active-set"
+
+    def __init__(
+        self, data: QPData, rule: BranchingRule, size: int, offset: float = 0.0, always: tuple[int, ...] = ()
+    ) -> None:
+        self.data, self.rule, self.size, self.offset, self.always = data, rule, size, offset, always
+        #: Most changes of the active set; a program that needs more has stalled.
+        self.limit = 200 + 10 * size
+
+    def root(self, rows: list[int], modes: list[int]) -> Relaxation:
+        """The relaxation with the given rows on."""
+        from enumsol.relaxation._active_set import QPState  # compiled: whoever made the data has it
+
+        return ActiveSetRelaxation(
+            self, QPState(self.data), [*rows, *self.always], modes + [INEQUALITY] * len(self.always)
+        )
+
+
+class ActiveSetEngine(CompiledEngine):
+    """Relaxations at one alpha.
+
+    Parameters
+    ----------
+    system : ScaledSystem
+    candidates : int
+        Nodes whose children are bounded before one of them is branched on.
+    form : (H, h), optional
+        Shapes (2p, 2p) and (2p,): minimise lambda' H lambda - h' lambda in place of the energy, H = S and h = g. H must
+        be positive definite, and the form at most zero at every solution.
+
+    Raises
+    ------
+    ImportError
+        The compiled solver is not available.
+    """
+
+    def __init__(
+        self,
+        system: ScaledSystem,
+        *,
+        candidates: int = BRANCHING_CANDIDATES,
+        form: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    ) -> None:
+        from enumsol.relaxation import _active_set  # compiled; its absence is handled by make_engine
+
+        p = system.p
+        start, index, value = row_terms(p, system.F)
+        rhs = np.zeros(len(start) - 1)
+        H, h = (system.S, system.g) if form is None else form
+        data = _active_set.QPData(H, h, -system.S, system.g, start, index, value, rhs)
+        cones = np.array([RowKind.CONE_PLUS, RowKind.CONE_MINUS])[:, None] * p + np.arange(p)
+        modes = np.full((2, p), EQUALITY, dtype=np.int8)
+        super().__init__(data, _active_set.BranchingRule(system.F, cones, modes, candidates), 2 * p)
+
+
+class ActiveSetRelaxation:
+    """A solved relaxation; the state that it holds is handed on to its last child."""
+
+    __slots__ = ("_engine", "_state", "bound", "pruned", "stalled")
+
+    def __init__(self, engine: CompiledEngine, state: QPState, rows: list[int], modes: list[int]) -> None:
+        self._engine, self._state = engine, state
+        state.switch(rows, modes)
+        status = state.solve(PRUNE_MARGIN + engine.offset, FEASIBILITY_TOLERANCE, engine.limit)
+        self.bound: float = state.bound - engine.offset
+        self.pruned = status == 1
+        self.stalled = status == 2
+
+    @property
+    def forces(self) -> NDArray[np.float64]:
+        """lambda at the minimiser, shape (2p,), scaled."""
+        return self._state.x_array[: self._engine.size]
+
+    @property
+    def displacements(self) -> NDArray[np.float64]:
+        """w at the minimiser, shape (2p,), scaled."""
+        return self._state.w_array
+
+    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Rows of statuses and their multipliers, which prove ``bound``."""
+        rows, values = self._state.multipliers()
+        if not self._engine.always:
+            return rows, values
+        keep = rows < self._engine.always[0]
+        return rows[keep], values[keep]
+
+    def choose(self, codes: Codes) -> int:
+        """The contact node that the partial assignment is to be branched on, -1 when all are decided."""
+        engine = self._engine
+        return self._state.choose(np.array(codes, dtype=np.int8), engine.rule, PRUNE_MARGIN + engine.offset)
+
+    def forced(self, codes: Codes) -> tuple[int, ...]:
+        """Undecided contact nodes of which one child at most is not excluded by a bound that is at hand."""
+        engine = self._engine
+        return self._state.forced(np.array(codes, dtype=np.int8), engine.rule, PRUNE_MARGIN + engine.offset)
+
+    def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
+        """The relaxation with further rows switched on; ``last``: this object is not used again."""
+        return ActiveSetRelaxation(self._engine, self._state if last else self._state.copy(), rows, modes)

@@ -1,0 +1,72 @@
+"""What the search asks of a relaxation, a convex QP in lambda, and of the engine that solves it (theory, section 5)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from enumsol.statuses import CONTACT, UNDECIDED
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.selections.solution import Codes
+
+#: The compiled module of the active-set method.
+COMPILED = "enumsol.relaxation._active_set"
+#: Largest violation of a row (rows of unit length in the norm of S^{-1}) that the QP takes for none.
+FEASIBILITY_TOLERANCE = 1e-11
+#: A leaf is pruned when its energy bound exceeds this; g' S^{-1} g lies in [1, 4), so it is relative to the data.
+PRUNE_MARGIN = 1e-9
+#: Nodes whose children are bounded before one of them is branched on (measured in studies/branching_rule).
+BRANCHING_CANDIDATES = 16
+
+
+class Relaxation(Protocol):
+    """The solved relaxation of one partial assignment."""
+
+    pruned: bool  # the energy bound is above PRUNE_MARGIN: no solution
+    stalled: bool  # the engine gave no answer: nothing may be concluded
+    bound: float
+
+    @property
+    def forces(self) -> NDArray[np.float64]:
+        """lambda at the minimiser, shape (2p,), scaled."""
+
+    @property
+    def displacements(self) -> NDArray[np.float64]:
+        """w at the minimiser, shape (2p,), scaled."""
+
+    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Rows and their multipliers, which prove ``bound``."""
+
+    def choose(self, codes: Codes) -> int:
+        """The contact node that the partial assignment is to be branched on, -1 when all are decided."""
+
+    def forced(self, codes: Codes) -> tuple[int, ...]:
+        """Undecided contact nodes of which one child at most is not excluded by a bound that is at hand."""
+
+    def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
+        """The relaxation with further rows switched on; ``last``: this object is not used again."""
+
+
+def largest_violation(codes: Codes, F: NDArray[np.float64], forces: NDArray[np.float64], w: NDArray[np.float64]) -> int:
+    """The undecided node at which complementarity is violated most, -1 when all are decided."""
+    array, p = np.array(codes), len(F)
+    open_nodes = np.flatnonzero(array >= CONTACT)
+    if not len(open_nodes):
+        return -1
+    slip = F * forces[:p] * np.abs(w[p:]) - forces[p:] * w[p:]
+    # an undecided node's slip counts double: deciding it now saves the slack that it leaves in the energy
+    score = np.where(array == UNDECIDED, slip - forces[:p] * w[:p], 0.0) + slip
+    return int(open_nodes[np.argmax(score[open_nodes])])
+
+
+class Engine(Protocol):
+    """Makes the relaxation at the root of the tree."""
+
+    name: str
+
+    def root(self, rows: list[int], modes: list[int]) -> Relaxation:
+        """The relaxation with the given rows on."""

@@ -1,0 +1,118 @@
+"""Relaxations by an interior-point method, for nodes on which the active-set method gives no answer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import solve_triangular
+
+from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation, largest_violation
+from enumsol.relaxation.rows import EQUALITY, row_terms
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.selections.solution import Codes
+
+
+class InteriorPointEngine:
+    """Clarabel's direct interface, one solve from scratch a node."""
+
+    name = "clarabel"
+
+    def __init__(self, system: ScaledSystem) -> None:
+        self.system = system
+        p = system.p
+        start, index, value = row_terms(p, system.F)
+        terms = sp.csr_array((value, index, start), shape=(len(start) - 1, 4 * p)).toarray()
+        # a row is n'lambda - b with w = g - S lambda
+        self.normals = terms[:, : 2 * p] - terms[:, 2 * p :] @ system.S
+        self.offsets = -terms[:, 2 * p :] @ system.g
+        norms = np.sqrt(np.sum(self.lower(self.normals.T) ** 2, axis=0))
+        self.norms = np.where(norms > 0, norms, 1.0)
+
+    def lower(self, rhs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """L^{-1} rhs with S = L L'."""
+        return np.asarray(solve_triangular(self.system.cholesky, rhs, lower=True))
+
+    def dual_bound(self, rows: NDArray[np.intp], values: NDArray[np.float64]) -> float:
+        """Lower bound on the energy that the multipliers prove (theory, (6.1), in floats)."""
+        v = self.system.g + self.normals[rows].T @ values
+        return float(values @ self.offsets[rows] - 0.25 * np.sum(self.lower(v) ** 2))
+
+    def root(self, rows: list[int], modes: list[int]) -> Relaxation:
+        """The relaxation with the given rows on."""
+        return _InteriorPointRelaxation(self, rows, modes)
+
+
+class _InteriorPointRelaxation:
+    def __init__(self, engine: InteriorPointEngine, rows: list[int], modes: list[int]) -> None:
+        import clarabel  # a fallback: most searches never need it
+
+        self._engine = engine
+        self._on = dict(zip(rows, modes, strict=True))
+        equal = [row for row, mode in self._on.items() if mode == EQUALITY]
+        other = [row for row, mode in self._on.items() if mode != EQUALITY]
+        order = np.array(equal + other, dtype=np.intp)
+        scale = 1.0 / engine.norms[order]
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        size = len(engine.system.g)
+        solver = clarabel.DefaultSolver(
+            sp.csc_matrix(np.triu(2.0 * engine.system.S)),
+            -engine.system.g,
+            sp.csc_matrix(-engine.normals[order] * scale[:, None]),
+            -engine.offsets[order] * scale,
+            [clarabel.ZeroConeT(len(equal)), clarabel.NonnegativeConeT(len(other))],
+            settings,
+        )
+        answer = solver.solve()
+        status = answer.status
+        infeasible = status in (clarabel.SolverStatus.PrimalInfeasible, clarabel.SolverStatus.AlmostPrimalInfeasible)
+        solved = status in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
+        values = np.array(answer.z) * scale
+        values[len(equal) :] = np.maximum(values[len(equal) :], 0.0)
+        self._rows, self._values = order, values
+        self.forces = np.array(answer.x) if solved else np.zeros(size)
+        self.displacements = engine.system.g - engine.system.S @ self.forces
+        if infeasible:
+            self._scale_ray()
+        usable = bool((infeasible or solved) and np.all(np.isfinite(self._values)))
+        self.bound = engine.dual_bound(order, self._values) if usable else -np.inf
+        self.pruned = usable and self.bound > PRUNE_MARGIN
+        self.stalled = not solved and not self.pruned
+
+    def _scale_ray(self) -> None:
+        """Stretch an infeasibility certificate so that the bound it proves is as large as it can be."""
+        engine = self._engine
+        direction = engine.normals[self._rows].T @ self._values
+        rate = float(self._values @ engine.offsets[self._rows])
+        a, g = engine.lower(direction), engine.lower(engine.system.g)
+        slope, curvature = rate - 0.5 * float(a @ g), 0.25 * float(a @ a)
+        if slope > 0:
+            # an exact ray has curvature 0: stop where the bound is large enough
+            needed = 2.0 * (0.25 * float(g @ g) + PRUNE_MARGIN) / slope
+            self._values = self._values * (min(needed, 0.5 * slope / curvature) if curvature > 0 else needed)
+
+    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Rows and their multipliers, which prove ``bound``."""
+        keep = self._values != 0
+        return self._rows[keep], self._values[keep]
+
+    def choose(self, codes: Codes) -> int:
+        """The undecided node at which complementarity is violated most, -1 when all are decided."""
+        return largest_violation(codes, self._engine.system.F, self.forces, self.displacements)
+
+    def forced(self, codes: Codes) -> tuple[int, ...]:
+        """None: this method has no bound at hand for a child but by solving it."""
+        del codes
+        return ()
+
+    def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
+        """The relaxation with further rows switched on, solved from scratch."""
+        del last
+        joined = self._on | dict(zip(rows, modes, strict=True))
+        return _InteriorPointRelaxation(self._engine, list(joined), list(joined.values()))

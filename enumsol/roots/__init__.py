@@ -1,0 +1,1 @@
+"""Roots at one alpha: enumerated, joined to families, counted with their degrees."""

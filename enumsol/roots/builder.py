@@ -1,0 +1,174 @@
+"""Roots and families in the user's terms, built from components of the root set."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.roots.linearisation import SelectionTangent
+from enumsol.roots.root_set import Enclosure, Polytope, Root, RootFamily, Undecided
+from enumsol.roots.slip_signs import SlipSigns, shown_status, sign_over
+from enumsol.statuses import (
+    CONTACT,
+    FRICTIONLESS,
+    OPEN,
+    STATUSES,
+    STICK,
+    UNDECIDED,
+    ContactStatus,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from enumsol.checks import Alpha
+    from enumsol.kernel.point import VerifiedSelection
+    from enumsol.problem import ContactProblem
+    from enumsol.roots.components import RootComponent
+    from enumsol.search.tree import UndecidedPart
+    from enumsol.selections.floats import FloatSelections
+    from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
+
+
+class RootBuilder:
+    """Builds Root and RootFamily objects at one alpha.
+
+    Parameters
+    ----------
+    problem, alpha : what was enumerated
+    solver : the solver whose points the components hold
+    floats : the float solver of the same system, for scaled margins and derivatives
+    verified : balls of the verified regular roots by their codes
+    """
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        alpha: Alpha,
+        solver: SelectionSolver,
+        floats: FloatSelections,
+        verified: Mapping[Codes, VerifiedSelection],
+    ) -> None:
+        self._problem = problem
+        self._alpha = alpha
+        self._solver = solver
+        self._floats = floats
+        self._verified = verified
+
+    def root(self, component: RootComponent) -> Root:
+        """The isolated root of a component."""
+        p = self._problem.p
+        solution = component.solutions[0]
+        active_codes = [set(codes) for codes in component.active]
+        canonical = tuple(min(codes) for codes in active_codes)
+        force, w = self._values(canonical, solution)
+        slips = self._slip_signs(canonical, solution)
+        statuses, active = [], []
+        for i, codes in enumerate(active_codes):
+            names = {STATUSES[code] for code in codes if code != FRICTIONLESS}
+            if FRICTIONLESS in codes:
+                names |= slips.names(i)
+            statuses.append(next(s for s in STATUSES if s in names))
+            active.append(frozenset(names))
+        regular = component.regular
+        scaled = force / self._floats.system.force
+        slack = self._floats.slacks(canonical, scaled, w / self._floats.system.length)
+        return Root(
+            alpha=self._alpha,
+            statuses=tuple(statuses),
+            active=tuple(active),
+            lambda_n=force[:p],
+            lambda_t=force[p:],
+            u_n=w[:p],
+            u_t=w[p:],
+            index=component.index,
+            regular=regular,
+            margin=max(float(np.min(slack)), 0.0) if regular else 0.0,
+            enclosure=self._enclosure(solution),
+            _condensed=self._problem.condensed,
+            _tangent=SelectionTangent(self._floats, self._problem.condensed, canonical, force, w) if regular else None,
+            _slips=slips,
+        )
+
+    def _slip_signs(self, codes: Codes, solution: SelectionSolution) -> SlipSigns:
+        """Signs of u_t: from the ball where it does not hold zero, otherwise those of the solver's arithmetic."""
+        p, ball = self._problem.p, self._verified.get(solution.codes)
+        known: tuple[int | None, ...]
+        if ball is None:
+            known = self._solver.slip_signs(solution.vertices[0])
+        else:
+            balls = zip(ball.w[p:].tolist(), ball.w_rad[p:].tolist(), strict=True)
+            known = tuple(int(np.sign(w)) if abs(w) > r or w == r == 0 else None for w, r in balls)
+        return SlipSigns(self._problem, self._alpha, codes, known)
+
+    def _enclosure(self, solution: SelectionSolution) -> Enclosure | None:
+        """Bounds of forces and displacements: from the balls, or the floats next to a rational root."""
+        p, system = self._problem.p, self._floats.system
+        ball = self._verified.get(solution.codes)
+        if ball is not None:
+            mid = np.concatenate([ball.force * system.force, ball.w * system.length])
+            rad = np.concatenate([ball.force_rad * system.force, ball.w_rad * system.length])
+            low = np.where(rad > 0, np.nextafter(mid - rad, -np.inf), mid)
+            high = np.where(rad > 0, np.nextafter(mid + rad, np.inf), mid)
+        elif (around := self._solver.bounds(solution.vertices[0])) is not None:
+            low, high = around
+        else:
+            return None
+        bounds = np.stack([low, high], axis=1)
+        return Enclosure(bounds[:p], bounds[p : 2 * p], bounds[2 * p : 3 * p], bounds[3 * p :])
+
+    def family(self, component: RootComponent, *, proven: bool) -> RootFamily:
+        """The family of a component of positive dimension."""
+        p = self._problem.p
+        parts = []
+        known: list[Any] = []
+        for solution in component.solutions:
+            # polytopes that meet share their corners to the last bit
+            corners = [self._representative(v, known) for v in solution.vertices]
+            points = np.array([self._solver.forces(v) for v in corners])
+            slips = [self._solver.slip_signs(v) for v in solution.vertices]
+            statuses = tuple(
+                shown_status(code, sign_over(s[i] for s in slips)) for i, code in enumerate(solution.codes)
+            )
+            order = np.lexsort(points.T[::-1])
+            vertices = np.stack([points[order, :p], points[order, p:]], axis=2)
+            parts.append(Polytope(statuses, vertices, solution.dimension))
+        return RootFamily(self._alpha, tuple(parts), component.index, vertices_proven=proven)
+
+    def _representative(self, vertex: Any, known: list[Any]) -> Any:
+        for other in known:
+            if self._solver.equal(vertex, other):
+                return other
+        known.append(vertex)
+        return vertex
+
+    def undecided(self, item: UndecidedPart) -> Undecided:
+        """An undecided part in the user's terms."""
+        named: list[ContactStatus | str | None] = []
+        for code in item.codes:
+            if code == UNDECIDED:
+                named.append(None)
+            else:
+                named.append("contact" if code in (CONTACT, FRICTIONLESS) else STATUSES[code])
+        return Undecided(tuple(named), item.reason, item.hint)
+
+    def _values(self, codes: Codes, solution: SelectionSolution) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Forces and displacements with the zeros that the statuses impose set exactly."""
+        p, point, ball = self._problem.p, solution.vertices[0], self._verified.get(solution.codes)
+        if ball is None:
+            force, w = self._solver.forces(point), self._solver.displacements(point)
+        else:
+            # the floats' own S and g may be off by more than the ball's radius
+            force, w = ball.force * self._floats.system.force, ball.w * self._floats.system.length
+        for i, code in enumerate(codes):
+            if code == OPEN:
+                force[[i, p + i]] = 0.0
+            else:
+                w[i] = 0.0
+                if code == STICK:
+                    w[p + i] = 0.0
+        # -0.0 prints badly
+        return force + 0.0, w + 0.0

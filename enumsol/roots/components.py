@@ -1,0 +1,225 @@
+"""From solutions of selections to roots and families: merging, connectivity and the local degree.
+
+A root at which several statuses hold solves several selections and is one root; roots that touch a polytope belong to
+its family. The local degree (index) of a root or family is the sum of sign det over the regular selections whose root
+stays one when g is moved a little in a generic direction (theory, sections 6.6 and 6.7).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from math import prod
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.selections.solution import VertexLimitError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+    from typing import Any
+
+    from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution, SelectionSolver
+
+#: Selections examined around one degenerate root or family to find all that hold there; beyond, a search on the
+#: perturbed problem gives the index.
+MAX_LOCAL_SELECTIONS = 256
+_DIRECTION_SEEDS = (20121, 20122, 20123, 20124)
+
+
+@dataclass(frozen=True)
+class RootComponent:
+    """A connected set of roots: an isolated root or a family.
+
+    Attributes
+    ----------
+    solutions : list of SelectionSolution
+        All selections known to hold on a part of it.
+    active : per node the codes that hold (for a family: somewhere on it)
+    dimension : int
+        0 for an isolated root.
+    index : int or None
+        Local degree; None when it could not be found within the limits.
+    whole : bool
+        All selections that hold on it were examined.
+    """
+
+    solutions: tuple[SelectionSolution, ...]
+    active: ActiveSets
+    dimension: int
+    index: int | None
+    whole: bool
+
+    @property
+    def point(self) -> Any:
+        """The root (of an isolated one)."""
+        return self.solutions[0].vertices[0]
+
+    @property
+    def regular(self) -> bool:
+        """One selection holds, strictly, and is not singular."""
+        first = self.solutions[0]
+        return len(self.solutions) == 1 and self.dimension == 0 and first.strict and first.det_sign != 0
+
+
+def connected_components(
+    solutions: Iterable[SelectionSolution],
+    solver: SelectionSolver,
+    degree: Callable[[ActiveSets], int | None] | None = None,
+) -> list[RootComponent]:
+    """Roots and families that the given solutions of selections form, every root once.
+
+    Parameters
+    ----------
+    solutions : solutions of selections, in any order, duplicates allowed
+    solver : the solver that made them
+    degree : called with the active sets of an isolated root when more than MAX_LOCAL_SELECTIONS hold there
+    """
+    known: dict[Codes, SelectionSolution] = {}
+    singles: list[RootComponent] = []
+    for solution in solutions:
+        if solution.codes in known:
+            continue
+        known[solution.codes] = solution
+    degenerate = []
+    for solution in known.values():
+        if solution.dimension == 0 and solution.strict and solution.det_sign != 0:
+            active = tuple(frozenset((code,)) for code in solution.codes)
+            singles.append(RootComponent((solution,), active, 0, solution.det_sign, whole=True))
+        else:
+            degenerate.append(solution)
+    groups = _grow(degenerate, known, solver)
+    absorbed = {s.codes for group, _ in groups for s in group}
+    singles = [c for c in singles if c.solutions[0].codes not in absorbed]
+    return singles + [_component(group, whole, solver, degree) for group, whole in groups]
+
+
+def _grow(
+    degenerate: Sequence[SelectionSolution], known: dict[Codes, SelectionSolution], solver: SelectionSolver
+) -> list[tuple[list[SelectionSolution], bool]]:
+    """Complete every degenerate solution by the selections that hold with it, and join those that meet."""
+    tried: dict[Codes, SelectionSolution | None] = dict(known)
+    groups: list[tuple[list[SelectionSolution], bool]] = []
+    placed: set[Codes] = set()
+    refused: set[Codes] = set()
+    for seed in degenerate:
+        if seed.codes in placed:
+            continue
+        group, whole, queue = [seed], True, [seed]
+        placed.add(seed.codes)
+        while queue:
+            solution = queue.pop()
+            for vertex in solution.vertices:
+                active = _with_own(solver.active(vertex), solution.codes if solution.dimension == 0 else None)
+                if prod(len(a) for a in active) > MAX_LOCAL_SELECTIONS:
+                    whole = False
+                    continue
+                for codes in product(*(sorted(a) for a in active)):
+                    if codes in placed:
+                        continue
+                    if codes not in tried:
+                        try:
+                            tried[codes] = solver.solve(codes)
+                        except VertexLimitError:
+                            # the search lists this selection as open
+                            tried[codes] = None
+                            refused.add(codes)
+                    whole = whole and codes not in refused
+                    other = tried[codes]
+                    if other is not None and _touch(solution, other, solver):
+                        placed.add(codes)
+                        group.append(other)
+                        queue.append(other)
+        groups.append((group, whole))
+    return _join(groups, solver)
+
+
+def _join(
+    groups: list[tuple[list[SelectionSolution], bool]], solver: SelectionSolver
+) -> list[tuple[list[SelectionSolution], bool]]:
+    """Join groups that have a point in common (a family may be met away from its vertices)."""
+    merged: list[tuple[list[SelectionSolution], bool]] = []
+    for group, whole in groups:
+        current, flag = group, whole
+        rest = []
+        for other, other_whole in merged:
+            if any(_touch(a, b, solver) for a in current for b in other):
+                current, flag = other + current, flag and other_whole
+            else:
+                rest.append((other, other_whole))
+        merged = [*rest, (current, flag)]
+    return merged
+
+
+def _with_own(active: ActiveSets, codes: Codes | None) -> ActiveSets:
+    return active if codes is None else tuple(a | {code} for a, code in zip(active, codes, strict=True))
+
+
+def _touch(a: SelectionSolution, b: SelectionSolution, solver: SelectionSolver) -> bool:
+    """Whether two solutions share a point; points must agree, and each lie in the other's selection."""
+    if a.dimension == 0 and b.dimension == 0:
+        return solver.equal(a.vertices[0], b.vertices[0])
+    return any(_holds(b.codes, v, solver) for v in a.vertices) or (
+        any(_holds(a.codes, v, solver) for v in b.vertices)
+        or (a.dimension > 0 and b.dimension > 0 and solver.meet(a, b))
+    )
+
+
+def _holds(codes: Codes, point: Any, solver: SelectionSolver) -> bool:
+    return all(code in active for code, active in zip(codes, solver.active(point), strict=True))
+
+
+def _component(
+    group: list[SelectionSolution],
+    whole: bool,
+    solver: SelectionSolver,
+    degree: Callable[[ActiveSets], int | None] | None,
+) -> RootComponent:
+    group = sorted(group, key=lambda s: (-s.dimension, s.codes))
+    dimension = group[0].dimension
+    sets = [set() for _ in range(solver.p)]  # type: list[set[int]]
+    for solution in group:
+        for node, code in enumerate(solution.codes):
+            sets[node].add(code)
+        if not whole:
+            for vertex in solution.vertices:
+                for node, codes in enumerate(solver.active(vertex)):
+                    sets[node] |= codes
+    active = tuple(frozenset(s) for s in sets)
+    index = _index(group, solver) if whole else (degree(active) if degree is not None else None)
+    if dimension > 0:
+        group = _maximal(group, solver)
+    return RootComponent(tuple(group), active, dimension, index, whole)
+
+
+def _maximal(group: list[SelectionSolution], solver: SelectionSolver) -> list[SelectionSolution]:
+    """The polytopes that lie in no other one; of equal ones (several statuses hold on all of it) the first."""
+
+    def inside(a: SelectionSolution, b: SelectionSolution) -> bool:
+        return a.dimension <= b.dimension and all(_holds(b.codes, v, solver) for v in a.vertices)
+
+    return [
+        a
+        for k, a in enumerate(group)
+        if not any(inside(a, b) and (j < k or not inside(b, a)) for j, b in enumerate(group) if j != k)
+    ]
+
+
+def _index(group: list[SelectionSolution], solver: SelectionSolver) -> int | None:
+    """Sum of sign det over the regular selections whose root survives; two generic directions must agree."""
+    found: list[int] = []
+    for seed in _DIRECTION_SEEDS:
+        direction = np.random.default_rng(seed).integers(-1000, 1001, size=2 * solver.p)
+        total = 0
+        for solution in group:
+            if solution.dimension == 0:
+                part = solver.departure(solution, direction)
+                if part is None:
+                    break
+                total += part
+        else:
+            found.append(total)
+            if len(found) == 2:
+                break
+    return found[0] if len(found) == 2 and found[0] == found[1] else None

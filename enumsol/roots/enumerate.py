@@ -1,0 +1,311 @@
+"""enumerate_roots: every solution at one alpha (theory, sections 2-5)."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING, Literal
+
+from enumsol.checks import (
+    alpha_value,
+    file_path,
+    instance_of,
+    one_of,
+    optional_callable,
+    optional_count,
+    optional_executor,
+    optional_seconds,
+    share,
+)
+from enumsol.errors import Interrupted, InvalidArgumentError, OutputError, WorkerError
+from enumsol.executors import WorkerLost
+from enumsol.problem import ContactProblem
+from enumsol.proof.proof_file import Proof, ProofWriter
+from enumsol.roots.at_rest import AtRest
+from enumsol.roots.builder import RootBuilder
+from enumsol.roots.components import RootComponent, connected_components
+from enumsol.roots.local_degree import perturbed_degree
+from enumsol.roots.root_set import RootSet, SearchStats
+from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
+from enumsol.search.parallel import run_parallel
+from enumsol.search.solvers import Arithmetic, Solvers
+from enumsol.search.tree import SearchLimits, SearchOutcome, SearchProgress, TreeSearch, UndecidedPart
+from enumsol.selections.floats import SIGN_TOLERANCE, FloatSelections
+from enumsol.selections.solution import SelectionSolution
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from concurrent.futures import Executor
+    from pathlib import Path
+
+    from enumsol.checks import AlphaLike
+    from enumsol.selections.solution import ActiveSets, SelectionSolver
+
+Method = Literal["tree", "exhaustive"]
+#: The exhaustive method reports progress this often [seconds].
+_REPORT_SECONDS = 0.1
+
+
+def enumerate_roots(
+    problem: ContactProblem,
+    alpha: AlphaLike,
+    arithmetic: Arithmetic = "verified",
+    method: Method = "tree",
+    executor: Executor | None = None,
+    progress: Callable[[SearchProgress], object] | None = None,
+    stop_after: int | None = None,
+    max_nodes: int | None = None,
+    time_limit: float | None = None,
+    proof_path: str | Path | None = None,
+    *,
+    tolerance: float = SIGN_TOLERANCE,
+    engine: str | None = None,
+) -> RootSet:
+    """All solutions of the problem at one alpha.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    alpha : float, Fraction, any other real number, or str
+        The parameter, read as the exact number that it is; a text is a fraction such as "8/3" or a decimal number,
+        which is read as float64.
+    arithmetic : {"verified", "fast", "exact"}
+        "verified": every root is enclosed and every excluded selection proven by rigorous error bounds for the data as
+        given, in rationals where a sign cannot be decided otherwise; what stays open is listed. "fast": float64 and a
+        tolerance, never claimed to be complete. "exact": the data are read as exact rationals and everything is
+        decided without rounding (small problems).
+    method : {"tree", "exhaustive"}
+        "tree": pruned search (theory, section 5.4). "exhaustive": all 4^p selections, the oracle for small p.
+    executor : concurrent.futures.Executor, optional
+        Runs subtrees in parallel (method "tree").
+    progress : callable, optional
+        Called now and then with a SearchProgress.
+    stop_after : int, optional
+        Stop when this many roots and families are found; 2 answers "is it unique?".
+    max_nodes : int, optional
+        Stop after so many nodes of the tree (selections, for the exhaustive method).
+    time_limit : float, optional
+        Stop after so many seconds.
+    proof_path : path, optional
+        Stream the proof to this file (arithmetic "verified"); by default it is kept, compressed, in memory.
+    tolerance : float
+        For arithmetic "fast": see enumsol.selections.floats.SIGN_TOLERANCE.
+    engine : {"active-set", "clarabel"}, optional
+        Solver of the relaxations; by default the compiled active-set method with clarabel as its fallback.
+
+    Returns
+    -------
+    RootSet
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is out of range.
+    TooLargeError
+        The exhaustive method or exact arithmetic would take too long; the message says how long.
+    Interrupted
+        On Ctrl-C; ``partial`` holds what was found.
+    WorkerError
+        A worker of the executor died; ``partial`` holds what was found.
+    OutputError
+        The proof could not be written to the end, for want of space; ``partial`` holds the result without a proof.
+    """
+    instance_of(problem, ContactProblem, "problem")
+    value = alpha_value(alpha)
+    one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
+    one_of(method, "method", ("tree", "exhaustive"))
+    one_of(engine, "engine", (None, "active-set", "clarabel"))
+    optional_executor(executor)
+    optional_callable(progress, "progress")
+    counts = optional_count(stop_after, "stop_after"), optional_count(max_nodes, "max_nodes")
+    seconds, tolerance = optional_seconds(time_limit), share(tolerance)
+    _check_proof(arithmetic, method, proof_path)
+    solvers = Solvers(problem, value, arithmetic, tolerance)
+    return _Enumeration(solvers, method, progress, engine, proof_path).run(executor, *counts, seconds)
+
+
+class _Enumeration:
+    """One call of enumerate_roots."""
+
+    def __init__(
+        self,
+        solvers: Solvers,
+        method: Method,
+        progress: Callable[[SearchProgress], object] | None,
+        engine: str | None,
+        proof_path: str | Path | None,
+    ) -> None:
+        self.solvers, self.method, self.progress, self.engine = solvers, method, progress, engine
+        self.started = time.perf_counter()
+        self.outcome = SearchOutcome()
+        self.at_rest: AtRest | None = None
+        self.solver: SelectionSolver = solvers.floats
+        if solvers.arithmetic == "exact" and solvers.exact is not None:
+            self.solver = solvers.exact
+        self.writer: ProofWriter | None = None
+        if solvers.arithmetic == "verified":
+            self.writer = ProofWriter(proof_path)
+            self.writer.write(solvers.proof_header())
+        self.certifier = solvers.certifier(self.writer)
+
+    def run(
+        self, executor: Executor | None, stop_after: int | None, max_nodes: int | None, time_limit: float | None
+    ) -> RootSet:
+        """Search, then build the result; an interruption keeps what was found."""
+        deadline = None if time_limit is None else self.started + time_limit
+        limits = SearchLimits(self._enough(stop_after), max_nodes, deadline)
+        try:
+            if self.method == "exhaustive":
+                self._exhaustive(limits)
+            else:
+                self._tree(limits, executor)
+        except KeyboardInterrupt as interruption:
+            self.outcome.stopped = f"interrupted after {self.outcome.nodes + self.outcome.selections} nodes"
+            partial = self._result()
+            message = f"enumerate_roots was interrupted; {len(partial)} roots so far"
+            raise Interrupted(message, partial) from interruption
+        except WorkerLost as loss:
+            partial = self._result()
+            raise WorkerError(f"{loss}; {len(partial)} roots so far", partial) from loss
+        result = self._result()
+        if self.writer is not None and self.writer.failure is not None:
+            raise OutputError(self.writer.failure, result)
+        return result
+
+    def _enough(self, stop_after: int | None) -> Callable[[list[SelectionSolution]], bool] | None:
+        if stop_after is None:
+            return None
+        counted = [0, 0]
+
+        def enough(solutions: list[SelectionSolution]) -> bool:
+            # several selections may hold at one root: count roots, and only when something was added
+            if len(solutions) >= stop_after and len(solutions) != counted[0]:
+                counted[:] = [len(solutions), sum(len(part) for part, _ in self._components())]
+            return counted[1] >= stop_after
+
+        return enough
+
+    def _tree(self, limits: SearchLimits, executor: Executor | None) -> None:
+        solvers = self.solvers
+        search = TreeSearch(solvers.scaled, self.certifier, engine=self.engine, limits=limits, progress=self.progress)
+        self.outcome = search.outcome
+        if solvers.unloaded():
+            if isinstance(self.certifier, VerifiedCertifier):
+                self.certifier.unloaded()
+            self.at_rest = AtRest(solvers.floats.F_positive, proven=solvers.arithmetic != "fast")
+        elif (reason := solvers.undecidable) is not None:
+            # without any means of proof the tree would only grow
+            codes = search.first().codes
+            self.certifier.skipped(codes, reason)
+            self.outcome.undecided.append(UndecidedPart(codes, reason, "hold the body better, or scale the data"))
+        elif executor is not None:
+            run_parallel(executor, solvers, search, self.engine, solvers.floats.tolerance)
+        else:
+            search.run()
+
+    def _exhaustive(self, limits: SearchLimits) -> None:
+        outcome, reported = self.outcome, self.started
+        if isinstance(self.solver, FloatSelections):
+            stream = exhaustive_float(self.solvers.scaled, self.solver)
+        else:
+            stream = exhaustive_exact(self.solver)
+        total = math.prod(4 if positive else 2 for positive in self.solver.F_positive)
+        for outcome.selections, solution in stream:
+            if solution is not None:
+                outcome.solutions.append(solution)
+            now = time.perf_counter()
+            due = now - reported > _REPORT_SECONDS or (solution is None and outcome.selections % BLOCK == 0)
+            if self.progress is not None and (due or outcome.selections == total):
+                reported = now
+                share = outcome.selections / total
+                state = SearchProgress(outcome.selections, share, len(outcome.solutions), now - self.started)
+                self.progress(state)
+            if solution is not None and limits.enough is not None and limits.enough(outcome.solutions):
+                outcome.stopped = "stopped after enough roots"
+            elif limits.max_nodes is not None and limits.max_nodes <= outcome.selections < total:
+                outcome.stopped = f"stopped after max_nodes = {limits.max_nodes} selections"
+            elif limits.deadline is not None and now > limits.deadline and outcome.selections < total:
+                outcome.stopped = "stopped by the time limit"
+            if outcome.stopped is not None:
+                return
+
+    def _components(self) -> list[tuple[list[RootComponent], SelectionSolver]]:
+        """Components of the root set with the solver whose points they hold."""
+        if self.at_rest is not None:
+            return [([self.at_rest.component], self.at_rest)]
+        solutions = self.outcome.solutions
+        exact = [s for s in solutions if isinstance(s.vertices[0], tuple)]
+        floats = [s for s in solutions if not isinstance(s.vertices[0], tuple)]
+        parts: list[tuple[list[RootComponent], SelectionSolver]] = []
+        if floats:
+            parts.append((connected_components(floats, self.solvers.floats, self._degree), self.solvers.floats))
+        if exact and self.solvers.exact is not None:
+            parts.append((connected_components(exact, self.solvers.exact, self._degree), self.solvers.exact))
+        return parts
+
+    def _degree(self, active: ActiveSets) -> int | None:
+        return perturbed_degree(self.solvers.floats, active)
+
+    def _result(self) -> RootSet:
+        outcome, solvers = self.outcome, self.solvers
+        roots, families = [], []
+        apart, joinable = 0, False
+        verified = self.certifier.verified if isinstance(self.certifier, VerifiedCertifier) else {}
+        for components, solver in self._components():
+            builder = RootBuilder(solvers.problem, solvers.alpha, solver, solvers.floats, verified)
+            # of a component that was not examined whole it is not known what joins it
+            apart += sum(c.whole for c in components)
+            joinable = joinable or not all(c.whole for c in components)
+            roots += [builder.root(c) for c in components if c.dimension == 0]
+            proven = solver is not solvers.floats
+            families += [builder.family(c, proven=proven) for c in components if c.dimension > 0]
+        roots.sort(key=lambda root: ([s.value for s in root.statuses], root.lambda_n.tolist(), root.lambda_t.tolist()))
+        families.sort(key=lambda family: family.vertices.tolist())
+        builder = RootBuilder(solvers.problem, solvers.alpha, self.solver, solvers.floats, verified)
+        whole = outcome.stopped is None and not outcome.undecided
+        counts = (outcome.nodes, outcome.pruned, outcome.selections, outcome.qps, outcome.fallback_qps)
+        return RootSet(
+            alpha=solvers.alpha,
+            roots=roots,
+            families=families,
+            undecided=[builder.undecided(item) for item in outcome.undecided],
+            arithmetic=solvers.arithmetic,
+            method=self.method,
+            stopped=outcome.stopped,
+            stats=SearchStats(
+                *counts,
+                time.perf_counter() - self.started,
+                self.certifier.escalations if isinstance(self.certifier, VerifiedCertifier) else None,
+                outcome.presolved,
+            ),
+            node_ids=solvers.problem.node_ids,
+            at_least=None if whole else apart + int(joinable),
+            certified_data=solvers.data,
+            proof=self._proof(len(roots), len(families)),
+        )
+
+    def _proof(self, roots: int, families: int) -> Proof | None:
+        """Close the proof. One that was interrupted or had no room stays without its end, and is none."""
+        if self.writer is None or not isinstance(self.certifier, VerifiedCertifier):
+            return None
+        whole = self.outcome.stopped is None or "not examined" in self.outcome.stopped
+        if whole:
+            undecided = len(self.outcome.undecided)
+            footer = {"roots": roots, "families": families, "undecided": undecided, "leaves": self.certifier.leaves}
+            self.writer.write(footer)
+        proof = self.writer.close()
+        return proof if whole and self.writer.failure is None else None
+
+
+def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None) -> None:
+    if method == "exhaustive" and arithmetic == "verified":
+        raise InvalidArgumentError(
+            'method is "exhaustive" with arithmetic "verified"; expected "fast" or "exact" arithmetic for the oracle'
+        )
+    if proof_path is not None and arithmetic != "verified":
+        raise InvalidArgumentError(
+            f'proof_path is given with arithmetic {arithmetic!r}; expected "verified", which alone writes proofs'
+        )
+    if proof_path is not None:
+        file_path(proof_path, "proof_path")

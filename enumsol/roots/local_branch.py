@@ -1,0 +1,188 @@
+"""Whether a local Lipschitz branch passes through a root: coherent orientation of the normal map (theory, (3.3))."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from math import prod
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from enumsol.checks import instance_of
+from enumsol.errors import InvalidArgumentError, TooLargeError
+from enumsol.problem import ContactProblem
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, STATUSES, STICK, contact_status
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence, Set
+
+    from numpy.typing import NDArray
+
+    from enumsol.checks import Alpha
+    from enumsol.condensation.condensed import CondensedProblem
+    from enumsol.selections.solution import Codes
+    from enumsol.statuses import ContactStatus
+
+#: Selections examined at one point (paper, Remark 5.1); six nodes in a corner of three statuses have 729.
+MAX_SELECTIONS = 4096
+#: A singular value of the normal map's scaled matrix below this counts as zero, as in arithmetic "fast".
+SINGULAR_TOLERANCE = 1e-12
+#: The same at transition points of a path, whose alpha is located to about 1e-10.
+LOCATED_SINGULAR_TOLERANCE = 1e-8
+
+
+class SolutionPoint(Protocol):
+    """What the test asks of a root: its alpha, the statuses that hold at every node, and u_t."""
+
+    @property
+    def alpha(self) -> Alpha:
+        """The parameter."""
+
+    @property
+    def active(self) -> Sequence[Set[ContactStatus]]:
+        """All statuses that hold, node by node."""
+
+    @property
+    def u_t(self) -> NDArray[np.float64]:
+        """Tangential displacements, shape (p,)."""
+
+
+@dataclass(frozen=True)
+class LocalBranchTest:
+    """Answer of the local branch test at one root.
+
+    The contact forces are a Lipschitz function of the load near the root, at fixed friction, exactly when the
+    determinants of the normal map have one and the same sign, not zero, over all statuses that hold there. By
+    paper, Theorem 4.1, they then are one of the friction coefficients too, provided that F > 0 at every node.
+
+    Attributes
+    ----------
+    exists : bool
+        A local Lipschitz branch in the load exists.
+    premise : bool
+        F > 0 at every node: the premise of the paper's Theorem 4.1 for a branch in F.
+    signs : tuple of (statuses, sign)
+        Every selection that holds at the root with the sign of its determinant: +1, -1 or 0.
+    differing : tuple of tuples of ContactStatus
+        The selections whose sign is zero or differs from that of the first; empty when the branch exists.
+    """
+
+    exists: bool
+    premise: bool
+    signs: tuple[tuple[tuple[ContactStatus, ...], int], ...]
+    differing: tuple[tuple[ContactStatus, ...], ...]
+
+    @classmethod
+    def from_signs(cls, signs: tuple[tuple[tuple[ContactStatus, ...], int], ...], *, premise: bool) -> LocalBranchTest:
+        """The answer that these signs give."""
+        first = signs[0][1] if signs else 0
+        differing = tuple(statuses for statuses, sign in signs if sign == 0 or sign != first)
+        return cls(bool(signs) and not differing, premise, signs, differing)
+
+    def __str__(self) -> str:
+        many = len(self.signs)
+        answer = "a local Lipschitz branch exists" if self.exists else "no local Lipschitz branch"
+        detail = f"{many} selection{'s' if many != 1 else ''} hold{'s' if many == 1 else ''}"
+        if not self.exists:
+            detail += f", the sign of {len(self.differing)} of them differs or is zero"
+        premise = "" if self.premise else "; F = 0 at some node, so Theorem 4.1 does not carry it over to F"
+        return f"{answer} in the load ({detail}){premise}"
+
+
+def local_branch_test(problem: ContactProblem, root: SolutionPoint) -> LocalBranchTest:
+    """Whether a local Lipschitz branch of solutions passes through a root (theory, section 3.2).
+
+    The test looks at the normal map G(z) = w + S lambda, which does not depend on the parameter r of H, over the
+    statuses that hold at the root (``root.active``).
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    root : Root
+        Or a vertex of a branch graph.
+
+    Returns
+    -------
+    LocalBranchTest
+
+    Raises
+    ------
+    InvalidArgumentError
+        The root does not belong to the problem.
+    TooLargeError
+        More than MAX_SELECTIONS selections hold at the root.
+    """
+    instance_of(problem, ContactProblem, "problem")
+    active = getattr(root, "active", None)
+    if not isinstance(active, tuple) or len(active) != problem.p:
+        raise InvalidArgumentError(f"root is {type(root).__name__}; expected a Root with {problem.p} contact nodes")
+    return branch_test(problem.condensed, root)
+
+
+def branch_test(condensed: CondensedProblem, root: SolutionPoint) -> LocalBranchTest:
+    """The test at a root of the condensed problem; see local_branch_test."""
+    alpha = float(root.alpha)
+    frictionless = (condensed.F0 == 0) & (condensed.F1 == 0)
+    active = []
+    for without, holds in zip(frictionless, root.active, strict=True):
+        codes = {STATUSES.index(status) for status in holds}
+        active.append(frozenset(OPEN if code == OPEN else FRICTIONLESS for code in codes) if without else codes)
+    F = condensed.F0 + alpha * condensed.F1
+    return coherent_orientation(condensed.balanced, F, active, root.u_t, alpha, SINGULAR_TOLERANCE)
+
+
+def coherent_orientation(
+    S: NDArray[np.float64],
+    F: NDArray[np.float64],
+    active: Sequence[Set[int]],
+    slip: NDArray[np.float64],
+    alpha: float,
+    singular: float = LOCATED_SINGULAR_TOLERANCE,
+) -> LocalBranchTest:
+    """The test for the statuses that hold at a solution.
+
+    Parameters
+    ----------
+    S : (2p, 2p) balanced compliance
+    F : (p,) friction coefficients at alpha
+    active : per node the codes that hold
+    slip : (p,) u_t, whose sign names the slip of nodes without friction
+    alpha : for messages
+    singular : singular values below this count as zero
+    """
+    count = prod(len(codes) for codes in active)
+    if count > MAX_SELECTIONS:
+        raise TooLargeError(
+            f"{count} selections hold at alpha = {alpha:g}; the local branch test examines at most {MAX_SELECTIONS}"
+        )
+    signs = tuple(
+        (
+            tuple(contact_status(code, float(u)) for code, u in zip(codes, slip, strict=True)),
+            normal_map_sign(S, F, codes, singular),
+        )
+        for codes in product(*(sorted(codes) for codes in active))
+    )
+    return LocalBranchTest.from_signs(signs, premise=bool(np.all(F > 0)))
+
+
+def normal_map_sign(
+    S: NDArray[np.float64], F: NDArray[np.float64], codes: Codes, singular: float = SINGULAR_TOLERANCE
+) -> int:
+    """Sign of det DG in the cell of these statuses, 0 when it is singular; columns scaled to length one."""
+    p = len(codes)
+    DG = np.eye(2 * p)
+    for i, code in enumerate(codes):
+        if code == OPEN:
+            continue
+        DG[:, i] = S[:, i]
+        if code == STICK:
+            DG[:, p + i] = S[:, p + i]
+        elif code != FRICTIONLESS:
+            slope = -F[i] if code == SLIP_MINUS else F[i]
+            DG[:, i] += slope * S[:, p + i]
+            DG[p + i, i] -= slope
+    DG /= np.linalg.norm(DG, axis=0)
+    if np.linalg.svd(DG, compute_uv=False)[-1] <= singular:
+        return 0
+    return int(np.linalg.slogdet(DG)[0])

@@ -1,0 +1,79 @@
+"""Signs of u_t at a root, from its enclosure or from rationals: they name the slip of nodes without friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.statuses import FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from enumsol.checks import Alpha
+    from enumsol.problem import ContactProblem
+    from enumsol.selections.solution import Codes
+
+
+@dataclass(frozen=True)
+class SlipSigns:
+    """Signs of u_t at a root of one selection.
+
+    Attributes
+    ----------
+    problem : ContactProblem
+    alpha : float or Fraction
+    codes : tuple of p status codes
+        The root's selection, which is regular where a sign has to be found in rationals.
+    known : tuple of p (int or None)
+        Signs that the enclosure, rationals or the tolerance of fast arithmetic decide; None where they do not.
+    """
+
+    problem: ContactProblem
+    alpha: Alpha
+    codes: Codes
+    known: tuple[int | None, ...]
+
+    def sign(self, node: int) -> int | None:
+        """-1, 0 or 1; None where the problem is too large for the rationals that could tell."""
+        known = self.known[node]
+        return known if known is not None or self._exact is None else self._exact[node]
+
+    def names(self, node: int) -> frozenset[ContactStatus]:
+        """Statuses that the sign gives to a node in contact without friction: all three where u_t = 0 may hold."""
+        return slip_names(self.sign(node))
+
+    @cached_property
+    def _exact(self) -> tuple[int, ...] | None:
+        """All signs in rationals; None when the problem is too large for them."""
+        if self.problem.n > EXACT_DOF_LIMIT:
+            return None
+        from enumsol.condensation.exact import ExactSystem  # python-flint, not for fast arithmetic
+        from enumsol.selections.rationals import ExactSelections
+
+        solver = ExactSelections(ExactSystem.from_problem(self.problem, self.alpha))
+        solution = solver.solve(self.codes)
+        return None if solution is None else solver.slip_signs(solution.vertices[0])
+
+
+def slip_names(sign: int | None) -> frozenset[ContactStatus]:
+    """Statuses of a node in contact without friction by the sign of its u_t: all three where that is 0 or not known."""
+    if not sign:
+        return frozenset(STATUSES[code] for code in (STICK, SLIP_PLUS, SLIP_MINUS))
+    return frozenset((STATUSES[SLIP_PLUS if sign > 0 else SLIP_MINUS],))
+
+
+def sign_over(signs: Iterable[int]) -> int:
+    """The sign of u_t on a polytope whose corners have these signs; 0 where it takes both or none."""
+    found = set(signs) - {0}
+    return found.pop() if len(found) == 1 else 0
+
+
+def shown_status(code: int, sign: int) -> ContactStatus:
+    """The status that a code shows; ``sign`` is that of u_t, which names a node in contact without friction."""
+    if code != FRICTIONLESS:
+        return STATUSES[code]
+    names = slip_names(sign)
+    return next(status for status in STATUSES if status in names)

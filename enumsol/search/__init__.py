@@ -1,0 +1,1 @@
+"""The tree search over the statuses, at one alpha and over an interval."""

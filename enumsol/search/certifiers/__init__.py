@@ -1,0 +1,1 @@
+"""What each arithmetic lets a search conclude."""

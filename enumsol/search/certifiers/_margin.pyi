@@ -1,0 +1,10 @@
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from enumsol.condensation.enclosure import EnclosedSystem
+
+class Margins:
+    def __init__(self, system: EnclosedSystem) -> None: ...
+    def margin(self, codes: Sequence[int], rows: NDArray[np.intp], values: NDArray[np.float64]) -> float: ...

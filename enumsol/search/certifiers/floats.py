@@ -1,0 +1,59 @@
+"""What each arithmetic lets the tree conclude: prunings accepted, complete selections decided."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.relaxation.engine import PRUNE_MARGIN
+from enumsol.search.tree import UndecidedPart
+from enumsol.selections.solution import VertexLimitError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from enumsol.relaxation.engine import Relaxation
+    from enumsol.selections.floats import FloatSelections
+    from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
+
+
+def solve_or_open(solver: SelectionSolver, codes: Codes) -> SelectionSolution | UndecidedPart | None:
+    """The solver's answer; a polytope with too many candidate vertices leaves the selection open."""
+    try:
+        return solver.solve(codes)
+    except VertexLimitError as error:
+        return UndecidedPart(codes, str(error), "perturb the load or the friction coefficient")
+
+
+class Silent:
+    """A certifier that writes no proof."""
+
+    def branching(self, node: int, children: Sequence[int]) -> None:
+        """Nothing to write."""
+
+    def skipped(self, codes: Codes, reason: str) -> None:
+        """Nothing to write."""
+
+
+class FastCertifier(Silent):
+    """Floats and tolerances: what the engine computed is believed, unless the tolerance could overturn it.
+
+    A condition within the tolerance of zero counts as satisfied. Shifting every row of a certificate by twice that
+    changes its bound by the multipliers times the shift; a pruning that does not survive it is branched on.
+    """
+
+    def __init__(self, selections: FloatSelections) -> None:
+        self._selections = selections
+        self._norms = selections.row_norms()
+
+    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+        """Accept the pruning if conditions may be off by twice the tolerance."""
+        del codes
+        rows, values = relaxation.multipliers()
+        shift = float(np.abs(values) @ self._norms[rows])
+        return relaxation.bound > PRUNE_MARGIN + 2.0 * self._selections.tolerance * shift
+
+    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
+        """All roots in the selection within the tolerance."""
+        return solve_or_open(self._selections, codes)

@@ -1,0 +1,206 @@
+"""The certifier of arithmetic "verified" (and the one that writes proofs): nothing is concluded that is not proven.
+
+Escalation only where needed: balls in double arithmetic first, rationals where a sign cannot be decided and the
+problem is small enough, otherwise the selection is left undecided with the reason.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.kernel.point import VerifiedSelection, exclusion_margin, holds_no_root, solve_selection
+from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
+from enumsol.proof.proof_file import fraction_text, packed
+from enumsol.search.tree import UndecidedPart
+from enumsol.selections.solution import SelectionSolution
+from enumsol.statuses import FRICTIONLESS, OPEN, STICK
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.proof.proof_file import Recorder
+    from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.rationals import ExactCertifier
+    from enumsol.selections.solution import Codes
+
+    Array = NDArray[np.float64]
+
+#: The balls written into a proof are wider than those found by this factor, so that a checker's own balls fit in.
+_WIDEN = 4.0
+
+
+@dataclass
+class Escalations:
+    """How many selections and prunings needed which arithmetic.
+
+    Attributes
+    ----------
+    balls : int
+        Decided by error bounds in double arithmetic.
+    rationals : int
+        Decided in rational arithmetic.
+    refined : int
+        Prunings whose inequality failed; they were branched on.
+    undecided : int
+    """
+
+    balls: int = 0
+    rationals: int = 0
+    refined: int = 0
+    undecided: int = 0
+
+    def add(self, other: Escalations) -> None:
+        """Add the counts of another part of the search."""
+        self.balls += other.balls
+        self.rationals += other.rationals
+        self.refined += other.refined
+        self.undecided += other.undecided
+
+
+class VerifiedCertifier:
+    """Proves prunings and complete selections, and writes the proof.
+
+    Parameters
+    ----------
+    scaled : ScaledSystem
+        The system that the search works on; it gives the units of the multipliers.
+    enclosed : EnclosedSystem or None
+        Balls for the same system; None sends everything to rationals.
+    exact : callable giving an ExactCertifier, or None when the problem is too large for rationals
+    recorder : Recorder
+        Where the records of the proof go.
+    node_ids : labels of the contact nodes, for messages
+    """
+
+    def __init__(
+        self,
+        scaled: ScaledSystem,
+        enclosed: EnclosedSystem | None,
+        exact: Callable[[], ExactCertifier | None],
+        recorder: Recorder,
+        node_ids: Sequence[Any],
+    ) -> None:
+        self._scaled = scaled
+        self._enclosed = enclosed
+        self._margin = None if enclosed is None else _margins(enclosed)
+        self._exact = exact
+        self.recorder = recorder
+        self._node_ids = node_ids
+        self.escalations = Escalations()
+        self.verified: dict[Codes, VerifiedSelection] = {}
+        self.leaves = 0
+
+    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+        """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
+        rows, values = relaxation.multipliers()
+        if self._margin is not None:
+            if self._margin(codes, rows, values) > 0:
+                self.escalations.balls += 1
+                self._leaf("x", *packed(rows, values))
+                return True
+        elif (certifier := self._exact()) is not None and certifier.excluded(codes, relaxation):
+            # no balls for an S that is positive definite only within rounding
+            self.escalations.rationals += 1
+            # the certifier passes over multipliers that prove nothing, a checker refuses them
+            kind, node = np.divmod(rows, self._scaled.p)
+            signs = row_signs(np.array(codes), self._scaled.F)[node, kind]
+            keep = (signs == FREE) | ((signs == NONNEGATIVE) & (values > 0))
+            self._leaf("X", *packed(rows[keep], values[keep]))
+            return True
+        self.escalations.refined += 1
+        return False
+
+    def branching(self, node: int, children: Sequence[int]) -> None:
+        """Write a branching of the tree."""
+        self.recorder.write(["b", node, list(children)])
+
+    def skipped(self, codes: Codes, reason: str) -> None:
+        """Write a subtree that was not examined."""
+        del codes
+        self._leaf("u", reason)
+
+    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
+        """All roots in a complete selection."""
+        ball = None if self._enclosed is None else solve_selection(self._enclosed, codes)
+        if ball is not None and ball.is_root:
+            self.escalations.balls += 1
+            return self._regular(codes, ball)
+        if self._enclosed is not None and holds_no_root(self._enclosed, codes, ball):
+            self.escalations.balls += 1
+            self._leaf("n")
+            return None
+        certifier = self._exact()
+        if certifier is None:
+            return self._undecided(codes, *_reason(codes, ball, self._node_ids))
+        solution = certifier.selection(codes)
+        if isinstance(solution, UndecidedPart):
+            return self._undecided(codes, solution.reason, solution.hint)
+        self.escalations.rationals += 1
+        if solution is None:
+            self._leaf("N")
+        else:
+            points = [[_fraction(v) for v in vertex] for vertex in solution.vertices]
+            self._leaf("D", points, solution.dimension)
+        return solution
+
+    def unloaded(self) -> None:
+        """Write the proof of the unloaded body."""
+        self._leaf("z")
+
+    def _regular(self, codes: Codes, ball: VerifiedSelection) -> SelectionSolution:
+        self.verified[codes] = ball
+        force = ball.force * self._scaled.force
+        radius = ball.force_rad * self._scaled.force * _WIDEN
+        self._leaf("r", force.tolist(), radius.tolist(), ball.det_sign)
+        return SelectionSolution(codes, (ball.force,), 0, ball.det_sign, strict=True)
+
+    def _undecided(self, codes: Codes, reason: str, hint: str) -> UndecidedPart:
+        self.escalations.undecided += 1
+        self._leaf("u", reason)
+        return UndecidedPart(codes, reason, hint)
+
+    def _leaf(self, *record: Any) -> None:
+        self.leaves += 1
+        self.recorder.write(list(record))
+
+
+def _margins(system: EnclosedSystem) -> Callable[[Codes, NDArray[np.intp], Array], float]:
+    """The exclusion inequality, compiled where that is installed."""
+    try:
+        from enumsol.search.certifiers._margin import Margins
+    except ImportError:
+        return partial(exclusion_margin, system, errors=2.0)
+    return Margins(system).margin
+
+
+def _fraction(value: Any) -> str:
+    return fraction_text(int(value.p), int(value.q))
+
+
+def _reason(codes: Codes, ball: VerifiedSelection | None, node_ids: Sequence[Any]) -> tuple[str, str]:
+    """Why a selection could not be decided, and what may help."""
+    hint = "the problem is too large for exact arithmetic; perturb the load, or condense the body to its contact nodes"
+    if ball is None:
+        return "the matrix of a selection may be singular", hint
+    if not (np.all(np.isfinite(ball.slack)) and np.all(np.isfinite(ball.slack_rad))):
+        return "the solution of a selection overflows float64", "scale the data"
+    names = []
+    for node, code in zip(node_ids, codes, strict=True):
+        if code == OPEN:
+            names.append(f"the gap of node {node}")
+        elif code == STICK:
+            names += [f"the slip bound of node {node} (forward)", f"the slip bound of node {node} (backward)"]
+        else:
+            names.append(f"the normal force of node {node}")
+            if code != FRICTIONLESS:
+                names.append(f"the slip condition of node {node}")
+    k = int(np.argmin(np.where(np.abs(ball.slack) <= ball.slack_rad, np.abs(ball.slack), np.inf)))
+    return f"{names[k]} is zero to {abs(ball.slack[k]) + ball.slack_rad[k]:.0e} (scaled)", hint

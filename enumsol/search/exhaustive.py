@@ -1,0 +1,103 @@
+"""All 4^p selections, block by block: the oracle for small p."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.errors import TooLargeError
+from enumsol.selections.floats import selection_systems
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_PLUS, STICK
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
+
+#: Most selections that the exhaustive method examines, in floats and in rationals.
+FLOAT_LIMIT = 4**11
+EXACT_LIMIT = 4**7
+#: Selections solved together in floats, and between two reports of progress.
+BLOCK = 2048
+#: Selections whose float solution breaks a condition by more than this are dropped without a second look.
+_SCREEN = 1e-6
+#: Reciprocal condition below which the screen does not trust a float solution.
+_SCREEN_RANK = 1e-9
+
+
+def all_codes(F_positive: tuple[bool, ...]) -> Iterator[Codes]:
+    """Every selection: four statuses a node, two (open, in contact) where F = 0."""
+    return product(*(range(4) if positive else (OPEN, FRICTIONLESS) for positive in F_positive))
+
+
+def refuse_if_too_large(F_positive: tuple[bool, ...], limit: int, per_second: float) -> int:
+    """Number of selections.
+
+    Raises
+    ------
+    TooLargeError
+        There are more than ``limit``; the message estimates the cost.
+    """
+    count = 1
+    for positive in F_positive:
+        count *= 4 if positive else 2
+    if count > limit:
+        hours = count / per_second / 3600
+        raise TooLargeError(
+            f'method="exhaustive" would solve {count:.3g} selections (about {hours:.3g} hours); the limit is {limit} '
+            'selections: use method="tree"'
+        )
+    return count
+
+
+def exhaustive_float(system: ScaledSystem, solver: SelectionSolver) -> Iterator[tuple[int, SelectionSolution | None]]:
+    """Selections examined so far with a solution found, or with None after every block; in floats.
+
+    A vectorised solve screens every block; what it cannot refuse clearly (all conditions nearly hold, or the matrix is
+    nearly singular) is decided by ``solver``.
+    """
+    total = refuse_if_too_large(solver.F_positive, FLOAT_LIMIT, 20_000.0)
+    codes = all_codes(solver.F_positive)
+    done = 0
+    while done < total:
+        block = np.array([next(codes) for _ in range(min(BLOCK, total - done))], dtype=np.int8)
+        for row in block[_candidates(system, block)]:
+            solution = solver.solve(tuple(int(c) for c in row))
+            if solution is not None:
+                yield done, solution
+        done += len(block)
+        yield done, None
+
+
+def _candidates(system: ScaledSystem, block: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Mask of the selections of a block that may hold a root."""
+    p, F, S, g = system.p, system.F, system.S, system.g
+    M, b = selection_systems(S, g, F, block)
+    # rows and columns of comparable size, so that the reciprocal condition means something
+    M /= np.max(np.abs(M), axis=2, keepdims=True)
+    scale = np.max(np.abs(selection_systems(S, g, F, block)[0]), axis=2)
+    singular = np.linalg.svd(M, compute_uv=False)
+    doubtful = singular[:, -1] <= _SCREEN_RANK * singular[:, 0]
+    M[doubtful] = np.eye(2 * p)
+    force = np.linalg.solve(M, (b / scale)[:, :, None])[:, :, 0]
+    w = g - force @ S
+    size = _SCREEN * (1.0 + np.max(np.abs(force), axis=1, keepdims=True))
+    n, t, wn, wt = force[:, :p], force[:, p:], w[:, :p], w[:, p:]
+    reach = F * n * (1 + _SCREEN) + size
+    ok = np.where(block == OPEN, wn <= size, n >= -size)
+    ok &= np.where(block == STICK, np.abs(t) <= reach, True)
+    ok &= np.where(block == SLIP_PLUS, wt >= -size, True)
+    ok &= np.where(block == 3, wt <= size, True)
+    return np.asarray(doubtful | np.all(ok, axis=1))
+
+
+def exhaustive_exact(solver: SelectionSolver) -> Iterator[tuple[int, SelectionSolution | None]]:
+    """Selections examined so far with the last one's solution, or None; in rationals, one linear solve each."""
+    refuse_if_too_large(solver.F_positive, EXACT_LIMIT, 1_000.0)
+    for done, codes in enumerate(all_codes(solver.F_positive), start=1):
+        yield done, solver.solve(codes)

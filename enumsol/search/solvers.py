@@ -1,0 +1,175 @@
+"""One problem at one alpha in one arithmetic: the solvers and the certifier that a search needs."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.proof.reading import rational_text
+from enumsol.search.certifiers.floats import FastCertifier
+from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.selections.floats import FloatSelections
+
+if TYPE_CHECKING:
+    from enumsol.checks import Alpha
+    from enumsol.problem import ContactProblem
+    from enumsol.proof.proof_file import Recorder
+    from enumsol.search.certifiers.rationals import ExactCertifier
+    from enumsol.search.tree import Certifier
+    from enumsol.selections.rationals import ExactSelections
+
+Arithmetic = Literal["fast", "verified", "exact"]
+
+
+class Solvers:
+    """Solvers and certifier for one problem at one alpha.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    alpha : float or Fraction
+    arithmetic : {"fast", "verified", "exact"}
+    tolerance : float
+        Sign tolerance of fast arithmetic.
+
+    Raises
+    ------
+    InvalidArgumentError
+        A friction coefficient is positive and underflows to zero: its node would be taken for one without friction.
+    """
+
+    def __init__(self, problem: ContactProblem, alpha: Alpha, arithmetic: Arithmetic, tolerance: float) -> None:
+        self.problem, self.alpha, self.arithmetic = problem, alpha, arithmetic
+        self.scaled = problem.condensed.at(alpha).scaled
+        self.floats = FloatSelections(self.scaled, tolerance)
+        pairs = zip(*(part.tolist() for part in problem.friction), strict=True)
+        lost = [
+            not F and Fraction(x) + Fraction(alpha) * Fraction(y) != 0
+            for F, (x, y) in zip(self.scaled.F, pairs, strict=True)
+        ]
+        if any(lost):
+            node = problem.node_ids[lost.index(True)]
+            raise InvalidArgumentError(
+                f"friction at contact node {node} is positive at this alpha and too small for float64; "
+                "expected 0 or more than 1e-307"
+            )
+
+    @cached_property
+    def exact(self) -> ExactSelections | None:
+        """Selections in rationals; None when the problem is too large for them.
+
+        Raises
+        ------
+        InvalidProblemError
+            S is not positive definite, exactly: no bound on the energy would hold.
+        """
+        from enumsol.arithmetic.rationals import is_positive_definite
+        from enumsol.condensation.exact import ExactSystem  # python-flint
+        from enumsol.selections.rationals import ExactSelections  # python-flint
+
+        if self.arithmetic != "exact" and self.problem.n > EXACT_DOF_LIMIT:
+            return None
+        system = ExactSystem.from_problem(self.problem, self.alpha)
+        if not is_positive_definite(system.S):
+            raise InvalidProblemError("A is not positive definite (S = B A^-1 B' is not, in rational arithmetic)")
+        return ExactSelections(system)
+
+    @cached_property
+    def exact_certifier(self) -> ExactCertifier | None:
+        """The certifier in rationals; None when the problem is too large, or only condensed data are certified."""
+        if self.data == "condensed" or self.exact is None:
+            return None
+        from enumsol.search.certifiers.rationals import ExactCertifier  # python-flint
+
+        return ExactCertifier(self.exact, self.scaled)
+
+    @cached_property
+    def _enclosed(self) -> tuple[EnclosedSystem | None, str]:
+        system = self.scaled
+        try:
+            enclosed = self.problem.enclosure.at(self.alpha, system.force, system.length)
+            if _positive(enclosed):
+                return enclosed, "problem"
+        except NotEnclosedError:
+            pass
+        if self.problem.n <= EXACT_DOF_LIMIT:
+            return None, "problem"
+        zero = np.zeros_like
+        F_rad = 4 * np.spacing(system.F)
+        enclosed = EnclosedSystem(system.S, zero(system.S), system.g, zero(system.g), system.F, F_rad)
+        return (enclosed if _positive(enclosed) else None), "condensed"
+
+    @property
+    def enclosed(self) -> EnclosedSystem | None:
+        """Balls for the scaled system; None when S is not proven positive definite by them."""
+        return self._enclosed[0]
+
+    @property
+    def data(self) -> str:
+        """What a proof is about: "problem" (the matrices as given) or "condensed" (S and g as computed)."""
+        return self._enclosed[1] if self.arithmetic == "verified" else "problem"
+
+    @property
+    def undecidable(self) -> str | None:
+        """Why verified arithmetic cannot prove anything about this problem, or None."""
+        if self.arithmetic != "verified" or self.enclosed is not None or self.exact_certifier is not None:
+            return None
+        return "the condensed compliance S is positive definite only within rounding"
+
+    def certifier(self, recorder: Recorder | None) -> Certifier:
+        """The certifier of this arithmetic."""
+        if self.arithmetic == "fast":
+            return FastCertifier(self.floats)
+        if self.arithmetic == "exact":
+            from enumsol.search.certifiers.rationals import ExactCertifier  # python-flint
+
+            return ExactCertifier(_present(self.exact), self.scaled)
+        return VerifiedCertifier(
+            self.scaled, self.enclosed, lambda: self.exact_certifier, _present(recorder), self.problem.node_ids
+        )
+
+    def unloaded(self) -> bool:
+        """Whether g = 0, so that only lambda = 0 solves: in the data (verified, exact) or as computed (fast)."""
+        if self.arithmetic == "fast":
+            return not np.any(self.scaled.g)
+        if self.arithmetic == "exact":
+            return not any(_present(self.exact).system.g)
+        return self.problem.is_unloaded(self.alpha)
+
+    def proof_header(self) -> dict[str, Any]:
+        """First record of a proof (see enumsol.proof.proof_file).
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is a fraction of more digits than a proof may hold.
+        """
+        return {
+            "format": "enumsol-proof",
+            "version": 1,
+            "problem": self.problem.fingerprint,
+            "alpha": rational_text(Fraction(self.alpha), "alpha"),
+            "p": self.problem.p,
+            "data": self.data,
+            "force": (np.frexp(self.scaled.force)[1] - 1).tolist(),
+            "length": (np.frexp(self.scaled.length)[1] - 1).tolist(),
+        }
+
+
+def _positive(system: EnclosedSystem) -> bool:
+    try:
+        return system.smallest_eigenvalue > 0
+    except NotEnclosedError:
+        return False
+
+
+def _present(value: Any) -> Any:
+    if value is None:
+        raise AssertionError("an arithmetic was asked for what it does not have")
+    return value

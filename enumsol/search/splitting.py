@@ -1,0 +1,78 @@
+"""What the tree knows of a contact node: how its status splits into others, and which rows a status imposes.
+
+The tree itself asks no more of a dimension than this, a certifier for its leaves and an engine for its relaxations.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from enumsol.relaxation.rows import status_rows
+from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.relaxation.engine import Relaxation
+    from enumsol.selections.solution import Codes
+
+
+class Splitting(Protocol):
+    """The statuses of a contact node as the tree sees them."""
+
+    def children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
+        """Codes that together cover the node's partial status, in the order in which they are to be examined."""
+
+    def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
+        """(kind, mode) of the rows that the node imposes in a status; those of a child extend its parent's."""
+
+
+class PlaneSplitting:
+    """Two dimensions at one alpha: open or in contact; then stick, slip+ or slip-.
+
+    Parameters
+    ----------
+    F : (p,) array
+        Friction coefficients; a node with F = 0 is open or in contact, and no more is asked.
+    allowed : per node the final codes to be examined; default all
+    """
+
+    def __init__(self, F: NDArray[np.float64], allowed: Sequence[frozenset[int]] | None = None) -> None:
+        self._F = F
+        self.friction = [bool(f > 0) for f in F]
+        every = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS))
+        self._allowed = list(allowed) if allowed is not None else [every] * len(F)
+
+    def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
+        """(kind, mode) of the rows that a contact node imposes in a status."""
+        return status_rows(code, friction=self.friction[node])
+
+    def children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
+        """Codes of the children, the one nearest to the minimiser first."""
+        allowed = self._allowed[node]
+        contact = [c for c in (STICK, SLIP_PLUS, SLIP_MINUS) if c in allowed]
+        p = len(codes)
+        if relaxation is not None:
+            force, w = relaxation.forces, relaxation.displacements
+        if codes[node] == UNDECIDED:
+            touching = FRICTIONLESS if not self.friction[node] else (contact[0] if len(contact) == 1 else CONTACT)
+            children = [OPEN] if OPEN in allowed else []
+            if (FRICTIONLESS in allowed) if touching == FRICTIONLESS else contact:
+                children.append(touching)
+            if relaxation is not None and force[node] > -w[node]:
+                children.reverse()
+            return children
+        if relaxation is not None:
+            w_t = w[p + node]
+            slack = self._F[node] * force[node] - abs(force[p + node])
+            order = {
+                STICK: 0.0 if slack > abs(w_t) else 2.0,
+                SLIP_PLUS: 1.0 - np.sign(w_t),
+                SLIP_MINUS: 1.0 + np.sign(w_t),
+            }
+            contact.sort(key=lambda c: order[c])
+        return contact

@@ -1,0 +1,307 @@
+"""The tree search: partial assignments, pruned by the energy-bounded relaxation (theory, section 5.4).
+
+Every node of the tree is a partial assignment of statuses. Its relaxation is solved, warm-started from its parent; it
+is pruned when the certifier accepts the multipliers as a proof that it holds no solution, branched on otherwise, and
+handed to the certifier as a complete selection when every contact node is decided. The leaves cover all selections by
+construction: an engine that fails is replaced by the fallback, and where that fails too the node is branched on.
+
+Presolve comes first: contact nodes that one dual step proves open or in contact are branched on before all others, so
+that everything below knows them.
+"""
+
+from __future__ import annotations
+
+import time
+import warnings
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
+
+from enumsol.errors import MissingDependencyError
+from enumsol.relaxation.active_set import ActiveSetEngine
+from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
+from enumsol.relaxation.interior_point import InteriorPointEngine
+from enumsol.search.splitting import PlaneSplitting, Splitting
+from enumsol.selections.solution import Codes, SelectionSolution
+from enumsol.statuses import CONTACT, UNDECIDED
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from enumsol.condensation.condensed import ScaledSystem
+
+#: Progress is reported and limits on time are looked at after this many nodes.
+_REPORT_EVERY = 64
+
+
+@dataclass(frozen=True)
+class SearchProgress:
+    """State of a running search, as handed to the ``progress`` callback.
+
+    Attributes
+    ----------
+    nodes : int
+        Partial assignments examined so far.
+    covered : float
+        Share of all selections accounted for, between 0 and 1.
+    solutions : int
+        Selections found so far that hold a root.
+    seconds : float
+        Wall time so far.
+    """
+
+    nodes: int
+    covered: float
+    solutions: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class UndecidedPart:
+    """A part of the selections that the search left undecided."""
+
+    codes: Codes
+    reason: str
+    hint: str
+
+
+class Certifier(Protocol):
+    """Decides in one arithmetic what the tree may conclude."""
+
+    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+        """Whether the relaxation's multipliers prove that the partial assignment holds no solution."""
+
+    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
+        """All roots in a complete selection, None when it holds none, or why that is open."""
+
+    def branching(self, node: int, children: Sequence[int]) -> None:
+        """Take note that a partial assignment is split at ``node`` (called in preorder, for the proof)."""
+
+    def skipped(self, codes: Codes, reason: str) -> None:
+        """Take note that a subtree was not examined because the search was stopped."""
+
+
+@dataclass
+class SearchLimits:
+    """When to stop early."""
+
+    enough: Callable[[list[SelectionSolution]], bool] | None = None
+    max_nodes: int | None = None
+    deadline: float | None = None
+
+    @staticmethod
+    def deadline_in(seconds: float | None) -> float | None:
+        """The clock's value after so many seconds from now."""
+        return None if seconds is None else time.perf_counter() + seconds
+
+    def remaining(self) -> float | None:
+        """Seconds until the deadline."""
+        return None if self.deadline is None else self.deadline - time.perf_counter()
+
+
+@dataclass
+class SearchOutcome:
+    """What a search found; filled while it runs, so that an interruption loses nothing."""
+
+    solutions: list[SelectionSolution] = field(default_factory=list)
+    undecided: list[UndecidedPart] = field(default_factory=list)
+    stopped: str | None = None
+    nodes: int = 0
+    pruned: int = 0
+    selections: int = 0
+    qps: int = 0
+    fallback_qps: int = 0
+    presolved: int = 0
+
+
+@dataclass(slots=True)
+class TreeNode:
+    """A node of the tree that waits to be examined: its parent's relaxation and what it adds."""
+
+    parent: Relaxation | None
+    codes: Codes
+    changed: int  # the contact node decided last, or -1
+    last: bool  # the last of its siblings: may take over the parent's state
+    weight: float
+    #: Presolve: nodes with one child that is not excluded, to be branched on first; None once there were no more.
+    forced: tuple[int, ...] | None = None
+
+
+def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
+    """The relaxation engine of that name; by default the compiled one, or the fallback with a warning.
+
+    Raises
+    ------
+    MissingDependencyError
+        The compiled one was asked for and cannot be imported.
+    """
+    if name == InteriorPointEngine.name:
+        return InteriorPointEngine(system)
+    try:
+        return ActiveSetEngine(system)
+    except ImportError as error:
+        from enumsol.compiled import why_missing  # seldom needed
+
+        missing = f"the compiled active-set solver is not available: {why_missing(COMPILED, error)}"
+        if name is not None:
+            raise MissingDependencyError(missing) from error
+        warnings.warn(f"{missing}; the much slower interior-point solver is used", RuntimeWarning, stacklevel=2)
+        return InteriorPointEngine(system)
+
+
+class TreeSearch:
+    """Depth-first search over the statuses of the contact nodes.
+
+    Parameters
+    ----------
+    system : ScaledSystem
+    certifier : Certifier
+    engine : str, Engine or None
+        "active-set", "clarabel", an engine ready for use, or None for the best available.
+    splitting : Splitting, optional
+        How a status splits and which rows it imposes; by default those of the plane at one alpha.
+    limits : SearchLimits
+    progress : called with a SearchProgress now and then
+    """
+
+    def __init__(
+        self,
+        system: ScaledSystem,
+        certifier: Certifier,
+        *,
+        engine: str | Engine | None = None,
+        splitting: Splitting | None = None,
+        limits: SearchLimits | None = None,
+        progress: Callable[[SearchProgress], object] | None = None,
+    ) -> None:
+        self.system = system
+        self.certifier = certifier
+        self.engine = make_engine(system, engine) if engine is None or isinstance(engine, str) else engine
+        self.limits = limits or SearchLimits()
+        self.progress = progress
+        self.outcome = SearchOutcome()
+        self._fallback: InteriorPointEngine | None = None
+        self.splitting = splitting or PlaneSplitting(system.F)
+        self._known_rows: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
+        self._covered = 0.0
+        self._start = time.perf_counter()
+
+    # -- the loop --------------------------------------------------------------------------------------------------
+
+    def first(self) -> TreeNode:
+        """The root of the tree: nothing decided."""
+        return TreeNode(None, (UNDECIDED,) * self.system.p, -1, last=False, weight=1.0, forced=())
+
+    def run(self, roots: Sequence[Codes] | None = None) -> SearchOutcome:
+        """Examine the subtrees of the given partial assignments (default: the whole tree)."""
+        stack = [self.first()]
+        if roots is not None:
+            stack = [TreeNode(None, codes, -1, last=False, weight=1.0 / len(roots)) for codes in reversed(roots)]
+        outcome = self.outcome
+        while stack:
+            if self.must_stop(len(stack)):
+                for branch in reversed(stack):
+                    self.certifier.skipped(branch.codes, str(outcome.stopped))
+                    outcome.undecided.append(
+                        UndecidedPart(branch.codes, "the search was stopped before it came here", "raise the limit")
+                    )
+                break
+            stack.extend(reversed(list(self.examine(stack.pop()))))
+        return outcome
+
+    def examine(self, branch: TreeNode) -> Iterator[TreeNode]:
+        """Settle one node of the tree, or give its children in the order in which they are to be examined."""
+        outcome = self.outcome
+        outcome.nodes += 1
+        relaxation = self._relax(branch)
+        codes = branch.codes
+        if relaxation is not None and relaxation.pruned and self.certifier.excluded(codes, relaxation):
+            outcome.pruned += 1
+            self._covered += branch.weight
+            return
+        node, forced = self._choose(branch, relaxation)
+        if node < 0:
+            self._settle(codes)
+            self._covered += branch.weight
+            return
+        children = self.splitting.children(codes, node, relaxation)
+        outcome.presolved += forced is not None
+        self.certifier.branching(node, children)
+        usable = relaxation if relaxation is not None and not relaxation.pruned else None
+        for k, code in enumerate(children):
+            child = (*codes[:node], code, *codes[node + 1 :])
+            last = k + 1 == len(children)
+            yield TreeNode(usable, child, node, last, branch.weight / len(children), forced)
+
+    def _settle(self, codes: Codes) -> None:
+        """Have the certifier decide a complete selection."""
+        outcome = self.outcome
+        outcome.selections += 1
+        answer = self.certifier.selection(codes)
+        if isinstance(answer, UndecidedPart):
+            outcome.undecided.append(answer)
+        elif answer is not None:
+            outcome.solutions.append(answer)
+
+    def must_stop(self, waiting: int) -> bool:
+        """Look at the limits and report progress."""
+        outcome, limits = self.outcome, self.limits
+        if limits.max_nodes is not None and outcome.nodes >= limits.max_nodes:
+            outcome.stopped = f"stopped after max_nodes = {limits.max_nodes} nodes, {waiting} subtrees not examined"
+        elif limits.enough is not None and limits.enough(outcome.solutions):
+            outcome.stopped = f"stopped after enough roots, {waiting} subtrees not examined"
+        elif limits.deadline is not None and time.perf_counter() > limits.deadline:
+            outcome.stopped = f"stopped by the time limit, {waiting} subtrees not examined"
+        elif outcome.nodes % _REPORT_EVERY == 0:
+            self.report(self._covered)
+        return outcome.stopped is not None
+
+    def report(self, covered: float) -> None:
+        """Call the progress callback."""
+        if self.progress is not None:
+            outcome, seconds = self.outcome, time.perf_counter() - self._start
+            self.progress(SearchProgress(outcome.nodes, covered, len(outcome.solutions), seconds))
+
+    # -- relaxations -----------------------------------------------------------------------------------------------
+
+    def _rows_of(self, node: int, code: int) -> tuple[list[int], list[int]]:
+        rows = self._known_rows.get((node, code))
+        if rows is None:
+            pairs = self.splitting.rows(node, code)
+            rows = [kind * self.system.p + node for kind, _ in pairs], [mode for _, mode in pairs]
+            self._known_rows[node, code] = rows
+        return rows
+
+    def _all_rows(self, codes: Codes) -> tuple[list[int], list[int]]:
+        parts = [self._rows_of(i, code) for i, code in enumerate(codes)]
+        return [row for rows, _ in parts for row in rows], [mode for _, modes in parts for mode in modes]
+
+    def _relax(self, branch: TreeNode) -> Relaxation | None:
+        """The solved relaxation; None when no engine has an answer."""
+        codes = branch.codes
+        self.outcome.qps += 1
+        if branch.parent is not None:
+            relaxation = branch.parent.child(*self._rows_of(branch.changed, codes[branch.changed]), last=branch.last)
+        else:
+            relaxation = self.engine.root(*self._all_rows(codes))
+        return self._fall_back(codes) if relaxation.stalled else relaxation
+
+    def _fall_back(self, codes: Codes) -> Relaxation | None:
+        """The relaxation by the slower engine; None when that gives no answer either."""
+        self.outcome.fallback_qps += 1
+        if self._fallback is None:
+            self._fallback = InteriorPointEngine(self.system)
+        relaxation = self._fallback.root(*self._all_rows(codes))
+        return None if relaxation.stalled else relaxation
+
+    # -- branching -------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def _choose(branch: TreeNode, relaxation: Relaxation | None) -> tuple[int, tuple[int, ...] | None]:
+        """The contact node to branch on, -1 when all are decided; and the forced ones that the children begin with."""
+        if relaxation is None or relaxation.pruned:
+            return next((i for i, code in enumerate(branch.codes) if code >= CONTACT), -1), branch.forced
+        if branch.forced is not None:
+            forced = branch.forced or relaxation.forced(branch.codes)
+            if forced:
+                return forced[0], forced[1:]
+        return relaxation.choose(branch.codes), None

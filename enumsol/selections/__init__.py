@@ -1,0 +1,1 @@
+"""Solving one complete selection, in one file for each arithmetic."""

@@ -1,0 +1,168 @@
+"""Forces and displacements of one selection as rational functions of alpha (theory, sections 4 and 7)."""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+from flint import fmpq, fmpq_mat, fmpz_mat, fmpz_poly
+
+from enumsol.arithmetic.algebraic import integer_polynomial
+from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+
+if TYPE_CHECKING:
+    from enumsol.condensation.exact import ExactPath
+    from enumsol.selections.solution import Codes
+
+
+@lru_cache(maxsize=64)
+def _interpolation(nodes: tuple[int, ...]) -> Any:
+    """Integer multiple (by a positive number) of the inverse Vandermonde matrix."""
+    inverse = fmpq_mat([[fmpq(x) ** k for k in range(len(nodes))] for x in nodes]).inv()
+    return inverse.numer_denom()[0]
+
+
+class SelectionFunctions:
+    """Forces and displacements of one selection as rational functions of alpha.
+
+    Every method returns a primitive integer polynomial whose quotient by ``det``, up to a positive constant factor, is
+    the quantity; ``det`` has the sign of the determinant of the reduced selection matrix. Cost: one determinant and
+    one solve in integers for every degree, then a matrix product.
+
+    Parameters
+    ----------
+    path : ExactPath
+    codes : status codes, FRICTIONLESS for the nodes in contact with F = 0 throughout
+    """
+
+    def __init__(self, path: ExactPath, codes: Codes) -> None:
+        self.path, self.codes = path, codes
+        self._closed = [i for i, c in enumerate(codes) if c != OPEN]
+        self._stuck = [i for i, c in enumerate(codes) if c == STICK]
+        self._cache: dict[tuple[str, int], Any] = {}
+        self._unknowns: list[Any] = []
+        self._solve()
+
+    @property
+    def singular(self) -> bool:
+        """Whether the determinant vanishes for every alpha."""
+        return bool(self.det.is_zero())
+
+    @property
+    def numerators(self) -> list[Any]:
+        """Numerators of the reduced unknowns (adj(M) b up to positive factors)."""
+        return list(self._unknowns)
+
+    def _matrix(self, alpha: int) -> tuple[Any, Any]:
+        """Integer matrix and right-hand side of the reduced system at an integer alpha."""
+        data, p = self.path.integers, self.path.p
+        rows = self._closed + [p + i for i in self._stuck]
+        matrix = []
+        slips = [(i, _direction(self.codes[i]) * (data.F0[i] + alpha * data.F1[i])) for i in self._closed]
+        for r in rows:
+            S = data.S[r]
+            matrix.append(
+                [S[i] * data.friction_unit + f * S[p + i] if f != 0 else S[i] * data.friction_unit for i, f in slips]
+            )
+            matrix[-1] += [S[p + i] * data.friction_unit for i in self._stuck]
+        return matrix, [[data.g0[r] + alpha * data.g1[r]] for r in rows]
+
+    def _solve(self) -> None:
+        """Determinant and unknowns by evaluation and interpolation."""
+        path, size = self.path, len(self._closed) + len(self._stuck)
+        slips = sum(1 for i, c in enumerate(self.codes) if c in (SLIP_PLUS, SLIP_MINUS) and path.F1[i] != 0)
+        needed = slips + 1 + int(path.loaded)
+        if size == 0:
+            self.det = fmpz_poly([1])
+            return
+        nodes: list[int] = []
+        values: list[list[Any]] = []
+        zeros = trial = 0
+        while len(nodes) < needed:
+            matrix, rhs = self._matrix(trial)
+            M = fmpz_mat(matrix)
+            det = M.det()
+            if det != 0:
+                nodes.append(trial)
+                values.append([det, *((v * det).p for v in M.solve(fmpz_mat(rhs)).entries())])
+            else:
+                zeros += 1
+                if zeros > slips:
+                    self.det = fmpz_poly([])
+                    return
+            trial = -trial if trial > 0 else 1 - trial
+        table = (_interpolation(tuple(nodes)) * fmpz_mat(values)).transpose().tolist()
+        self.det, *self._unknowns = (fmpz_poly(row) for row in table)
+
+    # -- quantities ------------------------------------------------------------------------------------------------
+
+    def normal_force(self, node: int) -> Any:
+        """lambda_n of a node."""
+        return self._get("n", node)
+
+    def gap(self, node: int) -> Any:
+        """w_n of an open node."""
+        return self._get("gap", node)
+
+    def slip(self, node: int) -> Any:
+        """w_t of a node that does not stick."""
+        return self._get("slip", node)
+
+    def cone(self, node: int, direction: int) -> Any:
+        """F lambda_n - direction * lambda_t of a node."""
+        return self._get("cone+" if direction > 0 else "cone-", node)
+
+    def _get(self, kind: str, node: int) -> Any:
+        key = (kind, node)
+        if key not in self._cache:
+            if kind == "n":
+                value = self._forces[node]
+            elif kind in ("gap", "slip"):
+                value = self._displacement(node if kind == "gap" else self.path.p + node)
+            else:
+                value = self._cone(node, 1 if kind == "cone+" else -1)
+            self._cache[key] = integer_polynomial(value)
+        return self._cache[key]
+
+    @cached_property
+    def _forces(self) -> list[Any]:
+        """Numerators of lambda in units of ``_Integers.force`` (a slipping node's unknown is lambda_n / dF)."""
+        data, p = self.path.integers, self.path.p
+        forces = [fmpz_poly([])] * (2 * p)
+        for k, i in enumerate(self._closed):
+            forces[i] = self._unknowns[k] * data.friction_unit
+            direction = _direction(self.codes[i])
+            if direction:
+                forces[p + i] = self._unknowns[k] * fmpz_poly([direction * data.F0[i], direction * data.F1[i]])
+        for k, i in enumerate(self._stuck, start=len(self._closed)):
+            forces[p + i] = self._unknowns[k] * data.friction_unit
+        return forces
+
+    def _displacement(self, row: int) -> Any:
+        data = self.path.integers
+        total = self.det * fmpz_poly([data.g0[row], data.g1[row]])
+        for s, force in zip(data.S[row], self._forces, strict=True):
+            if not force.is_zero():
+                total -= force * s
+        return total
+
+    def _cone(self, node: int, direction: int) -> Any:
+        data = self.path.integers
+        bound = self._forces[node] * fmpz_poly([data.F0[node], data.F1[node]])
+        return bound - direction * data.friction_unit * self._forces[self.path.p + node]
+
+    def forces_at(self, alpha: Any) -> tuple[Any, ...] | None:
+        """lambda at a rational alpha, exactly; None where the quotients are 0 / 0 and no limit exists there."""
+        det, force, shift = self.det, self.path.integers.force, fmpz_poly([-alpha.p, alpha.q])
+        numerators = self._forces
+        while det(alpha) == 0:
+            if any(f(alpha) != 0 for f in numerators):
+                return None
+            det = det // shift
+            numerators = [f // shift for f in numerators]
+        below = fmpq(det(alpha))
+        return tuple(force * f(alpha) / below for f in numerators)
+
+
+def _direction(code: int) -> int:
+    return {SLIP_PLUS: 1, SLIP_MINUS: -1}.get(code, 0)

@@ -1,0 +1,126 @@
+"""All solutions of selections at one exact alpha, rational or irrational (theory, section 7.4)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from flint import fmpq
+
+from enumsol.arithmetic.rationals import to_fraction
+from enumsol.condensation.exact import ExactSystem
+from enumsol.selections.polytopes import dot
+from enumsol.selections.rationals import ExactSelections
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+
+if TYPE_CHECKING:
+    from enumsol.condensation.exact import ExactPath
+    from enumsol.selections.polytopes import Form, Point, Table
+    from enumsol.selections.solution import ActiveSets, Codes
+
+
+class FiberSelections(ExactSelections):
+    """Solver of selections at one alpha in any exact ordered field.
+
+    Unlike its base class it keeps the four statuses where F = 0 at the end of an interval, as the limits of arcs need
+    them; nodes with F = 0 throughout are FRICTIONLESS.
+
+    Parameters
+    ----------
+    path : ExactPath
+    alpha : fmpq or NumberFieldElement
+    push : direction that replaces g, in the perturbations that give the local degree
+    """
+
+    def __init__(self, path: ExactPath, alpha: Any, push: tuple[Any, ...] | None = None) -> None:
+        g, F = path.at(alpha)
+        super().__init__(ExactSystem(path.S, g if push is None else push, F))
+        self.path, self.alpha = path, alpha
+        self.F_positive = tuple(not without for without in path.frictionless)
+
+    def _solve_reduced(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
+        rows, columns = self.reduced(codes)
+        if not rows:
+            return tuple(self._zero), 1
+        table = [[*(dot(self._S[r], column) for column in columns), target[r]] for r in rows]
+        det = row_reduce(table)[0]
+        if det == 0:
+            return None
+        y = [row[-1] for row in table]
+        point = tuple(dot(y, [column[j] for column in columns]) for j in range(2 * self.p))
+        return point, 1 if det > 0 else -1
+
+    def forms(self, codes: Codes) -> tuple[list[Form], list[Form]]:
+        """Equations and inequalities (>= 0) of a selection as forms over lambda."""
+        equations, inequalities = super().forms(codes)
+        # where F = 0 the cone of a sticking node does not imply that its normal force is none of tension
+        return equations, inequalities + [self.force_form(i) for i, code in enumerate(codes) if code == STICK]
+
+    def _w(self, point: Point) -> list[Any]:
+        return [g - dot(row, point) for g, row in zip(self.system.g, self._S, strict=True)]
+
+    def active(self, point: Point) -> ActiveSets:
+        """Per node the codes whose conditions hold at the point, exactly."""
+        p, w = self.p, self._w(point)
+        result = []
+        for i, F in enumerate(self.system.F):
+            n, t, w_t = point[i], point[p + i], w[p + i]
+            holds = set()
+            if n == 0 and t == 0 and w[i] <= 0:
+                holds.add(OPEN)
+            if w[i] == 0 and n >= 0:
+                bound = F * n
+                if self.path.frictionless[i]:
+                    holds |= {FRICTIONLESS} if t == 0 else set()
+                else:
+                    holds |= {STICK} if w_t == 0 and -bound <= t <= bound else set()
+                    holds |= {SLIP_PLUS} if t == bound and w_t >= 0 else set()
+                    holds |= {SLIP_MINUS} if t == -bound and w_t <= 0 else set()
+            result.append(frozenset(holds))
+        return tuple(result)
+
+    # -- the field -------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def row_reduced(table: Table) -> tuple[Table, list[int]]:
+        """Rows of the reduced row echelon form that are not zero, and their pivot columns."""
+        pivots = row_reduce(table)[1]
+        return table[: len(pivots)], pivots
+
+    @staticmethod
+    def as_float(number: Any) -> float:
+        """The nearest float."""
+        return as_float(number)
+
+    def pushed(self, direction: tuple[Any, ...]) -> FiberSelections:
+        """The solver whose g is a direction."""
+        return FiberSelections(self.path, self.alpha, direction)
+
+
+def as_float(value: Any) -> float:
+    """The nearest float of a field element."""
+    return float(to_fraction(value)) if isinstance(value, fmpq) else float(value)
+
+
+def row_reduce(table: list[list[Any]]) -> tuple[Any, list[int]]:
+    """Reduce a table to row echelon form in place; its determinant (a last column left out) and pivots."""
+    det: Any = fmpq(1)
+    pivots: list[int] = []
+    columns = len(table[0]) if table else 0
+    for column in range(columns):
+        rank = len(pivots)
+        pivot = next((r for r in range(rank, len(table)) if table[r][column] != 0), None)
+        if pivot is None:
+            continue
+        if pivot != rank:
+            table[rank], table[pivot] = table[pivot], table[rank]
+            det = -det
+        head = table[rank][column]
+        det = det * head
+        table[rank] = [v / head for v in table[rank]]
+        for r, row in enumerate(table):
+            if r != rank and row[column] != 0:
+                factor = row[column]
+                table[r] = [v - factor * u for v, u in zip(row, table[rank], strict=True)]
+        pivots.append(column)
+    full = pivots == list(range(len(table)))
+    return (det if full else fmpq(0)), pivots

@@ -1,0 +1,234 @@
+"""Selections solved in rational arithmetic: the given data read as exact rationals (theory, section 6.5)."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+
+from enumsol.condensation.exact import ExactSystem
+from enumsol.selections.polytopes import polytope_vertices, value
+from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.selections.polytopes import Form, Point, Table
+
+
+def _outward(number: Any) -> tuple[float, float]:
+    """The floats next below and above a rational; the same one twice if it is a float."""
+    exact = Fraction(int(number.p), int(number.q))
+    near = float(exact)
+    if near == exact:
+        return near, near
+    return math.nextafter(near, -math.inf), math.nextafter(near, math.inf)
+
+
+class ExactSelections:
+    """Solver of selections in rationals (a SelectionSolver; points are tuples of 2p fmpq).
+
+    Parameters
+    ----------
+    system : ExactSystem
+    """
+
+    def __init__(self, system: ExactSystem) -> None:
+        self.system = system
+        self.p = p = system.p
+        self.F_positive = tuple(bool(f > 0) for f in system.F)
+        self._S = system.S.tolist()
+        self._zero = [fmpq(0)] * (2 * p)
+
+    # -- linear forms ----------------------------------------------------------------------------------------------
+
+    def force_form(self, index: int) -> Form:
+        """lambda[index]."""
+        form = list(self._zero)
+        form[index] = fmpq(1)
+        return form, fmpq(0)
+
+    def gap_form(self, index: int, sign: int = 1) -> Form:
+        """sign * w[index]."""
+        return [-sign * v for v in self._S[index]], sign * self.system.g[index]
+
+    def cone_form(self, node: int, sign: int) -> Form:
+        """F lambda_n - sign * lambda_t."""
+        form = list(self._zero)
+        form[node] = self.system.F[node]
+        form[self.p + node] = fmpq(-sign)
+        return form, fmpq(0)
+
+    def forms(self, codes: Codes) -> tuple[list[Form], list[Form]]:
+        """Equations and inequalities (>= 0) of a selection as forms over lambda."""
+        p = self.p
+        equations, inequalities = [], []
+        for i, code in enumerate(codes):
+            if code == OPEN:
+                equations += [self.force_form(i), self.force_form(p + i)]
+                inequalities += [self.gap_form(i, -1)]
+                continue
+            equations.append(self.gap_form(i))
+            if code == FRICTIONLESS:
+                equations.append(self.force_form(p + i))
+                inequalities.append(self.force_form(i))
+            elif code == STICK:
+                equations.append(self.gap_form(p + i))
+                inequalities += [self.cone_form(i, 1), self.cone_form(i, -1)]
+            else:
+                sign = 1 if code == SLIP_PLUS else -1
+                equations.append(self.cone_form(i, sign))
+                inequalities += [self.force_form(i), self.gap_form(p + i, sign)]
+        return equations, inequalities
+
+    # -- the field -------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def row_reduced(table: Table) -> tuple[Table, list[int]]:
+        """Rows of the reduced row echelon form that are not zero, and their pivot columns."""
+        reduced, rank = fmpq_mat(table).rref()
+        rows = reduced.tolist()[:rank]
+        return rows, [next(j for j, v in enumerate(row) if v != 0) for row in rows]
+
+    @staticmethod
+    def as_float(number: Any) -> float:
+        """The nearest float."""
+        return float(Fraction(int(number.p), int(number.q)))
+
+    def pushed(self, direction: tuple[Any, ...]) -> ExactSelections:
+        """The solver whose g is a direction."""
+        return ExactSelections(ExactSystem(self.system.S, direction, self.system.F))
+
+    # -- solving ---------------------------------------------------------------------------------------------------
+
+    def reduced(self, codes: Codes) -> tuple[list[int], list[list[Any]]]:
+        """Rows of S that vanish in the selection and columns of E, lambda = E y."""
+        p, F = self.p, self.system.F
+        rows, columns = [], []
+        for i, code in enumerate(codes):
+            if code != OPEN:
+                column = list(self._zero)
+                column[i] = fmpq(1)
+                if code in (SLIP_PLUS, SLIP_MINUS):
+                    column[p + i] = F[i] if code == SLIP_PLUS else -F[i]
+                rows.append(i)
+                columns.append(column)
+        for i, code in enumerate(codes):
+            if code == STICK:
+                column = list(self._zero)
+                column[p + i] = fmpq(1)
+                rows.append(p + i)
+                columns.append(column)
+        return rows, columns
+
+    def _solve_reduced(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
+        """The selection's forces for the right-hand side ``target`` and sign det, or None when it is singular."""
+        rows, columns = self.reduced(codes)
+        if not rows:
+            return tuple(self._zero), 1
+        E = fmpq_mat(columns).transpose()
+        M = fmpq_mat([self._S[r] for r in rows]) * E
+        det = M.det()
+        if det == 0:
+            return None
+        y = M.solve(fmpq_mat([[target[r]] for r in rows]))
+        return tuple((E * y).entries()), 1 if det > 0 else -1
+
+    def solve(self, codes: Codes) -> SelectionSolution | None:
+        """All roots in the selection, or None."""
+        regular = self._solve_reduced(codes, self.system.g)
+        equations, inequalities = self.forms(codes)
+        if regular is not None:
+            point, sign = regular
+            values = [value(form, point) for form in inequalities]
+            if any(v < 0 for v in values):
+                return None
+            return SelectionSolution(codes, (point,), 0, sign, all(v > 0 for v in values))
+        vertices = polytope_vertices(equations, inequalities, self.row_reduced)
+        if not vertices:
+            return None
+        differences = [[a - b for a, b in zip(v, vertices[0], strict=True)] for v in vertices[1:]]
+        dimension = len(self.row_reduced(differences)[1]) if differences else 0
+        return SelectionSolution(codes, tuple(vertices), dimension, 0, strict=False)
+
+    # -- decisions -------------------------------------------------------------------------------------------------
+
+    def _w(self, point: Point) -> list[Any]:
+        product = self.system.S * fmpq_mat([[v] for v in point])
+        return [g - v for g, v in zip(self.system.g, product.entries(), strict=True)]
+
+    def active(self, point: Point) -> ActiveSets:
+        """Per node the codes whose conditions hold at the point, exactly."""
+        p, w = self.p, self._w(point)
+        result = []
+        for i, F in enumerate(self.system.F):
+            n, t = point[i], point[p + i]
+            holds = set()
+            if n == 0 and t == 0 and w[i] <= 0:
+                holds.add(OPEN)
+            if w[i] == 0 and n >= 0:
+                if F == 0:
+                    if t == 0:
+                        holds.add(FRICTIONLESS)
+                else:
+                    if w[p + i] == 0 and -F * n <= t <= F * n:
+                        holds.add(STICK)
+                    if t == F * n and w[p + i] >= 0:
+                        holds.add(SLIP_PLUS)
+                    if t == -F * n and w[p + i] <= 0:
+                        holds.add(SLIP_MINUS)
+            result.append(frozenset(holds))
+        return tuple(result)
+
+    def equal(self, a: Point, b: Point) -> bool:
+        """Exact equality."""
+        return a == b
+
+    def meet(self, a: SelectionSolution, b: SelectionSolution) -> bool:
+        """Whether both selections' conditions hold at a common point, exactly."""
+        first, second = self.forms(a.codes), self.forms(b.codes)
+        return bool(polytope_vertices(first[0] + second[0], first[1] + second[1], self.row_reduced))
+
+    def departure(self, solution: SelectionSolution, direction: NDArray[np.int64]) -> int | None:
+        """See SelectionSolver.departure."""
+        if solution.det_sign == 0:
+            return 0
+        push = tuple(fmpq(int(v)) for v in direction)
+        moved = self._solve_reduced(solution.codes, push)
+        if moved is None:  # det_sign says otherwise
+            raise AssertionError("a regular selection became singular")
+        step, sign = moved
+        _, inequalities = self.forms(solution.codes)
+        _, rates = self.pushed(push).forms(solution.codes)
+        point = solution.vertices[0]
+        for condition, rate in zip(inequalities, rates, strict=True):
+            if value(condition, point) == 0:
+                change = value(rate, step)
+                if change == 0:
+                    return None
+                if change < 0:
+                    return 0
+        return sign
+
+    # -- values ----------------------------------------------------------------------------------------------------
+
+    def forces(self, point: Point) -> NDArray[np.float64]:
+        """lambda as floats."""
+        return np.array([self.as_float(v) for v in point])
+
+    def displacements(self, point: Point) -> NDArray[np.float64]:
+        """w = g - S lambda as floats, rounded once."""
+        return np.array([self.as_float(v) for v in self._w(point)])
+
+    def slip_signs(self, point: Point) -> tuple[int, ...]:
+        """Signs of w_t, exactly."""
+        return tuple((v > 0) - (v < 0) for v in self._w(point)[self.p :])
+
+    def bounds(self, point: Point) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Floats below and above (lambda, w), two arrays of shape (4p,), equal where a value is a float."""
+        pairs = [_outward(v) for v in (*point, *self._w(point))]
+        return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])

@@ -1,0 +1,80 @@
+"""The solution set of one selection, and what a selection solver offers to search and roots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from enumsol.errors import TooLargeError
+
+Codes = tuple[int, ...]
+ActiveSets = tuple[frozenset[int], ...]
+
+#: Vertex enumeration tries at most this many bases; a polytope that needs more is refused.
+MAX_BASES = 200_000
+
+
+@dataclass(frozen=True)
+class SelectionSolution:
+    """All roots in one selection: a point or a polytope.
+
+    Attributes
+    ----------
+    codes : tuple of p status codes
+    vertices : tuple of points in the solver's own representation of lambda
+    dimension : int
+        0 for a point.
+    det_sign : int
+        Sign of the selection's determinant; 0 when it is singular.
+    strict : bool
+        All conditions of the selection hold strictly (only asked of points).
+    """
+
+    codes: Codes
+    vertices: tuple[Any, ...]
+    dimension: int
+    det_sign: int
+    strict: bool
+
+
+class SelectionSolver(Protocol):
+    """Solves selections and decides about their solutions in one arithmetic (floats with a tolerance, or rationals)."""
+
+    p: int
+    F_positive: tuple[bool, ...]
+
+    def solve(self, codes: Codes) -> SelectionSolution | None:
+        """All roots in the selection, or None when there is none."""
+
+    def active(self, point: Any) -> ActiveSets:
+        """Per node the codes whose conditions hold at a root."""
+
+    def equal(self, a: Any, b: Any) -> bool:
+        """Whether two points are the same."""
+
+    def meet(self, a: SelectionSolution, b: SelectionSolution) -> bool:
+        """Whether two polytopes have a point in common."""
+
+    def departure(self, solution: SelectionSolution, direction: np.ndarray[Any, Any]) -> int | None:
+        """det_sign if the regular selection's root stays a root when g moves a little along ``direction``.
+
+        0 if it does not; None if the direction is not generic. ``direction`` holds 2p small integers.
+        """
+
+    def forces(self, point: Any) -> np.ndarray[Any, Any]:
+        """The point's lambda as floats, shape (2p,), unscaled."""
+
+    def displacements(self, point: Any) -> np.ndarray[Any, Any]:
+        """w = g - S lambda at the point as floats, shape (2p,), unscaled, exact zeros where the status says so."""
+
+    def slip_signs(self, point: Any) -> tuple[int, ...]:
+        """Signs of w_t at the point, one a node."""
+
+    def bounds(self, point: Any) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]] | None:
+        """Proven bounds of (lambda, w) at the point, two arrays of shape (4p,); None in an arithmetic without any."""
+
+
+class VertexLimitError(TooLargeError):
+    """A polytope of roots has too many candidate vertices to enumerate."""

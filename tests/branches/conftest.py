@@ -1,9 +1,0 @@
-"""Fixtures of the tests of branch graphs; their problems are in problems.py."""
-
-import numpy as np
-import pytest
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(20121)

@@ -1,0 +1,192 @@
+"""Proofs of branch graphs: accepted as written, refused when tampered with, and right about which selections hold."""
+
+import json
+from collections import Counter
+from itertools import product
+
+import numpy as np
+import pytest
+from generators import through_the_unloaded_state
+from proof_tools import multipliers, proof_of, records_of, with_multipliers
+
+from enumsol import branch_graph, enumerate_roots, gallery, verify
+from enumsol.checker.graph import covers
+from enumsol.kernel.rows import children_of
+from enumsol.problem import ContactProblem
+
+
+def loading_path():
+    return gallery.get("two-node-6.7-minus").build(), (-3.0, 3.0)
+
+
+def friction_path():
+    return gallery.get("two-node-6.4").build(), (0.0, 6.0)
+
+
+def cut_path():
+    """A wedge whose interval is searched in several pieces, about S and g as computed."""
+    return gallery.get("wedge-8-5").build(), (0.0, 5.0)
+
+
+def varying_load_and_friction():
+    triangle = gallery.one_node_triangle()
+    load = {"load_slope": [0.2, -0.5], "friction": (0.5, 0.7)}
+    return ContactProblem(triangle.A, triangle.Bn, triangle.Bt, [1.0, -2.5], **load), (0.0, 6.0)
+
+
+PATHS = [loading_path, friction_path, cut_path, through_the_unloaded_state, varying_load_and_friction]
+
+
+@pytest.fixture(scope="module", params=PATHS, ids=lambda path: path.__name__)
+def proven(request):
+    problem, interval = request.param()
+    return problem, branch_graph(problem, interval)
+
+
+def refused(problem, records):
+    report = verify(problem, proof_of(records))
+    return not report.ok and bool(report.failures)
+
+
+def test_a_verified_graph_is_complete_and_its_proof_verifies(proven):
+    problem, graph = proven
+    assert graph.complete
+    report = verify(problem, graph.proof)
+    assert report.ok, report
+    assert report.data == graph.certified_data
+    assert report.leaves > 0
+
+
+def test_statuses_of_all_roots_are_among_the_selections_handed_on(proven):
+    problem, graph = proven
+    selections = verify(problem, graph.proof).selections
+    a, b = graph.interval
+    codes = {"open": 0, "stick": 1, "slip+": 2, "slip-": 3}
+    for alpha in np.random.default_rng(1).uniform(a, b, 12):
+        for root in enumerate_roots(problem, float(alpha), "fast"):
+            assert tuple(codes[status.value] for status in root.statuses) in selections
+
+
+def test_fast_graphs_have_no_proof():
+    problem, interval = friction_path()
+    graph = branch_graph(problem, interval, "fast")
+    assert graph.proof is None
+    assert not graph.complete
+
+
+def test_a_dropped_leaf_leaves_selections_uncovered(proven):
+    problem, graph = proven
+    records = records_of(graph.proof)
+    for k, record in enumerate(records):
+        if isinstance(record, list):
+            assert refused(problem, records[:k] + records[k + 1 :])
+            break
+
+
+def test_a_dropped_piece_is_missed(proven):
+    problem, graph = proven
+    records = records_of(graph.proof)
+    starts = [k for k, record in enumerate(records) if isinstance(record, dict) and "piece" in record]
+    end = starts[1] if len(starts) > 1 else len(records) - 1
+    assert refused(problem, records[: starts[0]] + records[end:])
+
+
+def test_changed_multipliers_do_not_exclude(proven):
+    problem, graph = proven
+    records = records_of(graph.proof)
+    k = next(k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "x")
+    rows, values = multipliers(["x", *records[k][2:]])
+    changed = with_multipliers(["x", "", ""], rows, [0.0 for _ in values])
+    assert refused(problem, [*records[:k], ["x", records[k][1], *changed[1:]], *records[k + 1 :]])
+    negative = with_multipliers(["x", "", ""], rows, [-v for v in values])
+    assert refused(problem, [*records[:k], ["x", records[k][1], *negative[1:]], *records[k + 1 :]])
+
+
+def test_a_certificate_for_a_leaf_that_holds_roots_is_refused(proven):
+    problem, graph = proven
+    records = records_of(graph.proof)
+    certificate = next(record for record in records if isinstance(record, list) and record[0] == "x")
+    k = next(k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "s")
+    assert refused(problem, [*records[:k], ["x", records[k][1], *certificate[2:]], *records[k + 1 :]])
+
+
+def test_a_wider_interval_or_another_problem_is_refused(proven):
+    problem, graph = proven
+    records = records_of(graph.proof)
+    a, b = records[0]["interval"]
+    assert refused(problem, [records[0] | {"interval": [a, str(int(float(b)) + 7)]}, *records[1:]])
+    assert refused(gallery.get("one-node-6.2").build(), records)
+
+
+@pytest.mark.parametrize(
+    "junk",
+    [
+        None,
+        7,
+        "s",
+        [],
+        ["x"],
+        ["s", "9"],
+        ["s", 5],
+        ["q", "00"],
+        {"piece": 3},
+        {"piece": ["a", "b"]},
+        ["x", "00", "?", "?"],
+    ],
+    ids=repr,
+)
+def test_junk_records_are_refused_without_a_traceback(junk):
+    problem, interval = loading_path()
+    records = records_of(branch_graph(problem, interval).proof)
+    for k in (1, 2, len(records) - 1):
+        assert refused(problem, [*records[:k], json.dumps(junk), *records[k + 1 :]])
+
+
+def covered(roots, leaves, friction):
+    return covers(*(np.array(part, dtype=np.uint8).reshape(-1, len(friction)) for part in (roots, leaves)), friction)
+
+
+def test_cover_of_a_tree_by_its_leaves():
+    assert covered([(6, 6)], [(0, 6), (5, 0), (1, 5), (2, 5), (3, 5)], [True, True])
+    assert not covered([(6, 6)], [(0, 6), (5, 0), (1, 5), (2, 5)], [True, True])
+    assert covered([(6,)], [(0,), (4,)], [False])
+    assert not covered([(6,)], [(0,), (4,)], [True])
+    assert not covered([(6,)], [], [True])
+    assert covered([(0, 6), (5, 0)], [(0, 6), (1, 0), (2, 0), (3, 0)], [True, True])
+    assert not covered([(0, 6), (5, 0)], [(0, 6), (1, 0), (2, 0)], [True, True])
+    # a leaf that is coarser than a root was not found below it
+    assert not covered([(0, 0)], [(0, 6)], [True, True])
+
+
+def selections_in(codes, friction):
+    """Complete selections of a partial assignment, one by one."""
+    final = {6: (0, 1, 2, 3), 5: (1, 2, 3)}
+    choices = [final.get(c, (c,)) if F or c < 5 else (0, 4) for c, F in zip(codes, friction, strict=True)]
+    return set(product(*choices))
+
+
+def test_covers_against_a_list_of_all_selections():
+    rng, outcomes = np.random.default_rng(3), Counter()
+    for _ in range(300):
+        friction = [bool(rng.random() < 0.8) for _ in range(int(rng.integers(1, 5)))]
+        roots = refined(rng, (6,) * len(friction), friction)
+        roots = [root for root in roots if rng.random() < 0.6] or roots[:1]
+        leaves = [leaf for root in roots for leaf in refined(rng, root, friction)]
+        if rng.random() < 0.5:
+            del leaves[int(rng.integers(len(leaves)))]
+        wanted = set().union(*(selections_in(root, friction) for root in roots))
+        had = set().union(*(selections_in(leaf, friction) for leaf in leaves))
+        found = covered(roots, leaves + leaves[:1], friction)
+        assert found == (wanted <= had)
+        outcomes[found] += 1
+    assert min(outcomes.values()) > 100
+
+
+def refined(rng, root, friction):
+    """Leaves of a random tree below a partial assignment."""
+    nodes = [i for i, code in enumerate(root) if children_of(code, friction=friction[i])]
+    if not nodes or rng.random() < 0.3:
+        return [root]
+    node = int(rng.choice(nodes))
+    children = children_of(root[node], friction=friction[node])
+    return [leaf for c in children for leaf in refined(rng, (*root[:node], c, *root[node + 1 :]), friction)]

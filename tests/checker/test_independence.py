@@ -1,0 +1,169 @@
+"""What the checkers import and what they share with the search: no more than ``enumsol.checker`` says."""
+
+import ast
+import json
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from generators import integer_problem, through_the_unloaded_state
+
+import enumsol
+from enumsol import branch_graph, checker, enumerate_roots, write_problem
+
+ROOT = Path(enumsol.__file__).parent
+CHECKERS = ("enumsol.checker.verify", "enumsol.checker.graph")
+#: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
+SEARCH = (
+    "enumsol.arithmetic.algebraic",
+    "enumsol.arithmetic.number_field",
+    "enumsol.branches",
+    "enumsol.condensation.exact",
+    "enumsol.continuation",
+    "enumsol.equation",
+    "enumsol.executors",
+    "enumsol.relaxation",
+    "enumsol.roots",
+    "enumsol.search",
+    "enumsol.selections",
+    "enumsol.statuses",
+)
+#: What may write a false proof and accept it: of these modules the search uses no more than these names; None: all.
+SHARED = {
+    "arithmetic.rationals": {"is_positive_definite", "rational", "rational_matrix", "to_fraction"},
+    "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
+    "condensation.unloaded": {"CondensedData", "vanishing_alpha"},
+    "kernel.interval": {"EnclosedPiece", "as_computed", "interval_exclusion_margins"},
+    "kernel.point": {"VerifiedSelection", "exclusion_margin", "holds_no_root", "solve_selection"},
+    "kernel.rows": None,
+    "proof.proof_file": {"Proof", "ProofWriter", "Recorder", "fraction_text", "packed"},
+    "proof.reading": {"fits", "rational_text"},
+}
+#: Rooms of such modules, and the checkers' own, of which the search uses nothing.
+TRUSTED = ("enumsol.arithmetic.", "enumsol.checker.", "enumsol.condensation.", "enumsol.kernel.", "enumsol.proof.")
+#: Of these rooms what proves nothing: the data, and S and g as computed.
+DATA = {"condensation.condensed", "condensation.data", "condensation.factorization"}
+
+
+def is_search(module):
+    return any(module == name or module.startswith(name + ".") for name in SEARCH)
+
+
+@cache
+def path_of(module):
+    """The source of a module of enumsol, or None when there is none of that name."""
+    path = ROOT.parent.joinpath(*module.split("."))
+    for file in (path.with_suffix(".py"), path / "__init__.py", path.with_suffix(".pyx")):
+        if file.is_file():
+            return file
+    return None
+
+
+@cache
+def imports_of(module):
+    """(module, name) of all imports anywhere in a module's source: in functions and for types only, too."""
+    if path_of(module).suffix == ".pyx":
+        return set()
+    tree = ast.parse(path_of(module).read_text())
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {(alias.name, None) for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module} imports relatively"
+            for alias in node.names:
+                inner = f"{node.module}.{alias.name}"
+                found.add(
+                    (inner, None) if inner.startswith("enumsol.") and path_of(inner) else (node.module, alias.name)
+                )
+    return {(name, what) for name, what in found if name == "enumsol" or name.startswith("enumsol.")}
+
+
+def closure_of(modules):
+    """All modules of enumsol that these import, however indirectly; of the package itself only what is asked of it."""
+    found, waiting = set(), list(modules)
+    while waiting:
+        module = waiting.pop()
+        if module in found or module == "enumsol":
+            continue
+        found.add(module)
+        waiting += [name for name, _ in imports_of(module)]
+        # importing a module runs the packages that it is in
+        waiting.append(module.rpartition(".")[0])
+    return found
+
+
+def test_no_module_of_the_search_is_imported_however_indirectly():
+    closure = closure_of(CHECKERS)
+    assert closure >= {*CHECKERS, "enumsol.checker.rational", "enumsol.checker.hull"}
+    assert not {module for module in closure if is_search(module)}
+    # the public names stand in a module that imports for types only
+    assert all(what is None for module in closure for name, what in imports_of(module) if name == "enumsol")
+
+
+def test_the_guard_sees_the_search_where_it_is():
+    assert any(is_search(module) for module in closure_of(["enumsol.branches.construction"]))
+    assert any(
+        is_search(module) for module in closure_of(["enumsol.gallery", "enumsol.cli.verify", "enumsol.roots.root_set"])
+    )
+    for name in SEARCH:
+        assert path_of(name)
+
+
+def test_what_the_checkers_load_is_listed():
+    # whatever they rest on besides their own modules is said in one place
+    others = {m for m in closure_of(CHECKERS) if not m.startswith("enumsol.checker")}
+    assert others
+    for module in others:
+        if path_of(module).name == "__init__.py" and not imports_of(module):
+            continue  # a room's docstring
+        assert f"``{module.removeprefix('enumsol.')}``" in checker.__doc__
+
+
+def test_what_the_search_uses_of_what_is_trusted_is_listed():
+    used = {}
+    for file in ROOT.rglob("*.py"):
+        module = ".".join(file.relative_to(ROOT.parent).with_suffix("").parts).removesuffix(".__init__")
+        if is_search(module):
+            for name, what in imports_of(module):
+                part = name.removeprefix("enumsol.")
+                if name.startswith(TRUSTED) and not is_search(name) and part not in DATA:
+                    used.setdefault(part, set()).add(what)
+    for part, names in used.items():
+        assert SHARED.get(part, set()) is None or names <= SHARED[part], f"the search uses {names} of {part}"
+        assert f"``{part}``" in checker.__doc__
+    assert set(used) == set(SHARED)
+
+
+def test_no_module_of_the_search_is_loaded_by_a_verification(tmp_path):
+    """Point proofs with and without rational leaves, and a graph's, checked in a process of their own."""
+    degenerate = integer_problem(np.random.default_rng(20), 2)
+    moving, interval = through_the_unloaded_state()
+    plain = enumsol.gallery.one_node_triangle()
+    proofs = [(degenerate, enumerate_roots(degenerate, 0.0)), (plain, enumerate_roots(plain, 5.0))]
+    proofs.append((moving, branch_graph(moving, interval)))
+    for k, (problem, found) in enumerate(proofs):
+        write_problem(problem, tmp_path / f"{k}.npz")
+        found.proof.save(tmp_path / f"{k}.proof")
+    code = (
+        "import sys, json, enumsol; from enumsol.checker.verify import verify; "
+        "from enumsol.proof.proof_file import Proof; "
+        f"reports = [verify(enumsol.read_problem(f'{tmp_path}/{{k}}.npz'), Proof.load(f'{tmp_path}/{{k}}.proof')) "
+        f"for k in range({len(proofs)})]; assert all(report.complete for report in reports); "
+        "print(json.dumps(sorted(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    modules = set(json.loads(done.stdout.splitlines()[-1]))
+    assert modules >= {*CHECKERS, "enumsol.checker.hull"}
+    assert not {module for module in modules if is_search(module)}
+
+
+def test_the_claims_point_at_the_one_place():
+    from enumsol.cli import verify
+
+    readme = ROOT.parent / "README.md"
+    for text in (verify.verify.__doc__, *([readme.read_text()] if readme.is_file() else [])):
+        assert "shares no code" not in text
+        assert "enumsol.checker" in text

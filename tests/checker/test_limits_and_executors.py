@@ -1,0 +1,215 @@
+"""Proofs of searches that were cut short, run in parallel, streamed, saved or interrupted."""
+
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from compare import differences
+from generators import integer_problem
+from proof_tools import bytes_of, records_of
+
+import enumsol
+from enumsol import ContactProblem, Interrupted, Proof, ProofFormatError, enumerate_roots, gallery, verify
+from enumsol.condensation.exact import ExactSystem
+from enumsol.proof.proof_file import fraction_text
+
+
+@pytest.fixture(scope="module")
+def wedge():
+    entry = gallery.get("wedge-8-5")
+    return entry.build(), entry.alpha
+
+
+@pytest.fixture(scope="module", params=["processes", "threads"])
+def executor(request):
+    pool = ProcessPoolExecutor(2) if request.param == "processes" else ThreadPoolExecutor(2)
+    with pool:
+        yield pool
+
+
+def degenerate():
+    """A problem with a root on the border of several selections, and two with a family."""
+    for seed in (20, 34):
+        yield integer_problem(np.random.default_rng(seed), 2), 0.0
+    yield gallery.get("one-node-6.3").build(), 2.0
+
+
+def test_executors_give_the_same_roots_and_a_proof(executor, wedge, tmp_path):
+    for k, (problem, alpha) in enumerate([wedge, *degenerate()]):
+        alone = enumerate_roots(problem, alpha)
+        path = tmp_path / f"{k}.proof"
+        together = enumerate_roots(problem, alpha, executor=executor, proof_path=path)
+        assert not differences(together, alone, rtol=1e-12)
+        assert together.complete
+        assert together.index_sum == 1
+        for one, two in zip(together, alone, strict=True):
+            assert (one.enclosure is None) == (two.enclosure is None)
+            if one.enclosure is not None:
+                assert np.all(one.enclosure.lambda_n == two.enclosure.lambda_n)
+        for proof in (together.proof, Proof.load(path)):
+            report = verify(problem, proof)
+            assert report.complete
+            assert (report.roots, report.families) == (len(alone), len(alone.families))
+
+
+def test_enough_in_parallel_leaves_a_proof_that_says_so(executor, wedge):
+    problem, alpha = wedge
+    roots = enumerate_roots(problem, alpha, executor=executor, stop_after=2)
+    assert len(roots) >= 2
+    check_cut_short(problem, roots)
+
+
+def check_cut_short(problem, roots):
+    """Not complete; the proof is good for what it covers and counts what it does not."""
+    assert not roots.complete
+    assert roots.stopped
+    assert roots.undecided
+    report = verify(problem, roots.proof)
+    assert report.ok
+    assert not report.complete
+    assert report.undecided == len(roots.undecided)
+    assert report.roots == len(roots)
+
+
+@pytest.mark.parametrize(
+    "limits", [{"stop_after": 1}, {"stop_after": 2}, {"max_nodes": 1}, {"max_nodes": 40}, {"time_limit": 1e-9}]
+)
+def test_limits(limits, wedge):
+    problem, alpha = wedge
+    roots = enumerate_roots(problem, alpha, **limits)
+    check_cut_short(problem, roots)
+    if "stop_after" in limits:
+        assert len(roots) == limits["stop_after"]
+
+
+def test_a_limit_that_was_not_reached(wedge):
+    problem, alpha = wedge
+    roots = enumerate_roots(problem, alpha, max_nodes=100_000, time_limit=1e6, stop_after=100)
+    assert roots.complete
+    assert verify(problem, roots.proof).complete
+
+
+def test_streamed_saved_and_loaded(wedge, tmp_path):
+    problem, alpha = wedge
+    in_memory = enumerate_roots(problem, alpha)
+    path = tmp_path / "streamed.proof"
+    streamed = enumerate_roots(problem, alpha, proof_path=path)
+    assert bytes_of(streamed.proof) == path.read_bytes() == bytes_of(in_memory.proof)
+    assert streamed.proof.size == path.stat().st_size
+    saved = tmp_path / "saved.proof"
+    in_memory.proof.save(saved)
+    assert saved.read_bytes() == path.read_bytes()
+    assert verify(problem, Proof.load(saved)).complete
+    assert str(path) in repr(streamed.proof)
+    assert "in memory" in repr(in_memory.proof)
+
+
+def test_proof_is_written_while_the_search_runs(wedge, tmp_path):
+    problem, alpha = wedge
+    path = tmp_path / "growing.proof"
+    sizes = []
+    enumerate_roots(problem, alpha, proof_path=path, progress=lambda _: sizes.append(path.stat().st_size))
+    assert len(sizes) >= 3
+    assert path.stat().st_size > sizes[0]
+
+
+def test_interruption_keeps_the_roots_and_no_proof(wedge, tmp_path):
+    problem, alpha = wedge
+    path = tmp_path / "interrupted.proof"
+
+    def stop(progress):
+        if progress.nodes >= 192:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted) as caught:
+        enumerate_roots(problem, alpha, progress=stop, proof_path=path)
+    partial = caught.value.partial
+    assert not partial.complete
+    assert partial.proof is None
+    assert "interrupted" in partial.stopped
+    # what is left on disk is no proof of anything
+    report = verify(problem, Proof.load(path))
+    assert not report.ok
+    assert "breaks off" in report.failures[0]
+
+
+def test_progress_of_the_checker():
+    entry = gallery.get("wedge-14-5")
+    problem, alpha = entry.build(), entry.alpha
+    proof = enumerate_roots(problem, alpha).proof
+    seen = []
+    report = verify(problem, proof, progress=seen.append)
+    assert seen == sorted(seen)
+    assert seen[-1] <= report.leaves
+    assert len(seen) == report.leaves // 256
+
+
+def test_a_file_that_is_not_there(tmp_path, wedge):
+    with pytest.raises(ProofFormatError, match="cannot be read"):
+        Proof.load(tmp_path / "nothing.proof")
+    with pytest.raises(ProofFormatError, match="cannot be read"):
+        Proof.load(tmp_path)
+    path = tmp_path / "gone.proof"
+    roots = enumerate_roots(*wedge, proof_path=path)
+    path.unlink()
+    with pytest.raises(ProofFormatError, match="cannot be read"):
+        verify(wedge[0], roots.proof)
+
+
+def test_a_proof_that_cannot_be_written(tmp_path, wedge):
+    with pytest.raises(enumsol.InvalidArgumentError, match=r"proof_path .* cannot be written"):
+        enumerate_roots(*wedge, proof_path=tmp_path / "nowhere" / "x.proof")
+
+
+def test_arguments_of_verify(wedge):
+    problem, alpha = wedge
+    roots = enumerate_roots(problem, alpha)
+    with pytest.raises(enumsol.InvalidArgumentError, match="proof is a RootSet"):
+        verify(problem, roots)
+    with pytest.raises(enumsol.InvalidArgumentError, match="problem is a Proof"):
+        verify(roots.proof, roots.proof)
+
+
+def test_a_report_prints_its_counts(wedge):
+    problem, alpha = wedge
+    report = verify(problem, enumerate_roots(problem, alpha).proof)
+    assert report.alpha == Fraction(alpha)
+    text = repr(report)
+    for part in (
+        "at alpha = 3.0\n",
+        "proof: verified",
+        "5 isolated roots",
+        "0 families",
+        "0 of them undecided",
+        "as given",
+        "complete: yes",
+    ):
+        assert part in text
+
+
+def test_rational_leaves_may_be_long():
+    # a gap that is closed to within rounding, in a body whose entries are full floats: fractions of many digits
+    rng = np.random.default_rng(3)
+    n = 60
+    X = rng.normal(size=(n, n + 5))
+    rows, f = np.eye(n), rng.normal(size=n)
+    A = X @ X.T
+    free = ContactProblem(0.5 * (A + A.T), rows[:1], rows[1:2], f, friction=0.5)
+    exact = ExactSystem.from_problem(free, 0).g[0]
+    nearest = int(exact.p) / int(exact.q)
+    longest = rationals = 0
+    for gap in (nearest, np.nextafter(nearest, -np.inf)):
+        problem = ContactProblem(free.A, rows[:1], rows[1:2], f, friction=0.5, gap=float(gap))
+        roots = enumerate_roots(problem, 0.0)
+        assert roots.complete
+        assert verify(problem, roots.proof).complete
+        rationals += roots.stats.escalations.rationals
+        points = [p for record in records_of(roots.proof)[1:-1] if record[0] == "D" for p in record[1]]
+        longest = max([longest, *(len(part) for point in points for x in point for part in x.split("/"))])
+    assert rationals
+    assert longest > 700
+    # Python by default refuses to convert numbers of more than 4300 decimal digits, which n = 250 brings about
+    long = Fraction(-(3**20000), 7**9000)
+    numerator, denominator = fraction_text(*long.as_integer_ratio()).split("/")
+    assert Fraction(int(numerator, 16), int(denominator, 16)) == long

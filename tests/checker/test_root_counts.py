@@ -1,0 +1,173 @@
+"""Verified counts against exact ones where a condition is next to zero, zero, or just broken."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from oracles import exact_condense, exact_solutions
+from proof_tools import Judge, records_of
+
+from enumsol import ContactProblem, enumerate_roots, verify
+from enumsol.search import solvers as workbench
+
+OPEN, STICK, SLIP_PLUS, SLIP_MINUS = range(4)
+
+
+def stiffness(rng, p):
+    """A small integer matrix, positive definite."""
+    X = rng.integers(-2, 3, size=(2 * p, 2 * p))
+    return (X @ X.T + np.eye(2 * p, dtype=int) * int(rng.integers(1, 4))).astype(float)
+
+
+def planted(rng, p):
+    """A problem whose parameter alpha is the distance of one condition of a planted root from zero.
+
+    All data are small whole numbers: lambda(alpha) and w(alpha) of the planted root are affine in alpha, and so is its
+    load, so that no rounding enters. For alpha < 0 the condition is broken and the planted root is none.
+    """
+    A = stiffness(rng, p)
+    F = rng.integers(1, 4, size=p).astype(float)
+    codes = rng.integers(0, 4, size=p)
+    chosen = int(rng.integers(p))
+    force, move = np.zeros(2 * p), np.zeros(2 * p)
+    force_rate, move_rate = np.zeros(2 * p), np.zeros(2 * p)
+    for i, code in enumerate(codes):
+        near = i == chosen
+        which = int(rng.integers(2))
+        if code == OPEN:
+            move[i], move_rate[i] = (0.0, -1.0) if near else (-float(rng.integers(1, 4)), 0.0)
+            move[p + i] = float(rng.integers(-2, 3))
+            continue
+        turn = {STICK: 0.0, SLIP_PLUS: 1.0, SLIP_MINUS: -1.0}[int(code)]
+        force[i] = float(rng.integers(1, 4))
+        move[p + i] = turn * float(rng.integers(1, 4))
+        force[p + i] = turn * F[i] * force[i]
+        if code == STICK:
+            reach = F[i] * force[i]
+            force[p + i] = float(rng.integers(-reach + 1, reach))
+            if near:
+                side = 1.0 if which else -1.0
+                force[p + i], force_rate[p + i] = side * reach, -side
+        elif near and which:
+            move[p + i], move_rate[p + i] = 0.0, turn
+        elif near:
+            force[i], force_rate[i] = 0.0, 1.0
+            force[p + i], force_rate[p + i] = 0.0, turn * F[i]
+    rows = np.eye(2 * p)
+    return ContactProblem(
+        A, rows[:p], rows[p:], A @ move + force, friction=(F, 0.0), load_slope=A @ move_rate + force_rate
+    )
+
+
+def distances(rng):
+    """alpha from 1e-6 to 1e-18 on both sides of zero, beyond, and zero itself; decimal fractions or floats."""
+    size = Fraction(1, 10 ** int(rng.choice([6, 8, 10, 12, 13, 14, 15, 16, 17, 18, 25, 40])))
+    alpha = rng.choice([-1, 1, 1, 0]) * size
+    return float(alpha) if rng.random() < 0.5 else Fraction(alpha)
+
+
+def as_floats(problem, alpha):
+    """The same problem with its load rounded to floats: its distance from degenerate is whatever that gives."""
+    f = problem.f + float(alpha) * problem.load_slope
+    return ContactProblem(problem.A, problem.Bn, problem.Bt, f, friction=problem.friction)
+
+
+def cases(seed, p, count):
+    rng = np.random.default_rng([seed, p])
+    for _ in range(count):
+        problem, alpha = planted(rng, p), distances(rng)
+        yield (as_floats(problem, alpha), 0.0) if rng.random() < 0.3 else (problem, alpha)
+
+
+def outline(roots):
+    """What a count consists of: statuses and indices of the roots, dimensions and indices of the families."""
+    singles = sorted((tuple(s.value for s in root.statuses), root.active, root.index) for root in roots)
+    return singles, sorted((family.dimension, family.index, family.vertices.shape) for family in roots.families)
+
+
+@pytest.mark.parametrize(("p", "count"), [(1, 130), (2, 210), (3, 130), (4, 30)])
+def test_counts_equal_the_exact_ones(p, count):
+    degenerate = balls = rationals = several = 0
+    for problem, alpha in cases(1, p, count):
+        exact = enumerate_roots(problem, alpha, "exact", "exhaustive")
+        roots = enumerate_roots(problem, alpha)
+        assert roots.complete
+        assert outline(roots) == outline(exact)
+        assert roots.index_sum == 1
+        report = verify(problem, roots.proof)
+        assert report.complete
+        assert (report.roots, report.families) == (len(exact), len(exact.families))
+        degenerate += any(not root.regular for root in roots) or bool(roots.families)
+        several += len(roots) > 1
+        balls += not roots.stats.escalations.rationals
+        rationals += bool(roots.stats.escalations.rationals)
+    # the cases are what they are meant to be
+    assert min(degenerate, several, rationals) >= count / 12
+    assert balls >= count / 5
+
+
+@pytest.mark.parametrize(("p", "count"), [(1, 40), (2, 60), (3, 30)])
+def test_without_rationals_the_count_is_right_or_open(p, count, monkeypatch):
+    verified = []
+    monkeypatch.setattr(workbench, "EXACT_DOF_LIMIT", 0)
+    for problem, alpha in cases(2, p, count):
+        verified.append((problem, alpha, enumerate_roots(problem, alpha)))
+    monkeypatch.undo()
+    left_open = 0
+    for problem, alpha, roots in verified:
+        exact = enumerate_roots(problem, alpha, "exact", "exhaustive")
+        assert roots.certified_data == "problem"
+        report = verify(problem, roots.proof)
+        assert report.ok
+        assert report.complete == roots.complete
+        if roots.complete:
+            assert outline(roots) == outline(exact)
+        else:
+            left_open += 1
+            assert "undecided" in roots.completeness()
+            for item in roots.undecided:
+                assert "singular" in item.reason or "is zero to" in item.reason
+                assert "perturb the load" in item.hint
+            known = {tuple(s.value for s in root.statuses) for root in exact}
+            assert {tuple(s.value for s in root.statuses) for root in roots} <= known
+    assert count / 10 <= left_open <= 0.9 * count
+
+
+def test_planted_roots_are_there():
+    # the generator does what it says: at alpha > 0 the planted root is regular, at 0 it is degenerate
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        problem = planted(rng, int(rng.integers(1, 3)))
+        regular = [root.regular for root in enumerate_roots(problem, Fraction(1, 1000), "exact", "exhaustive")]
+        at_zero = enumerate_roots(problem, 0, "exact", "exhaustive")
+        assert any(regular)
+        assert at_zero.families or not all(root.regular for root in at_zero)
+
+
+def test_proofs_stand_up_to_fractions():
+    for p, count in ((1, 30), (2, 30)):
+        for problem, alpha in cases(4, p, count):
+            roots = enumerate_roots(problem, alpha)
+            assert Judge(problem).valid(records_of(roots.proof))
+            components = exact_solutions(problem, alpha)
+            assert len(roots) == sum(c.dimension == 0 for c in components)
+            assert len(roots.families) == sum(c.dimension > 0 for c in components)
+            S, g, F = exact_condense(problem, alpha)
+            for root in roots:
+                if root.enclosure is not None:
+                    assert_enclosed(root, S, g, F, components)
+
+
+def assert_enclosed(root, S, g, F, components):
+    """The bounds hold lambda and w of one of the exact solutions."""
+    p = len(F)
+    bounds = np.concatenate([root.enclosure.lambda_n, root.enclosure.lambda_t])
+    moves = np.concatenate([root.enclosure.u_n, root.enclosure.u_t])
+    for component in components:
+        for _, vertices, _ in component.parts:
+            for x in vertices:
+                w = [g[r] - sum(S[r][k] * x[k] for k in range(2 * p)) for r in range(2 * p)]
+                pairs = [*zip(x, bounds, strict=True), *zip(w, moves, strict=True)]
+                if all(Fraction(float(low)) <= v <= Fraction(float(high)) for v, (low, high) in pairs):
+                    return
+    raise AssertionError(f"no exact solution within the bounds of {root}")

@@ -1,0 +1,454 @@
+import contextlib
+import csv
+import io
+import json
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from typer.testing import CliRunner
+
+from enumsol import Proof, gallery, read_problem, verify, write_problem
+from enumsol.cli import main
+from enumsol.cli.app import app
+from enumsol.relaxation.active_set import ActiveSetEngine
+
+A = np.array([[2.0, -0.5, 0.0, 0.0], [-0.5, 2.0, -0.5, 0.0], [0.0, -0.5, 2.0, -0.5], [0.0, 0.0, -0.5, 2.0]])
+DENSE = {"A": A, "Bn": np.eye(4)[[0, 2]], "Bt": np.eye(4)[[1, 3]], "f": np.array([1.0, -2.0, 0.5, 1.0])}
+
+
+def run(capsys, *arguments):
+    status = main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def call(*arguments, **options):
+    command = [sys.executable, "-m", "enumsol", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **options)
+
+
+def assert_refused(status, out, err, *parts):
+    assert status == 2
+    assert out == ""
+    assert err.startswith("enumsol: error: ")
+    assert err.count("\n") == 1
+    assert not err.endswith(".\n")
+    for part in parts:
+        assert part in err
+
+
+# -- what is printed ---------------------------------------------------------------------------------------------------
+
+
+def test_roots_of_the_first_example(capsys):
+    status, out, err = run(capsys, "roots", "gallery:one-node-6.1", "--alpha", 5)
+    assert (status, err) == (0, "")
+    assert "3 roots (verified, tree)" in out
+    assert "index sum: +1" in out
+    assert out.endswith("complete: yes (proven)\n")
+    rows = [line.split() for line in out.splitlines()[1:4]]
+    assert [row[3] for row in rows] == ["open", "slip-", "stick"]
+    assert [float(row[4]) for row in rows] == pytest.approx([0.0, 1 / 3, 1.5], abs=1e-6)
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_fast_arithmetic_is_not_proven_but_succeeds(capsys):
+    status, out, _ = run(capsys, "roots", "gallery:wedge-8-5", "--alpha", 3, "--arithmetic", "fast")
+    assert status == 0
+    assert "5 roots (fast, tree)" in out
+    assert out.endswith("complete: not proven (0 undecided)\n")
+
+
+def test_a_fraction_is_exact(capsys):
+    # at the fold alpha = 8/3 a second, degenerate root appears; the nearest float64 lies below
+    _, out, _ = run(capsys, "roots", "gallery:one-node-6.1", "--alpha", "8/3")
+    assert "2 roots" in out
+    assert "1    +0      no  0.00e+00" in out
+    _, out, _ = run(capsys, "roots", "gallery:one-node-6.1", "--alpha", repr(8 / 3))
+    assert "1 root (" in out
+
+
+def test_families_are_listed_with_their_vertices(capsys):
+    status, out, _ = run(capsys, "roots", "gallery:one-node-6.3", "--alpha", 2)
+    assert status == 0
+    assert "0 roots, 1 family" in out
+    assert "family 0, vertices" in out
+
+
+def test_large_results_have_no_table_over_nodes(capsys):
+    _, out, _ = run(capsys, "roots", "gallery:chain-4", "--alpha", 5, "--arithmetic", "fast")
+    assert out.startswith("RootSet at alpha = 5: 81 roots")
+    assert "... 61 more" in out
+
+
+def test_methods_and_jobs_agree(capsys):
+    counts = []
+    for options in ((), ("--arithmetic", "fast", "--method", "exhaustive"), ("--jobs", 2), ("--arithmetic", "exact")):
+        status, out, _ = run(capsys, "roots", "gallery:two-node-5", "--alpha", 5, *options)
+        assert status == 0
+        counts.append(out[out.index("RootSet") :].split()[5])
+    assert counts == ["5"] * 4
+    status, out, _ = run(capsys, "roots", "gallery:wedge-20-5", "--alpha", 2.25, "--jobs", 2)
+    assert status == 0
+    assert "5 roots (verified, tree)" in out
+
+
+def test_json_holds_everything(capsys, tmp_path):
+    status, out, err = run(capsys, "roots", "gallery:one-node-6.1", "--alpha", "5", "--json", "-")
+    assert (status, err) == (0, "")
+    result = json.loads(out)
+    assert result["alpha"] == 5.0
+    assert result["complete"] is True
+    assert result["index_sum"] == 1
+    assert [root["statuses"] for root in result["roots"]] == [["open"], ["slip-"], ["stick"]]
+    assert [root["index"] for root in result["roots"]] == [1, -1, 1]
+    assert result["roots"][1]["lambda_n"] == pytest.approx([1 / 3], rel=1e-12)
+    low, high = result["roots"][1]["enclosure"]["lambda_n"][0]
+    assert low <= 1 / 3 <= high
+    assert result["stats"]["nodes"] > 0
+    file = tmp_path / "result.json"
+    status, out, _ = run(capsys, "roots", "gallery:one-node-6.3", "--alpha", "2", "--json", file)
+    assert "complete: yes" in out
+    family = json.loads(file.read_text())["families"][0]
+    assert sorted(vertex[0] for vertex in family["polytopes"][0]["vertices"]) == [[0.0, 0.0], [1.0, -2.0]]
+
+
+def test_csv_has_a_row_a_root_and_node(capsys, tmp_path):
+    status, out, _ = run(capsys, "roots", "gallery:two-node-5", "--alpha", 5, "--csv", "-")
+    rows = list(csv.DictReader(io.StringIO(out)))
+    assert status == 0
+    assert len(rows) == 10
+    assert set(rows[0]) == {
+        "alpha", "root", "node", "status", "lambda_n", "lambda_t", "u_n", "u_t", "index", "regular"
+    }  # fmt: skip
+    file = tmp_path / "r.csv"
+    status, out, err = run(capsys, "roots", "gallery:one-node-6.3", "--alpha", 2, "--csv", file)
+    assert status == 0
+    assert err == "enumsol: note: the CSV holds the isolated roots only, --json the 1 families too\n"
+    assert file.read_text().startswith("alpha,root,node")
+
+
+def test_a_proof_can_be_written_and_checked(capsys, tmp_path):
+    file = tmp_path / "r.proof"
+    status, _, _ = run(capsys, "roots", "gallery:two-node-5", "--alpha", 5, "--proof", file)
+    assert status == 0
+    assert verify(gallery.get("two-node-5").build(), Proof.load(file)).ok
+
+
+def test_gallery_list_and_write(capsys, tmp_path):
+    status, out, _ = run(capsys, "gallery", "list")
+    assert status == 0
+    assert [line.split()[0] for line in out.splitlines()] == list(gallery.GALLERY)
+    file = tmp_path / "p.npz"
+    status, out, _ = run(capsys, "gallery", "write", "two-node-6.4", file)
+    assert status == 0
+    assert out == f"wrote two-node-6.4 to {file}; try: enumsol roots {file} --alpha 3.5\n"
+    assert read_problem(file).p == 2
+    status, out, _ = run(capsys, "roots", file, "--alpha", 3.5)
+    assert "5 roots" in out
+    status, _, _ = run(capsys, "gallery", "write", "gallery:two-node-6.4", tmp_path / "market")
+    assert status == 0
+    assert (tmp_path / "market" / "A.mtx").exists()
+
+
+def test_help_and_version(capsys):
+    for arguments in ((), ("gallery",), ("--help",), ("roots", "-h"), ("gallery", "write", "--help")):
+        status, out, _ = run(capsys, *arguments)
+        assert status == 0
+        assert "Usage: enumsol" in out
+    status, out, _ = run(capsys, "--version")
+    assert status == 0
+    assert out.startswith("enumsol ")
+    # as typer itself runs the application
+    result = CliRunner().invoke(app, ["roots", "--help"])
+    assert result.exit_code == 0
+    for word in ("--alpha", "--arithmetic", "--stop-after", "--max-nodes", "--time-limit", "--json", "130"):
+        assert word in result.output
+
+
+# -- exit statuses -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (("--stop-after", 2), "complete: no (stopped after enough roots"),
+        (("--max-nodes", 3), "complete: no (stopped after max_nodes = 3 nodes"),
+        (("--time-limit", 1e-9), "complete: no (stopped by the time limit"),
+        (("--max-nodes", 3, "--arithmetic", "fast"), "complete: no (stopped after max_nodes = 3 nodes"),
+    ],
+)
+def test_a_search_cut_short_is_status_3(capsys, options, line):
+    status, out, _ = run(capsys, "roots", "gallery:chain-4", "--alpha", 5, *options)
+    assert status == 3
+    assert out.splitlines()[-1].startswith(line)
+
+
+def test_statuses_of_the_process(tmp_path):
+    done = call("roots", "gallery:one-node-6.1", "--alpha", "5")
+    assert (done.returncode, done.stderr) == (0, "")
+    cut = call("roots", "gallery:chain-2", "--alpha", "5", "--stop-after", "1", "--json", tmp_path / "r.json")
+    assert (cut.returncode, cut.stderr) == (3, "")
+    assert json.loads((tmp_path / "r.json").read_text())["complete"] is False
+    bad = call("roots", "gallery:nothing", "--alpha", "5")
+    assert_refused(bad.returncode, bad.stdout, bad.stderr, "the gallery has no problem named 'nothing'")
+
+
+def test_a_reader_that_stops_early_does_no_harm():
+    command = f"{sys.executable} -m enumsol gallery list | head -1"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=60, check=False)
+    assert done.stderr == ""
+    assert done.stdout.startswith("one-node-6.1")
+
+
+# -- bad input ---------------------------------------------------------------------------------------------------------
+
+
+def bar(n):
+    main_diagonal = np.full(n, 2.0)
+    main_diagonal[[0, -1]] = 1.0
+    return sp.diags_array([-np.ones(n - 1), main_diagonal, -np.ones(n - 1)], offsets=(-1, 0, 1)).toarray()
+
+
+def with_entry(name, index, value):
+    changed = DENSE[name].copy()
+    changed[index] = value
+    return {name: changed}
+
+
+BAD_FILES = {
+    "A of wrong shape": (DENSE | {"A": A[:3]}, "A has shape (3, 4); expected a square matrix"),
+    "Bn of wrong shape": (DENSE | {"Bn": np.eye(3)[:2]}, "Bn has shape (2, 3); expected (p, n) = (2, 4)"),
+    "Bt of wrong shape": (DENSE | {"Bt": np.eye(4)[:1]}, "Bt has shape (1, 4); expected (p, n) = (2, 4)"),
+    "f of wrong shape": (DENSE | {"f": np.ones(3)}, "f has shape (3,); expected (4,)"),
+    "gap of wrong shape": (DENSE | {"gap": np.ones(3)}, "gap has shape (3,); expected (2,) or a single number"),
+    "A unsymmetric": (DENSE | with_entry("A", (0, 1), 0.4), "A is not symmetric"),
+    "A indefinite": (DENSE | {"A": A - 1.7 * np.eye(4)}, "A is not positive definite"),
+    "rigid body": (DENSE | {"A": bar(4)}, "the body is free to move as a rigid body"),
+    "NaN in A": (DENSE | with_entry("A", (2, 2), np.nan), "A has the value nan at index (2, 2)"),
+    "inf in Bn": (DENSE | with_entry("Bn", (0, 1), np.inf), "Bn has the value inf at index (0, 1)"),
+    "NaN in Bt": (DENSE | with_entry("Bt", (1, 1), np.nan), "Bt has the value nan at index (1, 1)"),
+    "inf in f": (DENSE | with_entry("f", 3, -np.inf), "f has the value -inf at index (3,)"),
+    "NaN in gap": (DENSE | {"gap": np.nan}, "gap has the value nan"),
+    "NaN in friction": (DENSE | {"friction0": np.nan}, "friction F0 has the value nan"),
+    "inf in load_slope": (DENSE | {"load_slope": np.full(4, np.inf)}, "load_slope has the value inf"),
+    "NaN in slip_offset": (DENSE | {"slip_offset": np.nan}, "slip_offset has the value nan"),
+    "dependent rows": (DENSE | {"Bt": DENSE["Bn"]}, "[Bn; Bt] has linearly dependent rows (Bn row 0, "),
+    "negative friction": (
+        DENSE | {"friction1": -1.0},
+        "friction at alpha = 5 is -5 at contact node 0; expected F >= 0",
+    ),
+    "negative constant": (DENSE | {"friction": -1.0}, "friction is -1 at contact node 0; expected F >= 0"),
+    "friction list": (DENSE | {"friction": [0.1, 0.2]}, "friction is an array of shape (2,), which is ambiguous"),
+    "p = 0": (DENSE | {"Bn": np.zeros((0, 4)), "Bt": np.zeros((0, 4))}, "p = 0 contact nodes"),
+    "missing array": ({k: v for k, v in DENSE.items() if k != "Bt"}, "Bt is missing (found A, Bn and f)"),
+    "misnamed array": ({**{k: v for k, v in DENSE.items() if k != "f"}, "F": DENSE["f"]}, "is F meant as f?"),
+    "misnamed option": (DENSE | {"Gap": 0.0}, "Gap is not known (is gap meant?)"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_FILES)
+def test_bad_problems_get_one_sentence(capsys, tmp_path, case):
+    arrays, part = BAD_FILES[case]
+    file = tmp_path / "p.npz"
+    np.savez(file, **arrays)
+    where = () if "alpha = 5" in part else (f"{file}: ",)
+    assert_refused(*run(capsys, "roots", file, "--alpha", 5), part, *where)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (("roots", "gallery:chain-2", "--alpha", "nan"), "--alpha is 'nan'; expected a finite real number"),
+        (("roots", "gallery:chain-2", "--alpha", "inf"), "--alpha is 'inf'; expected a finite real number"),
+        (("roots", "gallery:chain-2", "--alpha", "1e999"), "--alpha is '1e999'; expected a finite real number"),
+        (
+            ("roots", "gallery:chain-2", "--alpha", "five"),
+            "--alpha is 'five'; expected a finite real number such as 2.5 or a fraction such as 8/3",
+        ),
+        (("roots", "gallery:chain-2", "--alpha", "1/0"), "--alpha is '1/0'; expected a finite real number"),
+        (("roots", "gallery:chain-2", "--alpha", "1/2/3"), "--alpha is '1/2/3'; expected a finite real number"),
+        (("roots", "gallery:chain-2", "--alpha", "1" + 400 * "0" + "/3"), "expected a finite real number"),
+        (
+            ("roots", "gallery:chain-2", "--alpha", "-1"),
+            "friction at alpha = -1 is -1 at contact node 0; expected F >= 0",
+        ),
+        (("roots", "gallery:chian-2", "--alpha", "5"), "no problem named 'chian-2'; did you mean chain-2"),
+        (("gallery", "write", "chian-2", "p.npz"), "no problem named 'chian-2'; did you mean chain-2"),
+        (
+            ("roots", "nowhere.npz", "--alpha", "5"),
+            "nowhere.npz: there is no such file or directory; expected a .npz file",
+        ),
+        (("roots", __file__, "--alpha", "5"), "its name ends in '.py'; expected a .npz file"),
+        (("gallery", "write", "chain-2", "p.txt"), "p.txt: its name ends in '.txt'; expected a .npz file"),
+        (("gallery", "write", "chain-2", "/no/where.npz"), "it cannot be written (No such file or directory)"),
+        (("gallery", "write", "chain-2", "p.h5"), "friction or load depends on alpha, which fclib cannot hold"),
+        (("roots", "gallery:chain-2", "--alpha", "5", "--json", "/no/where"), "--json is /no/where, which cannot be"),
+        (("roots", "gallery:chain-2", "--alpha", "5", "--csv", "/tmp"), "--csv is /tmp, a directory; expected"),
+        (("roots", "gallery:chain-2", "--alpha", "5", "--csv", "-", "--json", "-"), "--json and --csv are both -"),
+        (("roots", "gallery:chain-2", "--alpha", "5", "--proof", "-"), "a proof is a binary file; expected the name"),
+        (("roots", "gallery:chain-2", "--alpha", "5", "--time-limit", "-1"), "time_limit is -1.0; expected a positive"),
+        (("roots", "gallery:chain-2", "--alpha", "5", "--max-nodes", "0"), "'--max-nodes'"),
+        (("roots", "gallery:chain-2", "--alpha", "5", "--stop-after", "two"), "'--stop-after'"),
+        (("roots", "gallery:chain-2", "--alpha", "5", "--arithmetic", "sloppy"), "'sloppy' is not one of"),
+        (("roots", "gallery:chain-2", "--alpha", "5", "--method", "exhaustive"), "for the oracle"),
+        (("roots", "gallery:chain-2", "--alpha", "5", "--method", "exhaustive", "--jobs", "2"), "expected 1 job"),
+        (
+            ("roots", "gallery:clamped-block-16", "--alpha", "5", "--method", "exhaustive", "--arithmetic", "fast"),
+            "hours",
+        ),
+        (("roots", "gallery:chain-2"), "missing option '--alpha'"),
+        (("roots", "--alpha", "5"), "missing argument 'PROBLEM'"),
+        (("roots", "gallery:chain-2", "--alfa", "5"), "no such option: --alfa"),
+        (("roots", "gallery:chain-2", "more", "--alpha", "5"), "unexpected extra argument"),
+        (("rots",), "no such command 'rots'"),
+        (("gallery", "lst"), "no such command 'lst'"),
+    ],
+)
+def test_bad_calls_get_one_sentence(capsys, tmp_path, monkeypatch, arguments, part):
+    monkeypatch.chdir(tmp_path)
+    assert_refused(*run(capsys, *arguments), part)
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_file_that_is_no_problem_file(capsys, tmp_path):
+    for content in (b"", b"just text", b"PK\x03\x04 and no more", b"\x93NUMPY"):
+        file = tmp_path / "p.npz"
+        file.write_bytes(content)
+        assert_refused(*run(capsys, "roots", file, "--alpha", 5), f"{file}: it is no", "expected")
+    assert_refused(*run(capsys, "roots", tmp_path, "--alpha", 5), "A.mtx, Bn.mtx, Bt.mtx and f.mtx are missing")
+
+
+def test_every_bad_input_is_status_2_of_the_process_too(tmp_path):
+    file = tmp_path / "p.npz"
+    np.savez(file, **(DENSE | {"A": bar(4)}))
+    done = call("roots", file, "--alpha", 5)
+    assert_refused(done.returncode, done.stdout, done.stderr, "the body is free to move as a rigid body")
+    done = call("roots", file, "--alfa", 5)
+    assert_refused(done.returncode, done.stdout, done.stderr, "no such option")
+
+
+@pytest.mark.filterwarnings("default")
+def test_warnings_are_lines_without_source_code(capsys, monkeypatch):
+    class Missing(ActiveSetEngine):
+        def __init__(self, *_args):
+            raise ImportError
+
+    # an installation without the compiled engine
+    monkeypatch.setattr("enumsol.search.tree.ActiveSetEngine", Missing)
+    status, out, err = run(capsys, "roots", "gallery:one-node-6.1", "--alpha", 5, "--arithmetic", "fast")
+    assert status == 0
+    assert "3 roots" in out
+    assert err.startswith("enumsol: warning: the compiled active-set solver is not available")
+    assert err.count("\n") == 1
+
+
+# -- interruption and progress -----------------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def on_terminal(*arguments):
+    """The command with a terminal for its stderr, and a reader of that terminal."""
+    master, slave = pty.openpty()
+    command = [sys.executable, "-m", "enumsol", *map(str, arguments)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=slave, text=True)
+    os.close(slave)
+    shown = bytearray()
+
+    def wait_for(pattern, seconds=60.0):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and pattern not in shown:
+            if select.select([master], [], [], 0.2)[0]:
+                shown.extend(os.read(master, 4096))
+        assert pattern in shown, shown.decode(errors="replace")
+
+    try:
+        yield process, wait_for
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+        os.close(master)
+
+
+def wait_for_children(process, number, seconds=60.0):
+    """Wait until the process has started that many others: it has imported everything by then."""
+    end = time.monotonic() + seconds
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    while time.monotonic() < end and len(children.read_text().split()) < number:
+        time.sleep(0.2)
+    assert len(children.read_text().split()) >= number
+
+
+@pytest.mark.parametrize("options", [("--arithmetic", "fast"), ("--arithmetic", "verified"), ("--jobs", "2")])
+def test_ctrl_c_prints_what_was_found(tmp_path, options):
+    # 3^12 roots take minutes
+    file, result = tmp_path / "chain.npz", tmp_path / "result.json"
+    write_problem(gallery.chain(12, 0.05), file)
+    with on_terminal("roots", file, "--alpha", 5, "--json", result, *options) as (process, wait_for):
+        # with jobs no progress comes before the first subtree does
+        if "--jobs" in options:
+            wait_for_children(process, 2)
+            time.sleep(6.0)
+        else:
+            wait_for(b"nodes")
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert out.startswith("RootSet at alpha = 5: ")
+    last = out.splitlines()[-1]
+    assert last.startswith("complete: no (interrupted after ")
+    content = json.loads(result.read_text())
+    assert content["complete"] is False
+    if "--jobs" not in options:
+        assert ": 0 roots" not in out.splitlines()[0]
+        assert len(content["roots"]) > 20
+        assert "slip-" in out
+
+
+def test_short_searches_show_no_progress():
+    with on_terminal("roots", "gallery:one-node-6.1", "--alpha", 5) as (process, wait_for):
+        out, _ = process.communicate(timeout=60)
+        assert process.returncode == 0
+        assert "3 roots" in out
+        with pytest.raises((AssertionError, OSError)):
+            wait_for(b"searching", seconds=0.5)
+
+
+def test_verify_accepts_a_proof_and_refuses_it_for_another_problem(capsys, tmp_path):
+    proof = tmp_path / "roots.proof"
+    assert run(capsys, "roots", "gallery:one-node-6.1", "--alpha", "5", "--proof", proof)[0] == 0
+    status, out, _ = run(capsys, "verify", "gallery:one-node-6.1", proof)
+    assert status == 0
+    assert "3 isolated roots" in out
+    assert "complete: yes" in out
+    status, out, _ = run(capsys, "verify", "gallery:one-node-6.2", proof)
+    assert status == 2
+    assert "another problem" in out
+
+
+def test_verify_says_what_stayed_undecided(capsys, tmp_path):
+    proof = tmp_path / "roots.proof"
+    assert run(capsys, "roots", "gallery:chain-4", "--alpha", "5", "--proof", proof, "--max-nodes", "30")[0] == 3
+    status, out, _ = run(capsys, "verify", "gallery:chain-4", proof)
+    assert status == 3
+    assert "complete: no" in out
+
+
+def test_verify_refuses_a_damaged_proof(capsys, tmp_path):
+    proof = tmp_path / "roots.proof"
+    run(capsys, "roots", "gallery:one-node-6.1", "--alpha", "5", "--proof", proof)
+    content = bytearray(proof.read_bytes())
+    content[len(content) // 2] ^= 1
+    proof.write_bytes(content)
+    assert_refused(*run(capsys, "verify", "gallery:one-node-6.1", proof), "checksum")
+    assert_refused(*run(capsys, "verify", "gallery:one-node-6.1", tmp_path / "missing.proof"), "cannot be read")

@@ -1,0 +1,239 @@
+import csv
+import importlib.util
+import io
+import json
+
+import numpy as np
+import pytest
+from cli.test_cli import assert_refused, call, on_terminal, run
+
+from enumsol import BranchGraph, gallery, write_problem
+
+GRAPH = ("graph", "gallery:one-node-6.1", "--from", 0, "--to", 20)
+
+
+# -- table -------------------------------------------------------------------------------------------------------------
+
+
+def test_table_of_the_first_example(capsys):
+    status, out, err = run(
+        capsys, "table", "gallery:one-node-6.1", "--from", 1, "--to", 5, "--samples", 5, "--arithmetic", "verified"
+    )
+    assert (status, err) == (0, "")
+    rows = [line.split() for line in out.splitlines()[1:6]]
+    assert [(row[0], row[1]) for row in rows] == [("1", "1"), ("2", "1"), ("3", "3"), ("4", "3"), ("5", "3")]
+    assert out.endswith("complete: yes (proven at all 5 alphas; says nothing about those in between)\n")
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_listed_alphas_may_be_fractions(capsys):
+    status, out, _ = run(capsys, "table", "gallery:one-node-6.1", "--alphas", "1, 8/3,5", "--csv", "-")
+    rows = list(csv.DictReader(io.StringIO(out)))
+    assert status == 0
+    assert [row["roots"] for row in rows] == ["1", "2", "3"]
+    status, out, _ = run(capsys, "table", "gallery:one-node-6.1", "--from", "7/3", "--to", "3", "--samples", 3)
+    assert [line.split()[1] for line in out.splitlines()[1:4]] == ["1", "2", "3"]
+
+
+def test_long_tables_are_printed_as_runs(capsys):
+    status, out, _ = run(
+        capsys,
+        *("table", "gallery:two-node-6.4", "--from", 0, "--to", 10, "--samples", 101, "--arithmetic", "fast"),
+    )
+    assert status == 0
+    rows = [line.split() for line in out.splitlines()[1:5]]
+    assert [row[:3] for row in rows] == [
+        ["0", "2.9", "1"],
+        ["3", "3", "3"],
+        ["3.1", "3.8", "5"],
+        ["3.9", "10", "3"],
+    ]
+    assert out.endswith("complete: not proven (0 undecided)\n")
+
+
+def test_table_as_json_and_with_jobs(capsys, tmp_path):
+    file = tmp_path / "table.json"
+    arguments = ("table", "gallery:two-node-6.5", "--from", 0, "--to", 9, "--samples", 7, "--json")
+    assert run(capsys, *arguments, file, "--jobs", 2)[0] == 0
+    _, out, _ = run(capsys, *arguments, "-")
+    spread, serial = json.loads(file.read_text()), json.loads(out)
+    assert [row["roots"] for row in spread["rows"]] == [1, 1, 1, 3, 3, 3, 3]
+    for name in ("alpha", "roots", "families", "index_sum", "complete"):
+        assert [row[name] for row in spread["rows"]] == [row[name] for row in serial["rows"]]
+
+
+@pytest.mark.parametrize("arithmetic", ["verified", "fast"])
+def test_table_cut_short_is_status_3(capsys, arithmetic):
+    status, out, _ = run(
+        capsys,
+        *("table", "gallery:chain-4", "--from", 1, "--to", 5, "--samples", 3, "--max-nodes", 3),
+        *("--arithmetic", arithmetic),
+    )
+    assert status == 3
+    assert "complete: no (at " in out
+    assert "undecided" in out.splitlines()[0]
+
+
+def test_ctrl_c_prints_the_table_so_far(tmp_path):
+    file, result = tmp_path / "chain.npz", tmp_path / "table.csv"
+    write_problem(gallery.chain(6, 0.05), file)
+    arguments = ("--from", 1, "--to", 5, "--samples", 400, "--csv", result)
+    with on_terminal("table", file, *arguments) as (process, wait_for):
+        wait_for(b"alphas")
+        process.send_signal(2)
+        out, _ = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert out.splitlines()[-1].startswith("complete: no (interrupted after ")
+    assert 1 < len(result.read_text().splitlines()) < 400
+
+
+# -- graph -------------------------------------------------------------------------------------------------------------
+
+
+def test_graph_of_the_first_example(capsys):
+    status, out, err = run(capsys, *GRAPH)
+    assert (status, err) == (0, "")
+    assert "branches 2, arcs 3" in out
+    assert "folds at 2.66667" in out
+    assert "one solution below alpha = 2.6666667" in out
+    assert out.endswith("complete: yes (proven)\n")
+    assert max(map(len, out.splitlines())) <= 100
+
+
+def test_graph_answers(capsys):
+    _, out, _ = run(capsys, "graph", "gallery:one-node-6.2", "--from", 0, "--to", 20, "--arithmetic", "fast")
+    assert "one solution throughout" in out
+    assert out.endswith("complete: not proven (degrees balance at every vertex)\n")
+    _, out, _ = run(capsys, "graph", "gallery:one-node-6.3", "--from", 0, "--to", 20)
+    assert "bifurcations at alpha = 2\n" in out
+    _, out, _ = run(capsys, "graph", "gallery:one-node-6.1", "--from", 3, "--to", 20)
+    assert "several solutions from the first alpha on" in out
+    _, out, _ = run(capsys, "graph", "gallery:two-node-6.7-minus", "--from", -3, "--to", 3)
+    assert "jumps with increasing alpha at 2.5714286" in out
+
+
+def test_graph_files(capsys, tmp_path):
+    files = {name: tmp_path / f"graph.{name}" for name in ("save", "json", "csv", "graphml", "plot")}
+    files["plot"] = tmp_path / "graph.png"
+    status, out, _ = run(capsys, *GRAPH, *(part for name, file in files.items() for part in (f"--{name}", file)))
+    assert status == 0
+    assert "branches 2" in out
+    assert len(BranchGraph.load(files["save"]).arcs) == 3
+    content = json.loads(files["json"].read_text())
+    assert content["folds"] == [pytest.approx(8 / 3)]
+    assert [branch["arcs"] for branch in content["branch_list"]] == [[0], [1, 2]]
+    assert len(content["arc_list"]) == 3
+    assert len(content["vertex_list"]) == 5
+    rows = list(csv.DictReader(io.StringIO(files["csv"].read_text())))
+    assert sorted(row["statuses"] for row in rows) == ["open", "slip-", "stick"]
+    assert files["graphml"].read_text().startswith("<?xml")
+    assert files["plot"].read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_graph_has_a_proof(capsys, tmp_path):
+    file = tmp_path / "graph.proof"
+    assert run(capsys, *GRAPH, "--proof", file)[0] == 0
+    status, out, _ = run(capsys, "verify", "gallery:one-node-6.1", file)
+    assert status == 0
+    assert "proof: verified for alpha in [0, 20]" in out
+    assert run(capsys, "verify", "gallery:one-node-6.2", file)[0] == 2
+    file.unlink()
+    status, _, err = run(capsys, *GRAPH, "--proof", file, "--arithmetic", "exact")
+    assert status == 0
+    assert err == "enumsol: note: no proof was written, only verified arithmetic gives one\n"
+    assert not file.exists()
+
+
+def test_graph_plots_chosen_nodes_and_quantities(capsys, tmp_path):
+    for ending, options in (("svg", ("--quantity", "u_t", "--nodes", "1")), ("pdf", ("--nodes", "0,1"))):
+        file = tmp_path / f"graph.{ending}"
+        arguments = ("graph", "gallery:two-node-6.5", "--from", 0, "--to", 9, "--plot", file, *options)
+        assert run(capsys, *arguments)[0] == 0
+        assert file.stat().st_size > 1000
+
+
+def test_graph_cut_short_is_status_3(capsys):
+    status, out, _ = run(capsys, "graph", "gallery:chain-4-coupled", "--from", 0, "--to", 5, "--max-nodes", 5)
+    assert status == 3
+    assert out.splitlines()[-1].startswith("complete: no (")
+
+
+def test_ctrl_c_stops_a_graph(tmp_path):
+    file = tmp_path / "chain.npz"
+    write_problem(gallery.chain(8, 0.05), file)
+    with on_terminal("graph", file, "--from", 0, "--to", 5) as (process, wait_for):
+        wait_for(b"search")
+        process.send_signal(2)
+        process.communicate(timeout=120)
+    assert process.returncode == 130
+
+
+def test_help_of_the_commands(capsys):
+    for command, words in (
+        ("table", ("--from", "--alphas", "--samples", "--jobs")),
+        ("graph", ("--plot", "--save", "--graphml", "--time-limit")),
+    ):
+        status, out, _ = run(capsys, command, "--help")
+        assert status == 0
+        for word in words:
+            assert word in out
+
+
+# -- bad input ---------------------------------------------------------------------------------------------------------
+
+TABLE = ("table", "gallery:one-node-6.1")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (TABLE, "expected --from and --to, or --alphas"),
+        ((*TABLE, "--from", 1), "expected --from and --to, or --alphas"),
+        ((*TABLE, "--from", 5, "--to", 1), "--from is 5 and --to is 1; expected the first below the second"),
+        ((*TABLE, "--from", 1, "--to", 5, "--alphas", "1"), "--alphas and --from or --to are both given"),
+        ((*TABLE, "--alphas", "1,two"), "--alphas[1] is 'two'"),
+        ((*TABLE, "--alphas", "1,-1"), "friction at alpha = -1 is -1 at contact node 0"),
+        ((*TABLE, "--from", 0, "--to", 1, "--samples", 1), "'--samples'"),
+        ((*TABLE, "--from", 0, "--to", 1, "--csv", "-", "--json", "-"), "--json and --csv are both -"),
+        ((*GRAPH, "--json", "/no/where.json"), "--json is /no/where.json, which cannot be written"),
+        ((*GRAPH, "--save", "-"), "--save is -; expected the name of a file"),
+        ((*GRAPH, "--plot", "-"), "a figure is a binary file"),
+        ((*GRAPH, "--plot", "graph.txt"), "--plot is graph.txt; expected a file name that ends in .png, .pdf or .svg"),
+        ((*GRAPH, "--plot", "graph"), "--plot is graph; expected a file name that ends in"),
+        ((*GRAPH, "--plot", "graph.png", "--nodes", "0,7"), "there is no contact node 7; expected one of 0"),
+        ((*GRAPH, "--quantity", "sigma"), "'sigma' is not one of"),
+        ((*GRAPH[:-1], "-1"), "--from is 0 and --to is -1"),
+        (("graph", "gallery:one-node-6.1", "--from", "-1", "--to", "1"), "negative in the interval"),
+        (("graph", "gallery:one-node-6.1", "--from", "0"), "missing option '--to'"),
+        (("graph", "gallery:nothing", "--from", "0", "--to", "1"), "no problem named 'nothing'"),
+        ((*GRAPH, "--time-limit", "-1"), "time_limit is -1.0"),
+    ],
+)
+def test_bad_calls_get_one_sentence(capsys, tmp_path, monkeypatch, arguments, part):
+    monkeypatch.chdir(tmp_path)
+    assert_refused(*run(capsys, *arguments), part)
+    assert not any(tmp_path.iterdir())
+
+
+def test_without_matplotlib_the_extra_is_named(capsys, monkeypatch, tmp_path):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        "enumsol.cli.output.find_spec", lambda name: None if name == "matplotlib" else find(name), raising=True
+    )
+    answer = run(capsys, *GRAPH, "--plot", tmp_path / "graph.png")
+    assert_refused(*answer, "--plot needs matplotlib", 'pip install "enumsol[plots]"')
+
+
+def test_statuses_of_the_process(tmp_path):
+    done = call("graph", "gallery:one-node-6.1", "--from", 0, "--to", 20)
+    assert (done.returncode, done.stderr) == (0, "")
+    bad = call("graph", "gallery:one-node-6.1", "--from", 2, "--to", 1)
+    assert_refused(bad.returncode, bad.stdout, bad.stderr, "--from is 2 and --to is 1")
+
+
+def test_json_has_no_nan(capsys):
+    _, out, _ = run(capsys, "table", "gallery:one-node-6.3", "--alphas", "2", "--json", "-")
+    assert "NaN" not in out
+    (row,) = json.loads(out)["rows"]
+    assert row["families"] == 1
+    assert np.isfinite(row["alpha"])

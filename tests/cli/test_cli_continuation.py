@@ -1,0 +1,296 @@
+import csv
+import io
+import json
+import subprocess
+import sys
+
+import pandas as pd
+import pytest
+from cli.test_cli import assert_refused, on_terminal, run
+
+from enumsol import Interrupted, branch_graph, gallery, write_problem
+
+FOLLOW = ("follow", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--start", 5)
+
+
+@pytest.fixture
+def points(capsys, tmp_path):
+    """All branches of the paper's Example 6.1, followed."""
+    file = tmp_path / "points.csv"
+    assert run(capsys, *FOLLOW, "--csv", file)[0] == 0
+    return file
+
+
+@pytest.fixture
+def graph(capsys, tmp_path):
+    file = tmp_path / "graph.json"
+    assert run(capsys, "graph", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--save", file)[0] == 0
+    return file
+
+
+# -- follow ------------------------------------------------------------------------------------------------------------
+
+
+def test_one_branch_through_its_fold(capsys):
+    status, out, err = run(capsys, *FOLLOW, "--root", 2, "--direction", "-1")
+    assert (status, err) == (0, "")
+    assert out.startswith("path 0, from root 2 in direction -1: Path with ")
+    assert "alpha = 2.6666667    stick -> slip-, fold, no local branch" in out
+    assert out.endswith("1 path, 1 of them left the interval or closed\n")
+
+
+def test_all_roots_and_none_twice(capsys):
+    status, out, _ = run(capsys, *FOLLOW)
+    assert status == 0
+    assert "root 2 lies on path" in out
+    assert out.endswith("4 paths, 4 of them left the interval or closed\n")
+
+
+def test_follow_csv_and_json(capsys, tmp_path):
+    file = tmp_path / "paths.json"
+    status, out, _ = run(capsys, *FOLLOW, "--root", 1, "--csv", "-", "--json", file)
+    assert status == 0
+    rows = list(csv.DictReader(io.StringIO(out)))
+    assert {row["path"] for row in rows} == {"0", "1"}
+    assert {row["direction"] for row in rows} == {"1", "-1"}
+    content = json.loads(file.read_text())
+    assert [path["direction"] for path in content["paths"]] == [1, -1]
+    assert sum(len(path["points"]["alpha"]) for path in content["paths"]) == len(rows)
+    folds = [fold for path in content["paths"] for fold in path["folds"]]
+    assert folds == [pytest.approx(8 / 3, abs=1e-12)]
+    (turn,) = [item for path in content["paths"] for item in path["transitions"]]
+    assert (turn["before"], turn["after"], turn["local_branch"]) == (["slip-"], ["stick"], False)
+
+
+def test_closed_branches_are_followed_once(capsys, tmp_path, closed_file):
+    status, out, _ = run(capsys, "follow", closed_file, "--from", -3, "--to", 3, "--start", 0.1)
+    assert status == 0
+    assert "closed" in out
+    assert out.count("path ") >= 2
+    assert "lies on path" in out
+
+
+@pytest.fixture
+def closed_file(tmp_path):
+    """One node, F = 4 - alpha, f = (1, -3.5) + alpha (1, -3): stick and slip- form a closed branch."""
+    from enumsol import ContactProblem
+
+    file = tmp_path / "closed.npz"
+    data = {"friction": (4.0, -1.0), "load_slope": [1.0, -3.0]}
+    write_problem(ContactProblem([[2.0, -1.0], [-1.0, 2.0]], [[1.0, 0.0]], [[0.0, 1.0]], [1.0, -3.5], **data), file)
+    return file
+
+
+def test_steps_can_be_set(capsys):
+    def rows(*options):
+        _, out, _ = run(capsys, *FOLLOW, "--root", 0, "--direction", "+1", "--csv", "-", *options)
+        return len(out.splitlines())
+
+    assert rows("--h-max", 0.1) > 2 * rows() > 2 * rows("--h-max", 5)
+    # the first step is no longer than the longest
+    assert rows("--h-max", 0.02) > 500
+
+
+def test_the_algorithm_as_printed_jumps_and_the_audit_says_so(capsys, tmp_path):
+    file = tmp_path / "points.csv"
+    options = ("--root", 2, "--direction", "-1", "--no-check-steps", "--h-max", 0.5, "--csv", file)
+    run(capsys, *FOLLOW, *options)
+    status, out, _ = run(capsys, "audit", "gallery:one-node-6.1", file, "--from", 0, "--to", 20)
+    assert status == 3
+    assert "jumps             1\n" in out
+    assert "branch 1 -> 0" in out
+
+
+def test_step_limit_is_status_3(capsys):
+    status, out, _ = run(capsys, *FOLLOW, "--root", 0, "--max-steps", 3)
+    assert status == 3
+    assert "the limit of 3 steps was reached" in out
+
+
+def test_degenerate_starts(capsys):
+    example = ("follow", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--start", "8/3")
+    # the fold itself: one tangent of each orientation, on both arcs
+    status, out, _ = run(capsys, *example, "--root", 1)
+    assert status == 0
+    assert "2 paths" in out
+    # where stick and slip of both nodes meet: several tangents, and the user is told how to choose
+    chain = ("follow", "gallery:chain-2", "--from", 0, "--to", 6, "--start", "8/3")
+    status, out, _ = run(capsys, *chain)
+    assert status == 3
+    assert "choose with tangent=k" in out
+    answer = run(capsys, *chain, "--root", 3, "--direction", "+1")
+    assert_refused(*answer, "admissible tangents have orientation +1")
+    status, out, _ = run(capsys, *chain, "--root", 3, "--direction", "+1", "--tangent", 0)
+    assert status == 0
+
+
+def test_follow_plots(capsys, tmp_path, graph):
+    for options in ((), ("--graph", graph), ("--quantity", "u_t", "--node", "0")):
+        file = tmp_path / "path.png"
+        assert run(capsys, *FOLLOW, "--plot", file, *options)[0] == 0
+        assert file.read_bytes().startswith(b"\x89PNG")
+        file.unlink()
+
+
+def test_ctrl_c_prints_the_paths_so_far(tmp_path):
+    result = tmp_path / "points.csv"
+    # a second or more a path
+    options = ("--h-max", 0.02, "--max-steps", 10**6, "--csv", result)
+    with on_terminal(*FOLLOW, *options) as (process, wait_for):
+        wait_for(b"paths")
+        process.send_signal(2)
+        out, _ = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert out.startswith("path 0, from root 0 in direction +1")
+    assert out.endswith(" left the interval or closed (interrupted)\n")
+    assert "root 2" not in out
+    assert pd.read_csv(result)["path"].nunique() >= 2
+
+
+# -- audit -------------------------------------------------------------------------------------------------------------
+
+
+def test_audit_of_all_branches(capsys, points):
+    status, out, err = run(capsys, "audit", "gallery:one-node-6.1", points)
+    assert (status, err) == (0, "")
+    assert ": ok, complete" in out
+    assert "jumps             0" in out
+    assert "3 visited, 0 missed" in out
+    # the interval is that of the points
+    assert "graph for alpha in [0, 20], 3 arcs" in out
+
+
+def test_audit_names_a_missed_branch(capsys, points, tmp_path):
+    frame = pd.read_csv(points)
+    some = tmp_path / "some.csv"
+    frame[frame["root"] > 0].to_csv(some, index=False)
+    status, out, _ = run(capsys, "audit", "gallery:one-node-6.1", some, "--from", 0)
+    assert status == 3
+    assert "arc 0 of branch 0, alpha from 0 to 20: open" in out
+
+
+def test_audit_finds_a_planted_jump(capsys, points, tmp_path, graph):
+    frame = pd.read_csv(points)
+    late = frame["status_0"].eq("slip-") & frame["alpha"].gt(10)
+    assert late.any()
+    frame.loc[late, ["lambda_n_0", "lambda_t_0"]] = 0.0
+    file, result = tmp_path / "jump.csv", tmp_path / "audit.csv"
+    frame.to_csv(file, index=False)
+    arguments = ("audit", "gallery:one-node-6.1", file, "--graph", graph)
+    status, out, _ = run(capsys, *arguments, "--json", "-", "--csv", result)
+    assert status == 3
+    content = json.loads(out)
+    assert content["ok"] is False
+    assert len(content["jumps"]) == 1
+    assert content["jumps"][0]["way"] is None
+    assert sorted(content["jumps"][0]["branches"]) == [0, 1]
+    assert pd.read_csv(result)["jump"].sum() == 1
+
+
+def test_audit_names_points_off_the_graph(capsys, points, tmp_path):
+    frame = pd.read_csv(points)
+    frame.loc[3, "lambda_n_0"] += 1e-3
+    file = tmp_path / "off.csv"
+    frame.to_csv(file, index=False)
+    status, out, _ = run(capsys, "audit", "gallery:one-node-6.1", file)
+    assert status == 3
+    assert "1 points off" in out
+    assert run(capsys, "audit", "gallery:one-node-6.1", file, "--tolerance", 0.1)[0] == 0
+
+
+def test_audit_reads_stdin(points):
+    command = [sys.executable, "-m", "enumsol", "audit", "gallery:one-node-6.1", "-"]
+    with points.open() as file:
+        done = subprocess.run(command, stdin=file, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert ": ok, complete" in done.stdout
+
+
+def test_audit_reads_points_before_it_searches(capsys, tmp_path, monkeypatch):
+    file = tmp_path / "bad.csv"
+    file.write_text("alpha,lambda_n_0\n1,2\n2,2\n")
+    monkeypatch.setattr("enumsol.cli.audit.build", lambda *_, **__: pytest.fail("the graph was built"))
+    assert_refused(*run(capsys, "audit", "gallery:one-node-6.1", file), "no column 'lambda_t_0'")
+
+
+def test_ctrl_c_audits_what_was_found(capsys, points, monkeypatch):
+    body = gallery.get("one-node-6.1").build()
+    partial = branch_graph(body, (0.0, 20.0), max_nodes=3)
+
+    def interrupted(*_, **__):
+        raise Interrupted("interrupted", partial)
+
+    monkeypatch.setattr("enumsol.cli.audit.build", interrupted)
+    status, out, _ = run(capsys, "audit", "gallery:one-node-6.1", points)
+    assert status == 130
+    assert "but the graph is not complete: stopped" in out
+
+
+# -- bad input ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "part"),
+    [
+        (("--direction", "2"), "--direction is 2; expected +1, -1 or both"),
+        (("--root", 3), "--root is 3; expected a number below 3, the number of roots at alpha = 5"),
+        (("--tangent", 0), "--tangent is given without --root or --direction"),
+        (("--root", 0, "--direction", "+1", "--tangent", 9), "tangent is 9; expected an index below 2"),
+        (("--h-max", -1), "options.h_max is -1.0; expected a finite number > 0"),
+        (("--h-min", 3), "options.h_init is 0.05"),
+        (("--eps", 0), "options.eps is 0.0"),
+        (("--graph", "graph.json"), "--graph is given without --plot"),
+        (("--node", "7"), "there is no contact node 7"),
+        (("--plot", "p.xyz"), "--plot is p.xyz; expected a file name that ends in"),
+        (("--csv", "-", "--json", "-"), "--json and --csv are both -"),
+        (("--graph", "graph.json", "--plot", "p.png"), "graph graph.json cannot be read"),
+    ],
+)
+def test_bad_follow_calls_get_one_sentence(capsys, tmp_path, monkeypatch, options, part):
+    monkeypatch.chdir(tmp_path)
+    assert_refused(*run(capsys, *FOLLOW, *options), part)
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("alpha", "name", "part"),
+    [
+        (25, "one-node-6.1", "--start is 25; expected an alpha between 0 and 20"),
+        (2, "one-node-6.3", "there is no isolated root at alpha = 2 (complete: yes (proven))"),
+        ("two", "one-node-6.3", "--start is 'two'"),
+    ],
+)
+def test_bad_starts(capsys, alpha, name, part):
+    assert_refused(*run(capsys, "follow", f"gallery:{name}", "--from", 0, "--to", 20, "--start", alpha), part)
+
+
+def test_bad_points_get_one_sentence(capsys, tmp_path, points, graph):
+    audit = ("audit", "gallery:one-node-6.1")
+    file = tmp_path / "bad.csv"
+    assert_refused(*run(capsys, *audit, tmp_path / "none.csv"), "expected a CSV file of points")
+    file.write_text("alpha,lambda_n_0,lambda_t_0\n")
+    assert_refused(*run(capsys, *audit, file), "holds no points")
+    file.write_text("")
+    assert_refused(*run(capsys, *audit, file), "expected a CSV file of points")
+    file.write_text("lambda_n_0,lambda_t_0\n1,2\n")
+    assert_refused(*run(capsys, *audit, file), "no column 'alpha'")
+    file.write_text("alpha,lambda_n_0\n1,2\n2,2\n")
+    assert_refused(*run(capsys, *audit, file), "no column 'lambda_t_0'")
+    file.write_text("alpha,lambda_n_0,lambda_t_0\n1,0,0\n")
+    assert_refused(*run(capsys, *audit, file), "alpha goes from 1 to 1; expected an interval")
+    file.write_text("alpha,lambda_n_0,lambda_t_0\n1,0,0\n2,0,zero\n")
+    assert_refused(*run(capsys, *audit, file), "not numeric")
+    file.write_text("alpha,lambda_n_0,lambda_t_0\n1,0,0\n2,0,\n")
+    assert_refused(*run(capsys, *audit, file), "not finite in row 1")
+    assert_refused(*run(capsys, *audit, points, "--graph", graph, "--to", 3), "a graph has its own interval")
+    other = ("audit", "gallery:one-node-6.2", points, "--graph", graph)
+    assert_refused(*run(capsys, *other), "a graph of another problem")
+    assert_refused(*run(capsys, *audit, points, "--graph", points), "is not a JSON file")
+
+
+def test_two_node_branches_end_to_end(capsys, tmp_path):
+    file = tmp_path / "points.csv"
+    write_problem(gallery.get("two-node-6.4").build(), tmp_path / "p.npz")
+    start = ("follow", tmp_path / "p.npz", "--from", 0, "--to", 10, "--start", 3.5, "--csv", file)
+    assert run(capsys, *start)[0] == 0
+    assert run(capsys, "audit", tmp_path / "p.npz", file, "--arithmetic", "exact")[0] == 0

@@ -1,0 +1,259 @@
+"""The compiled dual active-set method against an interior-point solver, and the bounds its multipliers prove."""
+
+import cvxpy as cp
+import numpy as np
+import pytest
+from generators import dense_compliance, fe_compliance, friction, planted_load, random_load
+from oracles import brute_force
+
+from enumsol.condensation.condensed import CondensedSystem
+from enumsol.relaxation.active_set import ActiveSetEngine
+from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
+from enumsol.relaxation.interior_point import InteriorPointEngine
+from enumsol.relaxation.rows import EQUALITY, INEQUALITY, imposed_rows, status_rows
+from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+
+
+def random_system(rng, p):
+    S = dense_compliance(rng, p) if rng.random() < 0.5 else fe_compliance(rng, p)
+    F = friction(rng, p)
+    g = planted_load(rng, S, F) if rng.random() < 0.5 else None
+    F[rng.random(p) < 0.15] = 0.0
+    return CondensedSystem(S, random_load(rng, p) if g is None else g, F).scaled
+
+
+def rows_of(codes, F, nodes=None):
+    p = len(codes)
+    nodes = range(p) if nodes is None else nodes
+    pairs = [(k * p + i, mode) for i in nodes for k, mode in status_rows(codes[i], friction=F[i] > 0)]
+    return [r for r, _ in pairs], [m for _, m in pairs]
+
+
+def dense_rows(system):
+    """Rows n'lambda - b >= 0 written out from their meaning (theory, section 5.2), in the order of RowKind."""
+    p, S, g, F = system.p, system.S, system.g, system.F
+    eye = np.eye(2 * p)
+    n, t, wn, wt = eye[:p], eye[p:], -S[:p], -S[p:]
+    cone = F[:, None] * n
+    normals = np.vstack([n, t, cone - t, cone + t, -wn, wt, -wt])
+    zero = np.zeros(p)
+    offsets = np.concatenate([zero, zero, zero, zero, g[:p], -g[p:], g[p:]])
+    return normals, offsets
+
+
+def reference(system, codes):
+    """Optimal value by clarabel through cvxpy, inf when infeasible."""
+    normals, offsets = dense_rows(system)
+    x = cp.Variable(2 * system.p)
+    constraints = []
+    for row, mode in zip(*rows_of(codes, system.F), strict=True):
+        value = normals[row] @ x - offsets[row]
+        constraints.append(value >= 0 if mode == INEQUALITY else value == 0)
+    problem = cp.Problem(cp.Minimize(cp.sum_squares(system.cholesky.T @ x) - system.g @ x), constraints)
+    problem.solve(solver="CLARABEL")
+    return float(problem.value)
+
+
+def proven(system, codes, relaxation):
+    """Lower bound that the multipliers prove, by theory, (6.1), after checking that they may be used."""
+    normals, offsets = dense_rows(system)
+    rows, values = relaxation.multipliers()
+    p = system.p
+    for row, value in zip(rows, values, strict=True):
+        mode = imposed_rows(codes[row % p], friction=system.F[row % p] > 0).get(row // p)
+        assert mode is not None, "a multiplier of a row that the assignment does not impose"
+        assert mode == EQUALITY or value >= 0, "a negative multiplier of an inequality"
+    # min e >= -1/4 v' S^-1 v + z'b with v = g + N'z for rows N lambda >= b
+    v = system.g + normals[rows].T @ values
+    return float(values @ offsets[rows] - 0.25 * v @ np.linalg.solve(system.S, v))
+
+
+def descend(rng, system, engine):
+    """Relaxations along a random path down the tree, each with its codes; ends where nothing is left to decide."""
+    F, p = system.F, system.p
+    codes = [UNDECIDED] * p
+    node = engine.root(*rows_of(codes, F))
+    while True:
+        yield tuple(codes), node
+        undecided = [i for i in range(p) if codes[i] >= CONTACT]
+        if node.pruned or node.stalled or not undecided:
+            return
+        i = int(rng.choice(undecided))
+        if codes[i] == UNDECIDED:
+            codes[i] = int(rng.choice([OPEN, CONTACT if F[i] > 0 else FRICTIONLESS]))
+        else:
+            codes[i] = int(rng.choice([STICK, SLIP_PLUS, SLIP_MINUS]))
+        node = node.child(*rows_of(codes, F, [i]), last=bool(rng.random() < 0.5))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_values_agree_with_an_interior_point_solver(seed):
+    rng = np.random.default_rng(seed)
+    seen = {"pruned": 0, "solved": 0}
+    for _ in range(25):
+        system = random_system(rng, int(rng.integers(1, 6)))
+        for codes, node in descend(rng, system, ActiveSetEngine(system)):
+            value = reference(system, codes)
+            assert not node.stalled
+            if node.pruned:
+                assert value > -1e-7
+                seen["pruned"] += 1
+            else:
+                assert node.bound == pytest.approx(value, abs=1e-6)
+                seen["solved"] += 1
+    assert min(seen.values()) > 15
+
+
+@pytest.mark.parametrize("engine", [ActiveSetEngine, InteriorPointEngine])
+@pytest.mark.parametrize("seed", range(4))
+def test_multipliers_prove_the_bound(engine, seed):
+    rng = np.random.default_rng(seed + 10)
+    pruned = 0
+    for _ in range(40):
+        system = random_system(rng, int(rng.integers(1, 9)))
+        for codes, node in descend(rng, system, engine(system)):
+            assert not node.stalled
+            bound = proven(system, codes, node)
+            assert bound == pytest.approx(node.bound, rel=1e-6, abs=1e-8)
+            if node.pruned:
+                assert bound > 0.5 * PRUNE_MARGIN
+                pruned += 1
+    assert pruned > 20
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_minimiser_is_feasible_and_attains_the_bound(seed):
+    rng = np.random.default_rng(seed + 20)
+    for _ in range(40):
+        system = random_system(rng, int(rng.integers(1, 9)))
+        normals, offsets = dense_rows(system)
+        unit = np.sqrt(np.einsum("ij,ij->i", normals, np.linalg.solve(system.S, normals.T).T)) + 1e-300
+        for codes, node in descend(rng, system, ActiveSetEngine(system)):
+            if node.pruned:
+                continue
+            x = node.forces
+            np.testing.assert_allclose(node.displacements, system.g - system.S @ x, atol=1e-12)
+            rows, modes = rows_of(codes, system.F)
+            value = (normals[rows] @ x - offsets[rows]) / unit[rows]
+            value = np.where(np.array(modes) == EQUALITY, -np.abs(value), value)
+            # rounding of this check itself comes on top
+            assert np.min(value) > -10 * FEASIBILITY_TOLERANCE
+            assert x @ system.S @ x - system.g @ x == pytest.approx(node.bound, abs=1e-8)
+
+
+def test_bounds_grow_along_a_path_and_a_copy_leaves_its_parent_alone():
+    rng = np.random.default_rng(30)
+    system = random_system(rng, 6)
+    engine = ActiveSetEngine(system)
+    for _ in range(30):
+        codes = [UNDECIDED] * 6
+        node = engine.root(*rows_of(codes, system.F))
+        for i in rng.permutation(6):
+            codes[i] = OPEN if rng.random() < 0.5 else (CONTACT if system.F[i] > 0 else FRICTIONLESS)
+            before = (
+                node.bound,
+                node.forces.copy(),
+                node.displacements.copy(),
+                [v.tolist() for v in node.multipliers()],
+            )
+            child = node.child(*rows_of(codes, system.F, [i]), last=False)
+            after = (node.bound, node.forces, node.displacements, [v.tolist() for v in node.multipliers()])
+            assert before[0] == after[0]
+            assert np.array_equal(before[1], after[1])
+            assert np.array_equal(before[2], after[2])
+            assert before[3] == after[3]
+            assert child.bound >= node.bound - 1e-9
+            if child.pruned:
+                break
+            node = child
+
+
+def test_infeasible_assignment_comes_with_a_proof():
+    # pressed together by a gap of -1 at a node without load: open is impossible
+    S, F = np.eye(2), np.array([1.0])
+    system = CondensedSystem(S, np.array([1.0, 0.0]), F).scaled
+    for engine in (ActiveSetEngine(system), InteriorPointEngine(system)):
+        node = engine.root(*rows_of((OPEN,), F))
+        assert node.pruned
+        assert reference(system, (OPEN,)) == np.inf
+        assert proven(system, (OPEN,), node) > PRUNE_MARGIN
+
+
+def test_no_partial_assignment_above_a_root_is_pruned():
+    rng = np.random.default_rng(40)
+    several = 0
+    for _ in range(60):
+        p = int(rng.integers(1, 5))
+        S, F = dense_compliance(rng, p), friction(rng, p)
+        g = planted_load(rng, S, F)
+        system = CondensedSystem(S, random_load(rng, p) if g is None else g, F).scaled
+        found, _, _ = brute_force(system.S, system.g, system.F)
+        several += len(found) > 1
+        engine = ActiveSetEngine(system)
+        for root in found:
+            codes = [UNDECIDED] * p
+            node = engine.root(*rows_of(codes, F))
+            for i in rng.permutation(p):
+                for code in (CONTACT, root.codes[i]) if root.codes[i] != OPEN else (OPEN,):
+                    codes[i] = code
+                    node = node.child(*rows_of(codes, F, [i]), last=True)
+                    assert not node.pruned
+                    assert not node.stalled
+                    assert node.bound < 1e-10
+            np.testing.assert_allclose(node.forces, root.forces, rtol=1e-6, atol=1e-9)
+    assert several > 10
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_one_dual_step_bounds_the_child(seed):
+    rng = np.random.default_rng(seed + 50)
+    compared = raised = 0
+    for _ in range(30):
+        p = int(rng.integers(1, 9))
+        system = random_system(rng, p)
+        for codes, node in descend(rng, system, ActiveSetEngine(system)):
+            if node.pruned:
+                continue
+            for i in range(p):
+                if codes[i] not in (UNDECIDED, CONTACT):
+                    continue
+                for code in (OPEN, STICK, SLIP_PLUS, SLIP_MINUS) if system.F[i] > 0 else (OPEN, FRICTIONLESS):
+                    if codes[i] == CONTACT and code == OPEN:
+                        continue
+                    rows, modes = rows_of((*codes[:i], code, *codes[i + 1 :]), system.F, [i])
+                    gain = max(node._state.gain(row, mode) for row, mode in zip(rows, modes, strict=True))
+                    child = node.child(rows, modes, last=False)
+                    compared += 1
+                    raised += gain > 1e-6
+                    # a search that prunes stops as soon as its bound suffices
+                    assert child.pruned or child.bound >= node.bound + gain - 1e-8
+                    assert child.pruned or gain < np.inf
+    assert compared > 100
+    assert raised > 30
+
+
+def test_branching_takes_an_undecided_node_and_prefers_one_that_is_forced():
+    # three blocks apart from each other: node 1 is pressed down hard, nodes 0 and 2 are balanced
+    S, F = np.eye(6), np.array([0.5, 0.5, 0.5])
+    system = CondensedSystem(S, np.array([0.2, 5.0, 0.2, 0.6, 0.0, 0.6]), F).scaled
+    codes = (UNDECIDED,) * 3
+    node = ActiveSetEngine(system).root(*rows_of(codes, F))
+    assert not node.pruned
+    assert node.child(*rows_of((UNDECIDED, OPEN, UNDECIDED), F, [1]), last=False).pruned
+    assert node.choose(codes) == 1
+    for decided in range(3):
+        codes = tuple(UNDECIDED if i == decided else STICK for i in range(3))
+        assert ActiveSetEngine(system).root(*rows_of(codes, F)).choose(codes) == decided
+    assert node.choose((STICK, OPEN, SLIP_PLUS)) == -1
+
+
+def test_memory_of_dropped_states_is_used_again():
+    rng = np.random.default_rng(60)
+    system = random_system(rng, 7)
+    root = ActiveSetEngine(system).root(*rows_of((UNDECIDED,) * 7, system.F))
+    kept = [root.child([], [], last=False) for _ in range(100)]
+    x = kept[50].forces
+    del kept[:50], kept[1:]
+    others = [root.child(*rows_of((CONTACT,) * 7, system.F), last=False) for _ in range(100)]
+    assert np.array_equal(kept[0].forces, x)
+    assert all(np.array_equal(other.forces, others[0].forces) for other in others)

@@ -1,0 +1,180 @@
+"""Engines of the relaxation are interchangeable, and their failures lose no root."""
+
+import importlib
+
+import clarabel
+import numpy as np
+import pytest
+from compare import differences
+from generators import random_problem, singular_problem
+
+import enumsol
+from enumsol import gallery
+from enumsol.relaxation import active_set
+from enumsol.relaxation import interior_point as fallback
+from enumsol.search.certifiers.floats import FastCertifier
+from enumsol.search.tree import TreeSearch
+from enumsol.selections.floats import FloatSelections
+
+
+def problems():
+    for name in ("one-node-6.1", "one-node-6.3", "two-node-5", "wedge-8-3", "wedge-8-5", "chain-4-coupled"):
+        entry = gallery.get(name)
+        yield entry.build(), entry.alpha
+    rng = np.random.default_rng(3)
+    for p in (2, 3, 4, 5):
+        yield random_problem(rng, p, planted=1.0), 0.0
+    yield singular_problem(rng, 3), 0.0
+
+
+PROBLEMS = list(problems())
+
+
+@pytest.mark.parametrize(("problem", "alpha"), PROBLEMS)
+def test_clarabel_gives_the_same(problem, alpha):
+    own = enumsol.enumerate_roots(problem, alpha, "fast", engine="active-set")
+    other = enumsol.enumerate_roots(problem, alpha, "fast", engine="clarabel")
+    assert not differences(other, own)
+    assert other.index_sum == 1
+    assert own.stats.fallback_qps == 0
+
+
+def searched(problem, alpha, **options):
+    """Outcome of the fast tree search with an engine that has these options."""
+    system = problem.condensed.at(alpha).scaled
+    certifier = FastCertifier(FloatSelections(system))
+    return TreeSearch(system, certifier, engine=active_set.ActiveSetEngine(system, **options)).run()
+
+
+@pytest.mark.parametrize("candidates", [1, 4, 1000])
+@pytest.mark.parametrize("name", ["wedge-8-5", "clamped-block-8"])
+def test_candidates_change_the_tree_and_not_what_is_found(name, candidates):
+    entry = gallery.get(name)
+    problem = entry.build()
+    want, found = searched(problem, entry.alpha), searched(problem, entry.alpha, candidates=candidates)
+    assert sorted(s.codes for s in found.solutions) == sorted(s.codes for s in want.solutions)
+    assert len(found.solutions) == entry.roots
+
+
+def test_the_energy_is_the_form_that_is_minimised_by_default():
+    entry = gallery.get("wedge-8-5")
+    problem = entry.build()
+    system = problem.condensed.at(entry.alpha).scaled
+    want = searched(problem, entry.alpha)
+    assert searched(problem, entry.alpha, form=(system.S, system.g)).nodes == want.nodes
+    # any multiple of the energy bounds it as well; a small one prunes no sooner
+    slack = searched(problem, entry.alpha, form=(1e-9 * system.S, 1e-9 * system.g))
+    assert slack.nodes > want.nodes
+    assert sorted(s.codes for s in slack.solutions) == sorted(s.codes for s in want.solutions)
+
+
+class Failing:
+    """Wraps a relaxation's constructor so that it stalls at random nodes."""
+
+    def __init__(self, monkeypatch, cls, share, seed):
+        self.rng, self.share, self.count = np.random.default_rng(seed), share, 0
+        original = cls.__init__
+
+        def init(relaxed, *args, **kwargs):
+            original(relaxed, *args, **kwargs)
+            if self.rng.random() < self.share:
+                relaxed.stalled, relaxed.pruned = True, False
+                self.count += 1
+
+        monkeypatch.setattr(cls, "__init__", init)
+
+
+@pytest.mark.parametrize("share", [0.2, 1.0])
+@pytest.mark.parametrize(("problem", "alpha"), PROBLEMS)
+def test_a_stalling_engine_is_replaced(monkeypatch, problem, alpha, share):
+    want = enumsol.enumerate_roots(problem, alpha, "fast")
+    failing = Failing(monkeypatch, active_set.ActiveSetRelaxation, share, 1)
+    roots = enumsol.enumerate_roots(problem, alpha, "fast")
+    assert failing.count > 0
+    assert roots.stats.fallback_qps == failing.count
+    assert not differences(roots, want)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_where_both_fail_the_search_branches_on(monkeypatch, share, seed):
+    expected = [enumsol.enumerate_roots(*item, "fast") for item in PROBLEMS]
+    Failing(monkeypatch, active_set.ActiveSetRelaxation, share, seed)
+    failing = Failing(monkeypatch, fallback._InteriorPointRelaxation, share, seed + 100)
+    for item, want in zip(PROBLEMS, expected, strict=True):
+        roots = enumsol.enumerate_roots(*item, "fast")
+        assert not differences(roots, want)
+        assert not roots.undecided
+    assert failing.count > 20
+
+
+def test_without_any_working_engine_it_is_an_exhaustive_search(monkeypatch):
+    problem, alpha = gallery.get("two-node-5").build(), 5.0
+    want = enumsol.enumerate_roots(problem, alpha, "fast", "exhaustive")
+    for cls in (active_set.ActiveSetRelaxation, fallback._InteriorPointRelaxation):
+        Failing(monkeypatch, cls, 1.0, 0)
+    roots = enumsol.enumerate_roots(problem, alpha, "fast")
+    assert not differences(roots, want)
+    # two levels a node: open / contact, then stick / slip+ / slip-
+    assert roots.stats.selections == 16
+    assert roots.stats.pruned == 0
+
+
+def test_an_interior_point_solver_that_gives_up_concludes_nothing(monkeypatch):
+    problem, alpha = gallery.get("two-node-5").build(), 5.0
+    want = enumsol.enumerate_roots(problem, alpha, "fast", "exhaustive")
+    make = clarabel.DefaultSettings
+
+    def impatient():
+        settings = make()
+        settings.max_iter = 1
+        return settings
+
+    monkeypatch.setattr(clarabel, "DefaultSettings", impatient)
+    roots = enumsol.enumerate_roots(problem, alpha, "fast", engine="clarabel")
+    assert not differences(roots, want)
+    assert roots.stats.fallback_qps == roots.stats.nodes
+    assert roots.stats.selections == 16
+
+
+@pytest.mark.parametrize("method", ["tree", "exhaustive"])
+def test_exact_arithmetic_does_not_believe_a_wrong_pruning(monkeypatch, method):
+    # an engine that claims every second node to be empty: the multipliers do not prove it
+    problem, alpha = gallery.get("two-node-5").build(), 5.0
+    want = enumsol.enumerate_roots(problem, alpha, "exact", "exhaustive")
+    rng, original = np.random.default_rng(0), active_set.ActiveSetRelaxation.__init__
+    claims = []
+
+    def init(relaxed, *args, **kwargs):
+        original(relaxed, *args, **kwargs)
+        if not relaxed.pruned and rng.random() < 0.5:
+            relaxed.pruned = True
+            claims.append(relaxed)
+
+    monkeypatch.setattr(active_set.ActiveSetRelaxation, "__init__", init)
+    roots = enumsol.enumerate_roots(problem, alpha, "exact", method)
+    assert not differences(roots, want)
+    assert roots.complete
+    assert bool(claims) == (method == "tree")
+
+
+def test_missing_compiled_engine_warns_and_works(monkeypatch):
+    import builtins
+
+    real = builtins.__import__
+
+    def without(name, globals=None, locals=None, fromlist=(), level=0):
+        if name.startswith("enumsol.relaxation") and "_active_set" in (fromlist or ()):
+            raise ImportError(name)
+        return real(name, globals, locals, fromlist, level)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.warns(RuntimeWarning, match="compiled active-set solver is not available"):
+        roots = enumsol.enumerate_roots(gallery.one_node_triangle(), 5.0, "fast")
+    assert len(roots) == 3
+    with pytest.raises(ImportError):
+        enumsol.enumerate_roots(gallery.one_node_triangle(), 5.0, "fast", engine="active-set")
+
+
+def test_compiled_engine_is_there():
+    assert importlib.import_module("enumsol.relaxation._active_set").OPTIMAL == 0

@@ -1,0 +1,187 @@
+"""The search over an interval: what it may exclude, and what it says when it is stopped."""
+
+from fractions import Fraction
+from itertools import product
+
+import numpy as np
+import pytest
+from branches.problems import generic_problem, one_node
+from flint import fmpq
+
+from enumsol import gallery
+from enumsol.branches import branch_graph
+from enumsol.branches.gluing import Gluing
+from enumsol.condensation.exact import ExactPath
+from enumsol.errors import IncompleteGraphError, Interrupted, InvalidArgumentError, TooLargeError
+from enumsol.relaxation.interval import IntervalEngine, IntervalSystem
+from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
+from enumsol.search.interval import EmptyLeaf, FastIntervalCertifier, IntervalSearch, Piece
+from enumsol.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+
+BELOW = {UNDECIDED: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), CONTACT: (STICK, SLIP_PLUS, SLIP_MINUS)}
+
+
+def below(codes):
+    """Complete selections under a partial assignment."""
+    return set(product(*(BELOW.get(code, (code,)) for code in codes)))
+
+
+@pytest.mark.parametrize("kind", ["friction", "load", "both"])
+def test_leaves_cover_all_selections_over_the_whole_interval(kind):
+    rng = np.random.default_rng(7)
+    for _ in range(6):
+        problem = generic_problem(rng, 3, kind)
+        interval = (Fraction(0), Fraction(6))
+        search = IntervalSearch(problem.condensed, interval, None, FastIntervalCertifier())
+        search.run()
+        everything = set(product(range(4), repeat=3))
+        for alpha in map(Fraction, rng.uniform(0.0, 6.0, size=20)):
+            over = [part for part in search.pieces if part.piece.a <= alpha <= part.piece.b]
+            leaves = [below(leaf.codes) for part in over for leaf in part.empty]
+            leaves += [{codes} for part in over for codes in part.selections]
+            assert set().union(*leaves) == everything
+
+
+@pytest.mark.parametrize("kind", ["friction", "load", "both"])
+def test_every_leaf_the_engine_prunes_is_proven_in_rationals(kind):
+    rng = np.random.default_rng(11)
+    for _ in range(5):
+        problem = generic_problem(rng, 3, kind)
+        certifier = ExactIntervalCertifier(ExactPath.from_problem(problem))
+        search = IntervalSearch(problem.condensed, (Fraction(0), Fraction(6)), None, FastIntervalCertifier())
+        search.run()
+        for part in search.pieces:
+            for leaf in part.empty:
+                assert certifier.excluded(part.piece, part.system, leaf)
+
+
+def test_a_leaf_that_holds_a_solution_cannot_be_excluded(rng):
+    problem = one_node((1.5, -4.0))
+    path = ExactPath.from_problem(problem)
+    certifier = ExactIntervalCertifier(path)
+    piece = Piece(Fraction(2), Fraction(4))
+    system = IntervalSystem.from_problem(problem.condensed, 2.0, 4.0, None)
+    for codes in ((OPEN,), (STICK,), (SLIP_MINUS,), (CONTACT,), (UNDECIDED,)):
+        for _ in range(200):
+            rows = np.arange(9)
+            values = rng.normal(size=9) * 10.0 ** rng.uniform(-3, 2)
+            assert not certifier.excluded(piece, system, EmptyLeaf(codes, rows, values))
+
+
+def test_the_relaxation_on_a_loading_path_bounds_the_energy_from_below(rng):
+    """With no rows on, the minimum over [a, b] is no larger than the least minimum at fixed alphas."""
+    for _ in range(10):
+        problem = generic_problem(rng, 2, "load")
+        system = IntervalSystem.from_problem(problem.condensed, 1.0, 2.0, None)
+        relaxation = IntervalEngine(system).root([], [])
+        loads = [system.g + tau * system.half for tau in np.linspace(-1, 1, 21)]
+        least = min(-0.25 * g @ np.linalg.solve(system.S, g) for g in loads)
+        assert relaxation.bound <= least + 1e-12
+        assert relaxation.bound >= least - 0.26 * system.half @ np.linalg.solve(system.S, system.half) - 2e-3
+
+
+def test_a_stopped_search_is_not_complete():
+    problem = gallery.get("wedge-8-3").build()
+    graph = branch_graph(problem, (0.0, 5.0), max_nodes=50)
+    assert not graph.complete
+    assert "max_nodes = 50" in graph.completeness()
+    assert not graph.roots_at(1.0).complete
+    graph = branch_graph(problem, (0.0, 5.0), time_limit=1e-9)
+    assert "time limit" in graph.completeness()
+
+
+def test_bad_arguments_are_refused_by_name():
+    problem = one_node((1.5, -4.0))
+    for interval in ((1.0, 1.0), (2.0, 1.0), (0.0,), 3.0):
+        with pytest.raises(InvalidArgumentError, match="interval"):
+            branch_graph(problem, interval)
+    with pytest.raises(InvalidArgumentError, match=r"interval\[1\] is inf"):
+        branch_graph(problem, (0.0, np.inf))
+    with pytest.raises(InvalidArgumentError, match="arithmetic"):
+        branch_graph(problem, (0.0, 1.0), "sloppy")
+    with pytest.raises(InvalidArgumentError, match="max_nodes"):
+        branch_graph(problem, (0.0, 1.0), max_nodes=0)
+    with pytest.raises(InvalidArgumentError, match="time_limit"):
+        branch_graph(problem, (0.0, 1.0), time_limit=0.0)
+    with pytest.raises(InvalidArgumentError, match="ContactProblem"):
+        branch_graph(None, (0.0, 1.0))
+    with pytest.raises(TooLargeError, match="exact"):
+        branch_graph(gallery.clamped_block(16, 16, contact=2), (0.0, 1.0), "exact")
+
+
+def test_negative_friction_in_the_interval_is_refused_with_node_and_alpha():
+    with pytest.raises(InvalidArgumentError, match=r"node 0 .* alpha = -1 .*zero at alpha = 0"):
+        branch_graph(one_node((1.5, -4.0)), (-1.0, 1.0))
+    with pytest.raises(InvalidArgumentError, match=r"node 0 .* alpha = 5 .*zero at alpha = 4"):
+        branch_graph(one_node((1.5, -4.0), friction=(4.0, -1.0)), (0.0, 5.0))
+    branch_graph(one_node((1.5, -4.0), friction=(4.0, -1.0)), (0.0, 4.0))
+
+
+def test_progress_reaches_the_end_of_both_stages():
+    seen = {}
+    branch_graph(gallery.get("two-node-6.4").build(), (0.0, 8.0), progress=lambda *state: seen.update([state]))
+    assert seen == {"search": 1.0, "arcs": 1.0}
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_selection_left_out_by_the_search_is_noticed(seed):
+    """Gluing finds it by the statuses that hold at a neighbour's end, unless it has no neighbour at all."""
+    rng = np.random.default_rng(seed)
+    problem = generic_problem(rng, 3, ("friction", "load", "both")[seed % 3])
+    graph = branch_graph(problem, (0.0, 6.0), "exact")
+    present = {codes for arc in graph.arcs for codes in arc.selections}
+    for codes in present:
+        gluing = Gluing(graph.path, present - {codes}, fmpq(0), fmpq(6))
+        neighbours = any(codes in v.selections and len(v.selections) > 1 for v in graph.vertices)
+        assert bool(gluing.reasons) == neighbours
+
+
+def test_an_interrupted_search_keeps_its_arcs():
+    problem = gallery.get("wedge-8-5").build()
+    calls = []
+
+    def stop(stage, share):
+        calls.append((stage, share))
+        if stage == "search" and len(calls) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted) as caught:
+        branch_graph(problem, (0.0, 5.0), progress=stop)
+    partial = caught.value.partial
+    assert partial.arcs
+    assert not partial.complete
+    assert any("interrupted" in reason for reason in partial.reasons)
+    assert partial.proof is None
+
+
+@pytest.mark.parametrize("nodes", [20, 60, 150, 300, 600])
+@pytest.mark.parametrize("name", ["chain-4", "chain-4-coupled", "two-node-6.4"])
+def test_a_graph_cut_short_says_what_it_found_and_no_more(name, nodes):
+    graph = branch_graph(gallery.get(name).build(), (0.0, 5.0), "fast", max_nodes=nodes)
+    assert all(0 <= arc.tail < len(graph.vertices) and 0 <= arc.head < len(graph.vertices) for arc in graph.arcs)
+    assert not graph.complete
+    assert repr(graph).splitlines()[-1].startswith("complete: ")
+    steps = graph.claims.steps()
+    assert len(steps.alphas) == len(steps.at)
+    assert steps.exact == (not graph.reasons)
+    if graph.reasons:
+        for question in ("steps", "uniqueness_limit"):
+            with pytest.raises(IncompleteGraphError, match="not complete"):
+                getattr(graph, question)
+
+
+@pytest.mark.parametrize("name", ["two-node-6.4", "chain-4", "one-node-6.3"])
+def test_a_selection_that_the_search_left_out_is_taken_in_and_told(name):
+    problem = gallery.get(name).build()
+    whole = branch_graph(problem, (0.0, 5.0), "exact")
+    selections = {codes for arc in whole.arcs for codes in arc.selections}
+    a, b = fmpq(0), fmpq(5)
+    for missing in sorted(selections)[:: max(1, len(selections) // 6)]:
+        gluing = Gluing(whole.path, selections - {missing}, a, b)
+        assert any("left out" in reason for reason in gluing.reasons) or missing not in gluing.arcs
+        assert all(edge.tail >= 0 and edge.head >= 0 for edge in gluing.edges)
+        if missing in gluing.arcs:
+            assert len(gluing.edges) == len(whole.arcs)
+        short = Gluing(whole.path, selections - {missing}, a, b, cut_short=True)
+        assert missing not in short.arcs
+        assert all(edge.tail >= 0 and edge.head >= 0 for edge in short.edges)
