@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from dying import DyingExecutor
 from cli.test_cli import run
+from dying import DyingExecutor
 
 import enumsol
 from enumsol import EnumsolError, enumerate_roots, gallery, multiplicity_table, verify, write_problem
