@@ -83,7 +83,8 @@ def branch_graph(
     MissingDependencyError
         The compiled solver of the relaxations is not installed.
     Interrupted
-        On Ctrl-C during the search; ``partial`` is the graph of the selections found so far, which is not complete.
+        On Ctrl-C during the search, or while arcs are worked out; ``partial`` is the graph of what was found so far,
+        which is not complete.
     """
     instance_of(problem, ContactProblem, "problem")
     a, b = (Fraction(end) for end in alpha_interval(interval))
@@ -105,6 +106,7 @@ def branch_graph(
         deadline=deadline,
         progress=_stage(progress, "search"),
     )
+    interrupted = False
     if path.unloaded:
         # nothing but lambda = 0 for every alpha; every selection holds there, and one of them tells it all
         candidates = {(0,) * path.p}
@@ -112,6 +114,7 @@ def branch_graph(
         try:
             search.run()
         except KeyboardInterrupt:
+            interrupted = True
             search.stopped = f"interrupted after {search.nodes} nodes"
         candidates = search.selections
     searched = time.perf_counter()
@@ -125,7 +128,7 @@ def branch_graph(
         seconds=time.perf_counter() - started,
     )
     arcs = make_arcs(gluing)
-    reasons = ([search.stopped] if search.stopped is not None else []) + gluing.reasons
+    cut = [reason for reason in (search.stopped, gluing.interrupted) if reason is not None]
     vertices = make_vertices(gluing, arcs)
     proof = None
     if (
@@ -134,13 +137,12 @@ def branch_graph(
         and search.stopped is None
         and not certifier.used_rationals
     ):
-        data = "problem" if path.condensed_exactly else "condensed"
-        proof = write_graph_proof(problem, (a, b), data, search.pieces)
-    pieces = tuple(search.pieces)
-    graph = BranchGraph(
-        GraphData(problem, path, (a, b), arithmetic, tuple(vertices), tuple(arcs), tuple(reasons), stats, pieces, proof)
-    )
-    if search.stopped is not None and search.stopped.startswith("interrupted"):
+        about = "problem" if path.condensed_exactly else "condensed"
+        proof = write_graph_proof(problem, (a, b), about, search.pieces)
+    reasons, pieces = (*cut, *gluing.reasons), tuple(search.pieces)
+    data = GraphData(problem, path, (a, b), arithmetic, tuple(vertices), tuple(arcs), reasons, stats, pieces, proof)
+    graph = BranchGraph(data)
+    if interrupted or gluing.interrupted is not None:
         raise Interrupted("branch_graph was interrupted; its arcs so far are kept", graph)
     return graph
 

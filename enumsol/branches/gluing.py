@@ -111,6 +111,8 @@ class Gluing:
     arcs : dict of SelectionArcs by codes, those that hold somewhere
     vertices : list of GluedVertex in the order of alpha
     edges : list of GluedArc
+    interrupted : str or None
+        How far it came, when Ctrl-C was pressed while the arcs of the selections were worked out.
     reasons : list of str
         What stayed undecided or contradicts completeness; empty when nothing does.
     """
@@ -139,11 +141,18 @@ class Gluing:
         self._fibers: list[tuple[CriticalAlpha, FiberSelections]] = []
         self._refused: set[Codes] = set()
         self._unsettled: set[int] = set()
+        self.interrupted: str | None = None
         todo = sorted(set(candidates))
         for k, codes in enumerate(todo):
-            self._add(codes)
-            if tick is not None:
-                tick((k + 1) / len(todo))
+            try:
+                self._add(codes)
+                if tick is not None:
+                    tick((k + 1) / len(todo))
+            except KeyboardInterrupt:
+                # as after a search that was cut short, what is known so far is glued
+                self._cut_short = True
+                self.interrupted = f"interrupted after the arcs of {k} of {len(todo)} selections"
+                break
         for codes in list(self.arcs):
             self._close(codes)
         self._glue()

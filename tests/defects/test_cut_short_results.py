@@ -46,7 +46,7 @@ def test_gallery_graphs_cut_short_claim_nothing_false(name):
     problem = gallery.get(name).build()
     full = branch_graph(problem, (0.0, 5.0))
     assert full.complete
-    for limit in np.unique(np.geomspace(1, full.stats.nodes, 8).astype(int)):
+    for limit in np.unique(np.geomspace(1, full.stats.nodes, 5).astype(int)):
         graph = branch_graph(problem, (0.0, 5.0), max_nodes=int(limit))
         assert list(false_claims_of_graph(graph, full)) == []
 
@@ -65,6 +65,25 @@ def test_a_graph_cut_short_by_an_interruption_claims_nothing_false(calls):
     with pytest.raises(Interrupted) as caught:
         branch_graph(problem, (0.0, 5.0), progress=progress)
     assert list(false_claims_of_graph(caught.value.partial, full)) == []
+
+
+@pytest.mark.parametrize("calls", [1, 5, 12])
+@pytest.mark.parametrize("name", ["two-node-6.4", "chain-4", "one-node-6.3"])
+def test_an_interruption_while_arcs_are_worked_out_keeps_those_that_are_done(name, calls):
+    problem = gallery.get(name).build()
+    full = branch_graph(problem, (0.0, 5.0))
+    seen = []
+
+    def progress(stage, _):
+        seen.append(stage)
+        if seen.count("arcs") == min(calls, full.stats.selections):
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted) as caught:
+        branch_graph(problem, (0.0, 5.0), progress=progress)
+    partial = caught.value.partial
+    assert "interrupted after the arcs of" in partial.reasons[0]
+    assert list(false_claims_of_graph(partial, full)) == []
 
 
 def _body(rng, seed):
