@@ -137,13 +137,11 @@ def branch_graph(
         and search.stopped is None
         and not certifier.used_rationals
     ):
-        data = "problem" if path.condensed_exactly else "condensed"
-        proof = write_graph_proof(problem, (a, b), data, search.pieces)
-    reasons = (*cut, *gluing.reasons)
-    pieces = tuple(search.pieces)
-    graph = BranchGraph(
-        GraphData(problem, path, (a, b), arithmetic, tuple(vertices), tuple(arcs), reasons, stats, pieces, proof)
-    )
+        about = "problem" if path.condensed_exactly else "condensed"
+        proof = write_graph_proof(problem, (a, b), about, search.pieces)
+    reasons, pieces = (*cut, *gluing.reasons), tuple(search.pieces)
+    data = GraphData(problem, path, (a, b), arithmetic, tuple(vertices), tuple(arcs), reasons, stats, pieces, proof)
+    graph = BranchGraph(data)
     if interrupted or gluing.interrupted is not None:
         raise Interrupted("branch_graph was interrupted; its arcs so far are kept", graph)
     return graph

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from enumsol.branches.graph_data import GraphData
     from enumsol.checks import AlphaLike
     from enumsol.roots.root_set import Root, RootFamily, RootSet
-    from enumsol.selections.solution import Codes
 
 
 class BranchGraph(Immutable):
@@ -193,11 +192,7 @@ class BranchGraph(Immutable):
         """
         arcs, vertices = self._located(alpha)
         codes = {c for arc in arcs for c in arc.selections} | {c for v in vertices for c in v.selections}
-        return self._roots(alpha, sorted(codes))
-
-    def _roots(self, alpha: AlphaLike, selections: Sequence[Codes]) -> RootSet:
-        stopped = None if not self.reasons else "the branch graph is not complete"
-        return roots_of(self.data, alpha_value(alpha), selections, stopped)
+        return roots_of(self.data, alpha_value(alpha), sorted(codes))
 
     def multiplicity_at(self, alpha: AlphaLike) -> int:
         """Number of isolated roots and of families at one alpha, together.
@@ -285,7 +280,7 @@ class BranchGraph(Immutable):
             alpha = 0.5 * (arc.lo + arc.hi)
             if arc.grazing or not arc.lo < alpha < arc.hi:
                 continue
-            roots = self._roots(alpha, arc.selections)
+            roots = roots_of(self.data, alpha, arc.selections)
             if len(roots) and roots[0].regular:
                 return roots[0]
         return None

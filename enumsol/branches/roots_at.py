@@ -21,11 +21,8 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import Codes, SelectionSolution
 
 
-def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes], stopped: str | None) -> RootSet:
-    """Roots and families that the selections have at ``alpha``; in floats where these find all of them.
-
-    ``stopped`` says why the list may lack some, None that it does not.
-    """
+def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> RootSet:
+    """Roots and families that the selections have at ``alpha``; in floats where these find all of them."""
     problem = data.problem
     floats = FloatSelections(problem.condensed.at(alpha).scaled)
     solver: Any = floats
@@ -55,10 +52,10 @@ def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes], stopped
         undecided=(),
         arithmetic=data.arithmetic,
         method="graph",
-        stopped=stopped,
+        stopped=None if not data.all_reasons else "the branch graph is not complete",
         stats=SearchStats(selections=len(selections)),
         node_ids=problem.node_ids,
-        at_least=whole + int(whole < len(components)) if stopped is not None else None,
+        at_least=whole + int(whole < len(components)) if data.all_reasons else None,
     )
 
 
