@@ -25,7 +25,7 @@ from enumsol.condensation import enclosure
 from enumsol.continuation import NotConverged, start_tangents
 from enumsol.equation import PiecewiseSmoothEquation
 from enumsol.kernel.point import exclusion_margin
-from enumsol.search import solvers as workbench
+from enumsol.search import solvers
 from enumsol.search.solvers import Solvers
 
 
@@ -189,7 +189,7 @@ def test_loads_of_all_sizes():
 
 def test_nothing_can_be_proven_about_a_body_on_the_verge(monkeypatch):
     # S definite only within rounding and too large for rationals: one undecided entry, and not 4^p of them
-    monkeypatch.setattr(workbench, "EXACT_DOF_LIMIT", 0)
+    monkeypatch.setattr(solvers, "EXACT_DOF_LIMIT", 0)
     monkeypatch.setattr(enclosure, "dense_eigenvalue_bound", lambda S: 0.0)
     problem = gallery.clamped_block(16, 8)
     found = enumerate_roots(problem, 1.0)
@@ -276,8 +276,8 @@ def test_the_checker_finds_better_bounds_than_the_search():
     # a body almost free to move: an approximate inverse of S has a small residual on one of its sides only
     problem = gallery.wedge(2, 2, springs=(1e-8, 1e-8))
     margins = pytest.importorskip("enumsol.search.certifiers._margin").Margins
-    solvers = Solvers(problem, 1.0, "verified", 1e-9)
-    system, rng = solvers.enclosed, np.random.default_rng(1)
+    found = Solvers(problem, 1.0, "verified", 1e-9)
+    system, rng = found.enclosed, np.random.default_rng(1)
     search = margins(system)
     p, compared = problem.p, 0
     for _ in range(200):

@@ -7,10 +7,10 @@ for every piece ``{"piece": [a, b], "force", "length", "roots"}``, then its leav
 of the piece); at the end ``{"pieces", "leaves", "selections"}``. Codes are strings of p digits; ends of pieces are
 fractions ``"a/b"`` in decimal digits.
 
-What is checked: pieces partition the interval (it is cut first where g vanishes, see ``unloaded``), with the subtrees
-left by a piece searched in both its halves; the leaves of every piece cover all selections of its roots; every
-exclusion is proven at both ends of the piece. What is not: that the arcs of the selections handed on are all there.
-They follow from these selections by exact algebra, and the balance of degrees checks them (theory, section 7.7).
+What is checked: pieces partition the interval (it is cut first where g vanishes, see ``condensation.unloaded``), with
+the subtrees left by a piece searched in both its halves; the leaves of every piece cover all selections of its roots;
+every exclusion is proven at both ends of the piece. What is not: that the arcs of the selections handed on are all
+there. They follow from these selections by exact algebra, and the balance of degrees checks them (theory, section 7.7).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 File layout: the line ``enumsol-proof 1``, a zlib stream, and the SHA-256 digest (32 bytes) of everything before it.
 The stream holds one JSON record a line, in ASCII: a header, the tree in preorder, and a footer. (Proofs of branch
-graphs have other records; see ``graph_checker``.)
+graphs have other records; see ``checker.graph``.)
 
 Header
     ``{"format": "enumsol-proof", "version": 1, "problem": <fingerprint>, "alpha": "a/b", "p": p,
@@ -28,8 +28,8 @@ Footer
 What reading costs
     A file is read as a stream, its header first. Whatever its bytes are, they become at most EXPANSION times as many
     characters, of which one record has at most RECORD_SHARE times the size of the file; numbers are finite and whole
-    numbers have at most 18 digits. The checkers read records strictly (``reading``), stop where the records cease to
-    make sense or soon after they cease to prove anything, and keep no more of them than what they still need.
+    numbers have at most 18 digits. The checkers read records strictly (``proof.reading``), stop where the records cease
+    to make sense or soon after they cease to prove anything, and keep no more of them than what they still need.
 """
 
 from __future__ import annotations

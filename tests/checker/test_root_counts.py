@@ -8,7 +8,7 @@ from oracles import exact_condense, exact_solutions
 from proof_tools import Judge, records_of
 
 from enumsol import ContactProblem, enumerate_roots, verify
-from enumsol.search import solvers as workbench
+from enumsol.search import solvers
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS = range(4)
 
@@ -109,7 +109,7 @@ def test_counts_equal_the_exact_ones(p, count):
 @pytest.mark.parametrize(("p", "count"), [(1, 40), (2, 60), (3, 30)])
 def test_without_rationals_the_count_is_right_or_open(p, count, monkeypatch):
     verified = []
-    monkeypatch.setattr(workbench, "EXACT_DOF_LIMIT", 0)
+    monkeypatch.setattr(solvers, "EXACT_DOF_LIMIT", 0)
     for problem, alpha in cases(2, p, count):
         verified.append((problem, alpha, enumerate_roots(problem, alpha)))
     monkeypatch.undo()
