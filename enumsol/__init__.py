@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from enumsol.equation import PiecewiseSmoothEquation
     from enumsol.errors import (
         EnumsolError,
+        FrictionJumpWarning,
         IncompleteGraphError,
         Interrupted,
         InvalidArgumentError,
@@ -51,8 +52,10 @@ if TYPE_CHECKING:
         TooLargeError,
         WorkerError,
     )
+    from enumsol.friction import FrictionTable
     from enumsol.io import read_problem, write_problem
     from enumsol.problem import ContactProblem
+    from enumsol.problem3d import BodyMesh, ContactProblem3D, SlipMean
     from enumsol.proof.proof_file import Proof, ProofFormatError
     from enumsol.roots.enumerate import enumerate_roots
     from enumsol.roots.root_set import Enclosure, Polytope, Root, RootFamily, RootSet, SearchStats, Undecided
@@ -83,6 +86,7 @@ _HOMES = {
     "enumsol.search.tree": ("SearchProgress",),
     "enumsol.errors": (
         "EnumsolError",
+        "FrictionJumpWarning",
         "IncompleteGraphError",
         "Interrupted",
         "InvalidArgumentError",
@@ -93,7 +97,9 @@ _HOMES = {
         "WorkerError",
     ),
     "enumsol.io": ("read_problem", "write_problem"),
+    "enumsol.friction": ("FrictionTable",),
     "enumsol.problem": ("ContactProblem",),
+    "enumsol.problem3d": ("BodyMesh", "ContactProblem3D", "SlipMean"),
     "enumsol.roots.root_set": ("Enclosure", "Polytope", "Root", "RootFamily", "RootSet", "SearchStats", "Undecided"),
     "enumsol.equation": ("PiecewiseSmoothEquation",),
     "enumsol.statuses": ("ContactStatus", "sign_array"),
@@ -125,12 +131,16 @@ _MODULES = frozenset(
 )
 
 __all__ = [
+    "BodyMesh",
     "BranchGraph",
     "ContactProblem",
+    "ContactProblem3D",
     "ContactStatus",
     "ContinuationOptions",
     "Enclosure",
     "EnumsolError",
+    "FrictionJumpWarning",
+    "FrictionTable",
     "IncompleteGraphError",
     "Interrupted",
     "InvalidArgumentError",
@@ -148,6 +158,7 @@ __all__ = [
     "RootSet",
     "SearchProgress",
     "SearchStats",
+    "SlipMean",
     "SmoothPath",
     "TooLargeError",
     "Undecided",

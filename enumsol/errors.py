@@ -73,3 +73,7 @@ class OutputError(_PartialResultError):
 
     def __init__(self, message: str, partial: Any = None) -> None:
         super().__init__(message, partial)
+
+
+class FrictionJumpWarning(UserWarning):
+    """A friction coefficient that depends on the solution seems to jump."""

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
-import scipy.sparse as sp
 
 from enumsol.checks import Alpha, alpha_value
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.checks import AlphaLike
-    from enumsol.condensation.data import ProblemData
+    from enumsol.condensation.data import CondensableData, ProblemData
 
 #: Units of force and length lie between 2^-900 and 2^900; products and quotients of two of them and proofs need that.
 UNIT_EXPONENT = 900
@@ -127,32 +126,28 @@ def _cholesky(S: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True)
-class CondensedProblem(Sealed):
-    """The problem condensed for all alpha: S, g(alpha) = g0 + alpha g1, F(alpha) = F0 + alpha F1.
+class Condensation(Sealed):
+    """A problem condensed to its contact forces for all alpha: S, and g(alpha) = g0 + alpha g1.
 
     Attributes
     ----------
-    S : (2p, 2p) array
-        B A^{-1} B' with B stacking Bn and Bt [length / force].
-    g0, g1 : (2p,) arrays
+    S : (m, m) array
+        B A^{-1} B' with B the contact rows, m = 2p or 3p: all normals, then all tangents [length / force].
+    g0, g1 : (m,) arrays
         B A^{-1} f - (gap, slip_offset), and B A^{-1} load_slope [length].
-    F0, F1 : (p,) arrays
-        Friction coefficients and their slopes [-].
     """
 
     S: NDArray[np.float64]
     g0: NDArray[np.float64]
     g1: NDArray[np.float64]
-    F0: NDArray[np.float64]
-    F1: NDArray[np.float64]
-    problem: ProblemData = field(repr=False)
+    problem: CondensableData = field(repr=False)
 
     @classmethod
-    def from_problem(cls, problem: ProblemData) -> CondensedProblem:
+    def from_problem(cls, problem: CondensableData) -> Self:
         """Condense with one sparse factorization; dense memory stays at RHS_BLOCK vectors of length n."""
-        B = sp.csr_array(sp.vstack([problem.Bn, problem.Bt], format="csr"))
+        B = problem.contact_rows
         size = B.shape[0]
-        offset = np.concatenate([problem.gap, problem.slip_offset])
+        offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
         slope = problem.load_slope
         S = np.empty((size, size))
         # what overflows is found and named below
@@ -163,10 +158,51 @@ class CondensedProblem(Sealed):
             S = 0.5 * (S + S.T)
             g0 = B @ problem.factorization.solve(problem.f) - offset
             g1 = np.zeros(size) if slope is None else B @ problem.factorization.solve(slope)
-        F0, F1 = problem.friction
         if not (np.all(np.isfinite(S)) and np.all(np.isfinite(g0)) and np.all(np.isfinite(g1))):
             raise InvalidProblemError("A, f: the condensed problem overflows float64; expected data in smaller units")
-        return cls(S, g0, g1, F0, F1, problem)
+        return cls(S, g0, g1, problem)
+
+    def free_displacements(self, alpha: AlphaLike) -> NDArray[np.float64]:
+        """g(alpha), shape (m,) [length].
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is not finite, or too large.
+        """
+        value = float(alpha_value(alpha))
+        with np.errstate(over="ignore", invalid="ignore"):
+            g = self.g0 + value * self.g1
+        if not np.all(np.isfinite(g)):
+            raise InvalidArgumentError(f"alpha = {value:g} makes the load overflow float64; expected a smaller value")
+        return np.asarray(g)
+
+    def displacement(self, alpha: AlphaLike, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+        """u = A^{-1} (f(alpha) - B' lambda), shape (n,), for forces of shape (m,)."""
+        problem = self.problem
+        rhs = problem.load_at(alpha) - problem.contact_rows.T @ forces
+        return problem.factorization.solve(np.asarray(rhs))
+
+
+class CondensedProblem3D(Condensation):
+    """A 3D problem condensed: rows all normals, then all first, then all second tangents."""
+
+
+@dataclass(frozen=True)
+class CondensedProblem(Condensation):
+    """A 2D problem condensed, with F(alpha) = F0 + alpha F1."""
+
+    problem: ProblemData = field(repr=False)
+
+    @property
+    def F0(self) -> NDArray[np.float64]:  # noqa: N802 (the field's letter)
+        """Friction coefficients at alpha = 0, shape (p,) [-]."""
+        return self.problem.friction[0]
+
+    @property
+    def F1(self) -> NDArray[np.float64]:  # noqa: N802 (as above)
+        """Derivatives of the friction coefficients with respect to alpha, shape (p,) [-]."""
+        return self.problem.friction[1]
 
     @cached_property
     def node_scale(self) -> NDArray[np.float64]:
@@ -189,16 +225,5 @@ class CondensedProblem(Sealed):
         InvalidArgumentError
             alpha is not finite or makes a friction coefficient negative.
         """
-        value = float(alpha_value(alpha))
         F = self.problem.friction_at(alpha)
-        with np.errstate(over="ignore", invalid="ignore"):
-            g = self.g0 + value * self.g1
-        if not np.all(np.isfinite(g)):
-            raise InvalidArgumentError(f"alpha = {value:g} makes the load overflow float64; expected a smaller value")
-        return CondensedSystem(self.S, g, F)
-
-    def displacement(self, alpha: AlphaLike, forces: NDArray[np.float64]) -> NDArray[np.float64]:
-        """u = A^{-1} (f(alpha) - B' lambda), shape (n,), for forces of shape (2p,)."""
-        problem, p = self.problem, self.problem.p
-        rhs = problem.load_at(alpha) - problem.Bn.T @ forces[:p] - problem.Bt.T @ forces[p:]
-        return problem.factorization.solve(np.asarray(rhs))
+        return CondensedSystem(self.S, self.free_displacements(alpha), F)

@@ -21,30 +21,48 @@ Data = Literal["problem", "condensed"]
 EXACT_DOF_LIMIT = 250
 
 
-class ProblemData(Protocol):
-    """Matrices and vectors of a contact problem, and the paths of friction and load over alpha.
+class CondensableData(Protocol):
+    """What condensing asks of a problem in 2D or 3D.
 
     Attributes
     ----------
-    A : (n, n) csc_array, symmetric positive definite [force / length]
-    Bn, Bt : (p, n) csr_arrays
     f : (n,) array, load at alpha = 0 [force]
     load_slope : (n,) array or None
-    gap, slip_offset : (p,) arrays [length]
-    friction : pair of (p,) arrays, F(alpha) = F0 + alpha F1
-    node_ids : tuple of p labels
+    gap : (p,) array, slip_offset : (p,) or (p, 2) array [length]
     """
 
     f: Vector
     load_slope: Vector | None
     gap: Vector
     slip_offset: Vector
+
+    @property
+    def contact_rows(self) -> sp.csr_array:
+        """Bn and the tangents one above the other."""
+
+    @property
+    def factorization(self) -> Factorization:
+        """Factors of A."""
+
+    def load_at(self, alpha: AlphaLike) -> Vector:
+        """f(alpha), shape (n,)."""
+
+
+class ProblemData(CondensableData, Protocol):
+    """Matrices and vectors of a 2D problem, and the paths of friction and load over alpha.
+
+    Attributes
+    ----------
+    friction : pair of (p,) arrays, F(alpha) = F0 + alpha F1
+    node_ids : tuple of p labels
+    """
+
     friction: tuple[Vector, Vector]
     node_ids: tuple[Any, ...]
 
     @property
     def A(self) -> sp.csc_array:  # noqa: N802 (the field's letter)
-        """Stiffness."""
+        """Stiffness, symmetric positive definite [force / length]."""
 
     @property
     def Bn(self) -> sp.csr_array:  # noqa: N802 (as above)
@@ -62,12 +80,5 @@ class ProblemData(Protocol):
     def p(self) -> int:
         """Number of contact nodes."""
 
-    @property
-    def factorization(self) -> Factorization:
-        """Factors of A."""
-
     def friction_at(self, alpha: AlphaLike) -> Vector:
         """F(alpha), shape (p,)."""
-
-    def load_at(self, alpha: AlphaLike) -> Vector:
-        """f(alpha), shape (n,)."""
