@@ -1,4 +1,4 @@
-"""Orthotropic friction coefficients of 3D problems: constant, or functions of the slip |u_t| (paper, (2.5))."""
+"""Orthotropic friction coefficients of 3D problems: constant, or functions of the slip |u_t| (paper, Section 2)."""
 
 from __future__ import annotations
 
@@ -188,7 +188,7 @@ def warn_of_jumps(law: FrictionLaw, reach: Vector, labels: tuple[Any, ...]) -> N
     """Warn where a coefficient seems to jump as a function of the slip, for slips up to ``reach`` of shape (p,).
 
     The largest step between neighbouring samples of every node is bisected: a step that does not get smaller with the
-    distance is a jump. A function that jumps need not have a fixed point (paper, section 3).
+    distance is a jump. A function that jumps need not have a fixed point (paper, Section 3).
     """
     shares = np.linspace(0.0, 1.0, _JUMP_SAMPLES)
     values = np.array([law.at(share * reach) for share in shares])

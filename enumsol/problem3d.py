@@ -52,7 +52,7 @@ class BodyMesh(Sealed):
 
 @dataclass(frozen=True)
 class SlipMean(Sealed):
-    """The slip that coefficients depend on, as weighted means of |u_t|: the return operator r_h (paper, (3.8)).
+    """The slip that coefficients depend on, as weighted means of |u_t|: the return operator r_h (paper, Section 3).
 
     The slips are ``weights @ |(T1 u, T2 u) - offset|``.
 
