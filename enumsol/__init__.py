@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from enumsol import equation as equation
     from enumsol import errors as errors
     from enumsol import fem as fem
+    from enumsol import fixed_points as fixed_points
     from enumsol import gallery
     from enumsol import io as io
     from enumsol import kernel as kernel
@@ -51,6 +52,15 @@ if TYPE_CHECKING:
         OutputError,
         TooLargeError,
         WorkerError,
+    )
+    from enumsol.fixed_points import (
+        FixedPoint,
+        TrescaSolution,
+        basin_table,
+        is_fixed_point,
+        lipschitz_estimate,
+        solve_tresca,
+        successive_approximations,
     )
     from enumsol.friction import FrictionTable
     from enumsol.io import read_problem, write_problem
@@ -97,6 +107,15 @@ _HOMES = {
         "WorkerError",
     ),
     "enumsol.io": ("read_problem", "write_problem"),
+    "enumsol.fixed_points": (
+        "FixedPoint",
+        "TrescaSolution",
+        "basin_table",
+        "is_fixed_point",
+        "lipschitz_estimate",
+        "solve_tresca",
+        "successive_approximations",
+    ),
     "enumsol.friction": ("FrictionTable",),
     "enumsol.problem": ("ContactProblem",),
     "enumsol.problem3d": ("BodyMesh", "ContactProblem3D", "SlipMean"),
@@ -117,6 +136,7 @@ _MODULES = frozenset(
         "equation",
         "errors",
         "fem",
+        "fixed_points",
         "gallery",
         "io",
         "kernel",
@@ -139,6 +159,7 @@ __all__ = [
     "ContinuationOptions",
     "Enclosure",
     "EnumsolError",
+    "FixedPoint",
     "FrictionJumpWarning",
     "FrictionTable",
     "IncompleteGraphError",
@@ -161,21 +182,27 @@ __all__ = [
     "SlipMean",
     "SmoothPath",
     "TooLargeError",
+    "TrescaSolution",
     "Undecided",
     "VerificationReport",
     "WorkerError",
     "audit",
+    "basin_table",
     "branch_graph",
     "enumerate_roots",
     "follow",
     "follow_all",
     "gallery",
+    "is_fixed_point",
     "link_samples",
+    "lipschitz_estimate",
     "local_branch_test",
     "multiplicity_table",
     "newton",
     "read_problem",
     "sign_array",
+    "solve_tresca",
+    "successive_approximations",
     "verify",
     "write_problem",
 ]

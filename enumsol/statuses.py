@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 
 
 class ContactStatus(enum.Enum):
-    """What a contact node does: it is open, it sticks, or it slips in the positive or negative direction."""
+    """What a contact node does: it is open, it sticks, or it slips; in 2D in the positive or negative direction."""
 
     OPEN = "open"
     STICK = "stick"
     SLIP_PLUS = "slip+"
     SLIP_MINUS = "slip-"
+    SLIP = "slip"
 
     def __repr__(self) -> str:
         return f"ContactStatus.{self.name}"

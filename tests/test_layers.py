@@ -15,7 +15,7 @@ import enumsol
 #: Rooms from the ground up ("." is the package's own ``__init__``). A room imports rooms of lower layers only.
 LAYERS = (
     ("errors", "sealed", "compiled", "executors", "_version", "arithmetic"),
-    ("checks",),
+    ("checks", "figures"),
     ("array_checks", "statuses"),
     ("condensation",),
     ("contact_body",),
@@ -25,7 +25,7 @@ LAYERS = (
     ("relaxation", "proof"),
     ("search", "checker"),
     ("roots",),
-    ("branches",),
+    ("branches", "fixed_points"),
     ("continuation",),
     ("fem", "io"),
     ("gallery",),
@@ -38,7 +38,8 @@ STRANGERS = {
     "checker": {"selections", "relaxation", "equation"},
     "roots": {"checker"},
     "branches": {"checker"},
-    "continuation": {"checker"},
+    "continuation": {"checker", "fixed_points"},
+    "fixed_points": {"checker", "search", "relaxation", "roots"},
     "fem": {"checker", "search", "roots", "branches", "continuation"},
     "io": {"checker", "search", "roots", "branches", "continuation"},
     "gallery": {"checker", "search", "roots", "branches", "continuation"},

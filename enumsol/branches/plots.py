@@ -11,7 +11,8 @@ import numpy as np
 
 from enumsol.branches.elements import UNSETTLED
 from enumsol.checks import one_of, positive_integer, shown
-from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.errors import InvalidArgumentError
+from enumsol.figures import new_figure
 from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
@@ -112,13 +113,11 @@ def plot_graph(
     """
     one_of(quantity, "quantity", QUANTITIES)
     samples = positive_integer(samples, "samples", 2, 100_000)
-    figure_class, canvas = _matplotlib()
     curves = {arc.number: _curve(arc, quantity, samples) for arc in graph.arcs if not arc.dimension}
     chosen = _nodes(graph, nodes, curves)
     rows = len(chosen) + int(multiplicity)
     height = 2.7 * len(chosen) + 1.3 * int(multiplicity) + 0.6
-    figure = figure_class(figsize=figsize or (7.5, height), layout="constrained")
-    canvas(figure)
+    figure = new_figure(figsize=figsize or (7.5, height))
     ratios = [2.7] * len(chosen) + [1.1] * int(multiplicity)
     axes = figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": ratios})[:, 0]
     for axis, node in zip(axes, chosen, strict=False):
@@ -138,15 +137,6 @@ def plot_graph(
     if file is not None:
         figure.savefig(file, dpi=150)
     return figure
-
-
-def _matplotlib() -> tuple[Any, Any]:
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingDependencyError('plots need matplotlib; install it with: pip install "enumsol[plots]"') from error
-    return Figure, FigureCanvasAgg
 
 
 def _curve(arc: Arc, quantity: str, samples: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from enumsol.checks import one_of, row_number
-from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.errors import InvalidArgumentError
+from enumsol.figures import new_figure
 
 if TYPE_CHECKING:
     from enumsol.continuation.path_data import PathData
@@ -23,7 +24,7 @@ def draw_path(path: PathData, graph: Any, node: int, quantity: str, ax: Any, gra
         # the graph draws a figure of its own; its first panel is this node's
         ax = graph.plot(quantity, [path.node_ids[node]], **graph_options).axes[0]
     elif ax is None:
-        ax = _axes()
+        ax = new_figure().subplots()
     values = getattr(path, quantity)[:, node]
     dots = [k for k, kind in enumerate(path.kinds) if kind in ("step", "end")]
     ax.plot(path.alpha[dots], values[dots], ".", color="black", markersize=3, label="steps", zorder=3)
@@ -41,17 +42,3 @@ def draw_path(path: PathData, graph: Any, node: int, quantity: str, ax: Any, gra
         ax.set_xlabel("alpha")
         ax.set_ylabel(f"{quantity} of node {path.node_ids[node]}")
     return ax
-
-
-def _axes() -> Any:
-    """Axes of a new figure that pyplot does not keep."""
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingDependencyError(
-            'plots need matplotlib, which is not installed; install it with: pip install "enumsol[plots]"'
-        ) from error
-    figure = Figure(layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure.subplots()

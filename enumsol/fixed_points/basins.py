@@ -1,0 +1,180 @@
+"""Solutions as fixed points of Psi, and which of several are reached from where (theory, section 11.3)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.checks import positive_integer, positive_number
+from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.fixed_points.state import scaled_forces
+from enumsol.fixed_points.successive import successive_approximations
+from enumsol.fixed_points.system import ContactSystem, contact_problem
+from enumsol.fixed_points.tresca import solve_tresca
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from numpy.typing import ArrayLike, NDArray
+
+    from enumsol.fixed_points.system import Problem
+
+    Vector = NDArray[np.float64]
+
+
+def fixed_point_residual(problem: Problem, root: Any) -> float:
+    """How far Psi moves a root, relative to the load [-].
+
+    The largest change of a contact force when the Tresca problem with the root's normal forces as slip bounds, and
+    the coefficients at its slips, is solved.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    root : Root, FixedPoint or other
+        With alpha, lambda_n, lambda_t and u_t.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The root is none, or is one of another problem (its arrays have other shapes).
+    """
+    body = contact_problem(problem)
+    for name in ("alpha", "lambda_n", "lambda_t", "u_t"):
+        if not hasattr(root, name):
+            raise InvalidArgumentError(
+                f"root is a {type(root).__name__} without {name}; expected a root of enumerate_roots or a fixed point"
+            )
+    if np.shape(root.lambda_n) != (body.p,) or np.size(root.lambda_t) != len(body.condensed.S) - body.p:
+        raise InvalidArgumentError(
+            f"root has lambda_n of shape {np.shape(root.lambda_n)} and lambda_t of shape {np.shape(root.lambda_t)}; "
+            f"expected a root of the problem, which has p = {body.p} contact nodes"
+        )
+    slip = getattr(root, "slip", None)
+    if slip is None:
+        slip = np.linalg.norm(np.reshape(root.u_t, (body.p, -1)), axis=1)
+    image = solve_tresca(body, np.maximum(root.lambda_n, 0.0), root.alpha, slip=slip, start=root)
+    system = ContactSystem.at(body, root.alpha)
+    return float(np.max(np.abs(scaled_forces(system, image) - scaled_forces(system, root))))
+
+
+def is_fixed_point(problem: Problem, root: Any, tolerance: float = 1e-8) -> bool:
+    """Whether a root is a fixed point of Psi within a tolerance (theory, section 11.3).
+
+    With coefficients that do not depend on the solution the fixed points are exactly the solutions with Coulomb
+    friction; every root of `enumerate_roots` is one.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    root : Root, FixedPoint or other
+        With alpha, lambda_n, lambda_t and u_t.
+    tolerance : float
+        Largest change of a contact force, relative to the load [-].
+
+    Raises
+    ------
+    InvalidArgumentError
+        The root is none, or is one of another problem; the tolerance is not positive.
+    """
+    tolerance = positive_number(tolerance, "tolerance")
+    return fixed_point_residual(problem, root) <= tolerance
+
+
+def basin_table(
+    problem: Problem,
+    roots: Sequence[Any],
+    starts: int | ArrayLike = 50,
+    *,
+    seed: int = 0,
+    anderson: int = 0,
+    tolerance: float = 1e-10,
+    max_iterations: int = 1000,
+    distance: float = 1e-6,
+) -> pd.DataFrame:
+    """Which of the roots successive approximations reach, start by start.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    roots : RootSet or sequence of roots at one alpha
+    starts : int or (k, p) array_like
+        Slip bounds to start from [force], or their number: random ones then, independent at the nodes, with sizes
+        log-uniform between 1e-3 and 10 times the largest normal force of all roots; the first start is 0.
+    seed : int
+        Of the random starts.
+    anderson, tolerance, max_iterations
+        As in `successive_approximations`.
+    distance : float
+        A limit counts as a root if no contact force differs by more, relative to the load [-].
+
+    Returns
+    -------
+    DataFrame
+        A row a start: ``start``, ``size`` (mean slip bound), ``outcome``, ``iterations``, ``contraction``, ``root``
+        (its number, or <NA>) and ``away`` (distance from the nearest root). ``attrs["never"]`` lists the roots that
+        no start reached.
+
+    Raises
+    ------
+    InvalidArgumentError
+        There are no roots, they belong to several alpha, or starts have the wrong shape.
+    Interrupted
+        Ctrl-C; ``partial`` is the table so far.
+    """
+    import pandas as pd  # for frames only
+
+    body = contact_problem(problem)
+    if len(roots) == 0 or len({float(root.alpha) for root in roots}) > 1:
+        raise InvalidArgumentError(f"roots has {len(roots)} roots; expected at least one, all at the same alpha")
+    alpha = roots[0].alpha
+    system = ContactSystem.at(body, alpha)
+    known = np.array([scaled_forces(system, root) for root in roots])
+    bounds = _starts(starts, seed, roots, body.p)
+    rows: list[dict[str, Any]] = []
+    stopped: KeyboardInterrupt | None = None
+    for k, bound in enumerate(bounds):
+        try:
+            found = successive_approximations(body, alpha, bound, tolerance, max_iterations, anderson)
+        except KeyboardInterrupt as error:
+            stopped = error
+            break
+        away = np.max(np.abs(known - scaled_forces(system, found)), axis=1)
+        nearest = int(np.argmin(away))
+        reached = found.converged and away[nearest] <= distance
+        rows.append(
+            {
+                "start": k,
+                "size": float(np.mean(bound)),
+                "outcome": found.outcome.value,
+                "iterations": found.iterations,
+                "contraction": found.contraction_factor,
+                "root": nearest if reached else pd.NA,
+                "away": float(away[nearest]),
+            }
+        )
+    names = ("start", "size", "outcome", "iterations", "contraction", "root", "away")
+    table = pd.DataFrame(rows, columns=names).astype({"root": "Int64"})
+    table.attrs["never"] = sorted(set(range(len(roots))) - set(table["root"].dropna().astype(int)))
+    if stopped is not None:
+        raise Interrupted(f"interrupted after {len(rows)} of {len(bounds)} starts", table) from None
+    return table
+
+
+def _starts(starts: int | ArrayLike, seed: int, roots: Sequence[Any], p: int) -> NDArray[np.float64]:
+    if np.ndim(starts) == 0:
+        count = positive_integer(starts, "starts")
+        size = max(float(np.max(root.lambda_n)) for root in roots) or 1.0
+        rng = np.random.default_rng(seed)
+        scale = size * 10.0 ** rng.uniform(-3.0, 1.0, (count, 1))
+        bounds = scale * rng.uniform(0.0, 1.0, (count, p))
+        bounds[0] = 0.0
+        return bounds
+    bounds = np.asarray(starts, dtype=np.float64)
+    if bounds.ndim != 2 or bounds.shape[1] != p:
+        raise InvalidArgumentError(
+            f"starts has shape {bounds.shape}; expected (k, p) = (k, {p}), or a number of starts"
+        )
+    return bounds

@@ -1,0 +1,207 @@
+"""How much Psi contracts, and up to which friction the solution is unique (theory, section 11.5), in floats."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import eigh
+
+from enumsol.checks import nonnegative_number
+from enumsol.fixed_points.system import ContactSystem, contact_problem
+from enumsol.fixed_points.tresca import node_values
+from enumsol.friction import FrictionTable
+from enumsol.problem3d import ContactProblem3D
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from enumsol.checks import AlphaLike
+    from enumsol.fixed_points.system import Problem
+
+    Vector = NDArray[np.float64]
+    Matrix = NDArray[np.float64]
+
+#: Slips per node at which a friction function is looked at for its largest values and slopes.
+_SAMPLES = 257
+
+
+@dataclass(frozen=True)
+class LipschitzEstimate:
+    """Bounds on the Lipschitz constant of Psi at one alpha, from eigenvalues in floats (theory, section 11.5).
+
+    Attributes
+    ----------
+    C1, C2 : float
+        The two parts of the Lipschitz constant, (theory, (11.8)): by the slip bounds, and by the dependence of the
+        coefficients on the slip [-].
+    uniqueness : float
+        The left-hand side of (theory, (11.9)) [-].
+    factor : float
+        With all coefficients multiplied by less than this the solution still is unique, where they do not depend on
+        the solution; inf without friction [-].
+    lipschitz, anisotropy : float
+        L [1 / length] and kappa [-] as used.
+    sampled : bool
+        L, kappa and the largest coefficients of a friction function are from samples, and so are no bounds.
+    """
+
+    C1: float
+    C2: float
+    uniqueness: float
+    factor: float
+    lipschitz: float
+    anisotropy: float
+    sampled: bool
+
+    @property
+    def constant(self) -> float:
+        """C1 + C2: below 1 Psi contracts in the norm of (theory, section 11.5)."""
+        return self.C1 + self.C2
+
+    @property
+    def contracts(self) -> bool:
+        """Whether Psi is known to contract; then successive approximations converge from every start."""
+        return self.constant < 1.0 and not self.sampled
+
+    @property
+    def unique(self) -> bool:
+        """Whether uniqueness follows; where it does not, or where it would rest on samples, False."""
+        return min(self.constant, self.uniqueness) < 1.0 and not self.sampled
+
+
+@dataclass(frozen=True)
+class _Coefficients:
+    """Over all slips: largest coefficients (p, d), Lipschitz constant [1 / length], largest ratio of F1 and F2."""
+
+    F: Matrix
+    lipschitz: float = 0.0
+    anisotropy: float = 1.0
+    sampled: bool = False
+
+    @property
+    def per_change(self) -> float:
+        """Lipschitz constant of v -> |F v| - |F' v| for F, F' of slips a unit apart (theory, section 11.5)."""
+        return self.lipschitz if self.anisotropy == 1.0 else self.lipschitz * (1.0 + self.anisotropy)
+
+
+def lipschitz_estimate(
+    problem: Problem, alpha: AlphaLike, *, areas: ArrayLike | None = None, lipschitz: float | None = None
+) -> LipschitzEstimate:
+    """Bounds on the Lipschitz constant of Psi, and whether uniqueness follows (theory, section 11.5).
+
+    Dense eigenvalue problems are solved, in a time that grows like p^3.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    alpha : float, Fraction or str
+    areas : (p,) array_like or None
+        Areas m_i that the contact rows stand for [length^2]; None: those of the problem, or 1.
+    lipschitz : float or None
+        A Lipschitz constant of a friction function in the slip, if one is known [1 / length]; None: the largest slope
+        among samples.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form, or alpha makes a coefficient negative.
+    """
+    body = contact_problem(problem)
+    p = body.p
+    known = body.areas if areas is None and isinstance(body, ContactProblem3D) else areas
+    m = np.ones(p) if known is None else node_values(known, "areas", p)
+    system = ContactSystem.at(body, alpha)
+    S = body.condensed.S
+    g = body.condensed.free_displacements(system.alpha)
+    d = system.tangents
+    # S is inverted in units in which its diagonal is near 1
+    units = np.tile(np.sqrt(system.force / system.length), 1 + d)
+    inverse = _weighted(np.asarray(np.linalg.inv(system.S), dtype=np.float64), units)
+    inverse_nn, S_tt = inverse[:p, :p], S[p:, p:]
+    load = max(float(g @ inverse @ g), 0.0) ** 0.5
+    blocks = S_tt.reshape(d, p, d, p)[:, np.arange(p), :, np.arange(p)]
+    c_inf = np.sqrt(np.linalg.eigvalsh(blocks)[:, -1])
+
+    used = _coefficients(system, c_inf * load, lipschitz)
+    C1 = min(_force_part(inverse_nn, S_tt, used.F, theta) for theta in _weights(inverse_nn, blocks, used.F, m))
+    C2 = second = 0.0
+    if used.lipschitz > 0:
+        c_0 = np.sqrt(_largest(inverse_nn / np.sqrt(np.outer(m, m))))
+        c_phi = np.sqrt(_slip_compliance(body, S_tt, m))
+        C2 = float(used.per_change * c_0 * np.max(c_inf) * c_phi * load)
+        most = np.sqrt(np.diagonal(inverse_nn)) * load
+        both = _slip_compliance(body, S_tt, most) * _largest(_weighted(S_tt, np.tile(np.sqrt(most), d)))
+        second = float(used.per_change * np.sqrt(both))
+    return LipschitzEstimate(
+        C1=C1,
+        C2=C2,
+        uniqueness=C1 + second,
+        factor=float("inf") if C1 == 0 else 1.0 / C1,
+        lipschitz=used.lipschitz,
+        anisotropy=used.anisotropy,
+        sampled=used.sampled,
+    )
+
+
+def _force_part(inverse_nn: Matrix, S_tt: Matrix, F: Matrix, theta: Vector) -> float:
+    """c_n c_t of (theory, (11.6)) for weights theta of shape (p,)."""
+    c_n = _largest(_weighted(inverse_nn, theta))
+    c_t = _largest(_weighted(S_tt, (F / theta[:, None]).ravel(order="F")))
+    return float(np.sqrt(c_n * c_t))
+
+
+def _weights(inverse_nn: Matrix, blocks: Matrix, F: Matrix, m: Vector) -> list[Vector]:
+    """Weights theta to choose from (theory, section 11.5), of shape (p,) each."""
+    tangential = np.max(F**2 * np.diagonal(blocks, axis1=1, axis2=2), axis=1)
+    balanced = (np.maximum(tangential, 1e-12 * np.max(tangential)) / np.diagonal(inverse_nn)) ** 0.25
+    return [1.0 / np.sqrt(m), balanced] if np.any(tangential) else [1.0 / np.sqrt(m)]
+
+
+def _slip_compliance(body: Problem, S_tt: Matrix, weights: Vector) -> float:
+    """Largest sum of weights * slip^2 over displacements of unit energy, weights of shape (p,)."""
+    mean = body.slip_mean if isinstance(body, ContactProblem3D) else None
+    if mean is None:
+        return _largest(_weighted(S_tt, np.tile(np.sqrt(weights), len(S_tt) // len(weights))))
+    root = sp.diags_array(np.tile(np.sqrt(mean.weights.T @ weights), 2))
+    T = sp.csr_array(root @ sp.vstack([mean.T1, mean.T2]))
+    return _largest(T @ body.factorization.solve(T.T.toarray()))
+
+
+def _coefficients(system: ContactSystem, reach: Vector, lipschitz: float | None) -> _Coefficients:
+    """What (theory, section 11.5) asks of the coefficients, for slips up to ``reach`` of shape (p,) [length]."""
+    body = system.problem
+    if not isinstance(body, ContactProblem3D):
+        return _Coefficients(body.friction_at(system.alpha)[:, None])
+    if isinstance(body.law, FrictionTable):
+        slips = np.tile(body.law.slip, (body.p, 1)).T
+    else:
+        slips = np.linspace(0.0, 1.0, _SAMPLES if body.depends_on_solution else 2)[:, None] * reach
+    F = np.array([body.coefficients(system.alpha, slip) for slip in slips])
+    most, least = np.max(F, axis=0), np.min(F, axis=0)
+    if not body.depends_on_solution:
+        return _Coefficients(most)
+    step = np.diff(slips, axis=0)[:, :, None]
+    slope = float(np.max(np.abs(np.diff(F, axis=0)) / np.where(step > 0, step, np.inf), initial=0.0))
+    by_table = isinstance(body.law, FrictionTable)
+    if lipschitz is not None and not by_table:
+        slope = nonnegative_number(lipschitz, "lipschitz")
+        between = 0.5 * slope * np.max(step, axis=0)
+        F = np.stack([most + between, np.maximum(least - between, 0.0)])
+        most = F[0]
+        ratio = np.max(np.max(F[0], axis=1) / np.maximum(np.min(F[1], axis=1), 1e-300))
+    else:
+        ratio = np.max(np.max(F, axis=2) / np.maximum(np.min(F, axis=2), 1e-300))
+    return _Coefficients(most, slope, float(ratio), sampled=not by_table and lipschitz is None)
+
+
+def _weighted(matrix: Matrix, weights: Vector) -> Matrix:
+    return np.asarray(weights[:, None] * matrix * weights[None, :])
+
+
+def _largest(matrix: Matrix) -> float:
+    """Largest eigenvalue of a symmetric positive semidefinite matrix."""
+    last = len(matrix) - 1
+    return max(float(eigh(matrix, eigvals_only=True, subset_by_index=(last, last))[0]), 0.0)

@@ -1,0 +1,58 @@
+"""Pictures of basins: which root successive approximations reach from which start."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from enumsol.errors import InvalidArgumentError
+from enumsol.figures import new_figure
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_MARKERS = "osD^v<>P*h"
+
+
+def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
+    """Every start of a `basin_table`: iterations against the mean slip bound, marked by the root that is reached.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Of `basin_table`.
+    ax : matplotlib Axes or None
+        None: those of a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The roots that no start reaches are named in its title.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The table is none of `basin_table`.
+    MissingDependencyError
+        matplotlib is not installed.
+    """
+    missing = {"size", "iterations", "root", "outcome"} - set(getattr(table, "columns", ()))
+    if missing:
+        raise InvalidArgumentError(f"table lacks {', '.join(sorted(missing))}; expected what basin_table returns")
+    if ax is None:
+        ax = new_figure(figsize=(6.4, 4.2)).subplots()
+    groups = list(table.groupby("root"))
+    for k, (root, rows) in enumerate(groups):
+        marker = _MARKERS[k % len(_MARKERS)]
+        ax.plot(rows["size"], rows["iterations"], marker, alpha=0.7, label=f"root {root}: {len(rows)} starts")
+    lost = table[table["root"].isna()]
+    for outcome, rows in lost.groupby("outcome"):
+        ax.plot(rows["size"], rows["iterations"], "x", color="black", label=f"no root ({outcome}): {len(rows)} starts")
+    positive = table["size"][table["size"] > 0]
+    ax.set_xscale("symlog", linthresh=float(positive.min()) if len(positive) else 1.0)
+    ax.set_yscale("log")
+    ax.set_xlabel("mean slip bound of the start [force]")
+    ax.set_ylabel("iterations")
+    never = table.attrs.get("never", [])
+    ax.set_title(f"never reached: {'roots ' + ', '.join(map(str, never)) if never else 'none'}")
+    ax.legend()
+    return ax

@@ -1,0 +1,241 @@
+"""Successive approximations for Coulomb friction: fixed points of Psi (theory, section 11.3; paper, Section 3)."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.checks import optional_callable, positive_integer, positive_number
+from enumsol.errors import Interrupted
+from enumsol.fixed_points.anderson import AndersonMixing
+from enumsol.fixed_points.newton import TrescaData
+from enumsol.fixed_points.result import FixedPoint, Outcome
+from enumsol.fixed_points.state import scaled_forces
+from enumsol.fixed_points.system import ContactSystem, contact_problem
+from enumsol.fixed_points.tresca import TrescaNotSolved, node_values, solve
+from enumsol.friction import warn_of_jumps
+from enumsol.problem3d import ContactProblem3D
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from enumsol.checks import AlphaLike
+    from enumsol.fixed_points.system import Problem
+
+    Vector = NDArray[np.float64]
+
+#: Cycles up to this length are looked for; two iterates are the same if they are this much closer than neighbours.
+LONGEST_CYCLE, _SAME = 12, 1e-9
+
+
+@dataclass(frozen=True)
+class FixedPointProgress:
+    """State of running successive approximations, as handed to the ``progress`` callback.
+
+    Attributes
+    ----------
+    iteration : int
+        Tresca problems solved so far.
+    increment : float
+        Last increment relative to the tolerance: converged at 1.
+    seconds : float
+        Wall time so far.
+    """
+
+    iteration: int
+    increment: float
+    seconds: float
+
+
+def successive_approximations(
+    problem: Problem,
+    alpha: AlphaLike,
+    start: Any = None,
+    tolerance: float = 1e-10,
+    max_iterations: int = 1000,
+    anderson: int = 0,
+    progress: Callable[[FixedPointProgress], object] | None = None,
+) -> FixedPoint:
+    """A solution of the contact problem with Coulomb friction as a limit of Tresca problems (theory, section 11.3).
+
+    Every iterate solves the Tresca problem whose slip bounds are the normal forces of the one before, and whose
+    coefficients, where they depend on the solution, are those at its slips. Convergence is certain only where Psi
+    contracts (`lipschitz_estimate`); a limit is a solution wherever it is, but others may exist.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    alpha : float, Fraction or str
+        Parameter of friction and load.
+    start : None, float, (p,) array_like, pair, or object with lambda_n and u_t
+        Slip bounds to begin with [force]; None is 0, a first iterate without friction. A pair gives slip bounds and
+        slips [length]; a root, a FixedPoint or a TrescaSolution gives its own.
+    tolerance : float
+        Converged when the increment of normal forces in the norm of (theory, (11.4)) is at most this fraction of the
+        load's, and that of the slips at most this fraction of the largest slips, where coefficients depend on them.
+    max_iterations : int
+    anderson : int
+        Depth of Anderson's mixing; 0 is plain iteration. With mixing, limits may be fixed points that repel Psi.
+    progress : callable or None
+        Called with a FixedPointProgress after every iteration.
+
+    Returns
+    -------
+    FixedPoint
+        Of the last iterate; ``converged`` and ``why`` say how it ended.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form, or alpha makes a coefficient negative.
+    InvalidProblemError
+        A friction function returns something else than finite numbers >= 0.
+    Interrupted
+        Ctrl-C; ``partial`` is the FixedPoint of the last iterate.
+
+    Warns
+    -----
+    FrictionJumpWarning
+        A coefficient that depends on the slip seems to jump.
+    """
+    body = contact_problem(problem)
+    tolerance = positive_number(tolerance, "tolerance")
+    limit = positive_integer(max_iterations, "max_iterations")
+    depth = positive_integer(anderson, "anderson", least=0)
+    optional_callable(progress, "progress")
+    system = ContactSystem.at(body, alpha)
+    return _Iteration(system, tolerance, depth, progress).run(start, limit)
+
+
+class _Iteration:
+    def __init__(
+        self,
+        system: ContactSystem,
+        tolerance: float,
+        depth: int,
+        progress: Callable[[FixedPointProgress], object] | None,
+    ) -> None:
+        self.system, self.tolerance, self.progress = system, tolerance, progress
+        body = system.problem
+        self.depends = isinstance(body, ContactProblem3D) and body.depends_on_solution
+        areas = body.areas if isinstance(body, ContactProblem3D) and body.areas is not None else np.ones(body.p)
+        self.slip_weights = np.sqrt(areas) * system.length
+        # sqrt(work) of the scaled system: the product of the force and the length factor is the same at every node
+        self.work = float(np.sqrt(system.force[0] * system.length[0]))
+        self.mixing = AndersonMixing(depth) if depth else None
+        self.recent: deque[Vector] = deque(maxlen=LONGEST_CYCLE + 1)
+        self.increments: list[tuple[float, float]] = []
+        self.largest_slip = 0.0
+        self.started = time.perf_counter()
+
+    def run(self, start: Any, limit: int) -> FixedPoint:
+        bound, slip = self._start(start)
+        data = TrescaData(self.system, bound, self.system.coefficients(slip))
+        forces = np.zeros(len(self.system.g)) if not hasattr(start, "lambda_t") else scaled_forces(self.system, start)
+        outcome, period = Outcome.ITERATION_LIMIT, None
+        try:
+            for _ in range(limit):
+                data = TrescaData(self.system, bound, self.system.coefficients(slip))
+                forces, _, _ = solve(data, forces)
+                image, image_slip = self._image(data, forces)
+                increment = self._record(bound, slip, image, image_slip)
+                if increment <= 1.0:
+                    outcome = Outcome.CONVERGED
+                    break
+                period = self._period(np.concatenate([image, image_slip] if self.depends else [image]))
+                if period is not None:
+                    outcome = Outcome.CYCLE
+                    break
+                bound, slip = self._next(bound, slip, image, image_slip)
+        except TrescaNotSolved:
+            outcome = Outcome.NOT_SOLVED
+        except KeyboardInterrupt:
+            partial = self._result(data, forces, Outcome.INTERRUPTED, None)
+            raise Interrupted(partial.why, partial) from None
+        return self._result(data, forces, outcome, period)
+
+    def _start(self, start: Any) -> tuple[Vector, Vector]:
+        """Scaled slip bounds and slips to begin with."""
+        system, p = self.system, self.system.p
+        slip: Any = 0.0
+        if start is None:
+            bound: Any = 0.0
+        elif hasattr(start, "lambda_n") and hasattr(start, "u_t"):
+            bound = np.maximum(np.asarray(start.lambda_n, dtype=np.float64), 0.0)
+            slip = getattr(start, "slip", None)
+            if slip is None:
+                slip = np.linalg.norm(np.reshape(start.u_t, (len(bound), -1)), axis=1)
+        elif isinstance(start, tuple) and len(start) == 2 and any(np.ndim(part) == 1 for part in start):
+            bound, slip = start
+        else:
+            bound = start
+        return node_values(bound, "start", p) / system.force, node_values(slip, "slips of start", p) / system.length
+
+    def _image(self, data: TrescaData, forces: Vector) -> tuple[Vector, Vector]:
+        """Psi of the iterate that gave these forces: scaled normal forces and slips."""
+        w = data.displacements(forces)
+        normal = np.maximum(self.system.split(forces)[0], 0.0)
+        return normal, self.system.slip(forces, w)
+
+    def _record(self, bound: Vector, slip: Vector, image: Vector, image_slip: Vector) -> float:
+        """Note the increment; returned relative to what counts as none."""
+        system = self.system
+        force = system.force_norm(image - bound)
+        change = float(np.linalg.norm(self.slip_weights * (image_slip - slip)))
+        if not self.increments and self.depends:
+            self._look_for_jumps(image_slip)
+        self.increments.append((change, force * self.work))
+        self.largest_slip = max(self.largest_slip, float(np.linalg.norm(self.slip_weights * image_slip)))
+        relative = [force / system.load_energy] if system.load_energy > 0 else [0.0]
+        if self.depends and self.largest_slip > 0:
+            relative.append(change / self.largest_slip)
+        increment = max(relative) / self.tolerance
+        if self.progress is not None:
+            self.progress(FixedPointProgress(len(self.increments), increment, time.perf_counter() - self.started))
+        return increment
+
+    def _look_for_jumps(self, slip: Vector) -> None:
+        body = self.system.problem
+        reach = 2.0 * float(np.max(slip * self.system.length))
+        if isinstance(body, ContactProblem3D) and reach > 0:
+            warn_of_jumps(body.law, np.full(body.p, reach), body.node_ids)
+
+    def _period(self, image: Vector) -> int | None:
+        """Length of the cycle that the iterates run through, if they do."""
+        if self.mixing is not None:
+            return None
+        earlier = list(self.recent)[::-1]
+        self.recent.append(image)
+        if len(earlier) < 2:
+            return None
+        distances = np.linalg.norm(np.array(earlier) - image, axis=1)
+        same = np.flatnonzero(distances[1:] <= _SAME * distances[0])
+        return int(same[0]) + 2 if len(same) else None
+
+    def _next(self, bound: Vector, slip: Vector, image: Vector, image_slip: Vector) -> tuple[Vector, Vector]:
+        if self.mixing is None:
+            return image, image_slip
+        if not self.depends:
+            return self.mixing.next(bound, image), image_slip
+        p = len(bound)
+        mixed = self.mixing.next(np.concatenate([bound, slip]), np.concatenate([image, image_slip]))
+        return mixed[:p], mixed[p:]
+
+    def _result(self, data: TrescaData, forces: Vector, outcome: Outcome, period: int | None) -> FixedPoint:
+        slip = self.system.slip(forces, data.displacements(forces))
+        return FixedPoint.of(
+            data,
+            forces,
+            outcome=outcome,
+            iterations=len(self.increments),
+            slip=slip * self.system.length,
+            increments=np.array(self.increments).reshape(-1, 2),
+            tolerance=self.tolerance,
+            period=period,
+        )

@@ -1,0 +1,152 @@
+"""A condensed problem in 2D or 3D at one alpha, without units: what Tresca problems are solved on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from enumsol.checks import Alpha, alpha_value, instance_of
+from enumsol.errors import InvalidProblemError
+from enumsol.problem import ContactProblem
+from enumsol.problem3d import ContactProblem3D
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from numpy.typing import NDArray
+
+    Vector = NDArray[np.float64]
+    Matrix = NDArray[np.float64]
+    Problem = ContactProblem | ContactProblem3D
+
+
+def contact_problem(value: Any) -> Problem:
+    """Value as a contact problem in 2D or 3D.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is neither.
+    """
+    if isinstance(value, ContactProblem3D):
+        return value
+    return instance_of(value, ContactProblem, "problem")
+
+
+@dataclass(frozen=True)
+class ContactSystem:
+    """w = g - S lambda at one alpha, scaled by powers of two (theory, section 11.2).
+
+    One factor a node makes its compliance of size one, alike in all directions, and one factor for all forces brings
+    the energy of the load, g' S^-1 g, into [1, 4) unless g = 0. Friction coefficients are unchanged.
+
+    Attributes
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    alpha : float or Fraction
+    S : ((1 + d) p, (1 + d) p) array, with d = 1 or 2 tangents
+    g : ((1 + d) p,) array
+    force, length : (p,) arrays
+        Factors: a force is ``force`` times its scaled one, a displacement ``length`` times.
+    """
+
+    problem: Problem
+    alpha: Alpha
+    S: Matrix = field(repr=False)
+    g: Vector = field(repr=False)
+    force: Vector = field(repr=False)
+    length: Vector = field(repr=False)
+
+    @classmethod
+    def at(cls, problem: Problem, alpha: Any) -> ContactSystem:
+        """The system of a problem at one alpha.
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is not finite.
+        InvalidProblemError
+            The compliance is not positive definite within rounding.
+        """
+        value = alpha_value(alpha)
+        condensed = problem.condensed
+        p = problem.p
+        factor = np.exp2(-np.round(0.5 * np.mean(np.log2(np.diagonal(condensed.S).reshape(-1, p)), axis=0)))
+        everywhere = np.tile(factor, len(condensed.S) // p)
+        S = condensed.S * everywhere[:, None] * everywhere[None, :]
+        g = condensed.free_displacements(value) * everywhere
+        largest = float(np.max(np.abs(g)))
+        size = 1.0
+        if largest > 0:
+            first = np.exp2(np.floor(np.log2(largest)))  # two steps, so that squares do not overflow
+            energy = float(np.sqrt(_solve(S, g / first) @ (g / first)))
+            size = float(first * np.exp2(np.floor(np.log2(energy))))
+        return cls(problem, value, S, g / size, factor * size, size / factor)
+
+    @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+        return len(self.force)
+
+    @property
+    def tangents(self) -> int:
+        """Number of tangents, 1 or 2."""
+        return len(self.g) // self.p - 1
+
+    @cached_property
+    def load_energy(self) -> float:
+        """||g||_(S^-1): no solution has a larger energy norm (theory, section 11.3)."""
+        return float(np.sqrt(np.maximum(_solve(self.S, self.g) @ self.g, 0.0)))
+
+    @cached_property
+    def normal_stiffness(self) -> Matrix:
+        """((S^-1)_nn)^-1, the matrix of the norm of normal forces (theory, (11.4)), shape (p, p)."""
+        p = self.p
+        coupling = self.S[:p, p:]
+        return np.asarray(self.S[:p, :p] - coupling @ _solve(self.S[p:, p:], coupling.T))
+
+    def force_norm(self, normal: Vector) -> float:
+        """||normal||_D of scaled normal forces (theory, (11.4)): at most ``load_energy`` at solutions."""
+        return float(np.sqrt(np.maximum(normal @ self.normal_stiffness @ normal, 0.0)))
+
+    def coefficients(self, slip: Vector) -> Matrix:
+        """Friction coefficients for scaled slips of shape (p,), shape (p, d)."""
+        if isinstance(self.problem, ContactProblem3D):
+            return self.problem.coefficients(self.alpha, slip * self.length)
+        return self.problem.friction_at(self.alpha)[:, None]
+
+    def slip(self, forces: Vector, w: Vector) -> Vector:
+        """The scaled slip that coefficients depend on, shape (p,), for scaled forces and displacements of all rows."""
+        mean = self.problem.slip_mean if isinstance(self.problem, ContactProblem3D) else None
+        if mean is None:
+            return np.asarray(np.linalg.norm(self.split(w)[1], axis=1))
+        return np.asarray(mean(self.displacement(forces)) / self.length)
+
+    def displacement(self, forces: Vector) -> Vector:
+        """u in the problem's units, shape (n,), for scaled forces of all rows."""
+        scaled = forces * np.tile(self.force, 1 + self.tangents)
+        return self.problem.condensed.displacement(self.alpha, scaled)
+
+    def split(self, values: Vector) -> tuple[Vector, Matrix]:
+        """Normal part (p,) and tangential part (p, d) of a vector over all rows."""
+        p = self.p
+        return values[:p], values[p:].reshape(-1, p).T
+
+    def joined(self, normal: Vector, tangential: Matrix) -> Vector:
+        """The vector over all rows with these parts."""
+        return np.concatenate([normal, tangential.T.ravel()])
+
+
+def _solve(S: Matrix, rhs: Matrix) -> Matrix:
+    """S^-1 rhs by Cholesky's method."""
+    try:
+        return np.asarray(cho_solve(cho_factor(S, lower=True, check_finite=False), rhs, check_finite=False))
+    except LinAlgError as error:
+        raise InvalidProblemError(
+            "the condensed compliance S = B A^-1 B' is not positive definite to working precision; expected contact "
+            "rows that are independent beyond rounding (are two contact nodes almost the same point?)"
+        ) from error

@@ -1,0 +1,170 @@
+"""The Tresca problem: contact with given slip bounds, in 2D and 3D (theory, section 11.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from enumsol.array_checks import real_array
+from enumsol.checks import one_of
+from enumsol.errors import EnumsolError, InvalidArgumentError
+from enumsol.fixed_points.newton import ACCEPTED, TrescaData
+from enumsol.fixed_points.state import ContactState, scaled_forces
+from enumsol.fixed_points.system import ContactSystem, contact_problem
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from enumsol.checks import AlphaLike
+    from enumsol.fixed_points.system import Problem
+
+    Vector = NDArray[np.float64]
+
+Solver = Literal["newton", "clarabel", "cvxpy"]
+SOLVERS = ("newton", "clarabel", "cvxpy")
+#: Residual of a solution by an interior-point method that is good enough where Newton's method does not improve it.
+_INTERIOR_POINT_ACCEPTED = 1e-7
+
+
+class TrescaNotSolved(EnumsolError, ArithmeticError):  # noqa: N818 (reads as what happened)
+    """No solver came close to the solution of a Tresca problem; the message says how close."""
+
+
+@dataclass(frozen=True)
+class TrescaSolution(ContactState):
+    """The solution of a Tresca problem (see ContactState for its forces and displacements).
+
+    Attributes
+    ----------
+    residual : float
+        Largest violation of (theory, (11.3)), in forces relative to the load [-].
+    solver : str
+        What found it: "newton", "clarabel" or "cvxpy".
+    """
+
+    residual: float
+    solver: str
+
+    def __repr__(self) -> str:
+        p = len(self.lambda_n)
+        return (
+            f"TrescaSolution at alpha = {float(self.alpha):g} on {p} contact node{'s' if p != 1 else ''}: "
+            f"sum of lambda_n {np.sum(self.lambda_n):.6g}, residual {self.residual:.1e}, by {self.solver}"
+        )
+
+
+def solve_tresca(
+    problem: Problem,
+    slip_bound: ArrayLike,
+    alpha: AlphaLike,
+    *,
+    slip: ArrayLike | None = None,
+    start: Any = None,
+    solver: Solver = "newton",
+) -> TrescaSolution:
+    """The one solution of the contact problem with friction of Tresca's type (theory, section 11.2).
+
+    |tau| <= s replaces |tau| <= lambda_n, lambda_t = F(alpha) tau: slip bounds s are given where Coulomb's law has the
+    unknown normal force.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    slip_bound : float or (p,) array_like
+        Bounds s >= 0 [force]; the friction coefficients multiply them.
+    alpha : float, Fraction or str
+        Parameter of friction and load.
+    slip : float or (p,) array_like or None
+        Slips at which coefficients that depend on the solution are taken [length]; None is 0.
+    start : TrescaSolution, Root or other with lambda_n and lambda_t, or None
+        Where Newton's method starts.
+    solver : {"newton", "clarabel", "cvxpy"}
+        Newton's method, with Clarabel where it does not converge; Clarabel on the condensed problem; CVXPY on the
+        problem in u, slow and readable.
+
+    Returns
+    -------
+    TrescaSolution
+
+    Raises
+    ------
+    InvalidArgumentError
+        A bound or slip is negative or has the wrong shape; alpha makes a coefficient negative.
+    TrescaNotSolved
+        No solver came close.
+    MissingDependencyError
+        CVXPY is asked for and not installed.
+    """
+    body = contact_problem(problem)
+    one_of(solver, "solver", SOLVERS)
+    system = ContactSystem.at(body, alpha)
+    bound = node_values(slip_bound, "slip_bound", body.p) / system.force
+    slips = node_values(0.0 if slip is None else slip, "slip", body.p) / system.length
+    data = TrescaData(system, bound, system.coefficients(slips))
+    if solver == "cvxpy":
+        return _by_cvxpy(data)
+    guess = np.zeros(len(system.g)) if start is None else scaled_forces(system, start)
+    forces, residual, used = solve(data, guess, first="clarabel" if solver == "clarabel" else "newton")
+    return TrescaSolution.of(data, forces, residual=residual, solver=used)
+
+
+def node_values(value: ArrayLike, name: str, p: int) -> Vector:
+    """Value as p numbers >= 0, one for each contact node.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It has another shape, or a negative entry.
+    """
+    array = real_array(value, name, error=InvalidArgumentError)
+    if array.ndim == 0:
+        array = np.full(p, float(array))
+    if array.shape != (p,):
+        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected (p,) = ({p},) or a single number")
+    if np.min(array) < 0:
+        raise InvalidArgumentError(
+            f"{name} is {np.min(array):g} at index {int(np.argmin(array))}; expected values >= 0"
+        )
+    return array
+
+
+def solve(data: TrescaData, start: Vector, first: str = "newton") -> tuple[Vector, float, str]:
+    """Scaled forces that solve a Tresca problem, their residual, and what found them.
+
+    Raises
+    ------
+    TrescaNotSolved
+        Neither Newton's method nor Clarabel came close.
+    """
+    from enumsol.fixed_points.clarabel_solver import interior_point  # a fallback
+
+    found: list[tuple[float, str, Vector]] = []
+    if first == "newton":
+        forces, residual = data.newton(start)
+        if residual <= ACCEPTED:
+            return forces, residual, "newton"
+        found.append((residual, "newton", forces))
+    rough = interior_point(data)
+    if rough is not None:
+        forces, residual = data.newton(rough)
+        found.append((residual, "clarabel", forces))
+    residual, used, forces = min(found, key=lambda item: item[0], default=(np.inf, "", start))
+    if residual > _INTERIOR_POINT_ACCEPTED:
+        raise TrescaNotSolved(
+            f"the Tresca problem at alpha = {float(data.system.alpha):g} was not solved: the residual relative to the "
+            f"load is {residual:.1e}; expected at most {_INTERIOR_POINT_ACCEPTED:g} (are the data badly scaled?)"
+        )
+    return forces, residual, used
+
+
+def _by_cvxpy(data: TrescaData) -> TrescaSolution:
+    from enumsol.fixed_points.reference import TrescaReference  # CVXPY takes a while to import
+
+    system = data.system
+    reference = TrescaReference(system.problem)
+    normal, tangential, _ = reference.solve(data.bound * system.force, data.F, system.problem.load_at(system.alpha))
+    forces = system.joined(normal / system.force, tangential / system.force[:, None])
+    residual = data.residual(forces, data.displacements(forces))
+    return TrescaSolution.of(data, forces, residual=residual, solver="cvxpy")
