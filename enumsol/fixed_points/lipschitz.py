@@ -181,20 +181,17 @@ def _coefficients(system: ContactSystem, reach: Vector, lipschitz: float | None)
         slips = np.linspace(0.0, 1.0, _SAMPLES if body.depends_on_solution else 2)[:, None] * reach
     F = np.array([body.coefficients(system.alpha, slip) for slip in slips])
     most, least = np.max(F, axis=0), np.min(F, axis=0)
+    ratio = float(np.max(np.max(F, axis=2) / np.maximum(np.min(F, axis=2), 1e-300)))
     if not body.depends_on_solution:
-        return _Coefficients(most)
+        return _Coefficients(most, anisotropy=ratio)
     step = np.diff(slips, axis=0)[:, :, None]
-    slope = float(np.max(np.abs(np.diff(F, axis=0)) / np.where(step > 0, step, np.inf), initial=0.0))
-    by_table = isinstance(body.law, FrictionTable)
-    if lipschitz is not None and not by_table:
-        slope = nonnegative_number(lipschitz, "lipschitz")
-        between = 0.5 * slope * np.max(step, axis=0)
-        F = np.stack([most + between, np.maximum(least - between, 0.0)])
-        most = F[0]
-        ratio = np.max(np.max(F[0], axis=1) / np.maximum(np.min(F[1], axis=1), 1e-300))
-    else:
-        ratio = np.max(np.max(F, axis=2) / np.maximum(np.min(F, axis=2), 1e-300))
-    return _Coefficients(most, slope, float(ratio), sampled=not by_table and lipschitz is None)
+    if isinstance(body.law, FrictionTable) or lipschitz is None:
+        slope = float(np.max(np.abs(np.diff(F, axis=0)) / np.where(step > 0, step, np.inf), initial=0.0))
+        return _Coefficients(most, slope, ratio, sampled=not isinstance(body.law, FrictionTable))
+    slope = nonnegative_number(lipschitz, "lipschitz")
+    between = 0.5 * slope * np.max(step, axis=0)
+    most, least = most + between, np.maximum(least - between, 1e-300)
+    return _Coefficients(most, slope, float(np.max(np.max(most, axis=1) / np.min(least, axis=1))))
 
 
 def _weighted(matrix: Matrix, weights: Vector) -> Matrix:

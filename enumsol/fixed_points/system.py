@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from enumsol.checks import Alpha, alpha_value, instance_of
-from enumsol.errors import InvalidProblemError
+from enumsol.checks import Alpha, alpha_value
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.problem import ContactProblem
 from enumsol.problem3d import ContactProblem3D
 
@@ -32,9 +32,9 @@ def contact_problem(value: Any) -> Problem:
     InvalidArgumentError
         It is neither.
     """
-    if isinstance(value, ContactProblem3D):
+    if isinstance(value, (ContactProblem, ContactProblem3D)):
         return value
-    return instance_of(value, ContactProblem, "problem")
+    raise InvalidArgumentError(f"problem is a {type(value).__name__}; expected a ContactProblem or a ContactProblem3D")
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,126 @@
+"""Bounds on the Lipschitz constant of Psi against differences of its values, closed forms and enumerated roots."""
+
+import numpy as np
+import pytest
+from generators import dense_compliance, from_condensed
+from problems3d import from_compliance, random_compliance
+
+import enumsol
+
+
+def test_closed_form_of_one_node():
+    # S^-1 of [[a, c], [c, b]]: C1^2 = F^2 b^2 / (a b - c^2)
+    a, b, c, F = 2.0, 3.0, 1.0, 0.4
+    estimate = enumsol.lipschitz_estimate(from_condensed(np.array([[a, c], [c, b]]), np.ones(2), [F]), 0)
+    np.testing.assert_allclose(estimate.C1, F * b / np.sqrt(a * b - c * c))
+    assert estimate.C2 == 0.0
+    np.testing.assert_allclose(estimate.factor, 1.0 / estimate.C1)
+    spatial = np.array([[a, c, 0.0], [c, b, 0.0], [0.0, 0.0, 0.1]])
+    orthotropic = enumsol.lipschitz_estimate(from_compliance(spatial, np.ones(3), (F, 0.2)), 0)
+    np.testing.assert_allclose(orthotropic.C1, estimate.C1)
+    assert orthotropic.anisotropy == pytest.approx(2.0)
+
+
+def test_it_is_the_bound_of_the_branch_graph_or_better(rng):
+    problem = enumsol.gallery.get("two-node-5").build()
+    bound = enumsol.branch_graph(problem, (0.0, 5.0)).uniqueness_bound
+    assert enumsol.lipschitz_estimate(problem, 1.0).factor >= bound * (1 - 1e-12)
+
+
+def test_below_the_bound_there_is_one_root(rng):
+    for _ in range(100):
+        p = int(rng.integers(1, 5))
+        S, F = dense_compliance(rng, p), rng.uniform(0.1, 3.0, p)
+        problem = from_condensed(S, rng.normal(size=2 * p), F)
+        factor = enumsol.lipschitz_estimate(problem, 0).factor
+        small = from_condensed(S, rng.normal(size=2 * p), 0.999 * factor * F)
+        assert enumsol.lipschitz_estimate(small, 0).unique
+        assert len(enumsol.enumerate_roots(small, 0)) == 1
+
+
+def test_the_constant_bounds_differences_of_psi(rng):
+    for _ in range(30):
+        p = int(rng.integers(1, 4))
+        S, g = random_compliance(rng, p), rng.normal(size=3 * p)
+        m, L = rng.uniform(0.2, 2.0, p), 0.05
+
+        def friction(node, slip, L=L):
+            return 0.2 + L * np.sin(slip), 0.3 + L * np.cos(slip)
+
+        problem = from_compliance(S, g, friction, areas=m)
+        estimate = enumsol.lipschitz_estimate(problem, 0, lipschitz=L)
+        assert not estimate.sampled
+        D = np.linalg.inv(np.linalg.inv(S)[:p, :p])
+        root = np.tile(np.sqrt(m), 2)
+        c_phi = np.sqrt(np.linalg.eigvalsh(root[:, None] * S[p:, p:] * root)[-1])
+
+        def size(slips, forces, D=D, m=m, c_phi=c_phi):
+            return max(np.sqrt(m @ slips**2) / c_phi, np.sqrt(forces @ D @ forces))
+
+        # inputs as Psi gives them, for which the energy bound holds
+        inputs = []
+        for _ in range(2):
+            rough = enumsol.solve_tresca(problem, rng.uniform(0, 1, p), 0, slip=rng.uniform(0, 1, p))
+            inputs.append((np.hypot(*rough.u_t.T), rough.lambda_n))
+        images = []
+        for slip, bound in inputs:
+            image = enumsol.solve_tresca(problem, np.maximum(bound, 0.0), 0, slip=slip)
+            images.append((np.hypot(*image.u_t.T), image.lambda_n))
+        before = size(inputs[0][0] - inputs[1][0], inputs[0][1] - inputs[1][1])
+        after = size(images[0][0] - images[1][0], images[0][1] - images[1][1])
+        assert after <= estimate.constant * before * (1 + 1e-9)
+
+
+def test_iterations_contract_at_least_as_much_as_the_estimate_says(rng):
+    for _ in range(20):
+        p = int(rng.integers(1, 5))
+        S, g, F = random_compliance(rng, p), rng.normal(size=3 * p), rng.uniform(0.1, 1.0, (p, 2))
+        factor = 0.9 * enumsol.lipschitz_estimate(from_compliance(S, g, (F[:, 0], F[:, 1])), 0).factor
+        small = from_compliance(S, g, (factor * F[:, 0], factor * F[:, 1]))
+        estimate = enumsol.lipschitz_estimate(small, 0)
+        assert estimate.contracts
+        found = enumsol.successive_approximations(small, 0, start=rng.uniform(0, 5, p))
+        assert found.converged
+        forces = found.increments[:, 1]
+        steps = forces[1:][forces[1:] > 1e-9] / forces[:-1][forces[1:] > 1e-9]
+        assert np.all(steps <= estimate.C1 * (1 + 1e-6))
+
+
+def test_tables_and_samples(rng):
+    S, g = random_compliance(rng, 2), rng.normal(size=6)
+    table = enumsol.FrictionTable([0.0, 1.0, 3.0], [0.3, 0.1, 0.2])
+    by_table = enumsol.lipschitz_estimate(from_compliance(S, g, table), 0)
+    assert by_table.lipschitz == pytest.approx(0.2)
+    assert by_table.anisotropy == 1.0
+    assert not by_table.sampled
+    sampled = enumsol.lipschitz_estimate(from_compliance(S, g, lambda node, slip: 0.01 * np.exp(-slip)), 0)
+    assert sampled.sampled
+    assert 0.009 < sampled.lipschitz <= 0.01
+    assert not sampled.unique
+    no_axis = enumsol.lipschitz_estimate(from_compliance(S, g, lambda node, slip: (0.01 * np.exp(-slip), 0.0)), 0)
+    assert no_axis.C2 > 1e100
+
+
+def test_without_friction_everything_is_unique():
+    estimate = enumsol.lipschitz_estimate(from_compliance(np.eye(3), np.ones(3), 0.0), 0)
+    assert estimate.C1 == 0.0
+    assert estimate.factor == np.inf
+    assert estimate.unique
+
+
+def test_units_do_not_matter(rng):
+    S, g = random_compliance(rng, 3), rng.normal(size=9)
+    one = enumsol.lipschitz_estimate(from_compliance(S, g, enumsol.FrictionTable([0, 1], [0.3, 0.2])), 0)
+    mm = enumsol.lipschitz_estimate(
+        from_compliance(1e3 * S, 1e3 * g, enumsol.FrictionTable([0, 1e3], [0.3, 0.2]), areas=np.full(3, 1e6)), 0
+    )
+    for name in ("C1", "C2", "uniqueness", "factor"):
+        np.testing.assert_allclose(getattr(mm, name), getattr(one, name), rtol=1e-9)
+
+
+def test_bad_arguments():
+    problem = from_compliance(np.eye(3), np.ones(3), lambda node, slip: 0.1)
+    with pytest.raises(enumsol.InvalidArgumentError, match="areas has shape"):
+        enumsol.lipschitz_estimate(problem, 0, areas=[1.0, 2.0])
+    with pytest.raises(enumsol.InvalidArgumentError, match="lipschitz is -1"):
+        enumsol.lipschitz_estimate(problem, 0, lipschitz=-1.0)

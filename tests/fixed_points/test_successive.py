@@ -1,0 +1,319 @@
+"""Successive approximations against solutions known otherwise, and how a run that does not converge is told."""
+
+import warnings
+
+import numpy as np
+import pytest
+from problems3d import from_compliance, random_compliance, violations
+from scipy.optimize import brentq
+
+import enumsol
+from enumsol.fixed_points import FixedPoint, Outcome
+from enumsol.fixed_points.anderson import AndersonMixing
+
+# a public test of the contact community: u = W r + q, normal first, r_n >= 0, u_n >= 0; here w = -u, so g = -q, S = W
+W = np.array([[15.0, -1.0, -2.0], [-1.0, 14.0, 1.0], [-2.0, 1.0, 16.0]])
+Q = np.array([-1.0, 2.0, 3.0])
+
+
+def test_the_public_one_contact_problem():
+    found = enumsol.successive_approximations(from_compliance(W, -Q, 0.1), 0)
+    assert found.converged
+    reaction = np.concatenate([found.lambda_n, found.lambda_t[0]])
+    velocity = W @ reaction + Q
+    # sliding, by hand: u_n = 0, |r_t| = F r_n, and r_t points against u_t
+    assert reaction[0] > 0
+    assert abs(velocity[0]) < 1e-12
+    np.testing.assert_allclose(np.hypot(*reaction[1:]), 0.1 * reaction[0], rtol=1e-9)
+    np.testing.assert_allclose(reaction[1:] / np.hypot(*reaction[1:]), -velocity[1:] / np.hypot(*velocity[1:]))
+
+    # the direction alone, found by bisection: r_n(phi) from u_n = 0, then u_t along -d(phi)
+    def turned(phi):
+        d = np.array([np.cos(phi), np.sin(phi)])
+        r_n = -Q[0] / (W[0, 0] + 0.1 * W[0, 1:] @ d)
+        u_t = W[1:, 0] * r_n + 0.1 * r_n * W[1:, 1:] @ d + Q[1:]
+        return u_t[0] * d[1] - u_t[1] * d[0]
+
+    phi = brentq(turned, np.pi, 1.5 * np.pi)
+    r_n = -Q[0] / (W[0, 0] + 0.1 * W[0, 1:] @ (np.cos(phi), np.sin(phi)))
+    np.testing.assert_allclose(reaction, r_n * np.array([1.0, 0.1 * np.cos(phi), 0.1 * np.sin(phi)]), rtol=1e-8)
+
+
+def test_random_problems_satisfy_the_equations(rng):
+    converged = 0
+    for _ in range(60):
+        p = int(rng.integers(1, 6))
+        S, g = random_compliance(rng, p), rng.normal(size=3 * p)
+        F = rng.uniform(0.0, 0.6, (p, 2)) * (rng.random((p, 2)) > 0.1)
+        found = enumsol.successive_approximations(from_compliance(S, g, (F[:, 0], F[:, 1])), 0)
+        if found.converged:
+            converged += 1
+            assert max(violations(S, g, F, found.lambda_n, found.lambda_t)) < 1e-8
+            assert max(found.residuals.values()) < 1e-8
+        else:
+            assert found.why.startswith("not converged")
+    assert converged > 50
+
+
+def test_turning_the_axes_of_every_node_changes_nothing(rng):
+    p = 4
+    S, g, F = random_compliance(rng, p), rng.normal(size=3 * p), rng.uniform(0.0, 0.4, p)
+    R = np.eye(3 * p)
+    for i, (c, s) in enumerate((np.cos(t), np.sin(t)) for t in rng.uniform(0, 2 * np.pi, p)):
+        R[np.ix_([p + i, 2 * p + i], [p + i, 2 * p + i])] = [[c, s], [-s, c]]
+    one = enumsol.successive_approximations(from_compliance(S, g, (F, F)), 0)
+    other = enumsol.successive_approximations(from_compliance(R @ S @ R.T, R @ g, (F, F)), 0)
+    np.testing.assert_allclose(other.forces, R @ one.forces, atol=1e-9)
+
+
+def test_a_quarter_turn_exchanges_orthotropic_coefficients(rng):
+    p = 3
+    S, g, F = random_compliance(rng, p), rng.normal(size=3 * p), rng.uniform(0.0, 0.4, (p, 2))
+    turned = np.concatenate([np.arange(p), np.arange(2 * p, 3 * p), np.arange(p, 2 * p)])
+    one = enumsol.successive_approximations(from_compliance(S, g, (F[:, 0], F[:, 1])), 0)
+    other = enumsol.successive_approximations(
+        from_compliance(S[np.ix_(turned, turned)], g[turned], (F[:, 1], F[:, 0])), 0
+    )
+    np.testing.assert_allclose(other.forces, one.forces[turned], atol=1e-9)
+
+
+def test_permuted_nodes(rng):
+    p = 4
+    S, g, F = random_compliance(rng, p), rng.normal(size=3 * p), rng.uniform(0.0, 0.4, p)
+    order = rng.permutation(p)
+    rows = np.concatenate([order, p + order, 2 * p + order])
+    one = enumsol.successive_approximations(from_compliance(S, g, (F, F)), 0)
+    other = enumsol.successive_approximations(from_compliance(S[np.ix_(rows, rows)], g[rows], (F[order], F[order])), 0)
+    np.testing.assert_allclose(other.lambda_n, one.lambda_n[order], atol=1e-10)
+
+
+def test_friction_that_depends_on_the_slip(rng):
+    p = 3
+    S, g = random_compliance(rng, p), rng.normal(size=3 * p)
+
+    def friction(node, slip):
+        return 0.2 + 0.1 * np.exp(-slip), 0.1 + 0.02 * node / (1.0 + slip)
+
+    found = enumsol.successive_approximations(from_compliance(S, g, friction), 0)
+    assert found.converged
+    slip = np.hypot(*found.u_t.T)
+    np.testing.assert_allclose(found.slip, slip)
+    F = np.array([friction(i, s) for i, s in enumerate(slip)])
+    np.testing.assert_allclose(found.coefficients, F, atol=1e-8)
+    assert max(violations(S, g, F, found.lambda_n, found.lambda_t)) < 1e-8
+    # frozen at the limit the coefficients give the same solution
+    frozen = enumsol.successive_approximations(from_compliance(S, g, (F[:, 0], F[:, 1])), 0)
+    np.testing.assert_allclose(frozen.forces, found.forces, atol=1e-7)
+
+
+def test_a_table_is_the_function_it_samples(rng):
+    S, g = random_compliance(rng, 2), rng.normal(size=6)
+    table = enumsol.FrictionTable([0.0, 0.5, 2.0], [0.4, 0.3, 0.1], [0.2, 0.2, 0.1])
+
+    def function(node, slip):
+        return tuple(np.interp(slip, [0.0, 0.5, 2.0], column) for column in ([0.4, 0.3, 0.1], [0.2, 0.2, 0.1]))
+
+    one, other = (enumsol.successive_approximations(from_compliance(S, g, F), 0) for F in (table, function))
+    np.testing.assert_allclose(one.forces, other.forces, atol=1e-10)
+
+
+def test_friction_and_load_at_alpha(rng):
+    S, g, slope = random_compliance(rng, 2), rng.normal(size=6), rng.normal(size=6)
+    A = np.linalg.inv(S)
+    problem = from_compliance(S, g, (0.1, 0.2), friction_slope=(0.3, 0.1), load_slope=A @ slope)
+    same = from_compliance(S, g + 0.5 * slope, (0.25, 0.25))
+    one, other = enumsol.successive_approximations(problem, 0.5), enumsol.successive_approximations(same, 0)
+    np.testing.assert_allclose(one.forces, other.forces, atol=1e-10)
+    np.testing.assert_allclose(problem.A @ one.u, problem.load_at(0.5) - one.forces, atol=1e-10)
+
+
+def test_gap_and_slip_offset_shift_the_free_displacements(rng):
+    S, g = random_compliance(rng, 2), rng.normal(size=6)
+    gap, offset = rng.normal(size=2), rng.normal(size=(2, 2))
+    shifted = from_compliance(
+        S, g + np.concatenate([gap, offset[:, 0], offset[:, 1]]), 0.3, gap=gap, slip_offset=offset
+    )
+    one = enumsol.successive_approximations(from_compliance(S, g, 0.3), 0)
+    other = enumsol.successive_approximations(shifted, 0)
+    np.testing.assert_allclose(other.forces, one.forces, atol=1e-10)
+    np.testing.assert_allclose(other.u_t, one.u_t, atol=1e-10)
+
+
+def test_a_decoupled_second_tangent_gives_the_roots_in_2d():
+    flat = enumsol.gallery.get("one-node-6.1").build()
+    S, g = flat.condensed.S, flat.condensed.g0
+    spatial = np.eye(3)
+    spatial[:2, :2] = S
+    problem = from_compliance(spatial, np.append(g, 0.0), 5.0)
+    roots = enumsol.enumerate_roots(flat, 5.0)
+    for root in roots:
+        start = enumsol.solve_tresca(problem, root.lambda_n, 0)
+        np.testing.assert_allclose(start.lambda_n, root.lambda_n, atol=1e-12)
+        np.testing.assert_allclose(start.lambda_t[:, 0], root.lambda_t, atol=1e-12)
+        assert enumsol.is_fixed_point(problem, start)
+
+
+def test_anderson_needs_fewer_iterations_where_psi_contracts_slowly():
+    # s -> 1 - 0.9 s
+    S = np.array([[1.0, 0.9, 0.0], [0.9, 2.0, 0.0], [0.0, 0.0, 1.0]])
+    problem = from_compliance(S, np.array([1.0, 9.0, 0.0]), 1.0)
+    plain = enumsol.successive_approximations(problem, 0)
+    mixed = enumsol.successive_approximations(problem, 0, anderson=4)
+    assert plain.converged
+    assert mixed.converged
+    np.testing.assert_allclose(mixed.forces, plain.forces, atol=1e-8)
+    assert mixed.iterations < 0.1 * plain.iterations
+
+
+def test_anderson_solves_a_linear_map_in_as_many_steps_as_it_has_dimensions(rng):
+    M, b = 0.3 * rng.random((4, 4)), rng.random(4)
+    limit = np.linalg.solve(np.eye(4) - M, b)
+    mixing, x = AndersonMixing(4), np.zeros(4)
+    for _ in range(6):
+        x = mixing.next(x, M @ x + b)
+    np.testing.assert_allclose(x, limit, rtol=1e-8)
+
+
+def test_contraction_is_what_the_iterates_show():
+    # slip in one direction: Psi is affine, s -> a - b s with b = 0.4 (S = [[1, -0.4], ...])
+    S = np.array([[1.0, 0.4, 0.0], [0.4, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    found = enumsol.successive_approximations(from_compliance(S, np.array([1.0, 3.0, 0.0]), 1.0), 0)
+    assert found.converged
+    np.testing.assert_allclose(found.contraction[1:8], 0.4, rtol=1e-6)
+    np.testing.assert_allclose(found.contraction_factor, 0.4, rtol=1e-3)
+    np.testing.assert_allclose(found.lambda_n, 1.0 / 1.4, rtol=1e-9)
+
+
+def test_a_cycle_is_recognised():
+    # the same with b = 2: s -> max(0, 1 - 2 s) has the repelling fixed point 1/3 and the cycle 0, 1
+    S = np.array([[1.0, 2.0, 0.0], [2.0, 5.0, 0.0], [0.0, 0.0, 1.0]])
+    problem = from_compliance(S, np.array([1.0, 30.0, 0.0]), 1.0)
+    found = enumsol.successive_approximations(problem, 0, start=0.2)
+    assert not found.converged
+    assert found.outcome is Outcome.CYCLE
+    assert found.period == 2
+    assert "repeats 2 iterates" in found.why
+    mixed = enumsol.successive_approximations(problem, 0, start=0.2, anderson=2)
+    assert mixed.converged
+    np.testing.assert_allclose(mixed.lambda_n, 1.0 / 3.0, rtol=1e-8)
+
+
+def test_the_limit_of_iterations_is_told():
+    found = enumsol.successive_approximations(from_compliance(W, -Q, 0.1), 0, max_iterations=2)
+    assert found.outcome is Outcome.ITERATION_LIMIT
+    assert found.iterations == 2
+    assert "not converged within 2 iterations" in found.why
+    assert "not converged" in repr(found)
+
+
+@pytest.mark.parametrize("start", [None, 0.5, [0.5, 0.1], (np.ones(2), np.zeros(2))])
+def test_starts_of_any_kind(start, rng):
+    problem = from_compliance(random_compliance(rng, 2), rng.normal(size=6), 0.2)
+    plain = enumsol.successive_approximations(problem, 0)
+    np.testing.assert_allclose(enumsol.successive_approximations(problem, 0, start).forces, plain.forces, atol=1e-8)
+    assert enumsol.successive_approximations(problem, 0, start=plain).iterations == 1
+
+
+def test_zero_load_and_no_friction():
+    nothing = enumsol.successive_approximations(from_compliance(W, 0.0 * Q, 0.3), 0, start=1.0)
+    assert nothing.converged
+    assert np.all(nothing.forces == 0)
+    smooth = enumsol.successive_approximations(from_compliance(W, -Q, 0.0), 0)
+    assert smooth.converged
+    np.testing.assert_allclose(smooth.lambda_n, 1.0 / 15.0)
+
+
+def test_interrupted_keeps_the_last_iterate():
+    def stop(state):
+        if state.iteration == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(enumsol.Interrupted) as caught:
+        enumsol.successive_approximations(from_compliance(W, -Q, 0.1), 0, progress=stop)
+    partial = caught.value.partial
+    assert partial.outcome is Outcome.INTERRUPTED
+    assert partial.iterations == 3
+    assert partial.lambda_n[0] == pytest.approx(0.066, abs=1e-3)
+
+
+def test_progress_is_told_every_iteration():
+    seen = []
+    found = enumsol.successive_approximations(from_compliance(W, -Q, 0.1), 0, progress=seen.append)
+    assert [state.iteration for state in seen] == list(range(1, found.iterations + 1))
+    assert seen[-1].increment <= 1.0 < seen[-2].increment
+
+
+def test_saved_and_loaded(tmp_path, rng):
+    problem = from_compliance(random_compliance(rng, 2), rng.normal(size=6), (0.2, 0.1))
+    found = enumsol.successive_approximations(problem, 0)
+    found.save(tmp_path / "limit.npz")
+    again = FixedPoint.load(tmp_path / "limit.npz", problem)
+    assert repr(again) == repr(found)
+    for name in ("lambda_n", "lambda_t", "u_n", "u_t", "u", "slip", "increments", "contraction"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(found, name))
+    with pytest.raises(enumsol.InvalidArgumentError, match="is about other contact nodes"):
+        FixedPoint.load(tmp_path / "limit.npz", from_compliance(W, Q, 0.1))
+    (tmp_path / "other.npz").write_bytes(b"PK")
+    with pytest.raises(enumsol.InvalidArgumentError, match="does not hold a fixed point"):
+        FixedPoint.load(tmp_path / "other.npz", problem)
+    with pytest.raises(enumsol.InvalidArgumentError, match="cannot be read"):
+        FixedPoint.load(tmp_path / "none.npz", problem)
+
+
+def test_frames(rng):
+    problem = from_compliance(random_compliance(rng, 2), rng.normal(size=6), (0.2, 0.1), node_ids=["a", "b"])
+    frame = enumsol.successive_approximations(problem, 0).to_frame()
+    assert list(frame["node"]) == ["a", "b"]
+    assert {"F1", "F2", "lambda_n", "lambda_t1", "lambda_t2", "u_n", "u_t1", "u_t2", "status"} <= set(frame.columns)
+    flat = enumsol.gallery.get("one-node-6.1").build()
+    assert {"F", "lambda_n", "lambda_t", "u_n", "u_t"} <= set(enumsol.successive_approximations(flat, 1).to_frame())
+
+
+@pytest.mark.parametrize("bad", [-0.1, np.nan, np.inf, "x", (1.0, 2.0, 3.0), None])
+def test_a_function_that_returns_no_coefficients(bad):
+    problem = from_compliance(W, -Q, lambda node, slip: bad, node_ids=["toe"])
+    with pytest.raises(
+        enumsol.InvalidProblemError, match=r"friction returns .* at contact node toe for slip 0; expected"
+    ):
+        enumsol.successive_approximations(problem, 0)
+
+
+def test_a_function_that_jumps_is_warned_of():
+    problem = from_compliance(W, -Q, lambda node, slip: 0.3 if slip < 1.0 else 0.1)
+    with pytest.warns(enumsol.FrictionJumpWarning, match="jumps by 0.2 near slip 1 at contact node 0") as caught:
+        enumsol.successive_approximations(problem, 0)
+    assert caught[0].filename == __file__
+
+
+def test_a_steep_function_is_not_warned_of():
+    problem = from_compliance(W, -Q, lambda node, slip: 0.1 + 0.2 / (1.0 + np.exp(min(400.0, 40.0 * (slip - 1.0)))))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert enumsol.successive_approximations(problem, 0).converged
+
+
+def test_errors_of_the_users_own_function_come_through():
+    def broken(node, slip):
+        raise ZeroDivisionError("mine")
+
+    with pytest.raises(ZeroDivisionError, match="mine"):
+        enumsol.successive_approximations(from_compliance(W, -Q, broken), 0)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tolerance": 0.0}, "tolerance is 0"),
+        ({"max_iterations": 0}, "max_iterations is 0"),
+        ({"anderson": -1}, "anderson is -1"),
+        ({"start": [1.0, 2.0]}, r"start has shape \(2,\)"),
+        ({"start": -1.0}, "start is -1"),
+        ({"start": (np.ones(1), -np.ones(1))}, "slips of start is -1"),
+        ({"progress": 3}, "progress is 3"),
+        ({"alpha": np.inf}, "alpha is inf"),
+    ],
+)
+def test_bad_arguments(change, message):
+    arguments = {"problem": from_compliance(W, -Q, 0.1), "alpha": 0} | change
+    with pytest.raises(enumsol.InvalidArgumentError, match=message):
+        enumsol.successive_approximations(**arguments)
