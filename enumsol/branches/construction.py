@@ -26,6 +26,7 @@ from enumsol.problem import ContactProblem
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 from enumsol.search.interval import FastIntervalCertifier, IntervalSearch
+from enumsol.search.stopping import Stop, StopReason
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -106,7 +107,6 @@ def branch_graph(
         deadline=deadline,
         progress=_stage(progress, "search"),
     )
-    interrupted = False
     if path.unloaded:
         # nothing but lambda = 0 for every alpha; every selection holds there, and one of them tells it all
         candidates = {(0,) * path.p}
@@ -114,8 +114,7 @@ def branch_graph(
         try:
             search.run()
         except KeyboardInterrupt:
-            interrupted = True
-            search.stopped = f"interrupted after {search.nodes} nodes"
+            search.stopped = Stop(StopReason.INTERRUPTED, search.nodes)
         candidates = search.selections
     searched = time.perf_counter()
     tick = _stage(progress, "arcs")
@@ -128,21 +127,16 @@ def branch_graph(
         seconds=time.perf_counter() - started,
     )
     arcs = make_arcs(gluing)
-    cut = [reason for reason in (search.stopped, gluing.interrupted) if reason is not None]
+    stops = [stop for stop in (search.stopped, gluing.interrupted) if stop is not None]
     vertices = make_vertices(gluing, arcs)
     proof = None
-    if (
-        isinstance(certifier, VerifiedIntervalCertifier)
-        and search.pieces
-        and search.stopped is None
-        and not certifier.used_rationals
-    ):
+    if certifier.checkable and search.pieces and search.stopped is None:
         about = "problem" if path.condensed_exactly else "condensed"
         proof = write_graph_proof(problem, (a, b), about, search.pieces)
-    reasons, pieces = (*cut, *gluing.reasons), tuple(search.pieces)
+    reasons, pieces = (*map(str, stops), *gluing.reasons), tuple(search.pieces)
     data = GraphData(problem, path, (a, b), arithmetic, tuple(vertices), tuple(arcs), reasons, stats, pieces, proof)
     graph = BranchGraph(data)
-    if interrupted or gluing.interrupted is not None:
+    if any(stop.interrupted for stop in stops):
         raise Interrupted("branch_graph was interrupted; its arcs so far are kept", graph)
     return graph
 

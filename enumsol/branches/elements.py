@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from enumsol.arithmetic.algebraic import CriticalAlpha
     from enumsol.checks import AlphaLike
     from enumsol.condensation.exact import ExactPath
-    from enumsol.roots.root_set import RootFamily
+    from enumsol.roots.root import RootFamily
     from enumsol.selections.solution import Codes
     from enumsol.statuses import ContactStatus
 

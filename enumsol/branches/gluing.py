@@ -17,6 +17,7 @@ from enumsol.arithmetic.number_field import exact_value
 from enumsol.branches.selection_arcs import SelectionArcs, active_sets, selection_arcs
 from enumsol.branches.sheets import sheet_arcs
 from enumsol.roots.components import connected_components
+from enumsol.search.stopping import Stop, StopReason
 from enumsol.selections.ordered_field import FiberSelections
 from enumsol.selections.solution import SelectionSolution, VertexLimitError
 
@@ -141,7 +142,7 @@ class Gluing:
         self._fibers: list[tuple[CriticalAlpha, FiberSelections]] = []
         self._refused: set[Codes] = set()
         self._unsettled: set[int] = set()
-        self.interrupted: str | None = None
+        self.interrupted: Stop | None = None
         todo = sorted(set(candidates))
         for k, codes in enumerate(todo):
             try:
@@ -151,7 +152,7 @@ class Gluing:
             except KeyboardInterrupt:
                 # as after a search that was cut short, what is known so far is glued
                 self._cut_short = True
-                self.interrupted = f"interrupted after the arcs of {k} of {len(todo)} selections"
+                self.interrupted = Stop(StopReason.INTERRUPTED, k, arcs_of=len(todo))
                 break
         for codes in list(self.arcs):
             self._close(codes)

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from enumsol.branches.elements import Arc, Branch, Component, Vertex
     from enumsol.branches.graph_data import GraphData
     from enumsol.checks import AlphaLike
-    from enumsol.roots.root_set import Root, RootFamily, RootSet
+    from enumsol.roots.root import Root, RootFamily
+    from enumsol.roots.root_set import RootSet
 
 
 class BranchGraph(Immutable):

@@ -10,7 +10,7 @@ from flint import fmpq
 
 from enumsol.arithmetic.rationals import to_fraction
 from enumsol.branches.elements import CUTS, UNSETTLED, Arc, Branch, Component, Vertex
-from enumsol.roots.root_set import Polytope, RootFamily
+from enumsol.roots.root import Polytope, RootFamily
 from enumsol.roots.slip_signs import shown_status, sign_over, slip_names
 from enumsol.selections.ordered_field import FiberSelections, as_float
 from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK

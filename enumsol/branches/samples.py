@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from enumsol.branches.graph import BranchGraph
     from enumsol.checks import AlphaLike
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.roots.root_set import Root, RootSet
+    from enumsol.roots.root import Root
+    from enumsol.roots.root_set import RootSet
 
 
 @dataclass(frozen=True)

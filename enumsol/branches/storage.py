@@ -20,7 +20,7 @@ from enumsol.checks import file_path, writing
 from enumsol.condensation.exact import ExactPath
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
-from enumsol.roots.root_set import Polytope, RootFamily
+from enumsol.roots.root import Polytope, RootFamily
 from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from enumsol.checks import Alpha
     from enumsol.continuation import ContinuationOptions, Path
     from enumsol.problem import ContactProblem
-    from enumsol.roots.root_set import Root
+    from enumsol.roots.root import Root
 
 _STEPS = "Steps"
 #: Ends of a path at which nothing is left to follow.

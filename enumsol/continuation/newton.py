@@ -13,7 +13,7 @@ from enumsol.continuation.errors import NewtonIteration, NotConverged
 from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
-from enumsol.roots.root_set import Root
+from enumsol.roots.root import Root
 from enumsol.statuses import FRICTIONLESS, STATUSES, STICK
 
 if TYPE_CHECKING:

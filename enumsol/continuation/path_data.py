@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.roots.root_set import summary
+from enumsol.roots.root import summary
 from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:

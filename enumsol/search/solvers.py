@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from enumsol.checks import Alpha
     from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Recorder
+    from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rationals import ExactCertifier
-    from enumsol.search.tree import Certifier
     from enumsol.selections.rationals import ExactSelections
 
 Arithmetic = Literal["fast", "verified", "exact"]

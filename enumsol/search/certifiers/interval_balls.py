@@ -38,8 +38,13 @@ class VerifiedIntervalCertifier:
         self._enclosure = certified_enclosure(problem, exactly=path.condensed_exactly)
         self._exact = ExactIntervalCertifier(path) if path.condensed_exactly else None
         self._zero = path.zero
-        self.used_rationals = False
+        self._used_rationals = False
         self._piece: tuple[Piece, EnclosedPiece | None] | None = None
+
+    @property
+    def checkable(self) -> bool:
+        """Whether balls accepted every leaf so far."""
+        return not self._used_rationals
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
@@ -51,7 +56,7 @@ class VerifiedIntervalCertifier:
             return bool(margins[0] > _MARGIN)
         if self._exact is None:
             return False
-        self.used_rationals = True
+        self._used_rationals = True
         return self._exact.excluded(piece, system, leaf)
 
     def _enclosed(self, piece: Piece, system: IntervalSystem) -> EnclosedPiece | None:

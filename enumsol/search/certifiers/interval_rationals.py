@@ -37,6 +37,8 @@ class ExactIntervalCertifier:
     path : ExactPath
     """
 
+    checkable = False
+
     def __init__(self, path: ExactPath) -> None:
         self._path = path
         self._inverse: Any = None

@@ -8,20 +8,21 @@ from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.relaxation.rows import INEQUALITY, RowKind, imposed_rows
-from enumsol.search.certifiers.floats import Silent, solve_or_open
+from enumsol.search.certifiers.floats import solve_or_open
+from enumsol.search.certifiers.protocol import WithoutProof
 from enumsol.selections.rationals import ExactSelections
 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.tree import UndecidedPart
+    from enumsol.search.certifiers.protocol import UndecidedPart
     from enumsol.selections.polytopes import Form
     from enumsol.selections.solution import Codes, SelectionSolution
 
 _FORCE_ROWS = (RowKind.NORMAL_FORCE, RowKind.TANGENTIAL_FORCE, RowKind.CONE_PLUS, RowKind.CONE_MINUS)
 
 
-class ExactCertifier(Silent):
+class ExactCertifier(WithoutProof):
     """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, (6.1))."""
 
     def __init__(self, selections: ExactSelections, scaled: ScaledSystem) -> None:
