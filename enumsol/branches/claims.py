@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.branches.elements import UNSETTLED
+from enumsol.branches.elements import VertexKind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -123,8 +123,8 @@ class Claims:
         """
         if self.whole:
             return Multiplicity(len(arcs) + len(vertices), exact=True)
-        apart = sum(not arc.grazing for arc in arcs) + sum(v.kind != UNSETTLED for v in vertices)
-        joinable = any(arc.grazing for arc in arcs) or any(v.kind == UNSETTLED for v in vertices)
+        apart = sum(not arc.grazing for arc in arcs) + sum(v.kind is not VertexKind.UNSETTLED for v in vertices)
+        joinable = any(arc.grazing for arc in arcs) or any(v.kind is VertexKind.UNSETTLED for v in vertices)
         return Multiplicity(apart + int(joinable), exact=False)
 
     def steps(self) -> MultiplicitySteps:
@@ -142,7 +142,7 @@ class Claims:
             cover.add(place[arc.tail], place[arc.head])
         at = []
         for group, over, joined in zip(groups, apart.at(), joinable.at(), strict=True):
-            settled = sum(self.whole or v.kind != UNSETTLED for v in group)
+            settled = sum(self.whole or v.kind is not VertexKind.UNSETTLED for v in group)
             at.append(over + settled + int(joined > 0 or settled < len(group)))
         between = [n + int(m > 0) for n, m in zip(apart.between(), joinable.between(), strict=True)]
         alphas = tuple(Fraction(group[0].alpha) for group in groups)

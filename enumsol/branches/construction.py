@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Literal
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.gluing import Gluing
+from enumsol.branches.gluing import glue
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.branches.make_elements import make_arcs, make_vertices
@@ -118,7 +118,7 @@ def branch_graph(
         candidates = search.selections
     searched = time.perf_counter()
     tick = _stage(progress, "arcs")
-    gluing = Gluing(path, candidates, rational(a), rational(b), tick, cut_short=search.stopped is not None)
+    gluing = glue(path, candidates, rational(a), rational(b), tick, cut_short=search.stopped is not None)
     stats = GraphStats(
         pieces=len(search.pieces),
         nodes=search.nodes,

@@ -14,7 +14,7 @@ import numpy as np
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps
-from enumsol.branches.elements import UNSETTLED
+from enumsol.branches.elements import VertexKind
 from enumsol.branches.make_elements import make_branches, make_components, multigraph
 from enumsol.branches.roots_at import roots_of
 from enumsol.checks import alpha_value
@@ -120,18 +120,18 @@ class BranchGraph(Immutable):
         """Number of the branch of every arc, by the arc's number."""
         return MappingProxyType({arc.number: branch.number for branch in self.branches for arc in branch.arcs})
 
-    def _of_kind(self, *kinds: str) -> tuple[Vertex, ...]:
-        return tuple(v for v in self.vertices if v.kind in kinds)
+    def _of_kind(self, kind: VertexKind) -> tuple[Vertex, ...]:
+        return tuple(v for v in self.vertices if v.kind is kind)
 
     @property
     def transitions(self) -> tuple[Vertex, ...]:
         """Vertices at which one arc goes on as another on the other side."""
-        return self._of_kind("transition")
+        return self._of_kind(VertexKind.TRANSITION)
 
     @property
     def folds(self) -> tuple[Vertex, ...]:
         """Vertices at which two arcs meet on one side: alpha turns back."""
-        return self._of_kind("fold")
+        return self._of_kind(VertexKind.FOLD)
 
     @property
     def bifurcations(self) -> tuple[Vertex, ...]:
@@ -140,13 +140,14 @@ class BranchGraph(Immutable):
         return tuple(
             v
             for v in self.vertices
-            if v.kind == "bifurcation" or (v.kind == "family" and not v.border and v.number in reached)
+            if v.kind is VertexKind.BIFURCATION
+            or (v.kind is VertexKind.FAMILY and not v.border and v.number in reached)
         )
 
     @cached_property
     def families(self) -> tuple[RootFamily, ...]:
         """Continua of solutions at single alphas (vertical arcs); those of sheets are found by ``roots_at``."""
-        return tuple(v.family for v in self.vertices if v.family is not None and v.kind == "family")
+        return tuple(v.family for v in self._of_kind(VertexKind.FAMILY) if v.family is not None)
 
     @property
     def sheets(self) -> tuple[Arc, ...]:
@@ -161,7 +162,7 @@ class BranchGraph(Immutable):
         return tuple(
             v
             for v in self.vertices
-            if not v.border and v.kind != UNSETTLED and v.number in heads and v.number not in tails
+            if not v.border and v.kind is not VertexKind.UNSETTLED and v.number in heads and v.number not in tails
         )
 
     # -- solutions at one alpha ------------------------------------------------------------------------------------
@@ -350,8 +351,7 @@ class BranchGraph(Immutable):
 
     def __repr__(self) -> str:
         kinds = Counter(v.kind for v in self.vertices)
-        order = ("transition", "fold", "bifurcation", "family", "sheet", "touch", "point", UNSETTLED, "broken", "end")
-        numbers = ", ".join(f"{kinds[k]} {k}" for k in order if kinds[k])
+        numbers = ", ".join(f"{kinds[kind]} {kind}" for kind in VertexKind if kinds[kind])
         a, b = self.interval
         found = "" if self.claims.whole else ", not complete; of what was found:"
         lines = [
@@ -383,7 +383,7 @@ class BranchGraph(Immutable):
             "components": len(self.components),
             "branches": len(self.branches),
             "arcs": len(self.arcs),
-            "vertices": dict(Counter(v.kind for v in self.vertices)),
+            "vertices": dict(Counter(v.kind.value for v in self.vertices)),
             "folds": [v.alpha for v in self.folds],
             "bifurcations": [v.alpha for v in self.bifurcations],
             "jumps": [v.alpha for v in self.jumps],
@@ -406,4 +406,4 @@ def _shape(branch: Branch) -> str:
         return "sheet"
     if branch.closed:
         return "closed"
-    return "unfinished" if any(v.kind == UNSETTLED for v in branch.vertices) else "open"
+    return "unfinished" if any(v.kind is VertexKind.UNSETTLED for v in branch.vertices) else "open"

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from enumsol.branches.claims import Claims, Standing
-from enumsol.branches.elements import UNSETTLED
+from enumsol.branches.elements import VertexKind
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -100,11 +100,11 @@ class GraphData:
         Each of them proves that something is missing.
         """
         found, first = [], float(self.interval[0])
-        unsettled = sum(v.kind == UNSETTLED for v in self.vertices)
+        unsettled = sum(v.kind is VertexKind.UNSETTLED for v in self.vertices)
         if unsettled and not self.reasons:
             found.append(f"selections that were not examined hold at {unsettled} of {len(self.vertices)} vertices")
         for v in self.vertices:
-            if v.kind == UNSETTLED:
+            if v.kind is VertexKind.UNSETTLED:
                 continue
             if v.index_left is None or v.index_right is None:
                 found.append(f"vertex {v.number} at alpha = {v.alpha:.17g}: the degree of an arc is not known")

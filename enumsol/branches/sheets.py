@@ -39,7 +39,7 @@ def sheet_arcs(path: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionArcs:
     points = [CriticalAlpha.rational(end) for end in ((a, b) if a != b else (a,))]
     for poly in _critical_polynomials(path, codes):
         points += real_roots(poly, a, b)
-    events = [Event(group[0], singular=True) for group in merge(points)]
+    events = [Event(codes, group[0], singular=True) for group in merge(points)]
     patterns = []
     for event in events:
         pattern = _pattern(path, codes, exact_value(event.alpha))
