@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.branches.elements import Arc, Vertex
+    from enumsol.condensation.condensed import CondensedProblem
 
 
 class Standing(enum.Enum):
@@ -187,6 +188,23 @@ class Claims:
         if bound is not None:
             lines.append(f"without any search, a bound evaluated in floats gives one solution up to {bound:.8g}")
         return lines
+
+
+def uniqueness_bound(condensed: CondensedProblem, interval: tuple[float, float]) -> float | None:
+    """An alpha up to which uniqueness follows without any search (theory, section 5.6); None when for no alpha."""
+    a, b = interval
+    p = len(condensed.F0)
+    try:
+        inverse = np.linalg.inv(condensed.S)
+    except np.linalg.LinAlgError:  # S is singular within rounding, and the bound nearly zero
+        return None
+    product = np.linalg.eigvalsh(inverse[:p, :p])[-1] * np.linalg.eigvalsh(condensed.S[p:, p:])[-1]
+    largest = 1.0 / float(np.sqrt(product))
+    if np.any(condensed.F0 + a * condensed.F1 >= largest):
+        return None
+    rising = condensed.F1 > 0
+    reached = (largest - condensed.F0[rising]) / condensed.F1[rising]
+    return min(b, float(np.min(reached, initial=np.inf)))
 
 
 class _Cover:

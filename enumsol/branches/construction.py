@@ -27,12 +27,15 @@ from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 from enumsol.search.interval import FastIntervalCertifier, IntervalSearch
 from enumsol.search.stopping import Stop, StopReason
+from enumsol.statuses import OPEN
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.checks import AlphaLike
+    from enumsol.proof.proof_file import Proof
     from enumsol.search.interval import IntervalCertifier
+    from enumsol.selections.solution import Codes
 
 Arithmetic = Literal["fast", "verified", "exact"]
 
@@ -95,30 +98,23 @@ def branch_graph(
     _check_friction(problem, a, b)
     started = time.perf_counter()
     exactly = arithmetic == "exact" or problem.n <= FAST_EXACT_DOF
-    path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
-    deadline = None if time_limit is None else started + time_limit
-    certifier = _certifier(problem, path, arithmetic)
+    exact = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
+    certifier = _certifier(problem, exact, arithmetic)
     search = IntervalSearch(
         problem.condensed,
         (a, b),
-        path.zero,
+        exact.zero,
         certifier,
         max_nodes=max_nodes,
-        deadline=deadline,
+        deadline=None if time_limit is None else started + time_limit,
         progress=_stage(progress, "search"),
     )
-    if path.unloaded:
-        # nothing but lambda = 0 for every alpha; every selection holds there, and one of them tells it all
-        candidates = {(0,) * path.p}
-    else:
-        try:
-            search.run()
-        except KeyboardInterrupt:
-            search.stopped = Stop(StopReason.INTERRUPTED, search.nodes)
-        candidates = search.selections
+    candidates = _candidates(search, exact)
     searched = time.perf_counter()
     tick = _stage(progress, "arcs")
-    gluing = glue(path, candidates, rational(a), rational(b), tick, cut_short=search.stopped is not None)
+    gluing = glue(exact, candidates, rational(a), rational(b), tick, cut_short=search.stopped is not None)
+    stops = [stop for stop in (search.stopped, gluing.interrupted) if stop is not None]
+    arcs = make_arcs(gluing)
     stats = GraphStats(
         pieces=len(search.pieces),
         nodes=search.nodes,
@@ -126,25 +122,49 @@ def branch_graph(
         search_seconds=searched - started,
         seconds=time.perf_counter() - started,
     )
-    arcs = make_arcs(gluing)
-    stops = [stop for stop in (search.stopped, gluing.interrupted) if stop is not None]
-    vertices = make_vertices(gluing, arcs)
-    proof = None
-    if certifier.checkable and search.pieces and search.stopped is None:
-        about = "problem" if path.condensed_exactly else "condensed"
-        proof = write_graph_proof(problem, (a, b), about, search.pieces)
-    reasons, pieces = (*map(str, stops), *gluing.reasons), tuple(search.pieces)
-    data = GraphData(problem, path, (a, b), arithmetic, tuple(vertices), tuple(arcs), reasons, stats, pieces, proof)
+    data = GraphData(
+        problem=problem,
+        exact=exact,
+        interval=(a, b),
+        arithmetic=arithmetic,
+        vertices=tuple(make_vertices(gluing, arcs)),
+        arcs=tuple(arcs),
+        reasons=(*map(str, stops), *gluing.reasons),
+        stats=stats,
+        pieces=tuple(search.pieces),
+        proof=_proof(search, certifier, problem, exact),
+    )
     graph = BranchGraph(data)
     if any(stop.interrupted for stop in stops):
         raise Interrupted("branch_graph was interrupted; its arcs so far are kept", graph)
     return graph
 
 
-def _certifier(problem: ContactProblem, path: ExactPath, arithmetic: Arithmetic) -> IntervalCertifier:
+def _certifier(problem: ContactProblem, exact: ExactPath, arithmetic: Arithmetic) -> IntervalCertifier:
     if arithmetic == "exact":
-        return ExactIntervalCertifier(path)
-    return VerifiedIntervalCertifier(problem, path) if arithmetic == "verified" else FastIntervalCertifier()
+        return ExactIntervalCertifier(exact)
+    return VerifiedIntervalCertifier(problem, exact) if arithmetic == "verified" else FastIntervalCertifier()
+
+
+def _candidates(search: IntervalSearch, exact: ExactPath) -> set[Codes]:
+    """The selections that may hold somewhere; Ctrl-C keeps those that were found."""
+    if exact.unloaded:
+        # nothing but lambda = 0 solves at any alpha; every selection holds there, so that one is enough
+        return {(OPEN,) * exact.p}
+    try:
+        search.run()
+    except KeyboardInterrupt:
+        search.stopped = Stop(StopReason.INTERRUPTED, search.nodes)
+    return search.selections
+
+
+def _proof(
+    search: IntervalSearch, certifier: IntervalCertifier, problem: ContactProblem, exact: ExactPath
+) -> Proof | None:
+    if not certifier.checkable or not search.pieces or search.stopped is not None:
+        return None
+    about = "problem" if exact.condensed_exactly else "condensed"
+    return write_graph_proof(problem, search.interval, about, search.pieces)
 
 
 def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callable[[float], object] | None:

@@ -49,7 +49,7 @@ class GraphData:
     Attributes
     ----------
     problem : ContactProblem
-    path : ExactPath
+    exact : ExactPath
         The condensed problem in rationals, on which the arcs rest.
     interval : (Fraction, Fraction)
     arithmetic : str
@@ -66,7 +66,7 @@ class GraphData:
     """
 
     problem: ContactProblem
-    path: ExactPath
+    exact: ExactPath
     interval: tuple[Fraction, Fraction]
     arithmetic: str
     vertices: tuple[Vertex, ...]
@@ -75,6 +75,11 @@ class GraphData:
     stats: GraphStats
     pieces: tuple[SearchedPiece, ...] = ()
     proof: Proof | None = None
+
+    @property
+    def certified_data(self) -> str:
+        """What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed)."""
+        return "problem" if self.exact.condensed_exactly else "condensed"
 
     @property
     def complete(self) -> bool:

@@ -32,7 +32,7 @@ def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> Root
         solutions = [solver.solve(codes) for codes in _codes_at(selections, floats.F_positive)]
         exact = any(solution is None for solution in solutions)
     if exact:
-        solver = ExactSelections(data.path.system(rational(alpha)))
+        solver = ExactSelections(data.exact.system(rational(alpha)))
         solutions = [solver.solve(codes) for codes in _codes_at(selections, solver.F_positive)]
     components = connected_components(
         [solution for solution in solutions if solution is not None],

@@ -144,16 +144,16 @@ class SelectionArcs:
         return event, True
 
 
-def selection_arcs(path: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionArcs | None:
+def selection_arcs(exact: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionArcs | None:
     """Cells and events of a selection in [a, b]; None when its determinant vanishes identically.
 
     Parameters
     ----------
-    path : ExactPath
+    exact : ExactPath
     codes : status codes
     a, b : fmpq, a <= b
     """
-    functions = SelectionFunctions(path, codes)
+    functions = SelectionFunctions(exact, codes)
     if functions.singular:
         return None
     arcs = SelectionArcs(codes, functions)
@@ -204,7 +204,7 @@ def _critical_points(det: Any, required: Sequence[Condition], a: Any, b: Any) ->
     return points + [(CriticalAlpha.rational(end), -2) for end in ((a, b) if a != b else (a,))]
 
 
-def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, path: ExactPath) -> ActiveSets:
+def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, exact: ExactPath) -> ActiveSets:
     """Per node the codes that hold at the selection's solution at ``alpha``, where its determinant does not vanish.
 
     Parameters
@@ -212,7 +212,7 @@ def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, path: 
     functions : the selection's functions
     alpha : CriticalAlpha
     det_sign : sign of the determinant there
-    path : ExactPath
+    exact : ExactPath
     """
 
     def at(poly: Any) -> int:
@@ -221,7 +221,7 @@ def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, path: 
     found = []
     for i, code in enumerate(functions.codes):
         holds = {code}
-        if path.frictionless[i]:
+        if exact.frictionless[i]:
             value = at(functions.gap(i)) if code == OPEN else at(functions.normal_force(i))
             holds |= {OPEN, FRICTIONLESS} if value == 0 else set()
         elif code == OPEN:
@@ -237,7 +237,7 @@ def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, path: 
             moves = at(functions.slip(i))
             if at(functions.normal_force(i)) == 0:
                 holds |= {OPEN} | _tangential(moves)
-            elif alpha.is_rational and path.F0[i] + path.F1[i] * alpha.lo == 0:
+            elif alpha.is_rational and exact.F0[i] + exact.F1[i] * alpha.lo == 0:
                 holds |= _tangential(moves)
             elif moves == 0:
                 holds.add(STICK)

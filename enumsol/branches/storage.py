@@ -41,7 +41,7 @@ def save_graph(data: GraphData, file: str | Path) -> None:
         "format": FORMAT,
         "version": VERSION,
         "problem": _problem_record(data.problem),
-        "condensed_exactly": data.path.condensed_exactly,
+        "condensed_exactly": data.exact.condensed_exactly,
         "interval": [str(end) for end in data.interval],
         "arithmetic": data.arithmetic,
         "reasons": list(data.reasons),

@@ -202,6 +202,7 @@ class IntervalSearch:
 
     Attributes
     ----------
+    interval : (Fraction, Fraction)
     pieces : list of SearchedPiece
     nodes : int
     stopped : Stop or None
@@ -221,7 +222,7 @@ class IntervalSearch:
         progress: Callable[[float], object] | None = None,
     ) -> None:
         self._condensed, self._origin, self._leaves = condensed, origin, leaves
-        self._interval = interval
+        self.interval = interval
         self._max_nodes, self._deadline, self._progress = max_nodes, deadline, progress
         self.pieces: list[SearchedPiece] = []
         self.nodes = 0
@@ -230,7 +231,7 @@ class IntervalSearch:
 
     def run(self) -> None:
         """Search all pieces, cutting those that pay."""
-        a, b = self._interval
+        a, b = self.interval
         ends = [a, b]
         if self._origin is not None and a < self._origin < b:
             ends.insert(1, self._origin)
@@ -254,7 +255,7 @@ class IntervalSearch:
         system = self._system(piece)
         found = SearchedPiece(piece, system, roots)
         certifier = _Collector(found, self._leaves, self.selections)
-        whole = float(piece.b - piece.a) <= SMALLEST_PIECE * float(self._interval[1] - self._interval[0])
+        whole = float(piece.b - piece.a) <= SMALLEST_PIECE * float(self.interval[1] - self.interval[0])
         limit: int | None = None if whole else NODES_PER_CONTACT * (system.p + 2)
         spent, left = 0, roots
         while True:

@@ -26,16 +26,16 @@ class FiberSelections(ExactSelections):
 
     Parameters
     ----------
-    path : ExactPath
+    exact : ExactPath
     alpha : fmpq or NumberFieldElement
     push : direction that replaces g, in the perturbations that give the local degree
     """
 
-    def __init__(self, path: ExactPath, alpha: Any, push: tuple[Any, ...] | None = None) -> None:
-        g, F = path.at(alpha)
-        super().__init__(ExactSystem(path.S, g if push is None else push, F))
-        self.path, self.alpha = path, alpha
-        self.F_positive = tuple(not without for without in path.frictionless)
+    def __init__(self, exact: ExactPath, alpha: Any, push: tuple[Any, ...] | None = None) -> None:
+        g, F = exact.at(alpha)
+        super().__init__(ExactSystem(exact.S, g if push is None else push, F))
+        self.exact, self.alpha = exact, alpha
+        self.F_positive = tuple(not without for without in exact.frictionless)
 
     def _solve_reduced(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
         rows, columns = self.reduced(codes)
@@ -69,7 +69,7 @@ class FiberSelections(ExactSelections):
                 holds.add(OPEN)
             if w[i] == 0 and n >= 0:
                 bound = F * n
-                if self.path.frictionless[i]:
+                if self.exact.frictionless[i]:
                     holds |= {FRICTIONLESS} if t == 0 else set()
                 else:
                     holds |= {STICK} if w_t == 0 and -bound <= t <= bound else set()
@@ -93,7 +93,7 @@ class FiberSelections(ExactSelections):
 
     def pushed(self, direction: tuple[Any, ...]) -> FiberSelections:
         """The solver whose g is a direction."""
-        return FiberSelections(self.path, self.alpha, direction)
+        return FiberSelections(self.exact, self.alpha, direction)
 
 
 def as_float(value: Any) -> float:

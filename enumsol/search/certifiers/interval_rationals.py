@@ -34,25 +34,25 @@ class ExactIntervalCertifier:
 
     Parameters
     ----------
-    path : ExactPath
+    exact : ExactPath
     """
 
     checkable = False
 
-    def __init__(self, path: ExactPath) -> None:
-        self._path = path
+    def __init__(self, exact: ExactPath) -> None:
+        self._exact = exact
         self._inverse: Any = None
-        self._S = path.rows
+        self._S = exact.rows
         self._bounds: tuple[Piece, tuple[Any, ...], tuple[Any, ...]] | None = None
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
         if self._inverse is None:
-            self._inverse = self._path.S.inv()
+            self._inverse = self._exact.S.inv()
         lowest, highest = self._friction(piece)
         terms = []
         for row, value in zip(leaf.rows, leaf.values, strict=True):
-            kind, node = divmod(int(row), self._path.p)
+            kind, node = divmod(int(row), self._exact.p)
             mode = imposed_interval_rows(
                 leaf.codes[node], friction=highest[node] > 0, constant=lowest[node] == highest[node]
             ).get(kind)
@@ -66,7 +66,7 @@ class ExactIntervalCertifier:
     def _friction(self, piece: Piece) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """Smallest and largest coefficients on the piece."""
         if self._bounds is None or self._bounds[0] != piece:
-            ends = [self._path.at(rational(alpha))[1] for alpha in (piece.a, piece.b)]
+            ends = [self._exact.at(rational(alpha))[1] for alpha in (piece.a, piece.b)]
             self._bounds = (
                 piece,
                 tuple(min(pair) for pair in zip(*ends, strict=True)),
@@ -76,13 +76,13 @@ class ExactIntervalCertifier:
 
     def _loads(self, piece: Piece) -> list[tuple[Any, ...]]:
         """g at both ends, once where it does not vary; at an end where g vanishes its direction stands for it."""
-        path = self._path
-        origin = path.origin
+        exact = self._exact
+        origin = exact.origin
         ends: list[Fraction] = [piece.a, piece.b]
         if origin is not None and origin in [rational(end) for end in ends]:
             direction = 1 if rational(piece.b) > origin else -1
-            return [tuple(direction * v for v in path.g1)]
-        return [path.at(rational(end))[0] for end in (ends if path.loaded else ends[:1])]
+            return [tuple(direction * v for v in exact.g1)]
+        return [exact.at(rational(end))[0] for end in (ends if exact.loaded else ends[:1])]
 
     def _positive(
         self,
@@ -92,7 +92,7 @@ class ExactIntervalCertifier:
         highest: tuple[Any, ...],
     ) -> bool:
         """Whether -1/4 v' S^-1 v - sum u * constant > 0 with v = g + sum u * form."""
-        p, v, total = self._path.p, list(g), fmpq(0)
+        p, v, total = self._exact.p, list(g), fmpq(0)
         for kind, node, u in terms:
             if kind == RowKind.NORMAL_FORCE:
                 v[node] += u
