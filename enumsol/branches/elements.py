@@ -30,42 +30,28 @@ if TYPE_CHECKING:
 
 
 class VertexKind(enum.StrEnum):
-    """What a vertex is, as a text: ``vertex.kind == "fold"`` holds where ``vertex.kind is VertexKind.FOLD`` does.
+    """What a vertex is; members compare with their texts: ``vertex.kind == "fold"``."""
 
-    Attributes
-    ----------
-    TRANSITION
-        One arc from the left goes on as another to the right.
-    FOLD
-        Two arcs meet on one side: alpha turns back.
-    BIFURCATION
-        Any other number of arcs.
-    FAMILY
-        A continuum of solutions at one alpha: a vertical arc.
-    SHEET
-        The border of a sheet.
-    TOUCH
-        A status is met and left again.
-    POINT
-        No arc at all.
-    UNSETTLED
-        Selections hold here that were not examined, because the search was cut short or a limit was reached: arcs that
-        were not found may end here, so that nothing is said about its kind.
-    BROKEN
-        An arc ends for no reason: something is missing, and the graph is not complete.
-    END
-        It lies on the interval's border.
-    """
-
+    #: One arc from the left goes on as another to the right.
     TRANSITION = "transition"
+    #: Two arcs meet on one side: alpha turns back.
     FOLD = "fold"
+    #: Any other number of arcs meet.
     BIFURCATION = "bifurcation"
+    #: A continuum of solutions at one alpha: a vertical arc.
     FAMILY = "family"
+    #: The border of a sheet.
     SHEET = "sheet"
+    #: A status is met and left again.
     TOUCH = "touch"
+    #: No arc at all.
     POINT = "point"
+    #: Selections hold here that were not examined, because the search was cut short or a limit was reached: arcs that
+    #: were not found may end here, so that nothing is said about its kind.
     UNSETTLED = "unsettled"
+    #: An arc ends for no reason: something is missing, and the graph is not complete.
     BROKEN = "broken"
+    #: On the interval's border.
     END = "end"
 
     def __repr__(self) -> str:

@@ -25,6 +25,21 @@ if TYPE_CHECKING:
     from enumsol.roots.root import Polytope
 
 
+#: What networkx's graph shows of vertices and arcs.
+_NODE_ATTRIBUTES = [
+    "alpha",
+    "kind",
+    "border",
+    "statuses",
+    "active",
+    "lambda_n",
+    "lambda_t",
+    "index_left",
+    "index_right",
+]
+_EDGE_ATTRIBUTES = ["statuses", "index", "dimension", "values"]
+
+
 def make_arcs(gluing: Gluing) -> list[Arc]:
     """The arcs of a gluing."""
     exact = gluing.exact
@@ -190,31 +205,10 @@ def multigraph(vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> Any:
     """The networkx.MultiGraph, frozen: vertices by number, arcs as edges keyed by their number."""
     graph = nx.MultiGraph()
     for v in vertices:
-        graph.add_node(
-            v.number,
-            alpha=v.alpha,
-            kind=v.kind,
-            border=v.border,
-            statuses=v.statuses,
-            active=v.active,
-            lambda_n=v.lambda_n,
-            lambda_t=v.lambda_t,
-            index_left=v.index_left,
-            index_right=v.index_right,
-            vertex=v,
-        )
+        graph.add_node(v.number, **{name: getattr(v, name) for name in _NODE_ATTRIBUTES}, vertex=v)
     for arc in arcs:
-        graph.add_edge(
-            arc.tail,
-            arc.head,
-            key=arc.number,
-            statuses=arc.statuses,
-            alpha=(arc.lo, arc.hi),
-            index=arc.index,
-            dimension=arc.dimension,
-            values=arc.values,
-            arc=arc,
-        )
+        shown = {name: getattr(arc, name) for name in _EDGE_ATTRIBUTES}
+        graph.add_edge(arc.tail, arc.head, key=arc.number, alpha=arc.interval, **shown, arc=arc)
     return nx.freeze(graph)
 
 

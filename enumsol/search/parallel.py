@@ -26,20 +26,6 @@ LEVELS = 7
 
 
 @dataclass(frozen=True)
-class _Task:
-    """A subtree for a worker; everything in it can be pickled."""
-
-    problem: ContactProblem
-    alpha: Alpha
-    arithmetic: Arithmetic
-    tolerance: float
-    engine: str | None
-    codes: Codes
-    max_nodes: int | None
-    seconds: float | None
-
-
-@dataclass(frozen=True)
 class _Answer:
     outcome: SearchOutcome
     records: list[Any]
@@ -59,9 +45,15 @@ def run_parallel(
         A worker died. The outcome holds the subtrees that were finished by then; the others are undecided in it and in
         its proof.
     """
-    plan = _Plan(executor, solvers, search.limits, engine, tolerance)
+    limits = search.limits
+
+    def hand_out(codes: Codes) -> Future[_Answer]:
+        given = (solvers.problem, solvers.alpha, solvers.arithmetic, tolerance, engine, limits.max_nodes)
+        return submit(executor, _subtree, codes, *given, limits.remaining())
+
+    plan = _Plan(hand_out)
     try:
-        _hand_out(plan, search)
+        _examine_top(plan, search)
         _collect(plan, search)
     finally:
         for handed in plan.handed:
@@ -71,7 +63,7 @@ def run_parallel(
         raise plan.lost
 
 
-def _hand_out(plan: _Plan, search: TreeSearch) -> None:
+def _examine_top(plan: _Plan, search: TreeSearch) -> None:
     """Examine the top of the tree, whose records go to the plan, and hand out what lies below."""
     certifier = search.certifier
     recorder, certifier.recorder = certifier.recorder, plan
@@ -100,23 +92,11 @@ class _Handed:
 class _Plan:
     """Records written while the top of the tree is examined, with places left for the subtrees handed out."""
 
-    def __init__(
-        self, executor: Executor, solvers: Solvers, limits: SearchLimits, engine: str | None, tolerance: float
-    ) -> None:
+    def __init__(self, hand_out: Callable[[Codes], Future[_Answer]]) -> None:
         self.items: list[Any] = []
         self.handed: list[_Handed] = []
         self.lost: WorkerLost | None = None
-        self._executor = executor
-        self._make: Callable[[Codes], _Task] = lambda codes: _Task(
-            solvers.problem,
-            solvers.alpha,
-            solvers.arithmetic,
-            tolerance,
-            engine,
-            codes,
-            limits.max_nodes,
-            limits.remaining(),
-        )
+        self._hand_out = hand_out
 
     def write(self, record: Any) -> None:
         """Keep a record of the top of the tree."""
@@ -127,7 +107,7 @@ class _Plan:
         future = None
         if self.lost is None:
             try:
-                future = submit(self._executor, _subtree, self._make(codes))
+                future = self._hand_out(codes)
             except WorkerLost as loss:
                 self.lost = loss
         self.handed.append(_Handed(future, codes))
@@ -144,12 +124,22 @@ class _Records:
         self.records.append(record)
 
 
-def _subtree(task: _Task) -> _Answer:
-    solvers = Solvers(task.problem, task.alpha, task.arithmetic, task.tolerance)
+def _subtree(
+    codes: Codes,
+    problem: ContactProblem,
+    alpha: Alpha,
+    arithmetic: Arithmetic,
+    tolerance: float,
+    engine: str | None,
+    max_nodes: int | None,
+    seconds: float | None,
+) -> _Answer:
+    """Search below a partial assignment, in a worker; everything here can be pickled."""
+    solvers = Solvers(problem, alpha, arithmetic, tolerance)
     records = _Records()
     certifier = solvers.certifier(records)
-    limits = SearchLimits(max_nodes=task.max_nodes, deadline=SearchLimits.deadline_in(task.seconds))
-    outcome = TreeSearch(solvers.scaled, certifier, engine=task.engine, limits=limits).run([task.codes])
+    limits = SearchLimits(max_nodes=max_nodes, deadline=SearchLimits.deadline_in(seconds))
+    outcome = TreeSearch(solvers.scaled, certifier, engine=engine, limits=limits).run([codes])
     return _Answer(outcome, records.records, certifier.certified)
 
 
