@@ -26,18 +26,8 @@ if TYPE_CHECKING:
 
 
 #: What networkx's graph shows of vertices and arcs.
-_NODE_ATTRIBUTES = [
-    "alpha",
-    "kind",
-    "border",
-    "statuses",
-    "active",
-    "lambda_n",
-    "lambda_t",
-    "index_left",
-    "index_right",
-]
-_EDGE_ATTRIBUTES = ["statuses", "index", "dimension", "values"]
+_NODE_DATA = ("alpha", "kind", "border", "statuses", "active", "lambda_n", "lambda_t", "index_left", "index_right")
+_EDGE_DATA = ("statuses", "index", "dimension", "values")
 
 
 def make_arcs(gluing: Gluing) -> list[Arc]:
@@ -205,9 +195,9 @@ def multigraph(vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> Any:
     """The networkx.MultiGraph, frozen: vertices by number, arcs as edges keyed by their number."""
     graph = nx.MultiGraph()
     for v in vertices:
-        graph.add_node(v.number, **{name: getattr(v, name) for name in _NODE_ATTRIBUTES}, vertex=v)
+        graph.add_node(v.number, **{name: getattr(v, name) for name in _NODE_DATA}, vertex=v)
     for arc in arcs:
-        shown = {name: getattr(arc, name) for name in _EDGE_ATTRIBUTES}
+        shown = {name: getattr(arc, name) for name in _EDGE_DATA}
         graph.add_edge(arc.tail, arc.head, key=arc.number, alpha=arc.interval, **shown, arc=arc)
     return nx.freeze(graph)
 

@@ -230,7 +230,7 @@ class IntervalSearch:
         self.selections: set[Codes] = set()
 
     def run(self) -> None:
-        """Search all pieces, cutting those that pay."""
+        """Search all pieces, cutting those whose trees grow too large."""
         a, b = self.interval
         ends = [a, b]
         if self._origin is not None and a < self._origin < b:

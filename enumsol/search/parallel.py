@@ -146,7 +146,7 @@ def _subtree(
 def _collect(plan: _Plan, search: TreeSearch) -> None:
     """Wait for the subtrees in the tree's order, until enough is found or a worker lost; put their records in place."""
     limits, outcome, total, done = search.limits, search.outcome, len(plan.handed), 0
-    #: When the waiting is over: the subtrees that are taken all the same, because they are finished.
+    # once enough is found or a worker lost: the subtrees that are finished, which still count
     finished: set[Future[_Answer]] | None = None
     if plan.lost is not None:
         finished = _finished(plan.handed, plan.lost, outcome)
