@@ -13,6 +13,7 @@ import scipy.sparse as sp
 
 from enumsol.array_checks import real_array, real_matrix
 from enumsol.checks import alpha_value, exact_number, shown
+from enumsol.condensation.affine import exactly_at
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.sealed import Immutable, SealedMatrix, sealed
 
@@ -177,12 +178,7 @@ class ContactProblem(Immutable):
         value = float(a)
         # rounded once from the exact value, so that zero and its sign are decided exactly
         try:
-            F = np.array(
-                [
-                    float(Fraction(x) + a * Fraction(y))
-                    for x, y in zip(*map(np.ndarray.tolist, self.friction), strict=True)
-                ]
-            )
+            F = np.array([float(x) for x in exactly_at(a, *self.friction)])
         except OverflowError:
             F = np.array([np.inf])
         if np.any(F < 0):
@@ -203,8 +199,7 @@ class ContactProblem(Immutable):
             return False
         if self.load_slope is None:
             return not np.any(self.f)
-        pairs = zip(self.f.tolist(), self.load_slope.tolist(), strict=True)
-        return all(Fraction(x) + a * Fraction(y) == 0 for x, y in pairs)
+        return not any(exactly_at(a, self.f, self.load_slope))
 
     @cached_property
     def fingerprint(self) -> str:

@@ -20,6 +20,7 @@ from enumsol.checks import (
     optional_count,
     optional_seconds,
 )
+from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactPath
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
@@ -173,9 +174,9 @@ def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callab
 
 def _check_friction(problem: ContactProblem, a: Fraction, b: Fraction) -> None:
     """Refuse negative and huge friction inside the interval; F is affine, so that both ends tell."""
-    for node, F0, F1 in zip(problem.node_ids, *(part.tolist() for part in problem.friction), strict=True):
-        for end in (a, b):
-            value = Fraction(F0) + end * Fraction(F1)
+    values = [exactly_at(end, *problem.friction) for end in (a, b)]
+    for node, *pair, F0, F1 in zip(problem.node_ids, *values, *problem.friction, strict=True):
+        for end, value in zip((a, b), pair, strict=True):
             if value < 0:
                 zero = -Fraction(F0) / Fraction(F1) if F1 else end
                 raise InvalidArgumentError(

@@ -16,9 +16,10 @@ from flint import fmpq, fmpz, fmpz_poly
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.branches.elements import Arc, Vertex, VertexKind
 from enumsol.branches.graph_data import GraphData, GraphStats
-from enumsol.checks import file_path, writing
+from enumsol.checks import file_path
 from enumsol.condensation.exact import ExactPath
 from enumsol.errors import InvalidArgumentError
+from enumsol.files import writing
 from enumsol.problem import ContactProblem
 from enumsol.roots.root import Polytope, RootFamily
 from enumsol.statuses import ContactStatus

@@ -34,6 +34,7 @@ from typing import TYPE_CHECKING
 
 from enumsol.checks import file_path, instance_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.files import writing
 from enumsol.io import fclib, matrix_market, npz
 from enumsol.problem import ContactProblem
 
@@ -89,7 +90,9 @@ def write_problem(problem: ContactProblem, path: str | os.PathLike[str]) -> None
     Raises
     ------
     InvalidArgumentError
-        The path cannot be written or its suffix is not known.
+        There can be no such file, or its suffix is not known.
+    OutputError
+        There is no room for it.
     InvalidProblemError
         The format cannot hold the problem: mixed node labels; friction or load that depend on alpha (fclib).
     MissingDependencyError
@@ -97,13 +100,11 @@ def write_problem(problem: ContactProblem, path: str | os.PathLike[str]) -> None
     """
     instance_of(problem, ContactProblem, "problem")
     place = file_path(path, "path", _A_PLACE)
-    try:
-        _write(problem, place)
-    except InvalidProblemError as error:
-        raise InvalidProblemError(f"{place}: {error}") from error
-    except OSError as error:
-        reason = error.strerror or error
-        raise InvalidArgumentError(f"{place}: it cannot be written ({reason}); expected a writable place") from error
+    with writing(place, "path"):
+        try:
+            _write(problem, place)
+        except InvalidProblemError as error:
+            raise InvalidProblemError(f"{place}: {error}") from error
 
 
 def _read(place: Path) -> ContactProblem:

@@ -47,8 +47,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 import numpy as np
 
-from enumsol.checks import file_path, writing
+from enumsol.checks import file_path
 from enumsol.errors import EnumsolError, InvalidArgumentError
+from enumsol.files import writing
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

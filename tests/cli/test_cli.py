@@ -290,7 +290,10 @@ def test_bad_problems_get_one_sentence(capsys, tmp_path, case):
         ),
         (("roots", __file__, "--alpha", "5"), "its name ends in '.py'; expected a .npz file"),
         (("gallery", "write", "chain-2", "p.txt"), "p.txt: its name ends in '.txt'; expected a .npz file"),
-        (("gallery", "write", "chain-2", "/no/where.npz"), "it cannot be written (No such file or directory)"),
+        (
+            ("gallery", "write", "chain-2", "/no/where.npz"),
+            "/no/where.npz cannot be written (No such file or directory)",
+        ),
         (("gallery", "write", "chain-2", "p.h5"), "friction or load depends on alpha, which fclib cannot hold"),
         (("roots", "gallery:chain-2", "--alpha", "5", "--json", "/no/where"), "--json is /no/where, which cannot be"),
         (("roots", "gallery:chain-2", "--alpha", "5", "--csv", "/tmp"), "--csv is /tmp, a directory; expected"),
