@@ -41,6 +41,14 @@ class Enclosure(Sealed):
         Lower and upper bounds [force].
     u_n, u_t : (p, 2) arrays
         Lower and upper bounds of u_n = Bn u - gap and u_t = Bt u - slip_offset [length].
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> root = enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), alpha=5)[1]  # lambda_n = 1 / 3
+    >>> low, high = root.enclosure.lambda_n[0]
+    >>> bool(low < 1 / 3 < high < low + 1e-12)
+    True
     """
 
     lambda_n: NDArray[np.float64]
@@ -76,6 +84,15 @@ class Root(Sealed):
     margin : float
         Distance to the next change of status, the least slack of the conditions that hold [-]: forces measured by
         their largest possible values at a solution, displacements likewise. 0 at a degenerate root.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), alpha=5)
+    >>> roots[2]
+    Root at alpha = 5: index +1, regular, margin 2.70e-01
+    node status      lambda_n     lambda_t          u_n          u_t
+       0 stick            1.5           -4            0            0
     """
 
     alpha: Alpha
@@ -173,6 +190,14 @@ class Polytope(Sealed):
     vertices : (k, p, 2) array
         (lambda_n, lambda_t) at every vertex [force].
     dimension : int
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(f=(1, -2)), alpha=2)
+    >>> segment = roots.families[0].polytopes[0]
+    >>> segment.dimension, segment.vertices.tolist()
+    (1, [[[0.0, 0.0]], [[1.0, -2.0]]])
     """
 
     statuses: tuple[ContactStatus, ...]
@@ -193,6 +218,13 @@ class RootFamily:
         Local degree of the whole family; None when it could not be found within the limits.
     vertices_proven : bool
         The lists of vertices were found in rational arithmetic.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> family = enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(f=(1, -2)), alpha=2).families[0]
+    >>> len(family.polytopes), family.index
+    (1, 1)
     """
 
     alpha: Alpha
@@ -223,6 +255,13 @@ class Undecided:
         What could not be decided.
     hint : str
         What may help.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.two_node_square(), alpha=3.5, max_nodes=2)
+    >>> roots.undecided[0].reason
+    'the search was stopped before it came here'
     """
 
     statuses: tuple[ContactStatus | str | None, ...]
@@ -250,6 +289,13 @@ class SearchStats:
         In verified arithmetic: how many decisions needed which arithmetic.
     presolved : int
         Contact nodes proven open or in contact before the search began to branch on alternatives.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> stats = enumsol.enumerate_roots(enumsol.gallery.two_node_square(), alpha=3.5).stats
+    >>> stats.nodes >= stats.pruned + stats.selections > 0
+    True
     """
 
     nodes: int = 0
@@ -283,6 +329,13 @@ class RootSet(Sequence[Root], Immutable):
         What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed).
     proof : Proof or None
         In verified arithmetic: the proof that ``enumsol.verify`` checks; None when the search was interrupted.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.two_node_square(), alpha=3.5)
+    >>> len(roots), roots.index_sum, roots.complete
+    (5, 1, True)
     """
 
     def __init__(
