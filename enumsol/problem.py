@@ -72,6 +72,17 @@ class ContactProblem(Immutable):
     ------
     InvalidProblemError
         The data cannot be used; the message names the argument, what was found and what was expected.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> A, Bn, Bt, f = [[2, -1], [-1, 2]], [[1, 0]], [[0, 1]], [1.5, -4]
+    >>> enumsol.ContactProblem(A, Bn, Bt, f, friction=(0.5, 1))
+    ContactProblem with 1 contact node
+      degrees of freedom  2  (A: 4 nonzeros)
+      friction            F0 + alpha F1,  F0 in 0.5, F1 in 1
+      load                constant,  max |f| = 4
+      gap                 0
     """
 
     def __init__(

@@ -90,6 +90,14 @@ def branch_graph(
     Interrupted
         On Ctrl-C during the search, or while arcs are worked out; ``partial`` is the graph of what was found so far,
         which is not complete.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> enumsol.branch_graph(enumsol.gallery.one_node_triangle(), (0, 10))
+    BranchGraph for alpha in [0, 10] (verified)
+    ...
+    complete: yes (proven)
     """
     instance_of(problem, ContactProblem, "problem")
     a, b = (Fraction(end) for end in alpha_interval(interval))

@@ -64,6 +64,13 @@ class BranchGraph(Immutable):
     proof : Proof or None
         In verified arithmetic: the search's leaves for ``enumsol.verify`` (None after ``load``, for a search that was
         cut short, and where rationals had to decide about leaves).
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> graph = enumsol.branch_graph(enumsol.gallery.two_node_square(), (0, 10))
+    >>> graph.uniqueness_limit, graph.multiplicity_at(3.5), len(graph.folds)
+    (3.0, 5, 3)
     """
 
     def __init__(self, data: GraphData) -> None:

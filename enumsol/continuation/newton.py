@@ -70,6 +70,13 @@ def newton(
         With the history of the iterations, and advice.
     InvalidArgumentError
         An argument cannot be used as given.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> [enumsol.newton(problem, 5, start=start).statuses for start in (None, (1.0, -1.5))]
+    [(ContactStatus.OPEN,), (ContactStatus.STICK,)]
     """
     instance_of(problem, ContactProblem, "problem")
     exact = alpha_value(alpha)

@@ -65,6 +65,15 @@ def read_problem(path: str | os.PathLike[str]) -> ContactProblem:
         closest name is given), or its data are no contact problem. The message begins with the path.
     MissingDependencyError
         An fclib file, and h5py is not installed.
+
+    Examples
+    --------
+    >>> import enumsol, tempfile
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     enumsol.write_problem(problem, f"{folder}/triangle.npz")
+    ...     enumsol.read_problem(f"{folder}/triangle.npz").fingerprint == problem.fingerprint
+    True
     """
     place = file_path(path, "path", _A_PLACE)
     try:
@@ -97,6 +106,14 @@ def write_problem(problem: ContactProblem, path: str | os.PathLike[str]) -> None
         The format cannot hold the problem: mixed node labels; friction or load that depend on alpha (fclib).
     MissingDependencyError
         An fclib file, and h5py is not installed.
+
+    Examples
+    --------
+    >>> import enumsol, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:  # MatrixMarket files
+    ...     enumsol.write_problem(enumsol.gallery.one_node_triangle(), folder)
+    ...     sorted(file.name for file in pathlib.Path(folder).glob("*.mtx"))
+    ['A.mtx', 'Bn.mtx', ..., 'slip_offset.mtx']
     """
     instance_of(problem, ContactProblem, "problem")
     place = file_path(path, "path", _A_PLACE)

@@ -187,6 +187,17 @@ class Proof:
     ----------
     source : path or bytes
         A proof file or its content.
+
+    Examples
+    --------
+    >>> import enumsol, tempfile
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> proof = enumsol.enumerate_roots(problem, alpha=5).proof
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     proof.save(f"{folder}/roots.proof")
+    ...     again = enumsol.Proof.load(f"{folder}/roots.proof")
+    ...     enumsol.verify(problem, again).complete
+    True
     """
 
     def __init__(self, source: str | Path | bytes) -> None:

@@ -112,6 +112,18 @@ def enumerate_roots(
         A worker of the executor died; ``partial`` holds what was found.
     OutputError
         The proof could not be written to the end, for want of space; ``partial`` holds the result without a proof.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), alpha=5)
+    RootSet at alpha = 5: 3 roots (verified, tree)
+           index regular    margin max lambda_n  contact
+         0    +1     yes  2.04e-01            0  open
+         1    -1     yes  6.24e-01      0.33333  slip-
+         2    +1     yes  2.70e-01          1.5  stick
+    index sum: +1
+    complete: yes (proven)
     """
     instance_of(problem, ContactProblem, "problem")
     value = alpha_value(alpha)

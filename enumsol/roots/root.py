@@ -37,6 +37,14 @@ class Enclosure(Sealed):
         Lower and upper bounds [force].
     u_n, u_t : (p, 2) arrays
         Lower and upper bounds of u_n = Bn u - gap and u_t = Bt u - slip_offset [length].
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> root = enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), alpha=5)[1]  # lambda_n = 1 / 3
+    >>> low, high = root.enclosure.lambda_n[0]
+    >>> bool(low < 1 / 3 < high < low + 1e-12)
+    True
     """
 
     lambda_n: NDArray[np.float64]
@@ -93,6 +101,15 @@ class Root(ContactState):
     margin : float
         Distance to the next change of status, the least slack of the conditions that hold [-]: forces measured by
         their largest possible values at a solution, displacements likewise. 0 at a degenerate root.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), alpha=5)
+    >>> roots[2]
+    Root at alpha = 5: index +1, regular, margin 2.70e-01
+    node status      lambda_n     lambda_t          u_n          u_t
+       0 stick            1.5           -4            0            0
     """
 
     index: int | None
@@ -183,6 +200,14 @@ class Polytope(Sealed):
     vertices : (k, p, 2) array
         (lambda_n, lambda_t) at every vertex [force].
     dimension : int
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(f=(1, -2)), alpha=2)
+    >>> segment = roots.families[0].polytopes[0]
+    >>> segment.dimension, segment.vertices.tolist()
+    (1, [[[0.0, 0.0]], [[1.0, -2.0]]])
     """
 
     statuses: tuple[ContactStatus, ...]
@@ -203,6 +228,13 @@ class RootFamily:
         Local degree of the whole family; None when it could not be found within the limits.
     vertices_proven : bool
         The lists of vertices were found in rational arithmetic.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> family = enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(f=(1, -2)), alpha=2).families[0]
+    >>> len(family.polytopes), family.index
+    (1, 1)
     """
 
     alpha: Alpha

@@ -36,6 +36,13 @@ class Undecided:
         What could not be decided.
     hint : str
         What may help.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.two_node_square(), alpha=3.5, max_nodes=2)
+    >>> roots.undecided[0].reason
+    'the search was stopped before it came here'
     """
 
     statuses: tuple[ContactStatus | str | None, ...]
@@ -63,6 +70,13 @@ class SearchStats:
         In verified arithmetic: how many decisions needed which arithmetic.
     presolved : int
         Contact nodes proven open or in contact before the search began to branch on alternatives.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> stats = enumsol.enumerate_roots(enumsol.gallery.two_node_square(), alpha=3.5).stats
+    >>> stats.nodes >= stats.pruned + stats.selections > 0
+    True
     """
 
     nodes: int = 0
@@ -96,6 +110,13 @@ class RootSet(Sequence[Root], Immutable):
         What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed).
     proof : Proof or None
         In verified arithmetic: the proof that ``enumsol.verify`` checks; None when the search was interrupted.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.two_node_square(), alpha=3.5)
+    >>> len(roots), roots.index_sum, roots.complete
+    (5, 1, True)
     """
 
     def __init__(

@@ -50,6 +50,14 @@ class SearchProgress:
         Selections found so far that hold a root.
     seconds : float
         Wall time so far.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> seen = []
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.chain(4), alpha=5, progress=seen.append)
+    >>> 0 < seen[-1].covered <= 1
+    True
     """
 
     nodes: int

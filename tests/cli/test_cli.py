@@ -392,7 +392,14 @@ def wait_for_children(process, number, seconds=60.0):
     assert len(children.read_text().split()) >= number
 
 
-@pytest.mark.parametrize("options", [("--arithmetic", "fast"), ("--arithmetic", "verified"), ("--jobs", "2")])
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--arithmetic", "fast"),
+        pytest.param(("--arithmetic", "verified"), marks=pytest.mark.slow),
+        pytest.param(("--jobs", "2"), marks=pytest.mark.slow),
+    ],
+)
 def test_ctrl_c_prints_what_was_found(tmp_path, options):
     # 3^12 roots take minutes
     file, result = tmp_path / "chain.npz", tmp_path / "result.json"

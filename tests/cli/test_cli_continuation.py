@@ -160,6 +160,7 @@ def test_follow_plots(capsys, tmp_path, graph):
         file.unlink()
 
 
+@pytest.mark.slow
 def test_ctrl_c_prints_the_paths_so_far(tmp_path):
     result = tmp_path / "points.csv"
     # a second or more a path

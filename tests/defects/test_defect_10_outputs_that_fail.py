@@ -75,7 +75,7 @@ PRINTING = {
 
 #: Runs each command in a process of its own, which begins with the libraries loaded and ends as any process does.
 DRIVER = """
-import contextlib, io, json, os, sys
+import contextlib, gc, io, json, os, sys
 import enumsol, pandas
 from enumsol.cli import main
 
@@ -84,6 +84,7 @@ with contextlib.redirect_stdout(io.StringIO()):
     main(["--help"])
     main(["roots", "gallery:one-node-6.1", "--alpha", "5"])
 where, commands = sys.argv[1], json.loads(sys.argv[2])
+gc.freeze()  # or every process would touch, and so copy, all objects when it ends
 for name, arguments in commands.items():
     reading, writing = os.pipe()
     child = os.fork()
