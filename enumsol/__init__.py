@@ -68,7 +68,8 @@ if TYPE_CHECKING:
     from enumsol.problem3d import BodyMesh, ContactProblem3D, SlipMean
     from enumsol.proof.proof_file import Proof, ProofFormatError
     from enumsol.roots.enumerate import enumerate_roots
-    from enumsol.roots.root_set import Enclosure, Polytope, Root, RootFamily, RootSet, SearchStats, Undecided
+    from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
+    from enumsol.roots.root_set import RootSet, SearchStats, Undecided
     from enumsol.search.tree import SearchProgress
     from enumsol.statuses import ContactStatus, sign_array
 
@@ -119,7 +120,8 @@ _HOMES = {
     "enumsol.friction": ("FrictionTable",),
     "enumsol.problem": ("ContactProblem",),
     "enumsol.problem3d": ("BodyMesh", "ContactProblem3D", "SlipMean"),
-    "enumsol.roots.root_set": ("Enclosure", "Polytope", "Root", "RootFamily", "RootSet", "SearchStats", "Undecided"),
+    "enumsol.roots.root": ("Enclosure", "Polytope", "Root", "RootFamily"),
+    "enumsol.roots.root_set": ("RootSet", "SearchStats", "Undecided"),
     "enumsol.equation": ("PiecewiseSmoothEquation",),
     "enumsol.statuses": ("ContactStatus", "sign_array"),
 }

@@ -12,13 +12,11 @@ Every refusal is one sentence: which argument, what was found, what was expected
 
 from __future__ import annotations
 
-import errno
 import math
 import numbers
 import operator
 import os
 import re
-from contextlib import contextmanager
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -27,10 +25,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from enumsol.errors import InvalidArgumentError, OutputError
+from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Collection
 
     from numpy.typing import NDArray
 
@@ -400,29 +398,3 @@ def file_path(value: Any, name: str, expected: str = "the name of a file") -> Pa
     if unusable:
         raise InvalidArgumentError(f"{name} is {shown(text)}, with a character that no name has; expected {expected}")
     return Path(text)
-
-
-#: What the operating system says when a file can be opened and not be written to.
-_NO_ROOM = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EPIPE))
-
-
-@contextmanager
-def writing(place: Path, name: str) -> Iterator[None]:
-    """Turn what the operating system says against writing a file into an error of ours.
-
-    Raises
-    ------
-    OutputError
-        There is no room for it, or the device failed.
-    InvalidArgumentError
-        There can be no such file.
-    """
-    try:
-        yield
-    except OSError as error:
-        reason = error.strerror or error
-        if error.errno in _NO_ROOM:
-            raise OutputError(f"{name} {place} cannot be written ({reason}); expected a place with room") from error
-        raise InvalidArgumentError(
-            f"{name} {place} cannot be written ({reason}); expected a path for a new file"
-        ) from error

@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from enumsol.array_checks import real_array, real_matrix
 from enumsol.checks import alpha_value, shown
+from enumsol.condensation.affine import exactly_at
 from enumsol.errors import InvalidProblemError
 from enumsol.sealed import Immutable, SealedMatrix, sealed
 
@@ -116,8 +117,7 @@ class ContactBody(Immutable):
             return False
         if self.load_slope is None:
             return not np.any(self.f)
-        pairs = zip(self.f.tolist(), self.load_slope.tolist(), strict=True)
-        return all(Fraction(x) + a * Fraction(y) == 0 for x, y in pairs)
+        return not any(exactly_at(a, self.f, self.load_slope))
 
     def load_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
         """Load f(alpha) = f + alpha load_slope, shape (n,) [force].

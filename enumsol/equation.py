@@ -36,6 +36,18 @@ class PiecewiseSmoothEquation:
     ------
     InvalidArgumentError
         r is not a positive finite number.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> equation = enumsol.PiecewiseSmoothEquation(problem)
+    >>> root = enumsol.newton(problem, 5)
+    >>> x = [*root.u, *root.lambda_n, *root.lambda_t]
+    >>> bool(abs(equation.residual(x, 5)).max() < 1e-12)
+    True
+    >>> equation.signs(x, 5).tolist()  # open
+    [[-1, -1, -1]]
     """
 
     problem: ContactProblem

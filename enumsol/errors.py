@@ -6,7 +6,17 @@ from typing import Any
 
 
 class EnumsolError(Exception):
-    """Base class of all errors that enumsol raises on purpose."""
+    """Base class of all errors that enumsol raises on purpose.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> try:
+    ...     enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), -1)
+    ... except enumsol.EnumsolError as error:
+    ...     print(type(error).__name__, "--", error)
+    InvalidArgumentError -- friction at alpha = -1 is -1 at contact node 0; expected F >= 0
+    """
 
 
 class InvalidProblemError(EnumsolError, ValueError):
@@ -22,7 +32,19 @@ class TooLargeError(EnumsolError, ValueError):
 
 
 class IncompleteGraphError(EnumsolError, ValueError):
-    """A branch graph with gaps was asked for what only a graph without gaps can tell."""
+    """A branch graph with gaps was asked for what only a graph without gaps can tell.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> graph = enumsol.branch_graph(enumsol.gallery.two_node_square(), (0, 10), max_nodes=1)
+    >>> graph.multiplicity_at(5)
+    Traceback (most recent call last):
+        ...
+    enumsol.errors.IncompleteGraphError: ...
+    >>> graph.at_least(5)
+    0
+    """
 
 
 class MissingDependencyError(EnumsolError, ImportError):

@@ -59,6 +59,13 @@ def one_node_triangle(f: Pair = (1.5, -4.0), lame: Pair = (1.0, 1.0)) -> Contact
     ------
     InvalidArgumentError
         An argument is not two admissible numbers.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle(f=(1.5, -4))
+    >>> [len(enumsol.enumerate_roots(problem, alpha)) for alpha in (1, 5)]
+    [1, 3]
     """
     return ContactProblem(
         _one_node_stiffness(lame), [[1.0, 0.0]], [[0.0, 1.0]], vector_2d(f, "f"), coordinates=[[0.0, 0.0]]
@@ -103,6 +110,12 @@ def two_node_square(
     ------
     InvalidArgumentError
         An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> len(enumsol.enumerate_roots(enumsol.gallery.two_node_square((1, -4), (1.5, -3.5)), alpha=5))
+    5
     """
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
     K = np.zeros((8, 8))
@@ -170,6 +183,13 @@ def clamped_block(
     ------
     InvalidArgumentError
         An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.clamped_block(8, 4)
+    >>> problem.p, len(enumsol.enumerate_roots(problem, alpha=3))
+    (8, 1)
     """
     mesh = fem.rectangle(nx, ny, length, height)
     cells = len(mesh.bottom) - 1
@@ -242,6 +262,13 @@ def wedge(
     ------
     InvalidArgumentError
         An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.wedge(4, 4)
+    >>> problem.p, len(enumsol.enumerate_roots(problem, alpha=1))
+    (8, 3)
     """
     angle = math.radians(positive_number(half_angle, "half_angle"))
     if angle > math.radians(80.0):
@@ -288,6 +315,12 @@ def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.
     ------
     InvalidArgumentError
         An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> len(enumsol.enumerate_roots(enumsol.gallery.chain(3), alpha=5)) == 3**3
+    True
     """
     count = positive_integer(p, "p", most=_MOST_TRIANGLES)
     spring = nonnegative_number(coupling, "coupling")
@@ -338,6 +371,13 @@ def get(name: str) -> GalleryEntry:
     ------
     InvalidArgumentError
         There is none; the message lists the names most like it, or all.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> entry = enumsol.gallery.get("wedge-8-5")
+    >>> entry.roots == len(enumsol.enumerate_roots(entry.build(), entry.alpha))
+    True
     """
     if not isinstance(name, str):
         raise InvalidArgumentError(f"name is {shown(name)}; expected a name of the gallery, such as one-node-6.1")
@@ -349,7 +389,14 @@ def get(name: str) -> GalleryEntry:
 
 
 def close_names(name: str) -> list[str]:
-    """Up to five names of `GALLERY` that are like this one, the most alike first; its own alone if it is one."""
+    """Up to five names of `GALLERY` that are like this one, the most alike first; its own alone if it is one.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> "wedge-8-5" in enumsol.gallery.close_names("wedge8-5")
+    True
+    """
     if name.lower() in GALLERY:
         return [name.lower()]
     return difflib.get_close_matches(name.lower(), GALLERY, n=5, cutoff=0.5)

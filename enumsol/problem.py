@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.checks import alpha_value, exact_number, shown
+from enumsol.condensation.affine import exactly_at
 from enumsol.contact_body import ContactBody, span, vector
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 
@@ -63,6 +64,17 @@ class ContactProblem(ContactBody):
     ------
     InvalidProblemError
         The data cannot be used; the message names the argument, what was found and what was expected.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> A, Bn, Bt, f = [[2, -1], [-1, 2]], [[1, 0]], [[0, 1]], [1.5, -4]
+    >>> enumsol.ContactProblem(A, Bn, Bt, f, friction=(0.5, 1))
+    ContactProblem with 1 contact node
+      degrees of freedom  2  (A: 4 nonzeros)
+      friction            F0 + alpha F1,  F0 in 0.5, F1 in 1
+      load                constant,  max |f| = 4
+      gap                 0
     """
 
     def __init__(
@@ -121,12 +133,7 @@ class ContactProblem(ContactBody):
         value = float(a)
         # rounded once from the exact value, so that zero and its sign are decided exactly
         try:
-            F = np.array(
-                [
-                    float(Fraction(x) + a * Fraction(y))
-                    for x, y in zip(*map(np.ndarray.tolist, self.friction), strict=True)
-                ]
-            )
+            F = np.array([float(x) for x in exactly_at(a, *self.friction)])
         except OverflowError:
             F = np.array([np.inf])
         if np.any(F < 0):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from enumsol.array_checks import real_array
 from enumsol.checks import alpha_value, instance_of
+from enumsol.condensation.affine import exactly_at
 from enumsol.contact_body import ContactBody, span, vector
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.friction import ConstantFriction, friction_law, friction_pair
@@ -205,9 +207,14 @@ class ContactProblem3D(ContactBody):
         InvalidProblemError
             A callable returns something else than finite numbers >= 0.
         """
-        value = float(alpha_value(alpha))
-        with np.errstate(over="ignore", invalid="ignore"):
-            F = self.law.at(slip) + value * self._slope
+        exact = Fraction(alpha_value(alpha))
+        value = float(exact)
+        try:
+            # rounded once from the exact values, so that zero and its sign are decided exactly
+            F = np.array([float(x) for x in exactly_at(exact, self.law.at(slip).ravel(), self._slope.ravel())])
+        except OverflowError:
+            F = np.full(2 * self.p, np.inf)
+        F = F.reshape(self.p, 2)
         if not np.all(np.isfinite(F)):
             raise InvalidArgumentError(
                 f"friction at alpha = {value:g} is too large for float64; expected a finite value"

@@ -17,7 +17,14 @@ if TYPE_CHECKING:
 
 
 class ContactStatus(enum.Enum):
-    """What a contact node does: it is open, it sticks, or it slips; in 2D in the positive or negative direction."""
+    """What a contact node does: it is open, it sticks, or it slips; in 2D in the positive or negative direction.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> enumsol.ContactStatus("slip+")
+    ContactStatus.SLIP_PLUS
+    """
 
     OPEN = "open"
     STICK = "stick"
@@ -60,6 +67,12 @@ def sign_array(statuses: Sequence[ContactStatus]) -> NDArray[np.int8]:
     """Signs of the test functions that name the selection of ``statuses``, shape (p, 3) (theory, section 2.1).
 
     At an open node theta2 = theta3 at a root and their sign does not matter; (-, -, -) is returned.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> enumsol.sign_array([enumsol.ContactStatus.STICK, enumsol.ContactStatus.SLIP_MINUS]).tolist()
+    [[1, -1, 1], [1, -1, -1]]
     """
     try:
         return np.array([_SIGNS[status] for status in statuses], dtype=np.int8).reshape(-1, 3)

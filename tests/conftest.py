@@ -12,3 +12,26 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 @pytest.fixture
 def rng():
     return np.random.default_rng(20121)
+
+
+#: Random cases in great number, judged by exact oracles. Other tests run the same lines, and under the tracer of
+#: coverage these take several times as long.
+UNTRACED = {
+    "test_active_set",
+    "test_against_enumeration",
+    "test_cut_short_results",
+    "test_defect_07_hostile_proofs",
+    "test_degenerate_problems",
+    "test_graph_mutants",
+    "test_random_problems",
+    "test_root_counts",
+    "test_singular_selections",
+}
+
+
+def pytest_collection_modifyitems(config, items):
+    """Coverage is not measured in slow tests and in those of `UNTRACED`."""
+    if config.pluginmanager.hasplugin("_cov"):
+        for item in items:
+            if item.get_closest_marker("slow") or item.path.stem in UNTRACED:
+                item.add_marker("no_cover")

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.branches.elements import UNSETTLED
+from enumsol.branches.elements import VertexKind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.branches.elements import Arc, Vertex
+    from enumsol.condensation.condensed import CondensedProblem
 
 
 class Standing(enum.Enum):
@@ -123,8 +124,8 @@ class Claims:
         """
         if self.whole:
             return Multiplicity(len(arcs) + len(vertices), exact=True)
-        apart = sum(not arc.grazing for arc in arcs) + sum(v.kind != UNSETTLED for v in vertices)
-        joinable = any(arc.grazing for arc in arcs) or any(v.kind == UNSETTLED for v in vertices)
+        apart = sum(not arc.grazing for arc in arcs) + sum(v.kind is not VertexKind.UNSETTLED for v in vertices)
+        joinable = any(arc.grazing for arc in arcs) or any(v.kind is VertexKind.UNSETTLED for v in vertices)
         return Multiplicity(apart + int(joinable), exact=False)
 
     def steps(self) -> MultiplicitySteps:
@@ -142,7 +143,7 @@ class Claims:
             cover.add(place[arc.tail], place[arc.head])
         at = []
         for group, over, joined in zip(groups, apart.at(), joinable.at(), strict=True):
-            settled = sum(self.whole or v.kind != UNSETTLED for v in group)
+            settled = sum(self.whole or v.kind is not VertexKind.UNSETTLED for v in group)
             at.append(over + settled + int(joined > 0 or settled < len(group)))
         between = [n + int(m > 0) for n, m in zip(apart.between(), joinable.between(), strict=True)]
         alphas = tuple(Fraction(group[0].alpha) for group in groups)
@@ -187,6 +188,23 @@ class Claims:
         if bound is not None:
             lines.append(f"without any search, a bound evaluated in floats gives one solution up to {bound:.8g}")
         return lines
+
+
+def uniqueness_bound(condensed: CondensedProblem, interval: tuple[float, float]) -> float | None:
+    """An alpha up to which uniqueness follows without any search (theory, section 5.6); None when for no alpha."""
+    a, b = interval
+    p = len(condensed.F0)
+    try:
+        inverse = np.linalg.inv(condensed.S)
+    except np.linalg.LinAlgError:  # S is singular within rounding, and the bound nearly zero
+        return None
+    product = np.linalg.eigvalsh(inverse[:p, :p])[-1] * np.linalg.eigvalsh(condensed.S[p:, p:])[-1]
+    largest = 1.0 / float(np.sqrt(product))
+    if np.any(condensed.F0 + a * condensed.F1 >= largest):
+        return None
+    rising = condensed.F1 > 0
+    reached = (largest - condensed.F0[rising]) / condensed.F1[rising]
+    return min(b, float(np.min(reached, initial=np.inf)))
 
 
 class _Cover:

@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Literal
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.gluing import Gluing
+from enumsol.branches.gluing import glue
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.branches.make_elements import make_arcs, make_vertices
@@ -20,18 +20,23 @@ from enumsol.checks import (
     optional_count,
     optional_seconds,
 )
+from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactPath
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 from enumsol.search.interval import FastIntervalCertifier, IntervalSearch
+from enumsol.search.stopping import Stop, StopReason
+from enumsol.statuses import OPEN
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.checks import AlphaLike
+    from enumsol.proof.proof_file import Proof
     from enumsol.search.interval import IntervalCertifier
+    from enumsol.selections.solution import Codes
 
 Arithmetic = Literal["fast", "verified", "exact"]
 
@@ -85,6 +90,14 @@ def branch_graph(
     Interrupted
         On Ctrl-C during the search, or while arcs are worked out; ``partial`` is the graph of what was found so far,
         which is not complete.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> enumsol.branch_graph(enumsol.gallery.one_node_triangle(), (0, 10))
+    BranchGraph for alpha in [0, 10] (verified)
+    ...
+    complete: yes (proven)
     """
     instance_of(problem, ContactProblem, "problem")
     a, b = (Fraction(end) for end in alpha_interval(interval))
@@ -94,32 +107,23 @@ def branch_graph(
     _check_friction(problem, a, b)
     started = time.perf_counter()
     exactly = arithmetic == "exact" or problem.n <= FAST_EXACT_DOF
-    path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
-    deadline = None if time_limit is None else started + time_limit
-    certifier = _certifier(problem, path, arithmetic)
+    exact = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
+    certifier = _certifier(problem, exact, arithmetic)
     search = IntervalSearch(
         problem.condensed,
         (a, b),
-        path.zero,
+        exact.zero,
         certifier,
         max_nodes=max_nodes,
-        deadline=deadline,
+        deadline=None if time_limit is None else started + time_limit,
         progress=_stage(progress, "search"),
     )
-    interrupted = False
-    if path.unloaded:
-        # nothing but lambda = 0 for every alpha; every selection holds there, and one of them tells it all
-        candidates = {(0,) * path.p}
-    else:
-        try:
-            search.run()
-        except KeyboardInterrupt:
-            interrupted = True
-            search.stopped = f"interrupted after {search.nodes} nodes"
-        candidates = search.selections
+    candidates = _candidates(search, exact)
     searched = time.perf_counter()
     tick = _stage(progress, "arcs")
-    gluing = Gluing(path, candidates, rational(a), rational(b), tick, cut_short=search.stopped is not None)
+    gluing = glue(exact, candidates, rational(a), rational(b), tick, cut_short=search.stopped is not None)
+    stops = [stop for stop in (search.stopped, gluing.interrupted) if stop is not None]
+    arcs = make_arcs(gluing)
     stats = GraphStats(
         pieces=len(search.pieces),
         nodes=search.nodes,
@@ -127,30 +131,49 @@ def branch_graph(
         search_seconds=searched - started,
         seconds=time.perf_counter() - started,
     )
-    arcs = make_arcs(gluing)
-    cut = [reason for reason in (search.stopped, gluing.interrupted) if reason is not None]
-    vertices = make_vertices(gluing, arcs)
-    proof = None
-    if (
-        isinstance(certifier, VerifiedIntervalCertifier)
-        and search.pieces
-        and search.stopped is None
-        and not certifier.used_rationals
-    ):
-        about = "problem" if path.condensed_exactly else "condensed"
-        proof = write_graph_proof(problem, (a, b), about, search.pieces)
-    reasons, pieces = (*cut, *gluing.reasons), tuple(search.pieces)
-    data = GraphData(problem, path, (a, b), arithmetic, tuple(vertices), tuple(arcs), reasons, stats, pieces, proof)
+    data = GraphData(
+        problem=problem,
+        exact=exact,
+        interval=(a, b),
+        arithmetic=arithmetic,
+        vertices=tuple(make_vertices(gluing, arcs)),
+        arcs=tuple(arcs),
+        reasons=(*map(str, stops), *gluing.reasons),
+        stats=stats,
+        pieces=tuple(search.pieces),
+        proof=_proof(search, certifier, problem, exact),
+    )
     graph = BranchGraph(data)
-    if interrupted or gluing.interrupted is not None:
+    if any(stop.interrupted for stop in stops):
         raise Interrupted("branch_graph was interrupted; its arcs so far are kept", graph)
     return graph
 
 
-def _certifier(problem: ContactProblem, path: ExactPath, arithmetic: Arithmetic) -> IntervalCertifier:
+def _certifier(problem: ContactProblem, exact: ExactPath, arithmetic: Arithmetic) -> IntervalCertifier:
     if arithmetic == "exact":
-        return ExactIntervalCertifier(path)
-    return VerifiedIntervalCertifier(problem, path) if arithmetic == "verified" else FastIntervalCertifier()
+        return ExactIntervalCertifier(exact)
+    return VerifiedIntervalCertifier(problem, exact) if arithmetic == "verified" else FastIntervalCertifier()
+
+
+def _candidates(search: IntervalSearch, exact: ExactPath) -> set[Codes]:
+    """The selections that may hold somewhere; Ctrl-C keeps those that were found."""
+    if exact.unloaded:
+        # nothing but lambda = 0 solves at any alpha; every selection holds there, so that one is enough
+        return {(OPEN,) * exact.p}
+    try:
+        search.run()
+    except KeyboardInterrupt:
+        search.stopped = Stop(StopReason.INTERRUPTED, search.nodes)
+    return search.selections
+
+
+def _proof(
+    search: IntervalSearch, certifier: IntervalCertifier, problem: ContactProblem, exact: ExactPath
+) -> Proof | None:
+    if not certifier.checkable or not search.pieces or search.stopped is not None:
+        return None
+    about = "problem" if exact.condensed_exactly else "condensed"
+    return write_graph_proof(problem, search.interval, about, search.pieces)
 
 
 def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callable[[float], object] | None:
@@ -159,9 +182,9 @@ def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callab
 
 def _check_friction(problem: ContactProblem, a: Fraction, b: Fraction) -> None:
     """Refuse negative and huge friction inside the interval; F is affine, so that both ends tell."""
-    for node, F0, F1 in zip(problem.node_ids, *(part.tolist() for part in problem.friction), strict=True):
-        for end in (a, b):
-            value = Fraction(F0) + end * Fraction(F1)
+    values = [exactly_at(end, *problem.friction) for end in (a, b)]
+    for node, *pair, F0, F1 in zip(problem.node_ids, *values, *problem.friction, strict=True):
+        for end, value in zip((a, b), pair, strict=True):
             if value < 0:
                 zero = -Fraction(F0) / Fraction(F1) if F1 else end
                 raise InvalidArgumentError(

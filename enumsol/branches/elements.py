@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.checks import alpha_value
 from enumsol.errors import InvalidArgumentError
-from enumsol.sealed import Sealed
+from enumsol.roots.root import ContactState
 from enumsol.selections.functions import SelectionFunctions
+from enumsol.selections.ordered_field import as_float
+from enumsol.selections.polytopes import dot
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,18 +24,46 @@ if TYPE_CHECKING:
     from enumsol.arithmetic.algebraic import CriticalAlpha
     from enumsol.checks import AlphaLike
     from enumsol.condensation.exact import ExactPath
-    from enumsol.roots.root_set import RootFamily
+    from enumsol.roots.root import RootFamily
     from enumsol.selections.solution import Codes
     from enumsol.statuses import ContactStatus
 
-#: Kind of a vertex at which selections hold that the search did not reach: arcs that were not found may end there.
-UNSETTLED = "unsettled"
+
+class VertexKind(enum.StrEnum):
+    """What a vertex is; members compare with their texts: ``vertex.kind == "fold"``."""
+
+    #: One arc from the left goes on as another to the right.
+    TRANSITION = "transition"
+    #: Two arcs meet on one side: alpha turns back.
+    FOLD = "fold"
+    #: Any other number of arcs meet.
+    BIFURCATION = "bifurcation"
+    #: A continuum of solutions at one alpha: a vertical arc.
+    FAMILY = "family"
+    #: The border of a sheet.
+    SHEET = "sheet"
+    #: A status is met and left again.
+    TOUCH = "touch"
+    #: No arc at all.
+    POINT = "point"
+    #: Selections hold here that were not examined, because the search was cut short or a limit was reached: arcs that
+    #: were not found may end here, so that nothing is said about its kind.
+    UNSETTLED = "unsettled"
+    #: An arc ends for no reason: something is missing, and the graph is not complete.
+    BROKEN = "broken"
+    #: On the interval's border.
+    END = "end"
+
+    def __repr__(self) -> str:
+        return repr(self.value)
+
+
 #: Kinds of vertices at which branches are cut.
-CUTS = ("bifurcation", "family", "sheet", UNSETTLED)
+CUTS = (VertexKind.BIFURCATION, VertexKind.FAMILY, VertexKind.SHEET, VertexKind.UNSETTLED)
 
 
-@dataclass(frozen=True, eq=False)
-class Vertex(Sealed):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Vertex(ContactState):
     """A connected set of solutions at one critical alpha, where arcs begin and end.
 
     Attributes
@@ -41,21 +72,12 @@ class Vertex(Sealed):
         Its place in ``graph.vertices``, which are in the order of alpha.
     alpha : float
         Rounded to the nearest float from ``exact``.
-    kind : str
-        "transition" (one arc from the left goes on as another to the right), "fold" (alpha turns back), "bifurcation"
-        (any other number of arcs), "touch" (a status is met and left again), "point" (no arc at all), "family" (a
-        continuum of solutions at one alpha: a vertical arc), "sheet" (the border of a sheet), "end" (on the interval's
-        border), "unsettled" (selections hold here that were not examined, because the search was cut short or a limit
-        was reached: arcs that were not found may end here, so that nothing is said about its kind), or "broken" (an arc
-        ends for no reason: something is missing, and the graph is not complete).
+    kind : VertexKind
+        "transition", "fold", "bifurcation", "family", "sheet", "touch", "point", "unsettled", "broken" or "end".
     border : bool
         It lies at the first or last alpha.
-    statuses : tuple of p ContactStatus
-        Where several hold, the first of OPEN, STICK, SLIP_PLUS, SLIP_MINUS.
-    active : tuple of p frozensets of ContactStatus
-        All statuses that hold at a node (somewhere on a family).
-    lambda_n, lambda_t, u_n, u_t : (p,) arrays
-        Values at the vertex; of a family, at one of its points [force, length].
+    statuses, active, lambda_n, lambda_t, u_n, u_t
+        See ContactState. Of a family, ``active`` is what holds somewhere on it, and the values are those of one point.
     family : RootFamily or None
     index_left, index_right : int or None
         Sums of the indices of the arcs that end and begin here; equal inside the interval (balance of degrees). None
@@ -66,14 +88,8 @@ class Vertex(Sealed):
 
     number: int
     alpha: float
-    kind: str
+    kind: VertexKind
     border: bool
-    statuses: tuple[ContactStatus, ...]
-    active: tuple[frozenset[ContactStatus], ...]
-    lambda_n: NDArray[np.float64]
-    lambda_t: NDArray[np.float64]
-    u_n: NDArray[np.float64]
-    u_t: NDArray[np.float64]
     family: RootFamily | None
     index_left: int | None
     index_right: int | None
@@ -86,7 +102,7 @@ class Vertex(Sealed):
         return self.exact.enclosure()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Arc:
     """All solutions of one selection between two neighbouring critical alphas, one for every alpha (of a sheet: many).
 
@@ -121,7 +137,7 @@ class Arc:
     grazing: bool
     selections: tuple[Codes, ...] = field(repr=False)
     sample: Fraction = field(repr=False)
-    _path: ExactPath = field(repr=False)
+    _exact: ExactPath = field(repr=False)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -135,9 +151,9 @@ class Arc:
 
     @cached_property
     def _functions(self) -> SelectionFunctions:
-        return SelectionFunctions(self._path, self.selections[0])
+        return SelectionFunctions(self._exact, self.selections[0])
 
-    def _point(self, alpha: AlphaLike) -> tuple[object, ...]:
+    def _point(self, alpha: AlphaLike) -> tuple[Any, ...]:
         exact = alpha_value(alpha)
         value = float(exact)
         if self.dimension:
@@ -161,19 +177,14 @@ class Arc:
         InvalidArgumentError
             alpha is outside the arc, or the arc is a sheet.
         """
-        forces = np.array([float(Fraction(int(v.p), int(v.q))) for v in self._point(alpha)])  # type: ignore[attr-defined]
-        return forces[: self._path.p], forces[self._path.p :]
+        forces = np.array([as_float(v) for v in self._point(alpha)])
+        return forces[: self._exact.p], forces[self._exact.p :]
 
     def displacements(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(u_n, u_t) at an alpha of the arc, two arrays of shape (p,) [length]; errors as ``values``."""
-        point = self._point(alpha)
-        g = self._path.at(rational(alpha_value(alpha)))[0]
-        w = [
-            a - sum((s * v for s, v in zip(row, point, strict=True)), rational(0))
-            for a, row in zip(g, self._path.rows, strict=True)
-        ]
-        moves = np.array([float(Fraction(int(v.p), int(v.q))) for v in w])
-        return moves[: self._path.p], moves[self._path.p :]
+        point, g = self._point(alpha), self._exact.at(rational(alpha_value(alpha)))[0]
+        moves = np.array([as_float(a - dot(row, point)) for a, row in zip(g, self._exact.rows, strict=True)])
+        return moves[: self._exact.p], moves[self._exact.p :]
 
     def sampled(self, count: int = 33) -> NDArray[np.float64]:
         """Values of alpha along the arc, denser towards its ends (Chebyshev points), ends included."""
@@ -234,7 +245,7 @@ class Branch:
     @property
     def folds(self) -> tuple[Vertex, ...]:
         """Its folds, in the order in which it runs through them."""
-        return tuple(vertex for vertex in self.vertices if vertex.kind == "fold")
+        return tuple(vertex for vertex in self.vertices if vertex.kind is VertexKind.FOLD)
 
     @property
     def sheet(self) -> bool:

@@ -9,12 +9,11 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps
-from enumsol.branches.elements import UNSETTLED
+from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps, uniqueness_bound
+from enumsol.branches.elements import VertexKind
+from enumsol.branches.graph_text import completeness, graph_text
 from enumsol.branches.make_elements import make_branches, make_components, multigraph
 from enumsol.branches.roots_at import roots_of
 from enumsol.checks import alpha_value
@@ -30,7 +29,8 @@ if TYPE_CHECKING:
     from enumsol.branches.elements import Arc, Branch, Component, Vertex
     from enumsol.branches.graph_data import GraphData
     from enumsol.checks import AlphaLike
-    from enumsol.roots.root_set import Root, RootFamily, RootSet
+    from enumsol.roots.root import Root, RootFamily
+    from enumsol.roots.root_set import RootSet
 
 
 class BranchGraph(Immutable):
@@ -64,12 +64,19 @@ class BranchGraph(Immutable):
     proof : Proof or None
         In verified arithmetic: the search's leaves for ``enumsol.verify`` (None after ``load``, for a search that was
         cut short, and where rationals had to decide about leaves).
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> graph = enumsol.branch_graph(enumsol.gallery.two_node_square(), (0, 10))
+    >>> graph.uniqueness_limit, graph.multiplicity_at(3.5), len(graph.folds)
+    (3.0, 5, 3)
     """
 
     def __init__(self, data: GraphData) -> None:
         self.data = data
         self.problem = data.problem
-        self.path = data.path
+        self.exact = data.exact
         self.exact_interval = data.interval
         self.interval = (float(data.interval[0]), float(data.interval[1]))
         self.arithmetic = data.arithmetic
@@ -100,7 +107,7 @@ class BranchGraph(Immutable):
     @property
     def certified_data(self) -> str:
         """What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed)."""
-        return "problem" if self.path.condensed_exactly else "condensed"
+        return self.data.certified_data
 
     # -- parts -----------------------------------------------------------------------------------------------------
 
@@ -119,18 +126,18 @@ class BranchGraph(Immutable):
         """Number of the branch of every arc, by the arc's number."""
         return MappingProxyType({arc.number: branch.number for branch in self.branches for arc in branch.arcs})
 
-    def _of_kind(self, *kinds: str) -> tuple[Vertex, ...]:
-        return tuple(v for v in self.vertices if v.kind in kinds)
+    def _of_kind(self, kind: VertexKind) -> tuple[Vertex, ...]:
+        return tuple(v for v in self.vertices if v.kind is kind)
 
     @property
     def transitions(self) -> tuple[Vertex, ...]:
         """Vertices at which one arc goes on as another on the other side."""
-        return self._of_kind("transition")
+        return self._of_kind(VertexKind.TRANSITION)
 
     @property
     def folds(self) -> tuple[Vertex, ...]:
         """Vertices at which two arcs meet on one side: alpha turns back."""
-        return self._of_kind("fold")
+        return self._of_kind(VertexKind.FOLD)
 
     @property
     def bifurcations(self) -> tuple[Vertex, ...]:
@@ -139,13 +146,14 @@ class BranchGraph(Immutable):
         return tuple(
             v
             for v in self.vertices
-            if v.kind == "bifurcation" or (v.kind == "family" and not v.border and v.number in reached)
+            if v.kind is VertexKind.BIFURCATION
+            or (v.kind is VertexKind.FAMILY and not v.border and v.number in reached)
         )
 
     @cached_property
     def families(self) -> tuple[RootFamily, ...]:
         """Continua of solutions at single alphas (vertical arcs); those of sheets are found by ``roots_at``."""
-        return tuple(v.family for v in self.vertices if v.family is not None and v.kind == "family")
+        return tuple(v.family for v in self._of_kind(VertexKind.FAMILY) if v.family is not None)
 
     @property
     def sheets(self) -> tuple[Arc, ...]:
@@ -160,7 +168,7 @@ class BranchGraph(Immutable):
         return tuple(
             v
             for v in self.vertices
-            if not v.border and v.kind != UNSETTLED and v.number in heads and v.number not in tails
+            if not v.border and v.kind is not VertexKind.UNSETTLED and v.number in heads and v.number not in tails
         )
 
     # -- solutions at one alpha ------------------------------------------------------------------------------------
@@ -260,19 +268,7 @@ class BranchGraph(Immutable):
 
         F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node; evaluated in floats.
         """
-        condensed, p = self.problem.condensed, self.problem.p
-        try:
-            inverse = np.linalg.inv(condensed.S)
-        except np.linalg.LinAlgError:  # S is singular within rounding, and the bound nearly zero
-            return None
-        product = np.linalg.eigvalsh(inverse[:p, :p])[-1] * np.linalg.eigvalsh(condensed.S[p:, p:])[-1]
-        largest = 1.0 / float(np.sqrt(product))
-        a, b = self.interval
-        if np.any(condensed.F0 + a * condensed.F1 >= largest):
-            return None
-        rising = condensed.F1 > 0
-        reached = (largest - condensed.F0[rising]) / condensed.F1[rising]
-        return min(b, float(np.min(reached, initial=np.inf)))
+        return uniqueness_bound(self.problem.condensed, self.interval)
 
     def starting_point(self, branch: Branch) -> Root | None:
         """A regular root in the middle of the branch's longest arc; None when there is none at any float alpha."""
@@ -339,36 +335,10 @@ class BranchGraph(Immutable):
 
     def completeness(self) -> str:
         """The closing line of the printed summary."""
-        if self.reasons:
-            more = f" and {len(self.reasons) - 1} more" if len(self.reasons) > 1 else ""
-            return f"complete: no ({self.reasons[0]}{more})"
-        if not self.complete:
-            return "complete: not proven (degrees balance at every vertex)"
-        about = "" if self.certified_data == "problem" else " for S and g as computed"
-        return f"complete: yes (proven{about})"
+        return completeness(self.data)
 
     def __repr__(self) -> str:
-        kinds = Counter(v.kind for v in self.vertices)
-        order = ("transition", "fold", "bifurcation", "family", "sheet", "touch", "point", UNSETTLED, "broken", "end")
-        numbers = ", ".join(f"{kinds[k]} {k}" for k in order if kinds[k])
-        a, b = self.interval
-        found = "" if self.claims.whole else ", not complete; of what was found:"
-        lines = [
-            f"BranchGraph for alpha in [{a:g}, {b:g}] ({self.arithmetic}){found}",
-            f"  components {len(self.components)}, branches {len(self.branches)}, arcs {len(self.arcs)}",
-            f"  vertices {len(self.vertices)}" + (f": {numbers}" if numbers else ""),
-        ]
-        for branch in self.branches[:20]:
-            lo, hi = branch.interval
-            folds = ", ".join(f"{v.alpha:.6g}" for v in branch.folds)
-            shape = _shape(branch)
-            width = f", length {hi - lo:.3g}" if f"{lo:.6g}" == f"{hi:.6g}" else ""
-            text = f"  branch {branch.number}: {shape}, {len(branch.arcs)} arcs, alpha in [{lo:.6g}, {hi:.6g}]{width}"
-            lines.append(text + (f", folds at {folds}" if folds else ""))
-        if len(self.branches) > 20:
-            lines.append(f"  ... {len(self.branches) - 20} more branches")
-        lines.append(self.completeness())
-        return "\n".join(lines)
+        return graph_text(self.data, len(self.components), self.branches)
 
     def summary(self) -> dict[str, Any]:
         """Counts and answers as plain values, for JSON; what is not known is None."""
@@ -382,7 +352,7 @@ class BranchGraph(Immutable):
             "components": len(self.components),
             "branches": len(self.branches),
             "arcs": len(self.arcs),
-            "vertices": dict(Counter(v.kind for v in self.vertices)),
+            "vertices": dict(Counter(v.kind.value for v in self.vertices)),
             "folds": [v.alpha for v in self.folds],
             "bifurcations": [v.alpha for v in self.bifurcations],
             "jumps": [v.alpha for v in self.jumps],
@@ -398,11 +368,3 @@ class BranchGraph(Immutable):
             },
             "stats": asdict(self.stats),
         }
-
-
-def _shape(branch: Branch) -> str:
-    if branch.sheet:
-        return "sheet"
-    if branch.closed:
-        return "closed"
-    return "unfinished" if any(v.kind == UNSETTLED for v in branch.vertices) else "open"

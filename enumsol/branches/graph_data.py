@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from enumsol.branches.claims import Claims, Standing
-from enumsol.branches.elements import UNSETTLED
+from enumsol.branches.elements import VertexKind
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -49,7 +49,7 @@ class GraphData:
     Attributes
     ----------
     problem : ContactProblem
-    path : ExactPath
+    exact : ExactPath
         The condensed problem in rationals, on which the arcs rest.
     interval : (Fraction, Fraction)
     arithmetic : str
@@ -66,7 +66,7 @@ class GraphData:
     """
 
     problem: ContactProblem
-    path: ExactPath
+    exact: ExactPath
     interval: tuple[Fraction, Fraction]
     arithmetic: str
     vertices: tuple[Vertex, ...]
@@ -75,6 +75,11 @@ class GraphData:
     stats: GraphStats
     pieces: tuple[SearchedPiece, ...] = ()
     proof: Proof | None = None
+
+    @property
+    def certified_data(self) -> str:
+        """What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed)."""
+        return "problem" if self.exact.condensed_exactly else "condensed"
 
     @property
     def complete(self) -> bool:
@@ -100,11 +105,11 @@ class GraphData:
         Each of them proves that something is missing.
         """
         found, first = [], float(self.interval[0])
-        unsettled = sum(v.kind == UNSETTLED for v in self.vertices)
+        unsettled = sum(v.kind is VertexKind.UNSETTLED for v in self.vertices)
         if unsettled and not self.reasons:
             found.append(f"selections that were not examined hold at {unsettled} of {len(self.vertices)} vertices")
         for v in self.vertices:
-            if v.kind == UNSETTLED:
+            if v.kind is VertexKind.UNSETTLED:
                 continue
             if v.index_left is None or v.index_right is None:
                 found.append(f"vertex {v.number} at alpha = {v.alpha:.17g}: the degree of an arc is not known")

@@ -9,10 +9,12 @@ import numpy as np
 from flint import fmpq
 
 from enumsol.arithmetic.rationals import to_fraction
-from enumsol.branches.elements import CUTS, UNSETTLED, Arc, Branch, Component, Vertex
-from enumsol.roots.root_set import Polytope, RootFamily
+from enumsol.branches.elements import CUTS, Arc, Branch, Component, Vertex, VertexKind
+from enumsol.roots.builder import polytope
+from enumsol.roots.root import RootFamily
 from enumsol.roots.slip_signs import shown_status, sign_over, slip_names
 from enumsol.selections.ordered_field import FiberSelections, as_float
+from enumsol.selections.polytopes import dot
 from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK
 
 if TYPE_CHECKING:
@@ -20,42 +22,43 @@ if TYPE_CHECKING:
 
     from enumsol.branches.gluing import GluedArc, GluedVertex, Gluing
     from enumsol.condensation.exact import ExactPath
+    from enumsol.roots.root import Polytope
+
+
+#: What networkx's graph shows of vertices and arcs.
+_NODE_DATA = ("alpha", "kind", "border", "statuses", "active", "lambda_n", "lambda_t", "index_left", "index_right")
+_EDGE_DATA = ("statuses", "index", "dimension", "values")
 
 
 def make_arcs(gluing: Gluing) -> list[Arc]:
     """The arcs of a gluing."""
-    path, arcs = gluing.path, []
-    for number, edge in enumerate(gluing.edges):
-        tail, head = (float(gluing.vertices[k].alpha) for k in (edge.tail, edge.head))
-        slips = _slips(path, edge) if any(path.frictionless) else (0,) * path.p
-        statuses = tuple(shown_status(c, s) for c, s in zip(edge.codes, slips, strict=True))
-        selections = (edge.codes, *(c for c in edge.selections if c != edge.codes))
-        grazing = gluing.arcs[edge.codes].grazing
-        sample = to_fraction(fmpq(edge.sample))
-        arcs.append(
-            Arc(
-                number,
-                statuses,
-                tail,
-                head,
-                edge.tail,
-                edge.head,
-                edge.index,
-                edge.dimension,
-                grazing,
-                selections,
-                sample,
-                path,
-            )
+    exact = gluing.exact
+    return [
+        Arc(
+            number=number,
+            statuses=tuple(shown_status(c, s) for c, s in zip(edge.codes, _slips(exact, edge), strict=True)),
+            lo=float(gluing.vertices[edge.tail].alpha),
+            hi=float(gluing.vertices[edge.head].alpha),
+            tail=edge.tail,
+            head=edge.head,
+            index=edge.index,
+            dimension=edge.dimension,
+            grazing=gluing.arcs[edge.codes].grazing,
+            selections=(edge.codes, *(c for c in edge.selections if c != edge.codes)),
+            sample=to_fraction(fmpq(edge.sample)),
+            _exact=exact,
         )
-    return arcs
+        for number, edge in enumerate(gluing.edges)
+    ]
 
 
-def _slips(path: ExactPath, edge: GluedArc) -> tuple[int, ...]:
-    """Signs of u_t in the middle of an arc."""
-    solver = FiberSelections(path, fmpq(edge.sample))
+def _slips(exact: ExactPath, edge: GluedArc) -> tuple[int, ...]:
+    """Signs of u_t in the middle of an arc, where any node has no friction that they name."""
+    if not any(exact.frictionless):
+        return (0,) * exact.p
+    solver = FiberSelections(exact, fmpq(edge.sample))
     solution = solver.solve(edge.codes)
-    return (0,) * path.p if solution is None else solver.slip_signs(solution.vertices[0])
+    return (0,) * exact.p if solution is None else solver.slip_signs(solution.vertices[0])
 
 
 def make_vertices(gluing: Gluing, arcs: Sequence[Arc]) -> list[Vertex]:
@@ -65,44 +68,42 @@ def make_vertices(gluing: Gluing, arcs: Sequence[Arc]) -> list[Vertex]:
     for arc in arcs:
         right[arc.tail].append(arc)
         left[arc.head].append(arc)
-    made = []
-    for number, glued in enumerate(gluing.vertices):
-        border = glued.alpha.is_rational and glued.alpha.lo in (gluing.a, gluing.b)
-        p = gluing.path.p
-        degrees = (_sum(left[number]), _sum(right[number])) if glued.settled else (None, None)
-        # at the last alpha only the arcs from the left tell the degree
-        degree = degrees[0] if border and glued.alpha.lo == gluing.b else degrees[1]
-        family = _family(glued, degree, proven=gluing.path.condensed_exactly)
-        forces, w = _values(gluing, glued)
-        active = tuple(
-            frozenset(
-                name
-                for code in codes
-                for name in (slip_names(_slip_sign(gluing, glued, i)) if code == FRICTIONLESS else (STATUSES[code],))
-            )
-            for i, codes in enumerate(glued.active)
+    return [_vertex(gluing, number, glued, left[number], right[number]) for number, glued in enumerate(gluing.vertices)]
+
+
+def _vertex(gluing: Gluing, number: int, glued: GluedVertex, left: Sequence[Arc], right: Sequence[Arc]) -> Vertex:
+    """A vertex with the arcs that end there from the left and begin there to the right."""
+    border = glued.alpha.is_rational and glued.alpha.lo in (gluing.a, gluing.b)
+    p = gluing.exact.p
+    degrees = (_sum(left), _sum(right)) if glued.settled else (None, None)
+    # at the last alpha only the arcs from the left tell the degree
+    degree = degrees[0] if border and glued.alpha.lo == gluing.b else degrees[1]
+    forces, w = _values(gluing, glued)
+    active = tuple(
+        frozenset(
+            name
+            for code in codes
+            for name in (slip_names(_slip_sign(gluing, glued, i)) if code == FRICTIONLESS else (STATUSES[code],))
         )
-        made.append(
-            Vertex(
-                number,
-                float(glued.alpha),
-                _kind(left[number], right[number], border=border, dimension=glued.dimension)
-                if glued.settled
-                else UNSETTLED,
-                border,
-                tuple(next(s for s in STATUSES if s in names) for names in active),
-                active,
-                forces[:p],
-                forces[p:],
-                w[:p],
-                w[p:],
-                family,
-                *degrees,
-                tuple(glued.members),
-                glued.alpha,
-            )
-        )
-    return made
+        for i, codes in enumerate(glued.active)
+    )
+    return Vertex(
+        number=number,
+        alpha=float(glued.alpha),
+        kind=_kind(left, right, border=border, dimension=glued.dimension) if glued.settled else VertexKind.UNSETTLED,
+        border=border,
+        statuses=tuple(next(s for s in STATUSES if s in names) for names in active),
+        active=active,
+        lambda_n=forces[:p],
+        lambda_t=forces[p:],
+        u_n=w[:p],
+        u_t=w[p:],
+        family=_family(glued, degree, proven=gluing.exact.condensed_exactly),
+        index_left=degrees[0],
+        index_right=degrees[1],
+        selections=tuple(glued.members),
+        exact=glued.alpha,
+    )
 
 
 def _sum(arcs: Sequence[Arc]) -> int | None:
@@ -110,19 +111,24 @@ def _sum(arcs: Sequence[Arc]) -> int | None:
     return None if any(index is None for index in indices) else sum(index for index in indices if index is not None)
 
 
-def _kind(left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dimension: int) -> str:
+def _kind(left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dimension: int) -> VertexKind:
     if any(arc.dimension for arc in (*left, *right)):
-        return "sheet"
+        return VertexKind.SHEET
     if dimension:
-        return "family"
+        return VertexKind.FAMILY
     if border:
-        return "end"
-    count = (len(left), len(right))
-    if count == (1, 1):
-        return "touch" if left[0].selections == right[0].selections else "transition"
-    if count in ((1, 0), (0, 1)):
-        return "broken"
-    return {(0, 0): "point", (2, 0): "fold", (0, 2): "fold"}.get(count, "bifurcation")
+        return VertexKind.END
+    match len(left), len(right):
+        case 1, 1:
+            same = left[0].selections == right[0].selections
+            return VertexKind.TOUCH if same else VertexKind.TRANSITION
+        case 0, 0:
+            return VertexKind.POINT
+        case (1, 0) | (0, 1):
+            return VertexKind.BROKEN
+        case (2, 0) | (0, 2):
+            return VertexKind.FOLD
+    return VertexKind.BIFURCATION
 
 
 def _slip_sign(gluing: Gluing, glued: GluedVertex, node: int) -> int:
@@ -140,28 +146,24 @@ def _slip_sign(gluing: Gluing, glued: GluedVertex, node: int) -> int:
 
 def _values(gluing: Gluing, glued: GluedVertex) -> tuple[Any, Any]:
     """Forces and displacements at a vertex as floats, with exact zeros where the statuses say so."""
-    path, p = gluing.path, gluing.path.p
+    exact, p = gluing.exact, gluing.exact.p
     if glued.solutions and glued.solver is not None:
         point = glued.solutions[0].vertices[0]
         return glued.solver.forces(point) + 0.0, glued.solver.displacements(point) + 0.0
     # an irrational alpha is replaced by a rational one that agrees with it to many more digits than a float has
     glued.alpha.narrow(fmpq(1, 2**256))
     alpha = (glued.alpha.lo + glued.alpha.hi) / 2
-    exact = next(
+    point = next(
         (
-            point
+            found
             for c in glued.members
             if not gluing.arcs[c].functions.singular
-            and (point := gluing.arcs[c].functions.forces_at(alpha)) is not None
+            and (found := gluing.arcs[c].functions.forces_at(alpha)) is not None
         ),
         (fmpq(0),) * (2 * p),
     )
-    g = path.at(alpha)[0]
-    S = path.rows
-    w = np.array(
-        [as_float(a - sum((s * v for s, v in zip(r, exact, strict=True)), fmpq(0))) for a, r in zip(g, S, strict=True)]
-    )
-    forces = np.array([as_float(v) for v in exact])
+    w = np.array([as_float(a - dot(row, point)) for a, row in zip(exact.at(alpha)[0], exact.rows, strict=True)])
+    forces = np.array([as_float(v) for v in point])
     for i, active in enumerate(glued.active):
         if OPEN in active:
             forces[[i, p + i]] = 0.0
@@ -175,18 +177,7 @@ def _values(gluing: Gluing, glued: GluedVertex) -> tuple[Any, Any]:
 def _family(glued: GluedVertex, index: int | None, *, proven: bool) -> RootFamily | None:
     if not glued.dimension or glued.solver is None:
         return None
-    solver, parts = glued.solver, []
-    largest = [s for s in glued.solutions if s.dimension > 0]
-    for solution in largest:
-        points = np.array([solver.forces(v) for v in solution.vertices])
-        slips = [solver.slip_signs(v) for v in solution.vertices]
-        order = np.lexsort(points.T[::-1])
-        statuses = tuple(shown_status(c, sign_over(s[i] for s in slips)) for i, c in enumerate(solution.codes))
-        parts.append(
-            Polytope(
-                statuses, np.stack([points[order, : solver.p], points[order, solver.p :]], axis=2), solution.dimension
-            )
-        )
+    parts = [polytope(s, s.vertices, glued.solver) for s in glued.solutions if s.dimension > 0]
     return RootFamily(float(glued.alpha), tuple(_without_repetition(parts)), index, vertices_proven=proven)
 
 
@@ -204,31 +195,10 @@ def multigraph(vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> Any:
     """The networkx.MultiGraph, frozen: vertices by number, arcs as edges keyed by their number."""
     graph = nx.MultiGraph()
     for v in vertices:
-        graph.add_node(
-            v.number,
-            alpha=v.alpha,
-            kind=v.kind,
-            border=v.border,
-            statuses=v.statuses,
-            active=v.active,
-            lambda_n=v.lambda_n,
-            lambda_t=v.lambda_t,
-            index_left=v.index_left,
-            index_right=v.index_right,
-            vertex=v,
-        )
+        graph.add_node(v.number, **{name: getattr(v, name) for name in _NODE_DATA}, vertex=v)
     for arc in arcs:
-        graph.add_edge(
-            arc.tail,
-            arc.head,
-            key=arc.number,
-            statuses=arc.statuses,
-            alpha=(arc.lo, arc.hi),
-            index=arc.index,
-            dimension=arc.dimension,
-            values=arc.values,
-            arc=arc,
-        )
+        shown = {name: getattr(arc, name) for name in _EDGE_DATA}
+        graph.add_edge(arc.tail, arc.head, key=arc.number, alpha=arc.interval, **shown, arc=arc)
     return nx.freeze(graph)
 
 

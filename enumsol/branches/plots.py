@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.branches.elements import UNSETTLED
+from enumsol.branches.elements import VertexKind
 from enumsol.checks import one_of, positive_integer, shown
 from enumsol.errors import InvalidArgumentError
 from enumsol.figures import new_figure
@@ -185,13 +185,13 @@ def _panel(axis: Any, graph: DrawnGraph, quantity: str, node: int, curves: dict[
 
 
 _MARKERS = {
-    "transition": "o",
-    "touch": "o",
-    "fold": "s",
-    "bifurcation": "D",
-    "point": "x",
-    "broken": "X",
-    UNSETTLED: "4",
+    VertexKind.TRANSITION: "o",
+    VertexKind.TOUCH: "o",
+    VertexKind.FOLD: "s",
+    VertexKind.BIFURCATION: "D",
+    VertexKind.POINT: "x",
+    VertexKind.BROKEN: "X",
+    VertexKind.UNSETTLED: "4",
 }
 
 
@@ -279,13 +279,13 @@ def _legend(figure: Any, graph: DrawnGraph) -> None:
     ]
     kinds = {v.kind for v in graph.vertices}
     for kind, label in (
-        ("transition", "transition"),
-        ("fold", "fold"),
-        ("bifurcation", "bifurcation"),
-        (UNSETTLED, "not followed further"),
+        (VertexKind.TRANSITION, "transition"),
+        (VertexKind.FOLD, "fold"),
+        (VertexKind.BIFURCATION, "bifurcation"),
+        (VertexKind.UNSETTLED, "not followed further"),
     ):
         if kind in kinds:
-            filled = "#333333" if kind == UNSETTLED else "white"
+            filled = "#333333" if kind is VertexKind.UNSETTLED else "white"
             handles.append(
                 Line2D([], [], linestyle="", marker=_MARKERS[kind], color=_FAMILY, markerfacecolor=filled, label=label)
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,14 @@ if TYPE_CHECKING:
     from enumsol.problem import ContactProblem
     from enumsol.search.interval import SearchedPiece
     from enumsol.selections.solution import Codes
+
+
+class GraphLeaf(enum.StrEnum):
+    """Kinds of leaves in the proof of a graph (docs/proof_format.md); the checker keeps its own list."""
+
+    EXCLUDED = "x"
+    SELECTION = "s"
+    CUT = "c"
 
 
 def write_graph_proof(
@@ -50,8 +59,8 @@ def write_graph_proof(
             }
         )
         for leaf in found.empty:
-            writer.write(["x", _text(leaf.codes), *packed(leaf.rows, leaf.values)])
-        for kind, kept in (("s", found.selections), ("c", found.cut)):
+            writer.write([GraphLeaf.EXCLUDED, _text(leaf.codes), *packed(leaf.rows, leaf.values)])
+        for kind, kept in ((GraphLeaf.SELECTION, found.selections), (GraphLeaf.CUT, found.cut)):
             for codes in kept:
                 writer.write([kind, _text(codes)])
         leaves += len(found.empty)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.roots.builder import RootBuilder
+from enumsol.roots.builder import RootBuilder, in_order, root_family
 from enumsol.roots.components import connected_components
 from enumsol.roots.local_degree import perturbed_degree
 from enumsol.roots.root_set import RootSet, SearchStats
@@ -32,7 +32,7 @@ def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> Root
         solutions = [solver.solve(codes) for codes in _codes_at(selections, floats.F_positive)]
         exact = any(solution is None for solution in solutions)
     if exact:
-        solver = ExactSelections(data.path.system(rational(alpha)))
+        solver = ExactSelections(data.exact.system(rational(alpha)))
         solutions = [solver.solve(codes) for codes in _codes_at(selections, solver.F_positive)]
     components = connected_components(
         [solution for solution in solutions if solution is not None],
@@ -41,9 +41,8 @@ def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> Root
     )
     builder = RootBuilder(problem, alpha, solver, floats, {})
     roots = [builder.root(c) for c in components if c.dimension == 0]
-    families = [builder.family(c, proven=exact) for c in components if c.dimension > 0]
-    roots.sort(key=lambda root: ([s.value for s in root.statuses], root.lambda_n.tolist(), root.lambda_t.tolist()))
-    families.sort(key=lambda family: family.vertices.tolist())
+    families = [root_family(alpha, c, solver, proven=exact) for c in components if c.dimension > 0]
+    roots, families = in_order(roots, families)
     whole = sum(c.whole for c in components)
     return RootSet(
         alpha=alpha,

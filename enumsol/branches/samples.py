@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from enumsol.branches.graph import BranchGraph
     from enumsol.checks import AlphaLike
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.roots.root_set import Root, RootSet
+    from enumsol.roots.root import Root
+    from enumsol.roots.root_set import RootSet
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,12 @@ def link_samples(
     ------
     InvalidArgumentError
         There is no alpha, or one is not a finite number.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> enumsol.link_samples(enumsol.gallery.one_node_triangle(), [4, 5, 6])
+    SampledGraph of 3 samples: 9 roots, 6 links (heuristic), 0 ambiguous pairs left open
     """
     instance_of(problem, ContactProblem, "problem")
     optional_callable(progress, "progress")

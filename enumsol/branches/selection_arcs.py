@@ -18,14 +18,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.condensation.exact import ExactPath
-    from enumsol.selections.solution import ActiveSets, Codes
+    from enumsol.selections.ordered_field import FiberSelections
+    from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
 
 
 class Condition(NamedTuple):
     """A condition ``sign * poly / det >= 0`` of a selection."""
 
-    node: int
-    kind: str  # "gap", "force", "cone+", "cone-" or "slip"
     sign: int
     poly: Any
 
@@ -38,35 +37,45 @@ def conditions(functions: SelectionFunctions) -> list[Condition]:
     found = []
     for i, code in enumerate(functions.codes):
         if code == OPEN:
-            found.append(Condition(i, "gap", -1, functions.gap(i)))
+            found.append(Condition(-1, functions.gap(i)))
             continue
-        found.append(Condition(i, "force", 1, functions.normal_force(i)))
+        found.append(Condition(1, functions.normal_force(i)))
         if code == STICK:
-            found.append(Condition(i, "cone+", 1, functions.cone(i, 1)))
-            found.append(Condition(i, "cone-", 1, functions.cone(i, -1)))
+            found.append(Condition(1, functions.cone(i, 1)))
+            found.append(Condition(1, functions.cone(i, -1)))
         elif code in (SLIP_PLUS, SLIP_MINUS):
-            found.append(Condition(i, "slip", 1 if code == SLIP_PLUS else -1, functions.slip(i)))
+            found.append(Condition(1 if code == SLIP_PLUS else -1, functions.slip(i)))
     return found
 
 
-@dataclass
+@dataclass(eq=False)
 class Event:
     """A critical point of a selection.
 
     Attributes
     ----------
+    codes : the selection
     alpha : CriticalAlpha
     holds : bool
         The selection has a solution there.
     singular : bool
         Its determinant vanishes there: its solutions form a polytope, or it has none.
+    polytope : (FiberSelections, SelectionSolution) or None
+        Its solutions there, where it is singular, with their solver.
+    active : per node all codes that hold on its solutions, once asked for
+    settled : bool
+        Every selection that holds there is known.
     vertex : int
         The vertex of the graph it belongs to, once glued; -1 before.
     """
 
+    codes: Codes
     alpha: CriticalAlpha
     holds: bool = False
     singular: bool = False
+    polytope: tuple[FiberSelections, SelectionSolution] | None = None
+    active: ActiveSets = ()
+    settled: bool = True
     vertex: int = -1
 
 
@@ -113,46 +122,38 @@ class SelectionArcs:
         """Whether the selection holds nowhere in the interval."""
         return not any(event.holds for event in self.events)
 
-    def find(self, alpha: CriticalAlpha) -> int | None:
-        """Number of the event at this alpha, or None."""
-        low, high = 0, len(self.events)
-        while low < high:
-            middle = (low + high) // 2
-            order = self.events[middle].alpha.compare(alpha)
-            if order == 0:
-                return middle
-            low, high = (middle + 1, high) if order < 0 else (low, middle)
-        return None
-
     def beside(self, event: Event) -> bool:
         """Whether the selection holds in a cell beside the event."""
-        k = next(k for k, other in enumerate(self.events) if other is event)
+        k = self.events.index(event)
         return any(self.cells[j].holds for j in (k - 1, k) if 0 <= j < len(self.cells))
 
-    def place(self, alpha: CriticalAlpha) -> tuple[int, bool]:
-        """Number of the event at this alpha; where there is none the cell is cut in two (True)."""
-        found = self.find(alpha)
-        if found is not None:
-            return found, False
-        after = next(k for k, event in enumerate(self.events) if event.alpha.compare(alpha) > 0)
-        cell = self.cells[after - 1]
-        self.events.insert(after, Event(alpha, cell.holds))
+    def event_at(self, alpha: CriticalAlpha) -> tuple[Event, bool]:
+        """The event at this alpha; where there is none, the cell is cut in two (True)."""
+        after, high = 0, len(self.events)
+        while after < high:
+            middle = (after + high) // 2
+            order = self.events[middle].alpha.compare(alpha)
+            if order == 0:
+                return self.events[middle], False
+            after, high = (middle + 1, high) if order < 0 else (after, middle)
+        cell, event = self.cells[after - 1], Event(self.codes, alpha, self.cells[after - 1].holds)
+        self.events.insert(after, event)
         left = rational_between(self.events[after - 1].alpha, alpha)
         right = rational_between(alpha, self.events[after + 1].alpha)
         self.cells[after - 1 : after] = [Cell(left, cell.holds, cell.det_sign), Cell(right, cell.holds, cell.det_sign)]
-        return after, True
+        return event, True
 
 
-def selection_arcs(path: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionArcs | None:
+def selection_arcs(exact: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionArcs | None:
     """Cells and events of a selection in [a, b]; None when its determinant vanishes identically.
 
     Parameters
     ----------
-    path : ExactPath
+    exact : ExactPath
     codes : status codes
     a, b : fmpq, a <= b
     """
-    functions = SelectionFunctions(path, codes)
+    functions = SelectionFunctions(exact, codes)
     if functions.singular:
         return None
     arcs = SelectionArcs(codes, functions)
@@ -162,10 +163,10 @@ def selection_arcs(path: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionAr
     events = _critical_points(functions.det, required, a, b)
     if events is None:
         return arcs
-    groups = merge(number for number, _ in events)
-    owners = {id(number): owner for number, owner in events}
-    vanishing = [{owners[id(number)] for number in group} for group in groups]
-    arcs.events = [Event(group[0], singular=-1 in owner) for group, owner in zip(groups, vanishing, strict=True)]
+    owners = dict(events)
+    groups = merge(owners)
+    vanishing = [{owners[number] for number in group} for group in groups]
+    arcs.events = [Event(codes, group[0], singular=-1 in owner) for group, owner in zip(groups, vanishing, strict=True)]
     signs = []
     for left, right in zip(arcs.events, arcs.events[1:], strict=False):
         at = rational_between(left.alpha, right.alpha)
@@ -203,7 +204,7 @@ def _critical_points(det: Any, required: Sequence[Condition], a: Any, b: Any) ->
     return points + [(CriticalAlpha.rational(end), -2) for end in ((a, b) if a != b else (a,))]
 
 
-def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, path: ExactPath) -> ActiveSets:
+def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, exact: ExactPath) -> ActiveSets:
     """Per node the codes that hold at the selection's solution at ``alpha``, where its determinant does not vanish.
 
     Parameters
@@ -211,7 +212,7 @@ def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, path: 
     functions : the selection's functions
     alpha : CriticalAlpha
     det_sign : sign of the determinant there
-    path : ExactPath
+    exact : ExactPath
     """
 
     def at(poly: Any) -> int:
@@ -220,7 +221,7 @@ def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, path: 
     found = []
     for i, code in enumerate(functions.codes):
         holds = {code}
-        if path.frictionless[i]:
+        if exact.frictionless[i]:
             value = at(functions.gap(i)) if code == OPEN else at(functions.normal_force(i))
             holds |= {OPEN, FRICTIONLESS} if value == 0 else set()
         elif code == OPEN:
@@ -236,7 +237,7 @@ def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, path: 
             moves = at(functions.slip(i))
             if at(functions.normal_force(i)) == 0:
                 holds |= {OPEN} | _tangential(moves)
-            elif alpha.is_rational and path.F0[i] + path.F1[i] * alpha.lo == 0:
+            elif alpha.is_rational and exact.F0[i] + exact.F1[i] * alpha.lo == 0:
                 holds |= _tangential(moves)
             elif moves == 0:
                 holds.add(STICK)

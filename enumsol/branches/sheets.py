@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MAX_SHEET_BASES = min(2000, MAX_BASES)
 
 
-def sheet_arcs(path: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionArcs:
+def sheet_arcs(exact: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionArcs:
     """Cells and events of a selection that is singular for every alpha, in [a, b].
 
     A vertex of its polytope solves the equations and as many of the inequalities as its kernel has dimensions. All
@@ -37,43 +37,43 @@ def sheet_arcs(path: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionArcs:
         More than MAX_SHEET_BASES bases would have to be followed.
     """
     points = [CriticalAlpha.rational(end) for end in ((a, b) if a != b else (a,))]
-    for poly in _critical_polynomials(path, codes):
+    for poly in _critical_polynomials(exact, codes):
         points += real_roots(poly, a, b)
-    events = [Event(group[0], singular=True) for group in merge(points)]
+    events = [Event(codes, group[0], singular=True) for group in merge(points)]
     patterns = []
     for event in events:
-        pattern = _pattern(path, codes, exact_value(event.alpha))
+        pattern = _pattern(exact, codes, exact_value(event.alpha))
         event.holds = pattern is not None
         patterns.append(pattern)
     cells, between = [], []
     for left, right in pairwise(events):
         at = rational_between(left.alpha, right.alpha)
-        between.append(_pattern(path, codes, at))
+        between.append(_pattern(exact, codes, at))
         cells.append(Cell(at, between[-1] is not None, 0))
     for k in range(len(events) - 2, 0, -1):
         if patterns[k] == between[k - 1] == between[k]:
             del events[k], patterns[k], cells[k], between[k]
-    arcs = SelectionArcs(codes, SelectionFunctions(path, codes), events, cells, grazing=True)
+    arcs = SelectionArcs(codes, SelectionFunctions(exact, codes), events, cells, grazing=True)
     for event in arcs.events:
         event.singular = True
     return arcs
 
 
-def _pattern(path: ExactPath, codes: Codes, alpha: Any) -> Any:
+def _pattern(exact: ExactPath, codes: Codes, alpha: Any) -> Any:
     """What a polytope looks like: the active sets of its vertices; None when it is empty."""
-    solver = FiberSelections(path, alpha)
+    solver = FiberSelections(exact, alpha)
     solution = solver.solve(codes)
     if solution is None:
         return None
     return frozenset(solver.active(vertex) for vertex in solution.vertices)
 
 
-def _critical_polynomials(path: ExactPath, codes: Codes) -> list[Any]:
+def _critical_polynomials(exact: ExactPath, codes: Codes) -> list[Any]:
     """Nonzero integer polynomials whose roots include every alpha at which the polytope changes its shape."""
-    p, size = path.p, 2 * path.p
+    p, size = exact.p, 2 * exact.p
 
     def rows_at(alpha: Any) -> tuple[list[list[Any]], list[list[Any]]]:
-        equations, inequalities = FiberSelections(path, alpha).forms(codes)
+        equations, inequalities = FiberSelections(exact, alpha).forms(codes)
         return [[*form, c] for form, c in equations], [[*form, c] for form, c in inequalities]
 
     # a rank that holds for all but finitely many alpha is found at one of more points than the degree of any minor

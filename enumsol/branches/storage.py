@@ -14,13 +14,14 @@ import scipy.sparse as sp
 from flint import fmpq, fmpz, fmpz_poly
 
 from enumsol.arithmetic.algebraic import CriticalAlpha
-from enumsol.branches.elements import Arc, Vertex
+from enumsol.branches.elements import Arc, Vertex, VertexKind
 from enumsol.branches.graph_data import GraphData, GraphStats
-from enumsol.checks import file_path, writing
+from enumsol.checks import file_path
 from enumsol.condensation.exact import ExactPath
 from enumsol.errors import InvalidArgumentError
+from enumsol.files import writing
 from enumsol.problem import ContactProblem
-from enumsol.roots.root_set import Polytope, RootFamily
+from enumsol.roots.root import Polytope, RootFamily
 from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 FORMAT, VERSION = "enumsol-branch-graph", 2
 #: Version 1 gave kinds to the vertices of graphs that were not complete; only its complete graphs are read.
 _READ = (1, 2)
+#: Arrays of a vertex.
+_VALUES = ("lambda_n", "lambda_t", "u_n", "u_t")
 _FRACTION = re.compile(r"-?\d+(/\d+)?", re.ASCII)
 
 
@@ -39,7 +42,7 @@ def save_graph(data: GraphData, file: str | Path) -> None:
         "format": FORMAT,
         "version": VERSION,
         "problem": _problem_record(data.problem),
-        "condensed_exactly": data.path.condensed_exactly,
+        "condensed_exactly": data.exact.condensed_exactly,
         "interval": [str(end) for end in data.interval],
         "arithmetic": data.arithmetic,
         "reasons": list(data.reasons),
@@ -83,12 +86,12 @@ def load_graph(file: str | Path) -> GraphData:
 def _from_record(record: dict[str, Any]) -> GraphData:
     problem = _problem(record["problem"])
     exactly = record["condensed_exactly"]
-    path = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
+    exact = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
     first, last = (_fraction(end) for end in record["interval"])
     vertices = tuple(_vertex(k, item) for k, item in enumerate(record["vertices"]))
-    arcs = tuple(_arc(k, item, vertices, path) for k, item in enumerate(record["arcs"]))
+    arcs = tuple(_arc(k, item, vertices, exact) for k, item in enumerate(record["arcs"]))
     reasons, stats = tuple(record["reasons"]), GraphStats(**record["stats"])
-    return GraphData(problem, path, (first, last), record["arithmetic"], vertices, arcs, reasons, stats)
+    return GraphData(problem, exact, (first, last), record["arithmetic"], vertices, arcs, reasons, stats)
 
 
 # -- the problem -------------------------------------------------------------------------------------------------------
@@ -154,11 +157,11 @@ def _vertex_record(v: Vertex) -> dict[str, Any]:
         "lo": str(lo),
         "hi": str(hi),
         "polynomial": None if v.exact.poly is None else [str(c) for c in v.exact.poly.coeffs()],
-        "kind": v.kind,
+        "kind": v.kind.value,
         "border": v.border,
         "statuses": _names(v.statuses),
         "active": [sorted(_names(tuple(names))) for names in v.active],
-        **{name: getattr(v, name).tolist() for name in ("lambda_n", "lambda_t", "u_n", "u_t")},
+        **{name: getattr(v, name).tolist() for name in _VALUES},
         "family": family,
         "family_index": None if v.family is None else v.family.index,
         "index_left": v.index_left,
@@ -186,21 +189,18 @@ def _vertex(number: int, item: dict[str, Any]) -> Vertex:
         ]
         family = RootFamily(item["alpha"], tuple(parts), item["family_index"], vertices_proven=True)
     return Vertex(
-        number,
-        item["alpha"],
-        item["kind"],
-        item["border"],
-        _statuses(item["statuses"]),
-        tuple(frozenset(_statuses(names)) for names in item["active"]),
-        np.array(item["lambda_n"]),
-        np.array(item["lambda_t"]),
-        np.array(item["u_n"]),
-        np.array(item["u_t"]),
-        family,
-        item["index_left"],
-        item["index_right"],
-        tuple(tuple(codes) for codes in item["selections"]),
-        CriticalAlpha(poly, lo, hi),
+        number=number,
+        alpha=item["alpha"],
+        kind=VertexKind(item["kind"]),
+        border=item["border"],
+        statuses=_statuses(item["statuses"]),
+        active=tuple(frozenset(_statuses(names)) for names in item["active"]),
+        **{name: np.array(item[name]) for name in _VALUES},
+        family=family,
+        index_left=item["index_left"],
+        index_right=item["index_right"],
+        selections=tuple(tuple(codes) for codes in item["selections"]),
+        exact=CriticalAlpha(poly, lo, hi),
     )
 
 
@@ -217,20 +217,16 @@ def _arc_record(arc: Arc) -> dict[str, Any]:
     }
 
 
-def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], path: ExactPath) -> Arc:
+def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], exact: ExactPath) -> Arc:
     return Arc(
-        number,
-        _statuses(item["statuses"]),
-        vertices[item["tail"]].alpha,
-        vertices[item["head"]].alpha,
-        item["tail"],
-        item["head"],
-        item["index"],
-        item["dimension"],
-        item["grazing"],
-        tuple(tuple(codes) for codes in item["selections"]),
-        _fraction(item["sample"]),
-        path,
+        number=number,
+        statuses=_statuses(item["statuses"]),
+        lo=vertices[item["tail"]].alpha,
+        hi=vertices[item["head"]].alpha,
+        **{name: item[name] for name in ("tail", "head", "index", "dimension", "grazing")},
+        selections=tuple(tuple(codes) for codes in item["selections"]),
+        sample=_fraction(item["sample"]),
+        _exact=exact,
     )
 
 
@@ -244,9 +240,9 @@ def write_graphml(data: GraphData, branch_of: Mapping[int, int], file: str | Pat
         plain.add_node(
             v.number,
             alpha=v.alpha,
-            kind=v.kind,
+            kind=v.kind.value,
             statuses=" ".join(_names(v.statuses)),
-            **{name: " ".join(map(repr, getattr(v, name).tolist())) for name in ("lambda_n", "lambda_t", "u_n", "u_t")},
+            **{name: " ".join(map(repr, getattr(v, name).tolist())) for name in _VALUES},
         )
     for arc in data.arcs:
         plain.add_edge(

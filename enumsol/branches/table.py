@@ -98,6 +98,13 @@ def multiplicity_table(
         On Ctrl-C; ``partial`` is the table of what was done.
     WorkerError
         A worker of the executor died; ``partial`` is the table of what was done.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> table = enumsol.multiplicity_table(enumsol.gallery.one_node_triangle(), [1, "8/3", 5])
+    >>> table["roots"].tolist(), bool(table["complete"].all())
+    ([1, 2, 3], True)
     """
     instance_of(problem, ContactProblem, "problem")
     optional_executor(executor)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from flint import fmpq, fmpq_mat
 
-from enumsol.arithmetic.rationals import is_positive_definite
+from enumsol.arithmetic.rationals import is_positive_definite, rational
+from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.free_displacements import exact_matrices, free_displacements, solved
 from enumsol.kernel.rows import (
@@ -22,6 +22,7 @@ from enumsol.kernel.rows import (
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from fractions import Fraction
 
     import numpy as np
     from numpy.typing import NDArray
@@ -29,12 +30,6 @@ if TYPE_CHECKING:
     from enumsol.problem import ContactProblem
 
 Vector = list[Any]
-
-
-def fmpq_of(value: Any) -> Any:
-    """Exact rational value of a float, an int, a Fraction or a string ``"a/b"``."""
-    number = Fraction(value)
-    return fmpq(number.numerator, number.denominator)
 
 
 class RationalSystem:
@@ -53,14 +48,13 @@ class RationalSystem:
     """
 
     def __init__(self, problem: ContactProblem, alpha: Fraction) -> None:
-        self.p, a = problem.p, fmpq_of(alpha)
+        self.p, a = problem.p, rational(alpha)
         A, B = exact_matrices(problem)
         self.S = B * solved(A, B.transpose())
         if not is_positive_definite(self.S):
             raise NotEnclosedError("the condensed compliance S is not positive definite in rational arithmetic")
         self.g: Vector = [x + a * y for x, y in zip(*free_displacements(problem), strict=True)]
-        F0, F1 = problem.friction
-        self.F: Vector = [fmpq_of(x) + a * fmpq_of(y) for x, y in zip(F0.tolist(), F1.tolist(), strict=True)]
+        self.F: Vector = [rational(F) for F in exactly_at(alpha, *problem.friction)]
         self._inverse: Any = None
 
     def slip(self, point: Vector) -> Vector:
@@ -123,7 +117,7 @@ class RationalSystem:
             allowed = int(signs[i, kind])
             if allowed == FORBIDDEN or (allowed == NONNEGATIVE and value < 0):
                 return False
-            u = fmpq_of(value) * fmpq_of(units[row])
+            u = rational(value) * rational(units[row])
             if kind in (0, 2, 3):
                 v[i] += u * (fmpq(1) if kind == 0 else self.F[i])
             if kind in (1, 2, 3):

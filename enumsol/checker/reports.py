@@ -31,6 +31,14 @@ class VerificationReport:
         "problem": the theorem holds for the problem's own matrices; "condensed": for S, g and F as computed.
     alpha : Fraction or None
         The parameter that the proof is about; None when its header cannot be read.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem, other = enumsol.gallery.one_node_triangle(), enumsol.gallery.one_node_triangle(f=(1, 2))
+    >>> proof = enumsol.enumerate_roots(problem, alpha=5).proof
+    >>> enumsol.verify(problem, proof).complete, enumsol.verify(other, proof).complete
+    (True, False)
     """
 
     ok: bool

@@ -77,6 +77,18 @@ def verify(
         that make no sense, or prove nothing, are a reason to refuse the proof: the report says so.
     InvalidArgumentError
         An argument is of another type.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> roots = enumsol.enumerate_roots(problem, alpha=5)
+    >>> enumsol.verify(problem, roots.proof)
+    proof: verified at alpha = 5.0
+      4 leaves cover all selections, 0 of them undecided
+      3 isolated roots, 0 families
+      certified data: A, Bn, Bt, f as given
+      complete: yes
     """
     for name, value, kind in (("problem", problem, ContactProblem), ("proof", proof, Proof)):
         if not isinstance(value, kind):

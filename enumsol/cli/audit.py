@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from enumsol.cli.common import (
-    OUTPUT,
-    Arithmetic,
-    ExitStatus,
-    GraphFileOption,
-    JsonOption,
-    ProblemArgument,
-    load_problem,
-    parse_alpha,
-    parse_interval,
-)
+from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far
 from enumsol.cli.graph import build, read_graph
-from enumsol.cli.output import as_json, check_outputs, deliver, write_text
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, csv, file, number
+from enumsol.cli.output import as_json, check_outputs, deliver
+from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,48 +19,42 @@ if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
     from enumsol.checks import Alpha
     from enumsol.continuation import AuditReport, PointRun
+    from enumsol.problem import ContactProblem
 
 #: As of ``read_points``, which is not imported for --help.
 Columns = Literal["auto", "rows", "labels"]
+PointsArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="POINTS",
+        help="CSV with columns alpha, lambda_n_X and lambda_t_X for every contact node X and, for several paths, "
+        "path; - is stdin.",
+        show_default=False,
+    ),
+]
+Tolerance = Annotated[
+    float,
+    typer.Option(
+        metavar="LENGTH",
+        help="Distance from every arc beyond which a point is off the graph, as explained above; without units.",
+    ),
+]
+NamedBy = Annotated[
+    Columns, typer.Option(help="Whether the X of lambda_n_X is the node's row number (from 0) or its label.")
+]
 
 
 def audit(
     problem: ProblemArgument,
-    points: Annotated[
-        str,
-        typer.Argument(
-            metavar="POINTS",
-            help="CSV with columns alpha, lambda_n_X and lambda_t_X for every contact node X and, for several paths, "
-            "path; - is stdin.",
-            show_default=False,
-        ),
-    ],
-    first: Annotated[
-        str | None,
-        typer.Option("--from", metavar="NUMBER", help="First alpha; default: that of the points.", show_default=False),
-    ] = None,
-    last: Annotated[
-        str | None,
-        typer.Option("--to", metavar="NUMBER", help="Last alpha; default: that of the points.", show_default=False),
-    ] = None,
-    graph_file: GraphFileOption = None,
+    points: PointsArgument,
+    first: Annotated[str | None, number("--from", "First alpha; default: that of the points.")] = None,
+    last: Annotated[str | None, number("--to", "Last alpha; default: that of the points.")] = None,
+    graph_file: Annotated[str | None, file("--graph", "A graph that enumsol graph --save wrote.", None)] = None,
     arithmetic: Annotated[Arithmetic, typer.Option(help="Of the graph, as in enumsol graph.")] = "verified",
-    tolerance: Annotated[
-        float,
-        typer.Option(
-            metavar="LENGTH",
-            help="Distance from every arc beyond which a point is off the graph, as explained above; without units.",
-        ),
-    ] = 1e-5,
-    columns: Annotated[
-        Columns,
-        typer.Option(help="Whether the X of lambda_n_X is the node's row number (from 0) or its label."),
-    ] = "auto",
-    json_file: JsonOption = None,
-    csv_file: Annotated[
-        str | None,
-        typer.Option("--csv", metavar="FILE", help="Write one row a point; - is stdout.", rich_help_panel=OUTPUT),
-    ] = None,
+    tolerance: Tolerance = 1e-5,
+    columns: NamedBy = "auto",
+    json_file: JsonFile = None,
+    csv_file: Annotated[str | None, csv("a point")] = None,
 ) -> None:
     """Check POINTS, from any continuation code, against all solutions of PROBLEM.
 
@@ -95,8 +80,7 @@ def audit(
     known to be incomplete has no arc there; 2 on bad input; 130 on Ctrl-C; 74 when a result could not be written, 141
     when nobody read it any more.
     """
-    from enumsol.continuation import audit as check
-    from enumsol.continuation import read_points
+    from enumsol.continuation import audit as check  # numpy and scipy: not for --help
     from enumsol.continuation.graph_map import checked_tolerance
 
     checked_tolerance(tolerance)
@@ -104,27 +88,28 @@ def audit(
     if graph_file is not None and (first is not None or last is not None):
         raise InvalidArgumentError("--graph and --from or --to are both given; a graph has its own interval")
     body = load_problem(problem)
+    runs = _read_runs(points, body, columns)
+    known = None if graph_file is None else read_graph(graph_file, body)
+    found, ended = so_far(lambda: known or build(body, _interval(runs, first, last), arithmetic))
+    report = check(runs, found, tolerance=tolerance)
+    deliver(
+        json_file=json_file,
+        csv_file=csv_file,
+        text=lambda: _as_text(report, found),
+        content=lambda: as_json({"problem": problem, **report.summary(), "graph": found.summary()}),
+        frame=report.to_frame,
+    )
+    finish(ended, _status(report))
+
+
+def _read_runs(points: str, problem: ContactProblem, columns: Columns) -> Sequence[PointRun]:
+    from enumsol.continuation import read_points
+
     source, name = (sys.stdin, "stdin") if points == "-" else (points, points)
-    runs = read_points(source, body, columns=columns, name=name)
+    runs = read_points(source, problem, columns=columns, name=name)
     if not runs:
         raise InvalidArgumentError(f"{name} holds no points; expected one row a point below the names of columns")
-    interrupted = False
-    found: Any
-    try:
-        if graph_file is None:
-            found = build(body, _interval(runs, first, last), arithmetic)
-        else:
-            found = read_graph(graph_file, body)
-    except Interrupted as interruption:
-        interrupted, found = True, interruption.partial
-    report = check(runs, found, tolerance=tolerance)
-    content = {"problem": problem, **report.summary(), "graph": found.summary()}
-    deliver(
-        None if "-" in (json_file, csv_file) else lambda: typer.echo(_as_text(report, found)),
-        None if json_file is None else lambda: write_text(json_file, as_json(content)),
-        None if csv_file is None else lambda: write_text(csv_file, report.to_frame().to_csv(index=False)),
-    )
-    raise typer.Exit(ExitStatus.INTERRUPTED if interrupted else _status(report))
+    return runs
 
 
 def _as_text(report: AuditReport, found: BranchGraph) -> str:

@@ -1,4 +1,4 @@
-"""What the commands share: the problem and alpha they are given, options, exit statuses, worker processes."""
+"""What the commands share: the problem and alpha they are given, exit statuses, worker processes."""
 
 from __future__ import annotations
 
@@ -7,58 +7,24 @@ import os
 import sys
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import typer
 
-from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError
+from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutputError, WorkerError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from concurrent.futures import Executor
 
     from enumsol.checks import Alpha
     from enumsol.problem import ContactProblem
 
+T = TypeVar("T")
+
 _GALLERY = "gallery:"
 #: As many processes as Windows lets one wait for.
 _MOST_ON_WINDOWS = 61
-
-ProblemArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="PROBLEM",
-        help="A file (.npz, .h5), a directory of MatrixMarket files, or gallery:NAME.",
-        show_default=False,
-    ),
-]
-
-
-Arithmetic = Literal["verified", "fast", "exact"]
-FromOption = Annotated[
-    str,
-    typer.Option("--from", metavar="NUMBER", help="First alpha: a number or a fraction.", show_default=False),
-]
-ToOption = Annotated[
-    str,
-    typer.Option("--to", metavar="NUMBER", help="Last alpha: a number or a fraction.", show_default=False),
-]
-#: Options that are grouped in the help of every command.
-LIMITS, OUTPUT, PLOT = "Limits", "Output", "Plot"
-JsonOption = Annotated[
-    str | None,
-    typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is stdout.", rich_help_panel=OUTPUT),
-]
-PlotOption = Annotated[
-    str | None,
-    typer.Option("--plot", metavar="FILE", help="Draw a figure: .png, .pdf, .svg.", rich_help_panel=PLOT),
-]
-GraphFileOption = Annotated[
-    str | None,
-    typer.Option("--graph", metavar="FILE", help="A graph that enumsol graph --save wrote.", show_default=False),
-]
-Quantity = Literal["lambda_n", "lambda_t", "u_n", "u_t"]
-QuantityOption = Annotated[Quantity, typer.Option(help="What is drawn against alpha.", rich_help_panel=PLOT)]
 
 
 class ExitStatus(enum.IntEnum):
@@ -156,6 +122,16 @@ def node_row(problem: ContactProblem, label: str | None) -> int:
 def note(text: str) -> None:
     """Say something on stderr that is no error."""
     typer.echo(f"enumsol: note: {text}", err=True)
+
+
+def so_far(search: Callable[[], T]) -> tuple[T | Any, EnumsolError | None]:
+    """What a search found, be it ended early, and what ended it."""
+    try:
+        return search(), None
+    except (Interrupted, WorkerError, OutputError) as error:
+        if error.partial is None:
+            raise
+        return error.partial, error
 
 
 def finish(ended: EnumsolError | None, status: ExitStatus) -> NoReturn:

@@ -7,24 +7,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from enumsol.cli.common import (
-    OUTPUT,
-    PLOT,
-    Arithmetic,
-    ExitStatus,
-    FromOption,
-    JsonOption,
-    PlotOption,
-    ProblemArgument,
-    QuantityOption,
-    ToOption,
-    load_problem,
-    node_row,
-    parse_alpha,
-    parse_interval,
-)
+from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, parse_alpha, parse_interval
 from enumsol.cli.graph import read_graph
-from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure, write_text
+from enumsol.cli.options import (
+    PLOT,
+    STEPS,
+    Arithmetic,
+    DrawnQuantity,
+    FirstAlpha,
+    JsonFile,
+    LastAlpha,
+    PlotFile,
+    ProblemArgument,
+    count,
+    csv,
+    file,
+    node,
+    number,
+    step,
+)
+from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display, SearchDisplay
 from enumsol.errors import Interrupted, InvalidArgumentError
 
@@ -37,92 +39,45 @@ if TYPE_CHECKING:
     from enumsol.checks import Alpha
     from enumsol.continuation import ContinuationOptions, Path
     from enumsol.problem import ContactProblem
-    from enumsol.roots.root_set import Root
+    from enumsol.roots.root import Root
 
-_STEPS = "Steps"
+OneRoot = Annotated[
+    int | None, typer.Option(min=0, metavar="K", help="Start from root K of enumsol roots; default: from all.")
+]
+Direction = Annotated[
+    str, typer.Option(metavar="+1|-1|both", help="+1: positively oriented; alpha then grows where the index is +1.")
+]
+OneTangent = Annotated[
+    int | None, typer.Option(min=0, metavar="K", help="Of several tangents at a degenerate root, the K-th.")
+]
+CheckSteps = Annotated[
+    bool, step(None, "Refuse steps that may have left the branch; without, the algorithm as printed.")
+]
 #: Ends of a path at which nothing is left to follow.
 _ARRIVED = ("interval left", "closed")
 
 
 def follow(
     problem: ProblemArgument,
-    first: FromOption,
-    last: ToOption,
-    start: Annotated[
-        str,
-        typer.Option(metavar="NUMBER", help="Alpha at which the starts are enumerated.", show_default=False),
-    ],
-    root: Annotated[
-        int | None,
-        typer.Option(
-            min=0, metavar="K", help="Start from root K of enumsol roots; default: from all.", show_default=False
-        ),
-    ] = None,
-    direction: Annotated[
-        str,
-        typer.Option(metavar="+1|-1|both", help="+1: positively oriented; alpha then grows where the index is +1."),
-    ] = "both",
-    tangent: Annotated[
-        int | None,
-        typer.Option(
-            min=0, metavar="K", help="Of several tangents at a degenerate root, the K-th.", show_default=False
-        ),
-    ] = None,
+    first: FirstAlpha,
+    last: LastAlpha,
+    start: Annotated[str, number("--start", "Alpha at which the starts are enumerated.")],
+    root: OneRoot = None,
+    direction: Direction = "both",
+    tangent: OneTangent = None,
     arithmetic: Annotated[Arithmetic, typer.Option(help="Of the enumeration of the starts.")] = "verified",
-    h_max: Annotated[
-        float, typer.Option("--h-max", metavar="LENGTH", help="Longest step.", rich_help_panel=_STEPS)
-    ] = 1.0,
-    h_min: Annotated[
-        float, typer.Option("--h-min", metavar="LENGTH", help="Shortest step.", rich_help_panel=_STEPS)
-    ] = 1e-5,
-    h_init: Annotated[
-        float | None,
-        typer.Option("--h-init", metavar="LENGTH", help="First step; default: 0.05, or h-max.", rich_help_panel=_STEPS),
-    ] = None,
-    eps: Annotated[
-        float, typer.Option(metavar="NORM", help="Convergence of the corrections.", rich_help_panel=_STEPS)
-    ] = 1e-6,
-    max_steps: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Stop a path after N steps.", rich_help_panel=_STEPS)
-    ] = 5000,
-    check_steps: Annotated[
-        bool,
-        typer.Option(
-            help="Refuse steps that may have left the branch; without, the algorithm as printed.",
-            rich_help_panel=_STEPS,
-        ),
-    ] = True,
-    json_file: JsonOption = None,
-    csv_file: Annotated[
-        str | None,
-        typer.Option(
-            "--csv",
-            metavar="FILE",
-            help="Write one row a point, for enumsol audit; - is stdout.",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
-    plot_file: PlotOption = None,
-    graph_file: Annotated[
-        str | None,
-        typer.Option(
-            "--graph",
-            metavar="FILE",
-            help="Draw over this graph of enumsol graph --save.",
-            rich_help_panel=PLOT,
-            show_default=False,
-        ),
-    ] = None,
-    quantity: QuantityOption = "lambda_n",
-    node: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LABEL",
-            help="Contact node to draw; default: the first.",
-            rich_help_panel=PLOT,
-            show_default=False,
-        ),
-    ] = None,
+    h_max: Annotated[float, step("LENGTH", "Longest step.")] = 1.0,
+    h_min: Annotated[float, step("LENGTH", "Shortest step.")] = 1e-5,
+    h_init: Annotated[float | None, step("LENGTH", "First step; default: 0.05, or h-max.")] = None,
+    eps: Annotated[float, step("NORM", "Convergence of the corrections.")] = 1e-6,
+    max_steps: Annotated[int, count("Stop a path after N steps.", panel=STEPS)] = 5000,
+    check_steps: CheckSteps = True,
+    json_file: JsonFile = None,
+    csv_file: Annotated[str | None, csv("a point, for enumsol audit")] = None,
+    plot_file: PlotFile = None,
+    graph_file: Annotated[str | None, file("--graph", "Draw over this graph of enumsol graph --save.", PLOT)] = None,
+    quantity: DrawnQuantity = "lambda_n",
+    label: Annotated[str | None, node("--node", "LABEL", "Contact node to draw; default: the first.")] = None,
 ) -> None:
     """Follow branches of solutions of PROBLEM from its roots at one alpha.
 
@@ -142,28 +97,25 @@ def follow(
     options = _options(h_max, h_min, h_init, eps, max_steps, check_steps)
     interval, alpha, signs = parse_interval(first, last), parse_alpha(start, "--start"), _directions(direction)
     body = load_problem(problem)
-    row = node_row(body, node)
+    row = node_row(body, label)
     over = None if graph_file is None else read_graph(graph_file, body)
     followed = _Followed(body, (float(interval[0]), float(interval[1])), options, tangent)
-    interrupted = False
+    ended: Interrupted | None = None
     try:
         followed.run(_starts(body, interval, alpha, arithmetic, root), signs, alone=root is not None)
     except KeyboardInterrupt:
         # wherever it came: the paths so far are kept
-        interrupted = True
+        ended = Interrupted("interrupted", followed)
     about = {"problem": problem, "start": alpha, "interval": interval}
-    text = followed.as_text() + (" (interrupted)" if interrupted else "")
     deliver(
-        None if "-" in (json_file, csv_file) else lambda: typer.echo(text),
-        None if json_file is None else lambda: write_text(json_file, as_json({**about, **followed.content()})),
-        None if csv_file is None else lambda: write_text(csv_file, followed.frame().to_csv(index=False)),
-        (lambda: write_figure(plot_file, _draw(followed.paths, over, row, quantity)))
-        if plot_file and followed.paths
-        else None,
+        (plot_file if followed.paths else None, lambda path: write_figure(path, followed.draw(over, row, quantity))),
+        json_file=json_file,
+        csv_file=csv_file,
+        text=lambda: followed.as_text() + (" (interrupted)" if ended else ""),
+        content=lambda: as_json({**about, **followed.content()}),
+        frame=followed.frame,
     )
-    if interrupted:
-        raise typer.Exit(ExitStatus.INTERRUPTED)
-    raise typer.Exit(ExitStatus.DONE if followed.arrived else ExitStatus.INCOMPLETE)
+    finish(ended, ExitStatus.DONE if followed.arrived else ExitStatus.INCOMPLETE)
 
 
 def _options(
@@ -272,8 +224,8 @@ class _Followed:
     def as_text(self) -> str:
         """The printed paths."""
         lines = []
-        for k, ((number, sign), path) in enumerate(zip(self.labels, self.paths, strict=True)):
-            lines += [f"path {k}, from root {number} in direction {sign:+d}: {path!r}", ""]
+        for k, ((root, sign), path) in enumerate(zip(self.labels, self.paths, strict=True)):
+            lines += [f"path {k}, from root {root} in direction {sign:+d}: {path!r}", ""]
         lines += [f"root {number} lies on path {k}" for number, k in self.passed.items()]
         lines += [f"root {number} in direction {sign:+d}: {reason}" for number, sign, reason in self.failures]
         ended = sum(path.status in _ARRIVED for path in self.paths)
@@ -287,9 +239,9 @@ class _Followed:
         import pandas as pd
 
         frames = []
-        for k, ((number, sign), path) in enumerate(zip(self.labels, self.paths, strict=True)):
+        for k, ((root, sign), path) in enumerate(zip(self.labels, self.paths, strict=True)):
             one = path.to_frame()
-            for at, (name, value) in enumerate((("path", k), ("root", number), ("direction", sign))):
+            for at, (name, value) in enumerate((("path", k), ("root", root), ("direction", sign))):
                 one.insert(at, name, value)
             frames.append(one)
         return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=["path", "alpha"])
@@ -304,6 +256,13 @@ class _Followed:
             "passed": [{"root": number, "path": k} for number, k in self.passed.items()],
             "failures": [{"root": number, "direction": sign, "reason": why} for number, sign, why in self.failures],
         }
+
+    def draw(self, over: BranchGraph | None, node: int, quantity: str) -> Any:
+        """A figure of all paths."""
+        axes = self.paths[0].plot(over, node=node, quantity=quantity)
+        for path in self.paths[1:]:
+            path.plot(ax=axes, node=node, quantity=quantity)
+        return axes.figure
 
 
 def _passes(path: Path, root: Root) -> bool:
@@ -338,10 +297,3 @@ def _content(path: Path) -> dict[str, Any]:
         ],
         "points": path.to_frame().to_dict("list"),
     }
-
-
-def _draw(paths: Sequence[Path], over: BranchGraph | None, node: int, quantity: str) -> Any:
-    axes = paths[0].plot(over, node=node, quantity=quantity)
-    for path in paths[1:]:
-        path.plot(ax=axes, node=node, quantity=quantity)
-    return axes.figure

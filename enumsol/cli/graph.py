@@ -6,40 +6,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from enumsol.cli.common import (
-    LIMITS,
-    OUTPUT,
-    PLOT,
+from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, note, parse_interval, so_far
+from enumsol.cli.options import (
     Arithmetic,
-    ExitStatus,
-    FromOption,
-    JsonOption,
-    PlotOption,
+    DrawnQuantity,
+    FirstAlpha,
+    JsonFile,
+    LastAlpha,
+    MaxNodes,
+    PlotFile,
     ProblemArgument,
-    QuantityOption,
-    ToOption,
-    finish,
-    load_problem,
-    node_row,
-    note,
-    parse_interval,
+    csv,
+    file,
+    node,
+    seconds,
 )
-from enumsol.cli.output import (
-    as_json,
-    check_outputs,
-    check_plot,
-    check_writable,
-    deliver,
-    write_figure,
-    write_text,
-    writing,
-)
+from enumsol.cli.output import as_json, check_outputs, check_plot, check_writable, deliver, write_figure
 from enumsol.cli.progress import Display
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from enumsol.branches import BranchGraph
     from enumsol.checks import Alpha
     from enumsol.problem import ContactProblem
@@ -47,8 +33,8 @@ if TYPE_CHECKING:
 
 def graph(
     problem: ProblemArgument,
-    first: FromOption,
-    last: ToOption,
+    first: FirstAlpha,
+    last: LastAlpha,
     arithmetic: Annotated[
         Arithmetic,
         typer.Option(
@@ -56,43 +42,17 @@ def graph(
             "exact: rationals throughout, proven, slow beyond ten contact nodes."
         ),
     ] = "verified",
-    max_nodes: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Stop after N nodes of the tree.", rich_help_panel=LIMITS)
-    ] = None,
-    time_limit: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Stop the search after so long.", rich_help_panel=LIMITS)
-    ] = None,
-    save_file: Annotated[
-        str | None,
-        typer.Option(
-            "--save", metavar="FILE", help="Write the graph, for enumsol audit and follow.", rich_help_panel=OUTPUT
-        ),
-    ] = None,
-    json_file: JsonOption = None,
-    csv_file: Annotated[
-        str | None,
-        typer.Option("--csv", metavar="FILE", help="Write one row an arc; - is stdout.", rich_help_panel=OUTPUT),
-    ] = None,
-    proof_file: Annotated[
-        str | None,
-        typer.Option(
-            "--proof", metavar="FILE", help="Write the proof (verified), for enumsol verify.", rich_help_panel=OUTPUT
-        ),
-    ] = None,
-    graphml_file: Annotated[
-        str | None,
-        typer.Option("--graphml", metavar="FILE", help="Write GraphML for other programs.", rich_help_panel=OUTPUT),
-    ] = None,
-    plot_file: PlotOption = None,
-    quantity: QuantityOption = "lambda_n",
+    max_nodes: MaxNodes = None,
+    time_limit: Annotated[float | None, seconds("Stop the search after so long.")] = None,
+    save_file: Annotated[str | None, file("--save", "Write the graph, for enumsol audit and follow.")] = None,
+    json_file: JsonFile = None,
+    csv_file: Annotated[str | None, csv("an arc")] = None,
+    proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), for enumsol verify.")] = None,
+    graphml_file: Annotated[str | None, file("--graphml", "Write GraphML for other programs.")] = None,
+    plot_file: PlotFile = None,
+    quantity: DrawnQuantity = "lambda_n",
     nodes: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LABELS",
-            help="Contact nodes to draw, such as 0,3; default: up to three.",
-            rich_help_panel=PLOT,
-            show_default=False,
-        ),
+        str | None, node("--nodes", "LABELS", "Contact nodes to draw, such as 0,3; default: up to three.")
     ] = None,
 ) -> None:
     """Find all solutions of PROBLEM for every alpha of an interval, as branches of exact arcs.
@@ -111,35 +71,27 @@ def graph(
     check_plot(plot_file)
     interval, body = parse_interval(first, last), load_problem(problem)
     chosen = None if nodes is None else [body.node_ids[node_row(body, label.strip())] for label in nodes.split(",")]
-    ended: Interrupted | None = None
-    found: Any
-    try:
-        found = build(body, interval, arithmetic, max_nodes=max_nodes, time_limit=time_limit)
-    except Interrupted as interruption:
-        ended, found = interruption, interruption.partial
+    found, ended = so_far(lambda: build(body, interval, arithmetic, max_nodes=max_nodes, time_limit=time_limit))
     deliver(
-        None if "-" in (json_file, csv_file) else lambda: typer.echo(as_text(found)),
-        None if json_file is None else lambda: write_text(json_file, as_json({"problem": problem, **_content(found)})),
-        None if csv_file is None else lambda: write_text(csv_file, found.to_frame().to_csv(index=False)),
-        None if proof_file is None else lambda: _write_proof(found, proof_file),
-        None if save_file is None else lambda: _write(found.save, save_file),
-        None if graphml_file is None else lambda: _write(found.write_graphml, graphml_file),
-        None if plot_file is None else lambda: write_figure(plot_file, found.plot(quantity, chosen)),
+        (proof_file, lambda path: _write_proof(found, path)),
+        (save_file, found.save),
+        (graphml_file, found.write_graphml),
+        (plot_file, lambda path: write_figure(path, found.plot(quantity, chosen))),
+        json_file=json_file,
+        csv_file=csv_file,
+        text=lambda: as_text(found),
+        content=lambda: as_json({"problem": problem, **_content(found)}),
+        frame=found.to_frame,
     )
     finish(ended, ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
 
 
-def _write_proof(found: BranchGraph, file: str) -> None:
+def _write_proof(found: BranchGraph, path: str) -> None:
     if found.proof is None:
         why = "only verified arithmetic gives one" if found.arithmetic != "verified" else "this search gave none"
         note(f"no proof was written, {why}")
         return
-    _write(found.proof.save, file)
-
-
-def _write(save: Callable[[str], object], file: str) -> None:
-    with writing(file):
-        save(file)
+    found.proof.save(path)
 
 
 def build(

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import math
 import os
-from contextlib import contextmanager
 from fractions import Fraction
 from importlib.util import find_spec
 from io import BytesIO
@@ -19,9 +18,15 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
+from enumsol.files import writing
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
+
+    import pandas as pd
+
+    #: Where a result goes, None where it is not asked for, and what writes it there.
+    Output = tuple[str | None, Callable[[str], object]]
 
 
 def check_writable(path: str | None, option: str) -> None:
@@ -56,42 +61,40 @@ def write_text(path: str, text: str) -> None:
     if path == "-":
         typer.echo(text, nl=not text.endswith("\n"))
         return
-    with writing(path):
+    with writing(Path(path), "file"):
         Path(path).write_text(text if text.endswith("\n") else text + "\n", encoding="utf-8")
 
 
-@contextmanager
-def writing(path: str) -> Iterator[None]:
-    """A block that writes a file: what the system refuses is an OutputError.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
-    try:
-        yield
-    except OSError as error:
-        reason = error.strerror or error
-        raise OutputError(f"{path} cannot be written ({reason}); expected a file in a place with room") from error
-
-
-def deliver(*outputs: Callable[[], object] | None) -> None:
-    """Write results one after the other, None being nothing to write.
+def deliver(
+    *more: Output,
+    json_file: str | None,
+    csv_file: str | None,
+    text: Callable[[], str],
+    content: Callable[[], str],
+    frame: Callable[[], pd.DataFrame],
+) -> None:
+    """Write results one after the other: text on stdout, unless a file is to be written there; JSON; a table; ``more``.
 
     Raises
     ------
     OutputError
         Some could not be written, after all the others were.
     """
+    outputs: tuple[Output, ...] = (
+        (None if "-" in (json_file, csv_file) else "-", lambda path: write_text(path, text())),
+        (json_file, lambda path: write_text(path, content())),
+        (csv_file, lambda path: write_text(path, frame().to_csv(index=False))),
+        *more,
+    )
     failures = []
-    for output in outputs:
-        if output is None:
-            continue
+    for path, write in outputs:
         try:
-            output()
+            if path is not None:
+                write(path)
         except OutputError as error:
             failures.append(error)
+        except InvalidArgumentError as error:  # a place that was there before the search and is not any more
+            failures.append(OutputError(str(error)))
     if len(failures) == 1:
         raise failures[0]
     if failures:
@@ -150,7 +153,7 @@ def write_figure(path: str, figure: Any) -> None:
     """
     drawn = BytesIO()  # not all of matplotlib's formats survive a file that cannot be written
     figure.savefig(drawn, dpi=150, format=Path(path).suffix.removeprefix(".").lower())
-    with writing(path):
+    with writing(Path(path), "file"):
         Path(path).write_bytes(drawn.getvalue())
 
 

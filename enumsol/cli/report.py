@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from enumsol.roots.root_set import Root, RootFamily, RootSet
+    from enumsol.roots.root import Root, RootFamily
+    from enumsol.roots.root_set import RootSet
 
 #: The table over contact nodes is printed when it has at most so many rows.
 _ROWS = 24
@@ -21,7 +22,7 @@ def as_text(found: RootSet) -> str:
     rows = (len(found) + sum(len(family.vertices) for family in found.families)) * len(found.node_ids)
     if not 0 < rows <= _ROWS:
         return repr(found)
-    from enumsol.roots.root_set import node_heading  # numpy: not for --help
+    from enumsol.roots.root import node_heading  # numpy: not for --help
 
     width = max(4, *(len(str(label)) for label in found.node_ids))
     lines = [f"{'':>8} {node_heading(width)}"]
@@ -33,7 +34,7 @@ def as_text(found: RootSet) -> str:
 
 
 def _root_rows(title: str, root: Root, node_ids: tuple[Any, ...], width: int) -> Iterator[str]:
-    from enumsol.roots.root_set import node_line  # as above
+    from enumsol.roots.root import node_line  # as above
 
     for i, label in enumerate(node_ids):
         yield f"{title if i == 0 else '':>8} {node_line(root, i, label, width)}"

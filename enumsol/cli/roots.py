@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from enumsol.cli import report
-from enumsol.cli.common import (
-    LIMITS,
-    OUTPUT,
+from enumsol.cli.common import ExitStatus, finish, load_problem, note, parse_alpha, so_far, workers
+from enumsol.cli.options import (
     Arithmetic,
-    ExitStatus,
-    JsonOption,
+    JsonFile,
+    MaxNodes,
     ProblemArgument,
-    finish,
-    load_problem,
-    note,
-    parse_alpha,
-    workers,
+    count,
+    csv,
+    file,
+    number,
+    seconds,
 )
-from enumsol.cli.output import check_outputs, check_writable, deliver, write_text
+from enumsol.cli.output import check_outputs, check_writable, deliver
 from enumsol.cli.progress import SearchDisplay
-from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutputError, WorkerError
+from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     from enumsol.checks import Alpha
@@ -30,52 +29,32 @@ if TYPE_CHECKING:
     from enumsol.roots.root_set import RootSet
 
 Method = Literal["tree", "exhaustive"]
+AtAlpha = Annotated[
+    str,
+    number("--alpha", "Parameter value: a decimal number, read as float64, or a fraction such as 8/3, taken exactly."),
+]
+HowExact = Annotated[
+    Arithmetic,
+    typer.Option(
+        help="verified: rigorous error bounds, proven. fast: floats and a tolerance, never proven. "
+        "exact: rationals throughout, proven, for small problems."
+    ),
+]
+HowSearched = Annotated[Method, typer.Option(help="Pruned search; or all 4^p selections, fast or exact, for small p.")]
 
 
 def roots(
     problem: ProblemArgument,
-    alpha: Annotated[
-        str,
-        typer.Option(
-            metavar="NUMBER",
-            help="Parameter value: a decimal number, read as float64, or a fraction such as 8/3, taken exactly.",
-            show_default=False,
-        ),
-    ],
-    arithmetic: Annotated[
-        Arithmetic,
-        typer.Option(
-            help="verified: rigorous error bounds, proven. fast: floats and a tolerance, never proven. "
-            "exact: rationals throughout, proven, for small problems."
-        ),
-    ] = "verified",
-    method: Annotated[
-        Method, typer.Option(help="Pruned search; or all 4^p selections, fast or exact, for small p.")
-    ] = "tree",
-    stop_after: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="N", help="Stop at N roots; 2 answers: is it unique?", rich_help_panel=LIMITS),
-    ] = None,
-    max_nodes: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Stop after N nodes of the tree.", rich_help_panel=LIMITS)
-    ] = None,
-    time_limit: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Stop after so long.", rich_help_panel=LIMITS)
-    ] = None,
-    jobs: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Processes to search with (tree).", rich_help_panel=LIMITS)
-    ] = 1,
-    proof_file: Annotated[
-        str | None,
-        typer.Option("--proof", metavar="FILE", help="Write the proof (verified).", rich_help_panel=OUTPUT),
-    ] = None,
-    json_file: JsonOption = None,
-    csv_file: Annotated[
-        str | None,
-        typer.Option(
-            "--csv", metavar="FILE", help="Write one row a root and contact node; - is stdout.", rich_help_panel=OUTPUT
-        ),
-    ] = None,
+    alpha: AtAlpha,
+    arithmetic: HowExact = "verified",
+    method: HowSearched = "tree",
+    stop_after: Annotated[int | None, count("Stop at N roots; 2 answers: is it unique?")] = None,
+    max_nodes: MaxNodes = None,
+    time_limit: Annotated[float | None, seconds("Stop after so long.")] = None,
+    jobs: Annotated[int, count("Processes to search with (tree).")] = 1,
+    proof_file: Annotated[str | None, file("--proof", "Write the proof (verified).")] = None,
+    json_file: JsonFile = None,
+    csv_file: Annotated[str | None, csv("a root and contact node")] = None,
 ) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
 
@@ -93,54 +72,30 @@ def roots(
         raise InvalidArgumentError(f"--jobs is {jobs} with the exhaustive method; expected 1 job, or the method tree")
     check_writable(proof_file, "--proof")
     value, body = parse_alpha(alpha), load_problem(problem)
-    ended: EnumsolError | None = None
-    try:
-        found = _search(body, value, arithmetic, method, stop_after, max_nodes, time_limit, jobs, proof_file)
-    except (Interrupted, WorkerError, OutputError) as error:
-        ended, found = error, error.partial
-    _output(found, problem, json_file, csv_file)
+    limits = {"stop_after": stop_after, "max_nodes": max_nodes, "time_limit": time_limit}
+    found, ended = so_far(
+        lambda: _search(body, value, jobs, arithmetic=arithmetic, method=method, proof_path=proof_file, **limits)
+    )
+    deliver(
+        json_file=json_file,
+        csv_file=csv_file,
+        text=lambda: report.as_text(found),
+        content=lambda: report.as_json(found, problem),
+        frame=found.to_frame,
+    )
+    if csv_file is not None and found.families:
+        note(f"the CSV holds the isolated roots only, --json the {len(found.families)} families too")
     finish(ended, _status(found))
 
 
-def _search(
-    problem: ContactProblem,
-    alpha: Alpha,
-    arithmetic: Arithmetic,
-    method: Method,
-    stop_after: int | None,
-    max_nodes: int | None,
-    time_limit: float | None,
-    jobs: int,
-    proof_file: str | None,
-) -> RootSet:
+def _search(problem: ContactProblem, alpha: Alpha, jobs: int, **options: Any) -> RootSet:
     from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help
 
     with workers(jobs) as executor, SearchDisplay() as display:
-        return enumerate_roots(
-            problem,
-            alpha,
-            arithmetic,
-            method,
-            executor=executor,
-            progress=display,
-            stop_after=stop_after,
-            max_nodes=max_nodes,
-            time_limit=time_limit,
-            proof_path=proof_file,
-        )
+        return enumerate_roots(problem, alpha, executor=executor, progress=display, **options)
 
 
 def _status(found: RootSet) -> ExitStatus:
     if found.stopped is not None or found.undecided or found.index_sum not in (None, 1):
         return ExitStatus.INCOMPLETE
     return ExitStatus.DONE
-
-
-def _output(found: RootSet, name: str, json_file: str | None, csv_file: str | None) -> None:
-    deliver(
-        None if "-" in (json_file, csv_file) else lambda: typer.echo(report.as_text(found)),
-        None if json_file is None else lambda: write_text(json_file, report.as_json(found, name)),
-        None if csv_file is None else lambda: write_text(csv_file, found.to_frame().to_csv(index=False)),
-    )
-    if csv_file is not None and found.families:
-        note(f"the CSV holds the isolated roots only, --json the {len(found.families)} families too")

@@ -7,22 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from enumsol.cli.common import (
-    LIMITS,
-    OUTPUT,
-    Arithmetic,
-    ExitStatus,
-    JsonOption,
-    ProblemArgument,
-    finish,
-    load_problem,
-    parse_alpha,
-    parse_interval,
-    workers,
-)
-from enumsol.cli.output import as_json, check_outputs, deliver, write_text
+from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far, workers
+from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, count, csv, number, seconds
+from enumsol.cli.output import as_json, check_outputs, deliver
 from enumsol.cli.progress import Display
-from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, WorkerError
+from enumsol.errors import EnumsolError, InvalidArgumentError, WorkerError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,31 +38,18 @@ _RUNS_CAPTION = "a row: all alphas tried from its first to its last, which have 
 
 def table(
     problem: ProblemArgument,
-    first: Annotated[
-        str | None, typer.Option("--from", metavar="NUMBER", help="First alpha.", show_default=False)
-    ] = None,
-    last: Annotated[str | None, typer.Option("--to", metavar="NUMBER", help="Last alpha.", show_default=False)] = None,
+    first: Annotated[str | None, number("--from", "First alpha.")] = None,
+    last: Annotated[str | None, number("--to", "Last alpha.")] = None,
     samples: Annotated[int, typer.Option(min=2, metavar="N", help="Evenly spaced alphas, both ends included.")] = 21,
     alphas: Annotated[
-        str | None,
-        typer.Option(metavar="LIST", help="Instead of these: alphas, such as 1,2.5,8/3.", show_default=False),
+        str | None, typer.Option(metavar="LIST", help="Instead of these: alphas, such as 1,2.5,8/3.")
     ] = None,
     arithmetic: Annotated[Arithmetic, typer.Option(help="Of each enumeration, as in enumsol roots.")] = "verified",
-    max_nodes: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="N", help="Most nodes of the tree at one alpha.", rich_help_panel=LIMITS),
-    ] = None,
-    time_limit: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Longest search, per alpha.", rich_help_panel=LIMITS)
-    ] = None,
-    jobs: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Processes: alphas searched at a time.", rich_help_panel=LIMITS)
-    ] = 1,
-    json_file: JsonOption = None,
-    csv_file: Annotated[
-        str | None,
-        typer.Option("--csv", metavar="FILE", help="Write one row an alpha; - is stdout.", rich_help_panel=OUTPUT),
-    ] = None,
+    max_nodes: Annotated[int | None, count("Most nodes of the tree at one alpha.")] = None,
+    time_limit: Annotated[float | None, seconds("Longest search, per alpha.")] = None,
+    jobs: Annotated[int, count("Processes: alphas searched at a time.")] = 1,
+    json_file: JsonFile = None,
+    csv_file: Annotated[str | None, csv("an alpha")] = None,
 ) -> None:
     """Count the solutions of PROBLEM at many alphas, by kind of contact.
 
@@ -86,26 +62,15 @@ def table(
     """
     check_outputs(json=json_file, csv=csv_file)
     values, body = _alphas(first, last, samples, alphas), load_problem(problem)
-    options: dict[str, Any] = {"max_nodes": max_nodes, "time_limit": time_limit}
-    ended: EnumsolError | None = None
-    frame: Any
-    try:
-        frame = _search(body, values, arithmetic, jobs, {k: v for k, v in options.items() if v is not None})
-    except (Interrupted, WorkerError) as error:
-        ended, frame = error, error.partial
-    rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
-    content = {
-        "problem": problem,
-        "arithmetic": arithmetic,
-        "alphas": len(values),
-        "complete": len(frame) == len(values) and bool(frame["complete"].all()),
-        "completeness": _closing_line(frame, len(values), ended),
-        "rows": rows,
-    }
+    limits = {"max_nodes": max_nodes, "time_limit": time_limit}
+    options = {name: limit for name, limit in limits.items() if limit is not None}
+    frame, ended = so_far(lambda: _search(body, values, arithmetic, jobs, options))
     deliver(
-        None if "-" in (json_file, csv_file) else lambda: typer.echo(_as_text(frame, len(values), ended)),
-        None if json_file is None else lambda: write_text(json_file, as_json(content)),
-        None if csv_file is None else lambda: write_text(csv_file, frame.to_csv(index=False)),
+        json_file=json_file,
+        csv_file=csv_file,
+        text=lambda: _as_text(frame, len(values), ended),
+        content=lambda: as_json({"problem": problem, "arithmetic": arithmetic, **_content(frame, values, ended)}),
+        frame=lambda: frame,
     )
     finish(ended, ExitStatus.INCOMPLETE if len(_open(frame)) else ExitStatus.DONE)
 
@@ -135,6 +100,15 @@ def _search(
         return multiplicity_table(
             problem, alphas, arithmetic=arithmetic, executor=executor, progress=display.count("alphas"), **options
         )
+
+
+def _content(frame: pd.DataFrame, alphas: list[Alpha], ended: EnumsolError | None) -> dict[str, Any]:
+    return {
+        "alphas": len(alphas),
+        "complete": len(frame) == len(alphas) and bool(frame["complete"].all()),
+        "completeness": _closing_line(frame, len(alphas), ended),
+        "rows": frame.astype(object).where(frame.notna(), None).to_dict("records"),
+    }
 
 
 def _open(frame: pd.DataFrame) -> pd.DataFrame:

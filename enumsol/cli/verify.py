@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from enumsol.cli.common import ExitStatus, ProblemArgument, load_problem
+from enumsol.cli.common import ExitStatus, load_problem
+from enumsol.cli.options import ProblemArgument
 
 
 def verify(

@@ -28,6 +28,7 @@ from enumsol.arithmetic.balls import (
     upper_norm,
 )
 from enumsol.checks import alpha_value
+from enumsol.condensation.affine import exactly_at
 from enumsol.errors import EnumsolError
 from enumsol.sealed import Sealed
 
@@ -125,8 +126,7 @@ class CondensedEnclosure(Sealed):
     def at(self, alpha: AlphaLike, force: Array, length: Array) -> EnclosedSystem:
         """The enclosed system at one alpha, in units given by powers of two (see ScaledSystem)."""
         a = alpha if isinstance(alpha, Fraction) else Fraction(alpha_value(alpha))
-        F0, F1 = self.problem.friction
-        exact = [Fraction(float(x)) + a * Fraction(float(y)) for x, y in zip(F0, F1, strict=True)]
+        exact = exactly_at(a, *self.problem.friction)
         try:
             value = float(a)
             F = np.array([float(x) for x in exact])

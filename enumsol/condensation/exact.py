@@ -57,10 +57,7 @@ class ExactSystem:
             The problem has more than EXACT_DOF_LIMIT degrees of freedom.
         """
         problem.friction_at(alpha)
-        a = rational(alpha)
-        rows, g0, g1, F0, F1 = _condensed(problem)
-        g, F = (tuple(x + a * y for x, y in zip(*parts, strict=True)) for parts in ((g0, g1), (F0, F1)))
-        return cls(fmpq_mat(list(map(list, rows))), g, F)
+        return ExactPath(*_condensed(problem), condensed_exactly=True, zero=None).system(rational(alpha))
 
 
 @dataclass(frozen=True)
@@ -97,8 +94,7 @@ class ExactPath:
         TooLargeError
             The problem has more than EXACT_DOF_LIMIT degrees of freedom.
         """
-        rows, g0, g1, F0, F1 = _condensed(problem)
-        return cls(rows, g0, g1, F0, F1, condensed_exactly=True, zero=vanishing_alpha(problem, "problem"))
+        return cls(*_condensed(problem), condensed_exactly=True, zero=vanishing_alpha(problem, "problem"))
 
     @property
     def S(self) -> Any:  # noqa: N802 (the field's letter)
@@ -180,11 +176,15 @@ class _Integers:
     force: Any  # dS / dg
 
 
+#: S as a tuple of rows, g0, g1, F0, F1.
+_Parts = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
+
+
 def _times(value: Any, factor: int) -> Any:
     return value.p * (factor // value.q)
 
 
-def _condensed(problem: ProblemData) -> tuple[tuple[Any, ...], ...]:
+def _condensed(problem: ProblemData) -> _Parts:
     """S as a tuple of rows, g0, g1, F0 and F1 without any rounding.
 
     Raises

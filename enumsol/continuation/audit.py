@@ -66,6 +66,16 @@ def audit(
     InvalidArgumentError
         The points cannot be read, a column is missing, a row names no path, the points do not fit the graph's problem,
         the graph is no branch graph, or the tolerance or detour is out of range.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> graph = enumsol.branch_graph(problem, (0, 10))
+    >>> path = enumsol.follow(problem, enumsol.newton(problem, 0), interval=(0, 10))
+    >>> report = enumsol.audit(path, graph)
+    >>> report.ok, report.complete, len(report.missed)  # both arcs of the other branch
+    (True, False, 2)
     """
     factor = real_or_nan(detour)
     if not 1 <= factor < math.inf:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.roots.root_set import summary
+from enumsol.roots.root import summary
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

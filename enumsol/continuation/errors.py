@@ -38,6 +38,15 @@ class NotConverged(EnumsolError, ArithmeticError):  # noqa: N818 (the name is pa
     alpha : float
     history : tuple of NewtonIteration
     reason : str
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> try:
+    ...     enumsol.newton(enumsol.gallery.one_node_triangle(), 5, start=(-8.0, 3.0), max_iterations=1)
+    ... except enumsol.NotConverged as error:
+    ...     error.alpha, len(error.history)
+    (5.0, 1)
     """
 
     def __init__(self, alpha: float, history: Sequence[NewtonIteration], reason: str) -> None:

@@ -75,6 +75,15 @@ def follow(
         The start is not a root or an argument is out of range.
     Interrupted
         On Ctrl-C; ``partial`` holds the path so far.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> stick = enumsol.enumerate_roots(problem, alpha=5)[2]
+    >>> path = enumsol.follow(problem, stick, direction=-1, interval=(0, 10))
+    >>> [(item.before[0].value, item.after[0].value, round(item.alpha, 6)) for item in path.folds]
+    [('stick', 'slip-', 2.666667)]
     """
     direction = direction_value(direction)
     if not isinstance(visited, (list, tuple)) or not all(isinstance(path, Path) for path in visited):

@@ -105,6 +105,12 @@ def follow_all(
     ------
     InvalidArgumentError
         The graph belongs to another problem, or is no branch graph.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> enumsol.follow_all(enumsol.gallery.one_node_triangle(), (0, 10)).complete
+    True
     """
     instance_of(problem, ContactProblem, "problem")
     ends = alpha_interval(interval)

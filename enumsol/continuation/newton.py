@@ -13,7 +13,7 @@ from enumsol.continuation.errors import NewtonIteration, NotConverged
 from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
-from enumsol.roots.root_set import Root
+from enumsol.roots.root import Root
 from enumsol.statuses import FRICTIONLESS, STATUSES, STICK
 
 if TYPE_CHECKING:
@@ -70,6 +70,13 @@ def newton(
         With the history of the iterations, and advice.
     InvalidArgumentError
         An argument cannot be used as given.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> [enumsol.newton(problem, 5, start=start).statuses for start in (None, (1.0, -1.5))]
+    [(ContactStatus.OPEN,), (ContactStatus.STICK,)]
     """
     instance_of(problem, ContactProblem, "problem")
     exact = alpha_value(alpha)

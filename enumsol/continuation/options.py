@@ -51,6 +51,13 @@ class ContinuationOptions:
     choose : callable or None
         Called with the admissible tangents where several continue the path (theory, section 8.8); returns an index.
         None: the one that turns least.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> options = enumsol.ContinuationOptions(h_max=1.0, max_steps=100)
+    >>> options.h_max, options.check_steps
+    (1.0, True)
     """
 
     eps: float = 1e-6

@@ -46,6 +46,14 @@ class SmoothPath:
     ------
     InvalidArgumentError
         A function comes without its derivative, or none is given.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> smooth = enumsol.SmoothPath(F=lambda alpha: alpha**2, dF=lambda alpha: 2 * alpha)
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> enumsol.newton(problem, 2, start=(1.0, -3.5), smooth_path=smooth).statuses  # F = 4
+    (ContactStatus.STICK,)
     """
 
     F: PathFunction | None = None

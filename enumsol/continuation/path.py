@@ -53,6 +53,14 @@ class Path(PathData):
         Step length with which to go on.
     stats : PathStats
     node_ids : tuple
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> path = enumsol.follow(problem, enumsol.newton(problem, 1), interval=(0, 10))
+    >>> path.status, float(path.alpha[0]), float(path.alpha[-1])
+    ('interval left', 1.0, 10.0)
     """
 
     @classmethod

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.roots.root_set import summary
+from enumsol.roots.root import summary
 from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:
@@ -205,9 +205,14 @@ class PathData(Sequence[PathPoint], Sealed):
     # -- output ------------------------------------------------------------------------------------------------------
 
     def to_frame(self) -> pd.DataFrame:
-        """One row a point: alpha, kind, step, corrections, arclength; per node i lambda_n_i, .., status_i."""
+        """One row a point: alpha, kind, step, corrections, arclength; of every node X lambda_n_X, .., status_X.
+
+        X is the node's label, or its row number where two labels are the same text.
+        """
         import pandas as pd
 
+        labels = [str(node) for node in self.node_ids]
+        nodes = labels if len(set(labels)) == len(labels) else range(len(labels))
         columns: dict[str, Any] = {
             "alpha": self.alpha,
             "kind": list(self.kinds),
@@ -216,9 +221,8 @@ class PathData(Sequence[PathPoint], Sealed):
             "arclength": self.arclength,
         }
         for name in ("lambda_n", "lambda_t", "u_n", "u_t"):
-            values = getattr(self, name)
-            columns |= {f"{name}_{i}": values[:, i] for i in range(values.shape[1])}
-        columns |= {f"status_{i}": [names[i].value for names in self._names] for i in range(self.lambda_n.shape[1])}
+            columns |= {f"{name}_{node}": column for node, column in zip(nodes, getattr(self, name).T, strict=True)}
+        columns |= {f"status_{node}": [names[i].value for names in self._names] for i, node in enumerate(nodes)}
         return pd.DataFrame(columns)
 
     def joined(self, more: PathData) -> PathData:

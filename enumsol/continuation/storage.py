@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checks import file_path, writing
+from enumsol.checks import file_path
 from enumsol.continuation.options import ContinuationOptions
 from enumsol.continuation.path_data import ARRAYS, PathData, PathStats, Transition
 from enumsol.errors import InvalidArgumentError
+from enumsol.files import writing
 from enumsol.roots.local_branch import LocalBranchTest
 from enumsol.statuses import ContactStatus
 

@@ -50,6 +50,13 @@ def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]
     ------
     InvalidArgumentError
         The mesh is not one (shapes, node numbers, a triangle without area) or the coefficients are not admissible.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> mesh = fem.rectangle(2, 1)
+    >>> fem.stiffness(mesh.points, mesh.triangles, lame=(1, 1)).shape
+    (12, 12)
     """
     # scikit-fem takes a while to import and is needed for meshes only
     from skfem import Basis, ElementTriP1, ElementVector, MeshTri
@@ -89,6 +96,12 @@ def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> NDArray
     ------
     InvalidArgumentError
         The triangle has no area, or an argument is not of the stated form.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> fem.triangle_stiffness([[0, 0], [1, 0], [0, 1]], lame=(1, 1))[0].tolist()
+    [2.0, 1.0, -1.5, -0.5, -0.5, -0.5]
     """
     lam, mu = lame_coefficients(lame)
     nodes, cells = _points(corners), np.array([[0, 1, 2]])
@@ -119,6 +132,12 @@ def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> NDA
     ------
     InvalidArgumentError
         An argument has the wrong shape, or a node number is out of range.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> fem.edge_forces([[0, 0], [2, 0]], [[0, 1]], traction=(0, -1)).tolist()
+    [[0.0, -1.0], [0.0, -1.0]]
     """
     nodes = _points(points)
     ends = _elements(edges, "edges", 2, len(nodes))
@@ -146,6 +165,12 @@ def body_forces(points: ArrayLike, triangles: ArrayLike, density: ArrayLike) -> 
     ------
     InvalidArgumentError
         An argument has the wrong shape, or a node number is out of range.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> fem.body_forces([[0, 0], [3, 0], [0, 2]], [[0, 1, 2]], density=(0, -1)).tolist()
+    [[0.0, -1.0], [0.0, -1.0], [0.0, -1.0]]
     """
     nodes = _points(points)
     cells = _elements(triangles, "triangles", 3, len(nodes))
@@ -209,6 +234,17 @@ def contact_problem(
         An argument has the wrong shape or names a node that does not exist or is held.
     InvalidProblemError
         The body is free to move as a rigid body, or the data of ContactProblem are not admissible.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> mesh = fem.rectangle(4, 2)
+    >>> loads = fem.edge_forces(mesh.points, fem.edges_along(mesh.top), (0.3, -1.0))
+    >>> problem = fem.contact_problem(
+    ...     mesh.points, mesh.triangles, (1, 1), contact=mesh.bottom[1:], normals=(0, -1), held=mesh.left, forces=loads
+    ... )
+    >>> problem.n, problem.p
+    (24, 4)
     """
     nodes = _points(points)
     free = np.flatnonzero(~_held_mask(held, len(nodes)).ravel())

@@ -54,6 +54,13 @@ def rectangle(nx: int, ny: int, length: float = 1.0, height: float = 1.0) -> Mes
     ------
     InvalidArgumentError
         A number is not positive.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> mesh = fem.rectangle(2, 1)
+    >>> mesh.points.shape, mesh.triangles.shape, mesh.top.tolist()
+    ((6, 2), (4, 3), [3, 4, 5])
     """
     nx, ny = (positive_integer(count, name, most=MOST_CELLS) for name, count in (("nx", nx), ("ny", ny)))
     length, height = positive_number(length, "length"), positive_number(height, "height")
@@ -77,6 +84,13 @@ def trapezoid(nx: int, ny: int, bottom: float, top: float, height: float) -> Mes
     ------
     InvalidArgumentError
         A number is not positive.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> mesh = fem.trapezoid(2, 1, bottom=1.0, top=2.0, height=1.0)
+    >>> mesh.points[mesh.top].tolist()
+    [[-1.0, 1.0], [0.0, 1.0], [1.0, 1.0]]
     """
     nx, ny = (positive_integer(count, name, most=MOST_CELLS) for name, count in (("nx", nx), ("ny", ny)))
     bottom, top = positive_number(bottom, "bottom"), positive_number(top, "top")
@@ -98,6 +112,12 @@ def edges_along(nodes: ArrayLike) -> NDArray[np.int64]:
     ------
     InvalidArgumentError
         They are no node numbers in a row.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> fem.edges_along([3, 4, 5]).tolist()
+    [[3, 4], [4, 5]]
     """
     line = plain_array(nodes, "nodes", error=InvalidArgumentError)
     if line.ndim != 1 or line.dtype.kind not in "iu":

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checks import alpha_value, file_path, writing
+from enumsol.checks import alpha_value, file_path
 from enumsol.errors import InvalidArgumentError
+from enumsol.files import writing
 from enumsol.fixed_points.state import ContactState
 
 if TYPE_CHECKING:

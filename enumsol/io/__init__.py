@@ -34,6 +34,7 @@ from typing import TYPE_CHECKING
 
 from enumsol.checks import file_path, instance_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.files import writing
 from enumsol.io import fclib, matrix_market, npz
 from enumsol.problem import ContactProblem
 
@@ -64,6 +65,15 @@ def read_problem(path: str | os.PathLike[str]) -> ContactProblem:
         closest name is given), or its data are no contact problem. The message begins with the path.
     MissingDependencyError
         An fclib file, and h5py is not installed.
+
+    Examples
+    --------
+    >>> import enumsol, tempfile
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     enumsol.write_problem(problem, f"{folder}/triangle.npz")
+    ...     enumsol.read_problem(f"{folder}/triangle.npz").fingerprint == problem.fingerprint
+    True
     """
     place = file_path(path, "path", _A_PLACE)
     try:
@@ -89,21 +99,29 @@ def write_problem(problem: ContactProblem, path: str | os.PathLike[str]) -> None
     Raises
     ------
     InvalidArgumentError
-        The path cannot be written or its suffix is not known.
+        There can be no such file, or its suffix is not known.
+    OutputError
+        There is no room for it.
     InvalidProblemError
         The format cannot hold the problem: mixed node labels; friction or load that depend on alpha (fclib).
     MissingDependencyError
         An fclib file, and h5py is not installed.
+
+    Examples
+    --------
+    >>> import enumsol, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:  # MatrixMarket files
+    ...     enumsol.write_problem(enumsol.gallery.one_node_triangle(), folder)
+    ...     sorted(file.name for file in pathlib.Path(folder).glob("*.mtx"))
+    ['A.mtx', 'Bn.mtx', ..., 'slip_offset.mtx']
     """
     instance_of(problem, ContactProblem, "problem")
     place = file_path(path, "path", _A_PLACE)
-    try:
-        _write(problem, place)
-    except InvalidProblemError as error:
-        raise InvalidProblemError(f"{place}: {error}") from error
-    except OSError as error:
-        reason = error.strerror or error
-        raise InvalidArgumentError(f"{place}: it cannot be written ({reason}); expected a writable place") from error
+    with writing(place, "path"):
+        try:
+            _write(problem, place)
+        except InvalidProblemError as error:
+            raise InvalidProblemError(f"{place}: {error}") from error
 
 
 def _read(place: Path) -> ContactProblem:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -53,7 +54,9 @@ def write(problem: ContactProblem, path: Path) -> None:
     if stale:
         _remove(stale)
     for name, matrix in {**matrices, **columns}.items():
-        mmwrite(path / f"{name}.mtx", matrix, field="real", precision=_DIGITS)
+        text = BytesIO()  # the writer of scipy passes over what the disk refuses
+        mmwrite(text, matrix, field="real", precision=_DIGITS)
+        (path / f"{name}.mtx").write_bytes(text.getvalue())
     (path / _LABELS).write_text(labels + "\n", encoding="utf-8")
 
 

@@ -47,8 +47,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 import numpy as np
 
-from enumsol.checks import file_path, writing
+from enumsol.checks import file_path
 from enumsol.errors import EnumsolError, InvalidArgumentError
+from enumsol.files import writing
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -186,6 +187,17 @@ class Proof:
     ----------
     source : path or bytes
         A proof file or its content.
+
+    Examples
+    --------
+    >>> import enumsol, tempfile
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> proof = enumsol.enumerate_roots(problem, alpha=5).proof
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     proof.save(f"{folder}/roots.proof")
+    ...     again = enumsol.Proof.load(f"{folder}/roots.proof")
+    ...     enumsol.verify(problem, again).complete
+    True
     """
 
     def __init__(self, source: str | Path | bytes) -> None:

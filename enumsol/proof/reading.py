@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.condensation.affine import exactly_at
 from enumsol.errors import InvalidArgumentError
 from enumsol.kernel.rows import UNDECIDED
 
@@ -159,8 +160,7 @@ def codes_from(texts: Any, p: int) -> NDArray[np.uint8]:
 
 def friction_at(problem: ContactProblem, alpha: Fraction) -> list[Fraction]:
     """The friction coefficients at an alpha, exactly; ValueError where one is negative."""
-    F0, F1 = problem.friction
-    exact = [Fraction(x) + alpha * Fraction(y) for x, y in zip(F0.tolist(), F1.tolist(), strict=True)]
+    exact = exactly_at(alpha, *problem.friction)
     if min(exact) < 0:
         raise ValueError(f"friction is negative at alpha = {shown_alpha(alpha)}")
     return exact

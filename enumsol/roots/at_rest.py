@@ -13,14 +13,12 @@ from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.selections.solution import ActiveSets, Codes
-
 _ALL = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS))
 _FRICTIONLESS = frozenset((OPEN, FRICTIONLESS))
 
 
 class AtRest:
-    """The one root of a body with g = 0, at which every selection holds (a SelectionSolver that knows this root only).
+    """The one root of a body with g = 0, at which every selection holds, and its values (PointValues).
 
     The energy bound is lambda' S lambda <= 0 there, so that lambda = 0; its degree is that of all roots, +1.
 
@@ -32,54 +30,31 @@ class AtRest:
     """
 
     def __init__(self, F_positive: tuple[bool, ...], *, proven: bool) -> None:
-        self.F_positive, self.p, self._proven = F_positive, len(F_positive), proven
+        self._F_positive, self._p, self._proven = F_positive, len(F_positive), proven
 
     @property
     def component(self) -> RootComponent:
         """The root."""
-        solution = self.solve((OPEN,) * self.p)
-        return RootComponent((solution,), self.active(solution.vertices[0]), 0, 1, whole=True)
-
-    def solve(self, codes: Codes) -> SelectionSolution:
-        """The root; it solves every selection."""
-        return SelectionSolution(codes, (np.zeros(2 * self.p),), 0, 0, strict=False)
-
-    def active(self, point: Any) -> ActiveSets:
-        """All codes at every node."""
-        del point
-        return tuple(_ALL if positive else _FRICTIONLESS for positive in self.F_positive)
-
-    def equal(self, a: Any, b: Any) -> bool:
-        """True: there is one point."""
-        del a, b
-        return True
-
-    def meet(self, a: SelectionSolution, b: SelectionSolution) -> bool:
-        """True: there is one point."""
-        del a, b
-        return True
-
-    def departure(self, solution: SelectionSolution, direction: NDArray[np.int64]) -> int | None:
-        """None: the degree is that of all roots together, and not one of single selections."""
-        del solution, direction
-        return None
+        solution = SelectionSolution((OPEN,) * self._p, (np.zeros(2 * self._p),), 0, 0, strict=False)
+        active = tuple(_ALL if positive else _FRICTIONLESS for positive in self._F_positive)
+        return RootComponent((solution,), active, 0, 1, whole=True)
 
     def forces(self, point: Any) -> NDArray[np.float64]:
         """Zeros."""
         del point
-        return np.zeros(2 * self.p)
+        return np.zeros(2 * self._p)
 
     def displacements(self, point: Any) -> NDArray[np.float64]:
         """Zeros."""
         del point
-        return np.zeros(2 * self.p)
+        return np.zeros(2 * self._p)
 
     def slip_signs(self, point: Any) -> tuple[int, ...]:
         """Zeros."""
         del point
-        return (0,) * self.p
+        return (0,) * self._p
 
     def bounds(self, point: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Zeros where they are proven."""
         del point
-        return (np.zeros(4 * self.p), np.zeros(4 * self.p)) if self._proven else None
+        return (np.zeros(4 * self._p), np.zeros(4 * self._p)) if self._proven else None

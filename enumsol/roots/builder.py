@@ -1,4 +1,4 @@
-"""Roots and families in the user's terms, built from components of the root set."""
+"""Roots, families and undecided parts in the user's terms, built from what the search found."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.roots.linearisation import SelectionTangent
-from enumsol.roots.root_set import Enclosure, Polytope, Root, RootFamily, Undecided
+from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
+from enumsol.roots.root_set import Undecided
 from enumsol.roots.slip_signs import SlipSigns, shown_status, sign_over
 from enumsol.statuses import (
     CONTACT,
@@ -20,7 +21,7 @@ from enumsol.statuses import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -28,18 +29,18 @@ if TYPE_CHECKING:
     from enumsol.kernel.point import VerifiedSelection
     from enumsol.problem import ContactProblem
     from enumsol.roots.components import RootComponent
-    from enumsol.search.tree import UndecidedPart
+    from enumsol.search.certifiers.protocol import UndecidedPart
     from enumsol.selections.floats import FloatSelections
-    from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
+    from enumsol.selections.solution import Codes, PointValues, SelectionSolution, SelectionSolver
 
 
 class RootBuilder:
-    """Builds Root and RootFamily objects at one alpha.
+    """Builds the Root objects at one alpha.
 
     Parameters
     ----------
     problem, alpha : what was enumerated
-    solver : the solver whose points the components hold
+    values : of the points that the components hold
     floats : the float solver of the same system, for scaled margins and derivatives
     verified : balls of the verified regular roots by their codes
     """
@@ -48,13 +49,13 @@ class RootBuilder:
         self,
         problem: ContactProblem,
         alpha: Alpha,
-        solver: SelectionSolver,
+        values: PointValues,
         floats: FloatSelections,
         verified: Mapping[Codes, VerifiedSelection],
     ) -> None:
         self._problem = problem
         self._alpha = alpha
-        self._solver = solver
+        self._points = values
         self._floats = floats
         self._verified = verified
 
@@ -98,7 +99,7 @@ class RootBuilder:
         p, ball = self._problem.p, self._verified.get(solution.codes)
         known: tuple[int | None, ...]
         if ball is None:
-            known = self._solver.slip_signs(solution.vertices[0])
+            known = self._points.slip_signs(solution.vertices[0])
         else:
             balls = zip(ball.w[p:].tolist(), ball.w_rad[p:].tolist(), strict=True)
             known = tuple(int(np.sign(w)) if abs(w) > r or w == r == 0 else None for w, r in balls)
@@ -113,53 +114,18 @@ class RootBuilder:
             rad = np.concatenate([ball.force_rad * system.force, ball.w_rad * system.length])
             low = np.where(rad > 0, np.nextafter(mid - rad, -np.inf), mid)
             high = np.where(rad > 0, np.nextafter(mid + rad, np.inf), mid)
-        elif (around := self._solver.bounds(solution.vertices[0])) is not None:
+        elif (around := self._points.bounds(solution.vertices[0])) is not None:
             low, high = around
         else:
             return None
         bounds = np.stack([low, high], axis=1)
         return Enclosure(bounds[:p], bounds[p : 2 * p], bounds[2 * p : 3 * p], bounds[3 * p :])
 
-    def family(self, component: RootComponent, *, proven: bool) -> RootFamily:
-        """The family of a component of positive dimension."""
-        p = self._problem.p
-        parts = []
-        known: list[Any] = []
-        for solution in component.solutions:
-            # polytopes that meet share their corners to the last bit
-            corners = [self._representative(v, known) for v in solution.vertices]
-            points = np.array([self._solver.forces(v) for v in corners])
-            slips = [self._solver.slip_signs(v) for v in solution.vertices]
-            statuses = tuple(
-                shown_status(code, sign_over(s[i] for s in slips)) for i, code in enumerate(solution.codes)
-            )
-            order = np.lexsort(points.T[::-1])
-            vertices = np.stack([points[order, :p], points[order, p:]], axis=2)
-            parts.append(Polytope(statuses, vertices, solution.dimension))
-        return RootFamily(self._alpha, tuple(parts), component.index, vertices_proven=proven)
-
-    def _representative(self, vertex: Any, known: list[Any]) -> Any:
-        for other in known:
-            if self._solver.equal(vertex, other):
-                return other
-        known.append(vertex)
-        return vertex
-
-    def undecided(self, item: UndecidedPart) -> Undecided:
-        """An undecided part in the user's terms."""
-        named: list[ContactStatus | str | None] = []
-        for code in item.codes:
-            if code == UNDECIDED:
-                named.append(None)
-            else:
-                named.append("contact" if code in (CONTACT, FRICTIONLESS) else STATUSES[code])
-        return Undecided(tuple(named), item.reason, item.hint)
-
     def _values(self, codes: Codes, solution: SelectionSolution) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Forces and displacements with the zeros that the statuses impose set exactly."""
         p, point, ball = self._problem.p, solution.vertices[0], self._verified.get(solution.codes)
         if ball is None:
-            force, w = self._solver.forces(point), self._solver.displacements(point)
+            force, w = self._points.forces(point), self._points.displacements(point)
         else:
             # the floats' own S and g may be off by more than the ball's radius
             force, w = ball.force * self._floats.system.force, ball.w * self._floats.system.length
@@ -172,3 +138,47 @@ class RootBuilder:
                     w[p + i] = 0.0
         # -0.0 prints badly
         return force + 0.0, w + 0.0
+
+
+def root_family(alpha: Alpha, component: RootComponent, solver: SelectionSolver, *, proven: bool) -> RootFamily:
+    """The family of a component of positive dimension."""
+    known: list[Any] = []
+
+    def shared(vertex: Any) -> Any:
+        """The same for equal vertices, so that polytopes that meet share their corners to the last bit."""
+        found = next((other for other in known if solver.equal(vertex, other)), None)
+        if found is None:
+            known.append(vertex)
+        return vertex if found is None else found
+
+    parts = tuple(polytope(s, [shared(vertex) for vertex in s.vertices], solver) for s in component.solutions)
+    return RootFamily(alpha, parts, component.index, vertices_proven=proven)
+
+
+def polytope(solution: SelectionSolution, corners: Sequence[Any], solver: SelectionSolver) -> Polytope:
+    """The roots of one selection; ``corners`` are its vertices, or points equal to them."""
+    points = np.array([solver.forces(corner) for corner in corners])
+    slips = [solver.slip_signs(vertex) for vertex in solution.vertices]
+    statuses = tuple(shown_status(code, sign_over(s[i] for s in slips)) for i, code in enumerate(solution.codes))
+    points = points[np.lexsort(points.T[::-1])]
+    vertices = np.stack([points[:, : solver.p], points[:, solver.p :]], axis=2)
+    return Polytope(statuses, vertices, solution.dimension)
+
+
+def in_order(roots: list[Root], families: list[RootFamily]) -> tuple[list[Root], list[RootFamily]]:
+    """Roots by statuses and forces, families by vertices: an order that does not depend on the search."""
+    return (
+        sorted(roots, key=lambda r: ([s.value for s in r.statuses], r.lambda_n.tolist(), r.lambda_t.tolist())),
+        sorted(families, key=lambda family: family.vertices.tolist()),
+    )
+
+
+def named(part: UndecidedPart) -> Undecided:
+    """An undecided part in the user's terms."""
+    names: list[ContactStatus | str | None] = []
+    for code in part.codes:
+        if code == UNDECIDED:
+            names.append(None)
+        else:
+            names.append("contact" if code in (CONTACT, FRICTIONLESS) else STATUSES[code])
+    return Undecided(tuple(names), part.reason, part.hint)

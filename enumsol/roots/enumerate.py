@@ -22,15 +22,16 @@ from enumsol.executors import WorkerLost
 from enumsol.problem import ContactProblem
 from enumsol.proof.proof_file import Proof, ProofWriter
 from enumsol.roots.at_rest import AtRest
-from enumsol.roots.builder import RootBuilder
+from enumsol.roots.builder import RootBuilder, in_order, named, root_family
 from enumsol.roots.components import RootComponent, connected_components
 from enumsol.roots.local_degree import perturbed_degree
 from enumsol.roots.root_set import RootSet, SearchStats
-from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
 from enumsol.search.parallel import run_parallel
 from enumsol.search.solvers import Arithmetic, Solvers
-from enumsol.search.tree import SearchLimits, SearchOutcome, SearchProgress, TreeSearch, UndecidedPart
+from enumsol.search.stopping import Stop, StopReason
+from enumsol.search.tree import SearchLimits, SearchOutcome, SearchProgress, TreeSearch
 from enumsol.selections.floats import SIGN_TOLERANCE, FloatSelections
 from enumsol.selections.solution import SelectionSolution
 
@@ -40,7 +41,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from enumsol.checks import AlphaLike
-    from enumsol.selections.solution import ActiveSets, SelectionSolver
+    from enumsol.roots.root import Root, RootFamily
+    from enumsol.selections.solution import ActiveSets, PointValues, SelectionSolver
 
 Method = Literal["tree", "exhaustive"]
 #: The exhaustive method reports progress this often [seconds].
@@ -110,6 +112,18 @@ def enumerate_roots(
         A worker of the executor died; ``partial`` holds what was found.
     OutputError
         The proof could not be written to the end, for want of space; ``partial`` holds the result without a proof.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), alpha=5)
+    RootSet at alpha = 5: 3 roots (verified, tree)
+           index regular    margin max lambda_n  contact
+         0    +1     yes  2.04e-01            0  open
+         1    -1     yes  6.24e-01      0.33333  slip-
+         2    +1     yes  2.70e-01          1.5  stick
+    index sum: +1
+    complete: yes (proven)
     """
     instance_of(problem, ContactProblem, "problem")
     value = alpha_value(alpha)
@@ -161,7 +175,7 @@ class _Enumeration:
             else:
                 self._tree(limits, executor)
         except KeyboardInterrupt as interruption:
-            self.outcome.stopped = f"interrupted after {self.outcome.nodes + self.outcome.selections} nodes"
+            self.outcome.stopped = Stop(StopReason.INTERRUPTED, self.outcome.nodes + self.outcome.selections)
             partial = self._result()
             message = f"enumerate_roots was interrupted; {len(partial)} roots so far"
             raise Interrupted(message, partial) from interruption
@@ -191,8 +205,7 @@ class _Enumeration:
         search = TreeSearch(solvers.scaled, self.certifier, engine=self.engine, limits=limits, progress=self.progress)
         self.outcome = search.outcome
         if solvers.unloaded():
-            if isinstance(self.certifier, VerifiedCertifier):
-                self.certifier.unloaded()
+            self.certifier.unloaded()
             self.at_rest = AtRest(solvers.floats.F_positive, proven=solvers.arithmetic != "fast")
         elif (reason := solvers.undecidable) is not None:
             # without any means of proof the tree would only grow
@@ -222,18 +235,16 @@ class _Enumeration:
                 state = SearchProgress(outcome.selections, share, len(outcome.solutions), now - self.started)
                 self.progress(state)
             if solution is not None and limits.enough is not None and limits.enough(outcome.solutions):
-                outcome.stopped = "stopped after enough roots"
+                outcome.stopped = Stop(StopReason.ENOUGH_ROOTS)
             elif limits.max_nodes is not None and limits.max_nodes <= outcome.selections < total:
-                outcome.stopped = f"stopped after max_nodes = {limits.max_nodes} selections"
+                outcome.stopped = Stop(StopReason.NODE_LIMIT, limits.max_nodes, "selections")
             elif limits.deadline is not None and now > limits.deadline and outcome.selections < total:
-                outcome.stopped = "stopped by the time limit"
+                outcome.stopped = Stop(StopReason.TIME_LIMIT)
             if outcome.stopped is not None:
                 return
 
     def _components(self) -> list[tuple[list[RootComponent], SelectionSolver]]:
         """Components of the root set with the solver whose points they hold."""
-        if self.at_rest is not None:
-            return [([self.at_rest.component], self.at_rest)]
         solutions = self.outcome.solutions
         exact = [s for s in solutions if isinstance(s.vertices[0], tuple)]
         floats = [s for s in solutions if not isinstance(s.vertices[0], tuple)]
@@ -247,37 +258,43 @@ class _Enumeration:
     def _degree(self, active: ActiveSets) -> int | None:
         return perturbed_degree(self.solvers.floats, active)
 
+    def _root(self, component: RootComponent, values: PointValues) -> Root:
+        solvers, verified = self.solvers, self.certifier.certified.verified
+        return RootBuilder(solvers.problem, solvers.alpha, values, solvers.floats, verified).root(component)
+
     def _result(self) -> RootSet:
         outcome, solvers = self.outcome, self.solvers
-        roots, families = [], []
+        roots: list[Root] = []
+        families: list[RootFamily] = []
         apart, joinable = 0, False
-        verified = self.certifier.verified if isinstance(self.certifier, VerifiedCertifier) else {}
+        if self.at_rest is not None:
+            roots, apart = [self._root(self.at_rest.component, self.at_rest)], 1
         for components, solver in self._components():
-            builder = RootBuilder(solvers.problem, solvers.alpha, solver, solvers.floats, verified)
             # of a component that was not examined whole it is not known what joins it
             apart += sum(c.whole for c in components)
             joinable = joinable or not all(c.whole for c in components)
-            roots += [builder.root(c) for c in components if c.dimension == 0]
+            roots += [self._root(c, solver) for c in components if c.dimension == 0]
             proven = solver is not solvers.floats
-            families += [builder.family(c, proven=proven) for c in components if c.dimension > 0]
-        roots.sort(key=lambda root: ([s.value for s in root.statuses], root.lambda_n.tolist(), root.lambda_t.tolist()))
-        families.sort(key=lambda family: family.vertices.tolist())
-        builder = RootBuilder(solvers.problem, solvers.alpha, self.solver, solvers.floats, verified)
+            families += [root_family(solvers.alpha, c, solver, proven=proven) for c in components if c.dimension > 0]
+        roots, families = in_order(roots, families)
         whole = outcome.stopped is None and not outcome.undecided
-        counts = (outcome.nodes, outcome.pruned, outcome.selections, outcome.qps, outcome.fallback_qps)
         return RootSet(
             alpha=solvers.alpha,
             roots=roots,
             families=families,
-            undecided=[builder.undecided(item) for item in outcome.undecided],
+            undecided=[named(part) for part in outcome.undecided],
             arithmetic=solvers.arithmetic,
             method=self.method,
-            stopped=outcome.stopped,
+            stopped=None if outcome.stopped is None else str(outcome.stopped),
             stats=SearchStats(
-                *counts,
-                time.perf_counter() - self.started,
-                self.certifier.escalations if isinstance(self.certifier, VerifiedCertifier) else None,
-                outcome.presolved,
+                nodes=outcome.nodes,
+                pruned=outcome.pruned,
+                selections=outcome.selections,
+                qps=outcome.qps,
+                fallback_qps=outcome.fallback_qps,
+                seconds=time.perf_counter() - self.started,
+                escalations=self.certifier.certified.escalations,
+                presolved=outcome.presolved,
             ),
             node_ids=solvers.problem.node_ids,
             at_least=None if whole else apart + int(joinable),
@@ -286,14 +303,14 @@ class _Enumeration:
         )
 
     def _proof(self, roots: int, families: int) -> Proof | None:
-        """Close the proof. One that was interrupted or had no room stays without its end, and is none."""
-        if self.writer is None or not isinstance(self.certifier, VerifiedCertifier):
+        """The proof, closed; None when the search was interrupted or there was no room to write its end."""
+        if self.writer is None:
             return None
-        whole = self.outcome.stopped is None or "not examined" in self.outcome.stopped
+        outcome = self.outcome
+        whole = outcome.stopped is None or not outcome.stopped.interrupted
         if whole:
-            undecided = len(self.outcome.undecided)
-            footer = {"roots": roots, "families": families, "undecided": undecided, "leaves": self.certifier.leaves}
-            self.writer.write(footer)
+            undecided, leaves = len(outcome.undecided), self.certifier.certified.leaves
+            self.writer.write({"roots": roots, "families": families, "undecided": undecided, "leaves": leaves})
         proof = self.writer.close()
         return proof if whole and self.writer.failure is None else None
 

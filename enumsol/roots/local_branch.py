@@ -112,6 +112,14 @@ def local_branch_test(problem: ContactProblem, root: SolutionPoint) -> LocalBran
         The root does not belong to the problem.
     TooLargeError
         More than MAX_SELECTIONS selections hold at the root.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> root = enumsol.newton(problem, 5)
+    >>> print(enumsol.local_branch_test(problem, root))
+    a local Lipschitz branch exists in the load (1 selection holds)
     """
     instance_of(problem, ContactProblem, "problem")
     active = getattr(root, "active", None)

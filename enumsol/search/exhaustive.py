@@ -9,7 +9,7 @@ import numpy as np
 
 from enumsol.errors import TooLargeError
 from enumsol.selections.floats import selection_systems
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_PLUS, STICK
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -92,7 +92,7 @@ def _candidates(system: ScaledSystem, block: NDArray[np.int8]) -> NDArray[np.boo
     ok = np.where(block == OPEN, wn <= size, n >= -size)
     ok &= np.where(block == STICK, np.abs(t) <= reach, True)
     ok &= np.where(block == SLIP_PLUS, wt >= -size, True)
-    ok &= np.where(block == 3, wt <= size, True)
+    ok &= np.where(block == SLIP_MINUS, wt <= size, True)
     return np.asarray(doubtful | np.all(ok, axis=1))
 
 

@@ -15,7 +15,9 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Protocol
 
 from enumsol.relaxation.interval import IntervalEngine, IntervalSystem, interval_rows
+from enumsol.search.certifiers.protocol import WithoutProof
 from enumsol.search.splitting import PlaneSplitting
+from enumsol.search.stopping import Stop, StopReason
 from enumsol.search.tree import SearchLimits, TreeSearch
 from enumsol.statuses import UNDECIDED
 
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.tree import Certifier
+    from enumsol.search.certifiers.protocol import Certifier
     from enumsol.selections.solution import Codes
 
 #: Nodes of a piece's tree, per contact node, that are spent before the tree at its middle is looked at.
@@ -98,6 +100,10 @@ class SearchedPiece:
 class IntervalCertifier(Protocol):
     """Decides in one arithmetic whether multipliers prove a leaf empty on the whole piece."""
 
+    @property
+    def checkable(self) -> bool:
+        """Whether a checker can repeat what was accepted so far, so that it makes a proof."""
+
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
 
@@ -105,14 +111,19 @@ class IntervalCertifier(Protocol):
 class FastIntervalCertifier:
     """Floats: what the engine computed is believed."""
 
+    checkable = False
+
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Accept the pruning."""
         del piece, system, leaf
         return True
 
 
-class _Collector:
-    """The certifier of one piece's tree: keeps the leaves, and counts the selections not known before."""
+class _Collector(WithoutProof):
+    """The certifier of one piece's tree: keeps the leaves, and counts the selections not known before.
+
+    Branchings and subtrees left over need no note: the leaves cover everything, with those in SearchedPiece.cut.
+    """
 
     def __init__(self, found: SearchedPiece, leaves: IntervalCertifier, known: set[Codes]) -> None:
         self._found, self._leaves, self._known = found, leaves, known
@@ -128,12 +139,6 @@ class _Collector:
     def selection(self, codes: Codes) -> None:
         self._found.selections.append(codes)
         self.new += codes not in self._known
-
-    def branching(self, node: int, children: Sequence[int]) -> None:
-        """Nothing to note: the checker only needs the leaves, which cover everything."""
-
-    def skipped(self, codes: Codes, reason: str) -> None:
-        """Nothing to note: the subtrees left are in SearchedPiece.cut."""
 
 
 class _Uncounted(_Collector):
@@ -197,11 +202,10 @@ class IntervalSearch:
 
     Attributes
     ----------
+    interval : (Fraction, Fraction)
     pieces : list of SearchedPiece
-    left : list of Piece
-        Pieces that were not searched because of a limit.
     nodes : int
-    stopped : str or None
+    stopped : Stop or None
     selections : set of codes
         All complete selections that the trees could not exclude.
     """
@@ -218,17 +222,16 @@ class IntervalSearch:
         progress: Callable[[float], object] | None = None,
     ) -> None:
         self._condensed, self._origin, self._leaves = condensed, origin, leaves
-        self._interval = interval
+        self.interval = interval
         self._max_nodes, self._deadline, self._progress = max_nodes, deadline, progress
         self.pieces: list[SearchedPiece] = []
-        self.left: list[Piece] = []
         self.nodes = 0
-        self.stopped: str | None = None
+        self.stopped: Stop | None = None
         self.selections: set[Codes] = set()
 
     def run(self) -> None:
-        """Search all pieces, cutting those that pay."""
-        a, b = self._interval
+        """Search all pieces, cutting those whose trees grow too large."""
+        a, b = self.interval
         ends = [a, b]
         if self._origin is not None and a < self._origin < b:
             ends.insert(1, self._origin)
@@ -240,7 +243,6 @@ class IntervalSearch:
             self.pieces.append(found)
             self.selections.update(found.selections)
             if self.stopped is not None:
-                self.left = [piece, *(other for other, _ in waiting)]
                 return
             if found.cut:
                 halves = (Piece(piece.middle, piece.b), Piece(piece.a, piece.middle))
@@ -253,7 +255,7 @@ class IntervalSearch:
         system = self._system(piece)
         found = SearchedPiece(piece, system, roots)
         certifier = _Collector(found, self._leaves, self.selections)
-        whole = float(piece.b - piece.a) <= SMALLEST_PIECE * float(self._interval[1] - self._interval[0])
+        whole = float(piece.b - piece.a) <= SMALLEST_PIECE * float(self.interval[1] - self.interval[0])
         limit: int | None = None if whole else NODES_PER_CONTACT * (system.p + 2)
         spent, left = 0, roots
         while True:
@@ -284,9 +286,9 @@ class IntervalSearch:
 
     def _must_stop(self) -> bool:
         if self._max_nodes is not None and self.nodes >= self._max_nodes:
-            self.stopped = f"stopped after max_nodes = {self._max_nodes} nodes"
+            self.stopped = Stop(StopReason.NODE_LIMIT, self._max_nodes)
         elif self._deadline is not None and time.perf_counter() > self._deadline:
-            self.stopped = "stopped by the time limit"
+            self.stopped = Stop(StopReason.TIME_LIMIT)
         return self.stopped is not None
 
     def _system(self, piece: Piece) -> IntervalSystem:

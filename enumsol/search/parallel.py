@@ -6,19 +6,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from enumsol.executors import WorkerLost, has_result, result_of, submit
-from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.solvers import Solvers
-from enumsol.search.tree import SearchLimits, SearchOutcome, TreeNode, TreeSearch, UndecidedPart
+from enumsol.search.stopping import Stop, StopReason
+from enumsol.search.tree import SearchLimits, SearchOutcome, TreeNode, TreeSearch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from concurrent.futures import Executor, Future
 
     from enumsol.checks import Alpha
-    from enumsol.kernel.point import VerifiedSelection
     from enumsol.problem import ContactProblem
-    from enumsol.proof.proof_file import Recorder
-    from enumsol.search.certifiers.verified import Escalations
+    from enumsol.search.certifiers.protocol import Certified
     from enumsol.search.solvers import Arithmetic
     from enumsol.selections.solution import Codes
 
@@ -28,26 +26,10 @@ LEVELS = 7
 
 
 @dataclass(frozen=True)
-class _Task:
-    """A subtree for a worker; everything in it can be pickled."""
-
-    problem: ContactProblem
-    alpha: Alpha
-    arithmetic: Arithmetic
-    tolerance: float
-    engine: str | None
-    codes: Codes
-    max_nodes: int | None
-    seconds: float | None
-
-
-@dataclass(frozen=True)
 class _Answer:
     outcome: SearchOutcome
     records: list[Any]
-    verified: dict[Codes, VerifiedSelection]
-    escalations: Escalations | None
-    leaves: int
+    certified: Certified
 
 
 def run_parallel(
@@ -63,30 +45,40 @@ def run_parallel(
         A worker died. The outcome holds the subtrees that were finished by then; the others are undecided in it and in
         its proof.
     """
-    plan = _Plan(executor, solvers, search.limits, engine, tolerance)
-    certifier = search.certifier if isinstance(search.certifier, VerifiedCertifier) else None
-    recorder = None
-    if certifier is not None:
-        recorder, certifier.recorder = certifier.recorder, plan
+    limits = search.limits
+
+    def hand_out(codes: Codes) -> Future[_Answer]:
+        given = (solvers.problem, solvers.alpha, solvers.arithmetic, tolerance, engine, limits.max_nodes)
+        return submit(executor, _subtree, codes, *given, limits.remaining())
+
+    plan = _Plan(hand_out)
     try:
-        stack: list[tuple[TreeNode, int]] = [(search.first(), 0)]
-        while stack:
-            branch, level = stack.pop()
-            if level >= LEVELS:
-                plan.submit(branch)
-            else:
-                children = reversed(list(search.examine(branch)))
-                # presolve goes down without spreading out
-                stack.extend((child, level + (child.forced is None)) for child in children)
-        _collect(plan, search, recorder)
+        _examine_top(plan, search)
+        _collect(plan, search)
     finally:
-        if certifier is not None and recorder is not None:
-            certifier.recorder = recorder
         for handed in plan.handed:
             if handed.future is not None:
                 handed.future.cancel()
     if plan.lost is not None:
         raise plan.lost
+
+
+def _examine_top(plan: _Plan, search: TreeSearch) -> None:
+    """Examine the top of the tree, whose records go to the plan, and hand out what lies below."""
+    certifier = search.certifier
+    recorder, certifier.recorder = certifier.recorder, plan
+    try:
+        stack: list[tuple[TreeNode, int]] = [(search.first(), 0)]
+        while stack:
+            item, level = stack.pop()
+            if level >= LEVELS:
+                plan.submit(item.codes)
+            else:
+                children = reversed(list(search.examine(item)))
+                # presolve goes down without spreading out
+                stack.extend((child, level + (child.forced is None)) for child in children)
+    finally:
+        certifier.recorder = recorder
 
 
 @dataclass(frozen=True)
@@ -100,38 +92,25 @@ class _Handed:
 class _Plan:
     """Records written while the top of the tree is examined, with places left for the subtrees handed out."""
 
-    def __init__(
-        self, executor: Executor, solvers: Solvers, limits: SearchLimits, engine: str | None, tolerance: float
-    ) -> None:
+    def __init__(self, hand_out: Callable[[Codes], Future[_Answer]]) -> None:
         self.items: list[Any] = []
         self.handed: list[_Handed] = []
         self.lost: WorkerLost | None = None
-        self._executor = executor
-        self._limits = limits
-        self._make: Callable[[Codes], _Task] = lambda codes: _Task(
-            solvers.problem,
-            solvers.alpha,
-            solvers.arithmetic,
-            tolerance,
-            engine,
-            codes,
-            limits.max_nodes,
-            limits.remaining(),
-        )
+        self._hand_out = hand_out
 
     def write(self, record: Any) -> None:
         """Keep a record of the top of the tree."""
         self.items.append(record)
 
-    def submit(self, branch: TreeNode) -> None:
+    def submit(self, codes: Codes) -> None:
         """Hand out a subtree, as long as the executor takes any."""
         future = None
         if self.lost is None:
             try:
-                future = submit(self._executor, _subtree, self._make(branch.codes))
+                future = self._hand_out(codes)
             except WorkerLost as loss:
                 self.lost = loss
-        self.handed.append(_Handed(future, branch.codes))
+        self.handed.append(_Handed(future, codes))
         self.items.append(self.handed[-1])
 
 
@@ -145,28 +124,35 @@ class _Records:
         self.records.append(record)
 
 
-def _subtree(task: _Task) -> _Answer:
-    solvers = Solvers(task.problem, task.alpha, task.arithmetic, task.tolerance)
+def _subtree(
+    codes: Codes,
+    problem: ContactProblem,
+    alpha: Alpha,
+    arithmetic: Arithmetic,
+    tolerance: float,
+    engine: str | None,
+    max_nodes: int | None,
+    seconds: float | None,
+) -> _Answer:
+    """Search below a partial assignment, in a worker; everything here can be pickled."""
+    solvers = Solvers(problem, alpha, arithmetic, tolerance)
     records = _Records()
     certifier = solvers.certifier(records)
-    limits = SearchLimits(max_nodes=task.max_nodes, deadline=SearchLimits.deadline_in(task.seconds))
-    outcome = TreeSearch(solvers.scaled, certifier, engine=task.engine, limits=limits).run([task.codes])
-    if isinstance(certifier, VerifiedCertifier):
-        return _Answer(outcome, records.records, certifier.verified, certifier.escalations, certifier.leaves)
-    return _Answer(outcome, [], {}, None, 0)
+    limits = SearchLimits(max_nodes=max_nodes, deadline=SearchLimits.deadline_in(seconds))
+    outcome = TreeSearch(solvers.scaled, certifier, engine=engine, limits=limits).run([codes])
+    return _Answer(outcome, records.records, certifier.certified)
 
 
-def _collect(plan: _Plan, search: TreeSearch, recorder: Recorder | None) -> None:
+def _collect(plan: _Plan, search: TreeSearch) -> None:
     """Wait for the subtrees in the tree's order, until enough is found or a worker lost; put their records in place."""
     limits, outcome, total, done = search.limits, search.outcome, len(plan.handed), 0
-    #: When the waiting is over: the subtrees that are taken all the same, because they are finished.
+    # once enough is found or a worker lost: the subtrees that are finished, which still count
     finished: set[Future[_Answer]] | None = None
     if plan.lost is not None:
         finished = _finished(plan.handed, plan.lost, outcome)
     for item in plan.items:
         if not isinstance(item, _Handed):
-            if recorder is not None:
-                recorder.write(item)
+            search.certifier.recorder.write(item)
             continue
         answer = None
         if item.future is not None and (finished is None or item.future in finished):
@@ -176,48 +162,22 @@ def _collect(plan: _Plan, search: TreeSearch, recorder: Recorder | None) -> None
                 plan.lost = loss
                 finished = _finished(plan.handed[done:], loss, outcome)
         if answer is None:
-            _skip(
-                search,
-                item.codes,
-                recorder,
-                "search again, with fewer workers" if plan.lost is not None else "raise the limit",
-            )
+            hint = "search again, with fewer workers" if plan.lost is not None else "raise the limit"
+            search.skip(item.codes, hint)
             continue
-        _add(search, answer, recorder)
+        outcome.add(answer.outcome)
+        search.certifier.add(answer.certified)
+        for record in answer.records:
+            search.certifier.recorder.write(record)
         done += 1
         search.report(done / total)
         if finished is None and limits.enough is not None and limits.enough(outcome.solutions):
-            outcome.stopped = outcome.stopped or f"stopped after enough roots, {total - done} subtrees not examined"
+            outcome.stopped = outcome.stopped or Stop(StopReason.ENOUGH_ROOTS, unexamined=total - done)
             finished = set()
 
 
 def _finished(handed: Sequence[_Handed], loss: WorkerLost, outcome: SearchOutcome) -> set[Future[_Answer]]:
     """Of the subtrees still out when a worker was lost, those with an answer; the outcome says how many have none."""
     found = {item.future for item in handed if item.future is not None and has_result(item.future)}
-    outcome.stopped = f"{loss.what}, {len(handed) - len(found)} subtrees not examined"
+    outcome.stopped = Stop(StopReason.WORKER_LOST, unexamined=len(handed) - len(found), loss=loss.what)
     return found
-
-
-def _skip(search: TreeSearch, codes: Codes, recorder: Recorder | None, hint: str) -> None:
-    """Leave a subtree undecided because enough was found, or because a worker died."""
-    reason = str(search.outcome.stopped)
-    if isinstance(search.certifier, VerifiedCertifier) and recorder is not None:
-        recorder.write(["u", reason])
-        search.certifier.leaves += 1
-    search.outcome.undecided.append(UndecidedPart(codes, "the search was stopped before it came here", hint))
-
-
-def _add(search: TreeSearch, part: _Answer, recorder: Recorder | None) -> None:
-    total = search.outcome
-    total.solutions += part.outcome.solutions
-    total.undecided += part.outcome.undecided
-    total.stopped = total.stopped or part.outcome.stopped
-    for name in ("nodes", "pruned", "selections", "qps", "fallback_qps"):
-        setattr(total, name, getattr(total, name) + getattr(part.outcome, name))
-    if isinstance(search.certifier, VerifiedCertifier) and part.escalations is not None:
-        search.certifier.verified |= part.verified
-        search.certifier.leaves += part.leaves
-        search.certifier.escalations.add(part.escalations)
-        for record in part.records:
-            if recorder is not None:
-                recorder.write(record)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
     from enumsol.checks import Alpha
     from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Recorder
+    from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rationals import ExactCertifier
-    from enumsol.search.tree import Certifier
     from enumsol.selections.rationals import ExactSelections
 
 Arithmetic = Literal["fast", "verified", "exact"]
@@ -48,11 +49,8 @@ class Solvers:
         self.problem, self.alpha, self.arithmetic = problem, alpha, arithmetic
         self.scaled = problem.condensed.at(alpha).scaled
         self.floats = FloatSelections(self.scaled, tolerance)
-        pairs = zip(*(part.tolist() for part in problem.friction), strict=True)
-        lost = [
-            not F and Fraction(x) + Fraction(alpha) * Fraction(y) != 0
-            for F, (x, y) in zip(self.scaled.F, pairs, strict=True)
-        ]
+        exact = exactly_at(Fraction(alpha), *problem.friction)
+        lost = [not F and x != 0 for F, x in zip(self.scaled.F, exact, strict=True)]
         if any(lost):
             node = problem.node_ids[lost.index(True)]
             raise InvalidArgumentError(

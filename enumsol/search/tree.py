@@ -14,13 +14,15 @@ from __future__ import annotations
 import time
 import warnings
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from enumsol.errors import MissingDependencyError
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
+from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.splitting import PlaneSplitting, Splitting
+from enumsol.search.stopping import Stop, StopReason
 from enumsol.selections.solution import Codes, SelectionSolution
 from enumsol.statuses import CONTACT, UNDECIDED
 
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.search.certifiers.protocol import Certifier
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
@@ -47,37 +50,20 @@ class SearchProgress:
         Selections found so far that hold a root.
     seconds : float
         Wall time so far.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> seen = []
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.chain(4), alpha=5, progress=seen.append)
+    >>> 0 < seen[-1].covered <= 1
+    True
     """
 
     nodes: int
     covered: float
     solutions: int
     seconds: float
-
-
-@dataclass(frozen=True)
-class UndecidedPart:
-    """A part of the selections that the search left undecided."""
-
-    codes: Codes
-    reason: str
-    hint: str
-
-
-class Certifier(Protocol):
-    """Decides in one arithmetic what the tree may conclude."""
-
-    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
-        """Whether the relaxation's multipliers prove that the partial assignment holds no solution."""
-
-    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
-        """All roots in a complete selection, None when it holds none, or why that is open."""
-
-    def branching(self, node: int, children: Sequence[int]) -> None:
-        """Take note that a partial assignment is split at ``node`` (called in preorder, for the proof)."""
-
-    def skipped(self, codes: Codes, reason: str) -> None:
-        """Take note that a subtree was not examined because the search was stopped."""
 
 
 @dataclass
@@ -104,13 +90,25 @@ class SearchOutcome:
 
     solutions: list[SelectionSolution] = field(default_factory=list)
     undecided: list[UndecidedPart] = field(default_factory=list)
-    stopped: str | None = None
+    stopped: Stop | None = None
     nodes: int = 0
     pruned: int = 0
     selections: int = 0
     qps: int = 0
     fallback_qps: int = 0
     presolved: int = 0
+
+    def add(self, part: SearchOutcome) -> None:
+        """Add what the search of a subtree found."""
+        self.solutions += part.solutions
+        self.undecided += part.undecided
+        self.stopped = self.stopped or part.stopped
+        self.nodes += part.nodes
+        self.pruned += part.pruned
+        self.selections += part.selections
+        self.qps += part.qps
+        self.fallback_qps += part.fallback_qps
+        self.presolved += part.presolved
 
 
 @dataclass(slots=True)
@@ -199,29 +197,31 @@ class TreeSearch:
         outcome = self.outcome
         while stack:
             if self.must_stop(len(stack)):
-                for branch in reversed(stack):
-                    self.certifier.skipped(branch.codes, str(outcome.stopped))
-                    outcome.undecided.append(
-                        UndecidedPart(branch.codes, "the search was stopped before it came here", "raise the limit")
-                    )
+                for item in reversed(stack):
+                    self.skip(item.codes, "raise the limit")
                 break
             stack.extend(reversed(list(self.examine(stack.pop()))))
         return outcome
 
-    def examine(self, branch: TreeNode) -> Iterator[TreeNode]:
+    def skip(self, codes: Codes, hint: str) -> None:
+        """Leave a subtree undecided, because the search was stopped."""
+        self.certifier.skipped(codes, str(self.outcome.stopped))
+        self.outcome.undecided.append(UndecidedPart(codes, "the search was stopped before it came here", hint))
+
+    def examine(self, item: TreeNode) -> Iterator[TreeNode]:
         """Settle one node of the tree, or give its children in the order in which they are to be examined."""
         outcome = self.outcome
         outcome.nodes += 1
-        relaxation = self._relax(branch)
-        codes = branch.codes
+        relaxation = self._relax(item)
+        codes = item.codes
         if relaxation is not None and relaxation.pruned and self.certifier.excluded(codes, relaxation):
             outcome.pruned += 1
-            self._covered += branch.weight
+            self._covered += item.weight
             return
-        node, forced = self._choose(branch, relaxation)
+        node, forced = self._choose(item, relaxation)
         if node < 0:
             self._settle(codes)
-            self._covered += branch.weight
+            self._covered += item.weight
             return
         children = self.splitting.children(codes, node, relaxation)
         outcome.presolved += forced is not None
@@ -230,7 +230,7 @@ class TreeSearch:
         for k, code in enumerate(children):
             child = (*codes[:node], code, *codes[node + 1 :])
             last = k + 1 == len(children)
-            yield TreeNode(usable, child, node, last, branch.weight / len(children), forced)
+            yield TreeNode(usable, child, node, last, item.weight / len(children), forced)
 
     def _settle(self, codes: Codes) -> None:
         """Have the certifier decide a complete selection."""
@@ -246,11 +246,11 @@ class TreeSearch:
         """Look at the limits and report progress."""
         outcome, limits = self.outcome, self.limits
         if limits.max_nodes is not None and outcome.nodes >= limits.max_nodes:
-            outcome.stopped = f"stopped after max_nodes = {limits.max_nodes} nodes, {waiting} subtrees not examined"
+            outcome.stopped = Stop(StopReason.NODE_LIMIT, limits.max_nodes, unexamined=waiting)
         elif limits.enough is not None and limits.enough(outcome.solutions):
-            outcome.stopped = f"stopped after enough roots, {waiting} subtrees not examined"
+            outcome.stopped = Stop(StopReason.ENOUGH_ROOTS, unexamined=waiting)
         elif limits.deadline is not None and time.perf_counter() > limits.deadline:
-            outcome.stopped = f"stopped by the time limit, {waiting} subtrees not examined"
+            outcome.stopped = Stop(StopReason.TIME_LIMIT, unexamined=waiting)
         elif outcome.nodes % _REPORT_EVERY == 0:
             self.report(self._covered)
         return outcome.stopped is not None
@@ -275,12 +275,12 @@ class TreeSearch:
         parts = [self._rows_of(i, code) for i, code in enumerate(codes)]
         return [row for rows, _ in parts for row in rows], [mode for _, modes in parts for mode in modes]
 
-    def _relax(self, branch: TreeNode) -> Relaxation | None:
+    def _relax(self, item: TreeNode) -> Relaxation | None:
         """The solved relaxation; None when no engine has an answer."""
-        codes = branch.codes
+        codes = item.codes
         self.outcome.qps += 1
-        if branch.parent is not None:
-            relaxation = branch.parent.child(*self._rows_of(branch.changed, codes[branch.changed]), last=branch.last)
+        if item.parent is not None:
+            relaxation = item.parent.child(*self._rows_of(item.changed, codes[item.changed]), last=item.last)
         else:
             relaxation = self.engine.root(*self._all_rows(codes))
         return self._fall_back(codes) if relaxation.stalled else relaxation
@@ -296,12 +296,12 @@ class TreeSearch:
     # -- branching -------------------------------------------------------------------------------------------------
 
     @staticmethod
-    def _choose(branch: TreeNode, relaxation: Relaxation | None) -> tuple[int, tuple[int, ...] | None]:
+    def _choose(item: TreeNode, relaxation: Relaxation | None) -> tuple[int, tuple[int, ...] | None]:
         """The contact node to branch on, -1 when all are decided; and the forced ones that the children begin with."""
         if relaxation is None or relaxation.pruned:
-            return next((i for i, code in enumerate(branch.codes) if code >= CONTACT), -1), branch.forced
-        if branch.forced is not None:
-            forced = branch.forced or relaxation.forced(branch.codes)
+            return next((i for i, code in enumerate(item.codes) if code >= CONTACT), -1), item.forced
+        if item.forced is not None:
+            forced = item.forced or relaxation.forced(item.codes)
             if forced:
                 return forced[0], forced[1:]
-        return relaxation.choose(branch.codes), None
+        return relaxation.choose(item.codes), None

@@ -185,7 +185,7 @@ class FloatSelections:
         return bool(np.max(np.abs(a - b) / self._force_scale) <= 10 * self.tolerance)
 
     def meet(self, a: SelectionSolution, b: SelectionSolution) -> bool:
-        """Whether two polytopes share a point: the vertices of the selection that joins both sets of conditions."""
+        """Whether two polytopes share a point, within the tolerance: the distance of their hulls, a linear program."""
         from scipy.optimize import linprog  # only families need it
 
         Va = np.array(a.vertices) / self._force_scale

@@ -31,12 +31,12 @@ class SelectionFunctions:
 
     Parameters
     ----------
-    path : ExactPath
+    exact : ExactPath
     codes : status codes, FRICTIONLESS for the nodes in contact with F = 0 throughout
     """
 
-    def __init__(self, path: ExactPath, codes: Codes) -> None:
-        self.path, self.codes = path, codes
+    def __init__(self, exact: ExactPath, codes: Codes) -> None:
+        self.exact, self.codes = exact, codes
         self._closed = [i for i, c in enumerate(codes) if c != OPEN]
         self._stuck = [i for i, c in enumerate(codes) if c == STICK]
         self._cache: dict[tuple[str, int], Any] = {}
@@ -55,7 +55,7 @@ class SelectionFunctions:
 
     def _matrix(self, alpha: int) -> tuple[Any, Any]:
         """Integer matrix and right-hand side of the reduced system at an integer alpha."""
-        data, p = self.path.integers, self.path.p
+        data, p = self.exact.integers, self.exact.p
         rows = self._closed + [p + i for i in self._stuck]
         matrix = []
         slips = [(i, _direction(self.codes[i]) * (data.F0[i] + alpha * data.F1[i])) for i in self._closed]
@@ -69,9 +69,9 @@ class SelectionFunctions:
 
     def _solve(self) -> None:
         """Determinant and unknowns by evaluation and interpolation."""
-        path, size = self.path, len(self._closed) + len(self._stuck)
-        slips = sum(1 for i, c in enumerate(self.codes) if c in (SLIP_PLUS, SLIP_MINUS) and path.F1[i] != 0)
-        needed = slips + 1 + int(path.loaded)
+        exact, size = self.exact, len(self._closed) + len(self._stuck)
+        slips = sum(1 for i, c in enumerate(self.codes) if c in (SLIP_PLUS, SLIP_MINUS) and exact.F1[i] != 0)
+        needed = slips + 1 + int(exact.loaded)
         if size == 0:
             self.det = fmpz_poly([1])
             return
@@ -118,7 +118,7 @@ class SelectionFunctions:
             if kind == "n":
                 value = self._forces[node]
             elif kind in ("gap", "slip"):
-                value = self._displacement(node if kind == "gap" else self.path.p + node)
+                value = self._displacement(node if kind == "gap" else self.exact.p + node)
             else:
                 value = self._cone(node, 1 if kind == "cone+" else -1)
             self._cache[key] = integer_polynomial(value)
@@ -127,7 +127,7 @@ class SelectionFunctions:
     @cached_property
     def _forces(self) -> list[Any]:
         """Numerators of lambda in units of ``_Integers.force`` (a slipping node's unknown is lambda_n / dF)."""
-        data, p = self.path.integers, self.path.p
+        data, p = self.exact.integers, self.exact.p
         forces = [fmpz_poly([])] * (2 * p)
         for k, i in enumerate(self._closed):
             forces[i] = self._unknowns[k] * data.friction_unit
@@ -139,7 +139,7 @@ class SelectionFunctions:
         return forces
 
     def _displacement(self, row: int) -> Any:
-        data = self.path.integers
+        data = self.exact.integers
         total = self.det * fmpz_poly([data.g0[row], data.g1[row]])
         for s, force in zip(data.S[row], self._forces, strict=True):
             if not force.is_zero():
@@ -147,13 +147,13 @@ class SelectionFunctions:
         return total
 
     def _cone(self, node: int, direction: int) -> Any:
-        data = self.path.integers
+        data = self.exact.integers
         bound = self._forces[node] * fmpz_poly([data.F0[node], data.F1[node]])
-        return bound - direction * data.friction_unit * self._forces[self.path.p + node]
+        return bound - direction * data.friction_unit * self._forces[self.exact.p + node]
 
     def forces_at(self, alpha: Any) -> tuple[Any, ...] | None:
         """lambda at a rational alpha, exactly; None where the quotients are 0 / 0 and no limit exists there."""
-        det, force, shift = self.det, self.path.integers.force, fmpz_poly([-alpha.p, alpha.q])
+        det, force, shift = self.det, self.exact.integers.force, fmpz_poly([-alpha.p, alpha.q])
         numerators = self._forces
         while det(alpha) == 0:
             if any(f(alpha) != 0 for f in numerators):

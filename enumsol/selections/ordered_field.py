@@ -10,12 +10,12 @@ from enumsol.arithmetic.rationals import to_fraction
 from enumsol.condensation.exact import ExactSystem
 from enumsol.selections.polytopes import dot
 from enumsol.selections.rationals import ExactSelections
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import STICK
 
 if TYPE_CHECKING:
     from enumsol.condensation.exact import ExactPath
     from enumsol.selections.polytopes import Form, Point, Table
-    from enumsol.selections.solution import ActiveSets, Codes
+    from enumsol.selections.solution import Codes
 
 
 class FiberSelections(ExactSelections):
@@ -26,16 +26,16 @@ class FiberSelections(ExactSelections):
 
     Parameters
     ----------
-    path : ExactPath
+    exact : ExactPath
     alpha : fmpq or NumberFieldElement
     push : direction that replaces g, in the perturbations that give the local degree
     """
 
-    def __init__(self, path: ExactPath, alpha: Any, push: tuple[Any, ...] | None = None) -> None:
-        g, F = path.at(alpha)
-        super().__init__(ExactSystem(path.S, g if push is None else push, F))
-        self.path, self.alpha = path, alpha
-        self.F_positive = tuple(not without for without in path.frictionless)
+    def __init__(self, exact: ExactPath, alpha: Any, push: tuple[Any, ...] | None = None) -> None:
+        g, F = exact.at(alpha)
+        super().__init__(ExactSystem(exact.S, g if push is None else push, F))
+        self.exact, self.alpha = exact, alpha
+        self.F_positive = tuple(not without for without in exact.frictionless)
 
     def _solve_reduced(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
         rows, columns = self.reduced(codes)
@@ -58,26 +58,6 @@ class FiberSelections(ExactSelections):
     def _w(self, point: Point) -> list[Any]:
         return [g - dot(row, point) for g, row in zip(self.system.g, self._S, strict=True)]
 
-    def active(self, point: Point) -> ActiveSets:
-        """Per node the codes whose conditions hold at the point, exactly."""
-        p, w = self.p, self._w(point)
-        result = []
-        for i, F in enumerate(self.system.F):
-            n, t, w_t = point[i], point[p + i], w[p + i]
-            holds = set()
-            if n == 0 and t == 0 and w[i] <= 0:
-                holds.add(OPEN)
-            if w[i] == 0 and n >= 0:
-                bound = F * n
-                if self.path.frictionless[i]:
-                    holds |= {FRICTIONLESS} if t == 0 else set()
-                else:
-                    holds |= {STICK} if w_t == 0 and -bound <= t <= bound else set()
-                    holds |= {SLIP_PLUS} if t == bound and w_t >= 0 else set()
-                    holds |= {SLIP_MINUS} if t == -bound and w_t <= 0 else set()
-            result.append(frozenset(holds))
-        return tuple(result)
-
     # -- the field -------------------------------------------------------------------------------------------------
 
     @staticmethod
@@ -93,7 +73,7 @@ class FiberSelections(ExactSelections):
 
     def pushed(self, direction: tuple[Any, ...]) -> FiberSelections:
         """The solver whose g is a direction."""
-        return FiberSelections(self.path, self.alpha, direction)
+        return FiberSelections(self.exact, self.alpha, direction)
 
 
 def as_float(value: Any) -> float:

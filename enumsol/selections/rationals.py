@@ -166,21 +166,18 @@ class ExactSelections:
         p, w = self.p, self._w(point)
         result = []
         for i, F in enumerate(self.system.F):
-            n, t = point[i], point[p + i]
+            n, t, w_t = point[i], point[p + i], w[p + i]
             holds = set()
             if n == 0 and t == 0 and w[i] <= 0:
                 holds.add(OPEN)
             if w[i] == 0 and n >= 0:
-                if F == 0:
-                    if t == 0:
-                        holds.add(FRICTIONLESS)
+                bound = F * n
+                if not self.F_positive[i]:
+                    holds |= {FRICTIONLESS} if t == 0 else set()
                 else:
-                    if w[p + i] == 0 and -F * n <= t <= F * n:
-                        holds.add(STICK)
-                    if t == F * n and w[p + i] >= 0:
-                        holds.add(SLIP_PLUS)
-                    if t == -F * n and w[p + i] <= 0:
-                        holds.add(SLIP_MINUS)
+                    holds |= {STICK} if w_t == 0 and -bound <= t <= bound else set()
+                    holds |= {SLIP_PLUS} if t == bound and w_t >= 0 else set()
+                    holds |= {SLIP_MINUS} if t == -bound and w_t <= 0 else set()
             result.append(frozenset(holds))
         return tuple(result)
 

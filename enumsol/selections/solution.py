@@ -39,7 +39,23 @@ class SelectionSolution:
     strict: bool
 
 
-class SelectionSolver(Protocol):
+class PointValues(Protocol):
+    """Values at the points of a solution, whose representation of lambda is the solver's own."""
+
+    def forces(self, point: Any) -> np.ndarray[Any, Any]:
+        """The point's lambda as floats, shape (2p,), unscaled."""
+
+    def displacements(self, point: Any) -> np.ndarray[Any, Any]:
+        """w = g - S lambda at the point as floats, shape (2p,), unscaled, exact zeros where the status says so."""
+
+    def slip_signs(self, point: Any) -> tuple[int, ...]:
+        """Signs of w_t at the point, one a node."""
+
+    def bounds(self, point: Any) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]] | None:
+        """Proven bounds of (lambda, w) at the point, two arrays of shape (4p,); None in an arithmetic without any."""
+
+
+class SelectionSolver(PointValues, Protocol):
     """Solves selections and decides about their solutions in one arithmetic (floats with a tolerance, or rationals)."""
 
     p: int
@@ -62,18 +78,6 @@ class SelectionSolver(Protocol):
 
         0 if it does not; None if the direction is not generic. ``direction`` holds 2p small integers.
         """
-
-    def forces(self, point: Any) -> np.ndarray[Any, Any]:
-        """The point's lambda as floats, shape (2p,), unscaled."""
-
-    def displacements(self, point: Any) -> np.ndarray[Any, Any]:
-        """w = g - S lambda at the point as floats, shape (2p,), unscaled, exact zeros where the status says so."""
-
-    def slip_signs(self, point: Any) -> tuple[int, ...]:
-        """Signs of w_t at the point, one a node."""
-
-    def bounds(self, point: Any) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]] | None:
-        """Proven bounds of (lambda, w) at the point, two arrays of shape (4p,); None in an arithmetic without any."""
 
 
 class VertexLimitError(TooLargeError):

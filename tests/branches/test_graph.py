@@ -10,6 +10,7 @@ from branches.problems import assert_balanced, assert_same_roots, one_node
 
 from enumsol import ContactProblem, enumerate_roots, gallery
 from enumsol.branches import BranchGraph, branch_graph
+from enumsol.branches.elements import VertexKind
 from enumsol.errors import InvalidArgumentError
 
 
@@ -184,3 +185,19 @@ def test_figures_of_families_and_sheets(tmp_path):
         sheet.plot("pressure")
     with pytest.raises(InvalidArgumentError, match="nodes"):
         sheet.plot(nodes=["x"])
+
+
+def test_kinds_of_vertices_are_texts_too(square, tmp_path):
+    (fold, *_) = square.folds
+    assert fold.kind is VertexKind.FOLD
+    assert fold.kind == "fold"
+    assert (str(fold.kind), repr(fold.kind), f"{fold.kind:>5}") == ("fold", "'fold'", " fold")
+    assert {v.kind for v in square.vertices} == {"fold", "end"}
+    assert set(square.summary()["vertices"]) == {"fold", "end"}
+    file = tmp_path / "graph.json"
+    square.save(file)
+    assert [item["kind"] for item in json.loads(file.read_text())["vertices"]] == [v.kind for v in square.vertices]
+    assert all(type(v.kind) is VertexKind for v in BranchGraph.load(file).vertices)
+    file.write_text(file.read_text().replace('"kind": "fold"', '"kind": "cusp"', 1))
+    with pytest.raises(InvalidArgumentError, match=r"damaged .*'cusp'"):
+        BranchGraph.load(file)

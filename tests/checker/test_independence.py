@@ -33,6 +33,7 @@ SEARCH = (
 #: What may write a false proof and accept it: of these modules the search uses no more than these names; None: all.
 SHARED = {
     "arithmetic.rationals": {"is_positive_definite", "rational", "rational_matrix", "to_fraction"},
+    "condensation.affine": {"exactly_at"},
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
     "condensation.unloaded": {"CondensedData", "vanishing_alpha"},
     "kernel.interval": {"EnclosedPiece", "as_computed", "interval_exclusion_margins"},

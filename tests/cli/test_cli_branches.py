@@ -74,6 +74,7 @@ def test_table_cut_short_is_status_3(capsys, arithmetic):
     assert "undecided" in out.splitlines()[0]
 
 
+@pytest.mark.slow
 def test_ctrl_c_prints_the_table_so_far(tmp_path):
     file, result = tmp_path / "chain.npz", tmp_path / "table.csv"
     write_problem(gallery.chain(6, 0.05), file)
@@ -158,6 +159,7 @@ def test_graph_cut_short_is_status_3(capsys):
     assert out.splitlines()[-1].startswith("complete: no (")
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_a_graph(tmp_path):
     file = tmp_path / "chain.npz"
     write_problem(gallery.chain(8, 0.05), file)

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from cli.test_cli import assert_refused, on_terminal, run
 
-from enumsol import Interrupted, branch_graph, gallery, write_problem
+from enumsol import ContactProblem, Interrupted, branch_graph, enumerate_roots, follow, gallery, write_problem
 
 FOLLOW = ("follow", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--start", 5)
 
@@ -44,6 +44,34 @@ def test_all_roots_and_none_twice(capsys):
     assert status == 0
     assert "root 2 lies on path" in out
     assert out.endswith("4 paths, 4 of them left the interval or closed\n")
+
+
+def test_follow_csv_names_columns_by_label(capsys, tmp_path):
+    body = gallery.two_node_square()
+    labels = ("toe", "heel")
+    labelled = ContactProblem(body.A, body.Bn, body.Bt, body.f, friction=body.friction, node_ids=labels)
+    frames = []
+    for name, problem in (("rows", body), ("labels", labelled)):
+        write_problem(problem, tmp_path / f"{name}.npz")
+        arguments = ("follow", tmp_path / f"{name}.npz", "--from", 0, "--to", 10, "--start", 5)
+        assert run(capsys, *arguments, "--csv", tmp_path / f"{name}.csv")[0] == 0
+        frames.append(pd.read_csv(tmp_path / f"{name}.csv"))
+    for quantity in ("lambda_n", "lambda_t", "u_n", "u_t", "status"):
+        by_row = frames[0][[f"{quantity}_{row}" for row in range(2)]]
+        assert not by_row.iloc[:, 0].equals(by_row.iloc[:, 1])
+        for row, label in enumerate(labels):
+            assert frames[1][f"{quantity}_{label}"].tolist() == by_row.iloc[:, row].tolist()
+    assert not {"lambda_n_0", "status_0"} & set(frames[1].columns)
+    status, out, _ = run(capsys, "audit", tmp_path / "labels.npz", tmp_path / "labels.csv", "--json", "-")
+    assert status in (0, 3)
+    assert json.loads(out)["off"] == []
+
+
+def test_columns_go_by_row_where_two_labels_are_the_same_text():
+    body = gallery.two_node_square()
+    problem = ContactProblem(body.A, body.Bn, body.Bt, body.f, friction=body.friction, node_ids=["1", 1])
+    path = follow(problem, enumerate_roots(problem, 5.0)[0], interval=(0.0, 10.0))
+    assert {"lambda_n_0", "lambda_n_1", "status_1"} <= set(path.to_frame().columns)
 
 
 def test_follow_csv_and_json(capsys, tmp_path):
@@ -132,6 +160,7 @@ def test_follow_plots(capsys, tmp_path, graph):
         file.unlink()
 
 
+@pytest.mark.slow
 def test_ctrl_c_prints_the_paths_so_far(tmp_path):
     result = tmp_path / "points.csv"
     # a second or more a path

@@ -179,11 +179,11 @@ def test_no_attribute_of_a_problem_can_be_set(problem):
 def test_what_flint_computes_with_cannot_be_written():
     graph = enumsol.branch_graph(gallery.two_node_square(), (0, 4))
     before = graph.roots_at(3.5)
-    matrix = graph.path.S
+    matrix = graph.exact.S
     matrix[0, 0] = 77
-    assert graph.path.S[0, 0] != 77
+    assert graph.exact.S[0, 0] != 77
     assert [root.lambda_n.tolist() for root in graph.roots_at(3.5)] == [root.lambda_n.tolist() for root in before]
-    for rows in (graph.path.rows, graph.path.integers.S):
+    for rows in (graph.exact.rows, graph.exact.integers.S):
         with pytest.raises(TypeError, match="does not support item assignment"):
             rows[0][0] = 77
 

@@ -25,7 +25,8 @@ def place(tmp_path_factory):
     graph.proof.save(place / "graph.proof")
     path = enumsol.follow(graph.problem, graph.starting_points()[0], interval=(0.0, 5.0))
     path.to_frame().to_csv(place / "points.csv", index=False)
-    for name in ("full.png", "full.pdf", "full.svg", "full.npz"):
+    (place / "directory").mkdir()
+    for name in ("full.png", "full.pdf", "full.svg", "full.npz", "full.h5", "directory/A.mtx"):
         (place / name).symlink_to(FULL)
     return place
 
@@ -74,7 +75,7 @@ PRINTING = {
 
 #: Runs each command in a process of its own, which begins with the libraries loaded and ends as any process does.
 DRIVER = """
-import contextlib, io, json, os, sys
+import contextlib, gc, io, json, os, sys
 import enumsol, pandas
 from enumsol.cli import main
 
@@ -83,6 +84,7 @@ with contextlib.redirect_stdout(io.StringIO()):
     main(["--help"])
     main(["roots", "gallery:one-node-6.1", "--alpha", "5"])
 where, commands = sys.argv[1], json.loads(sys.argv[2])
+gc.freeze()  # or every process would touch, and so copy, all objects when it ends
 for name, arguments in commands.items():
     reading, writing = os.pipe()
     child = os.fork()
@@ -212,11 +214,21 @@ def test_a_file_on_a_full_disk(place, capsys, monkeypatch, verb, option, file):
     assert out.splitlines()[-1] == expected.splitlines()[-1]
 
 
-def test_gallery_write_on_a_full_disk(place, capsys, monkeypatch):
+@pytest.mark.parametrize("file", ["full.npz", "directory"])
+def test_gallery_write_on_a_full_disk(place, capsys, monkeypatch, file):
     monkeypatch.chdir(place)
-    status, _, err = run(capsys, "gallery", "write", "one-node-6.1", "full.npz")
-    assert_one_line(err, "full.npz: it cannot be written (No space left on device)")
-    assert status == 2
+    status, out, err = run(capsys, "gallery", "write", "one-node-6.1", file)
+    assert_one_line(err, f"path {file} cannot be written (No space left on device)")
+    assert status == 74
+    assert out == ""
+
+
+def test_an_fclib_file_on_a_full_disk(place):
+    pytest.importorskip("h5py")
+    problem = gallery.one_node_triangle()
+    constant = enumsol.ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f, friction=0.3)
+    with pytest.raises(enumsol.OutputError, match=r"full\.h5 cannot be written \(No space left on device\)"):
+        enumsol.write_problem(constant, place / "full.h5")
 
 
 def test_one_output_that_fails_keeps_no_other_back(place, tmp_path):

@@ -8,6 +8,8 @@ import pytest
 
 import enumsol
 
+#: mypy reads the whole package.
+pytestmark = pytest.mark.slow
 PACKAGE = Path(enumsol.__file__).parent
 
 

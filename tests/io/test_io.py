@@ -353,7 +353,7 @@ def test_places_that_cannot_be_written(tmp_path):
     with pytest.raises(InvalidArgumentError, match=r"its name ends in '\.txt'; expected a \.npz file"):
         write_problem(problem, tmp_path / "p.txt")
     for place in (tmp_path / "no" / "p.npz", tmp_path / "no" / "p"):
-        with pytest.raises(InvalidArgumentError, match=re.escape(f"{place}: it cannot be written (No such file")):
+        with pytest.raises(InvalidArgumentError, match=re.escape(f"path {place} cannot be written (No such file")):
             write_problem(problem, place)
     with pytest.raises(InvalidArgumentError, match="problem is a int; expected a ContactProblem"):
         write_problem(3, tmp_path / "p.npz")

@@ -43,7 +43,9 @@ def test_integer_data(seed, sizes, count):
     assert merged >= count / 10
 
 
-@pytest.mark.parametrize(("seed", "sizes", "count"), [(2, (1, 2), 120), (3, (3,), 15)])
+@pytest.mark.parametrize(
+    ("seed", "sizes", "count"), [(2, (1, 2), 120), pytest.param(3, (3,), 15, marks=pytest.mark.slow)]
+)
 def test_singular_selections(seed, sizes, count):
     rng = np.random.default_rng(seed)
     families = 0
@@ -74,6 +76,7 @@ def test_near_coincidences_in_exact_arithmetic():
         assert not tree.families
 
 
+@pytest.mark.slow
 def test_tree_equals_exhaustive_next_to_coincidences_in_fast_arithmetic():
     # around the tolerance neither is right, but a root that one method accepts must not be pruned by the other
     rng = np.random.default_rng(5)

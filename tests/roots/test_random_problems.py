@@ -37,6 +37,7 @@ def test_up_to_four_nodes(seed):
     assert check(seed, CHUNK, (1, 2, 3, 4)) >= CHUNK / 3
 
 
+@pytest.mark.slow
 def test_six_nodes():
     assert check(100, 50, (6,)) >= 50 / 3
 

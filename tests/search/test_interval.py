@@ -10,7 +10,7 @@ from flint import fmpq
 
 from enumsol import gallery
 from enumsol.branches import branch_graph
-from enumsol.branches.gluing import Gluing
+from enumsol.branches.gluing import glue
 from enumsol.condensation.exact import ExactPath
 from enumsol.errors import IncompleteGraphError, Interrupted, InvalidArgumentError, TooLargeError
 from enumsol.relaxation.interval import IntervalEngine, IntervalSystem
@@ -131,7 +131,7 @@ def test_a_selection_left_out_by_the_search_is_noticed(seed):
     graph = branch_graph(problem, (0.0, 6.0), "exact")
     present = {codes for arc in graph.arcs for codes in arc.selections}
     for codes in present:
-        gluing = Gluing(graph.path, present - {codes}, fmpq(0), fmpq(6))
+        gluing = glue(graph.exact, present - {codes}, fmpq(0), fmpq(6))
         neighbours = any(codes in v.selections and len(v.selections) > 1 for v in graph.vertices)
         assert bool(gluing.reasons) == neighbours
 
@@ -177,11 +177,11 @@ def test_a_selection_that_the_search_left_out_is_taken_in_and_told(name):
     selections = {codes for arc in whole.arcs for codes in arc.selections}
     a, b = fmpq(0), fmpq(5)
     for missing in sorted(selections)[:: max(1, len(selections) // 6)]:
-        gluing = Gluing(whole.path, selections - {missing}, a, b)
+        gluing = glue(whole.exact, selections - {missing}, a, b)
         assert any("left out" in reason for reason in gluing.reasons) or missing not in gluing.arcs
         assert all(edge.tail >= 0 and edge.head >= 0 for edge in gluing.edges)
         if missing in gluing.arcs:
             assert len(gluing.edges) == len(whole.arcs)
-        short = Gluing(whole.path, selections - {missing}, a, b, cut_short=True)
+        short = glue(whole.exact, selections - {missing}, a, b, cut_short=True)
         assert missing not in short.arcs
         assert all(edge.tail >= 0 and edge.head >= 0 for edge in short.edges)

@@ -63,6 +63,7 @@ def on_this_platform(name):
     return pytest.param(name, marks=marks) if name == "requirements" else name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [on_this_platform(name) for name in NAMES])
 def test_a_study_runs_at_its_smoke_size(name, tmp_path):
     before = results()

@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.tree import UndecidedPart
+from enumsol.search.certifiers.protocol import UndecidedPart, WithoutProof
 from enumsol.selections.solution import VertexLimitError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from enumsol.relaxation.engine import Relaxation
     from enumsol.selections.floats import FloatSelections
     from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
@@ -26,17 +24,7 @@ def solve_or_open(solver: SelectionSolver, codes: Codes) -> SelectionSolution | 
         return UndecidedPart(codes, str(error), "perturb the load or the friction coefficient")
 
 
-class Silent:
-    """A certifier that writes no proof."""
-
-    def branching(self, node: int, children: Sequence[int]) -> None:
-        """Nothing to write."""
-
-    def skipped(self, codes: Codes, reason: str) -> None:
-        """Nothing to write."""
-
-
-class FastCertifier(Silent):
+class FastCertifier(WithoutProof):
     """Floats and tolerances: what the engine computed is believed, unless the tolerance could overturn it.
 
     A condition within the tolerance of zero counts as satisfied. Shifting every row of a certificate by twice that

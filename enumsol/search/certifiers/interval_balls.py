@@ -25,21 +25,26 @@ class VerifiedIntervalCertifier:
     """Accepts a leaf when the dual bounds of its multipliers are proven positive at both ends of the piece.
 
     A leaf that the balls cannot exclude is branched on. Only where there are no balls at all (S positive definite
-    within rounding) do rationals decide, if the path was condensed without rounding; there is no proof file then.
+    within rounding) do rationals decide, if S and g were condensed without rounding; there is no proof file then.
 
     Parameters
     ----------
     problem : ContactProblem
-    path : ExactPath
+    exact : ExactPath
         Its data are certified: those of the problem, or S and g as computed.
     """
 
-    def __init__(self, problem: ContactProblem, path: ExactPath) -> None:
-        self._enclosure = certified_enclosure(problem, exactly=path.condensed_exactly)
-        self._exact = ExactIntervalCertifier(path) if path.condensed_exactly else None
-        self._zero = path.zero
-        self.used_rationals = False
+    def __init__(self, problem: ContactProblem, exact: ExactPath) -> None:
+        self._enclosure = certified_enclosure(problem, exactly=exact.condensed_exactly)
+        self._rationals = ExactIntervalCertifier(exact) if exact.condensed_exactly else None
+        self._zero = exact.zero
+        self._used_rationals = False
         self._piece: tuple[Piece, EnclosedPiece | None] | None = None
+
+    @property
+    def checkable(self) -> bool:
+        """Whether balls accepted every leaf so far."""
+        return not self._used_rationals
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
@@ -49,10 +54,10 @@ class VerifiedIntervalCertifier:
             first = np.zeros(len(leaf.rows), dtype=np.intp)
             margins = interval_exclusion_margins(enclosed, codes, first, leaf.rows, leaf.values, errors=2.0)
             return bool(margins[0] > _MARGIN)
-        if self._exact is None:
+        if self._rationals is None:
             return False
-        self.used_rationals = True
-        return self._exact.excluded(piece, system, leaf)
+        self._used_rationals = True
+        return self._rationals.excluded(piece, system, leaf)
 
     def _enclosed(self, piece: Piece, system: IntervalSystem) -> EnclosedPiece | None:
         if self._piece is None or self._piece[0] != piece:

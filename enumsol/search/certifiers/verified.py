@@ -6,7 +6,7 @@ problem is small enough, otherwise the selection is left undecided with the reas
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import enum
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from enumsol.kernel.point import VerifiedSelection, exclusion_margin, holds_no_root, solve_selection
 from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
 from enumsol.proof.proof_file import fraction_text, packed
-from enumsol.search.tree import UndecidedPart
+from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import FRICTIONLESS, OPEN, STICK
 
@@ -37,32 +37,21 @@ if TYPE_CHECKING:
 _WIDEN = 4.0
 
 
-@dataclass
-class Escalations:
-    """How many selections and prunings needed which arithmetic.
+class Leaf(enum.StrEnum):
+    """Kinds of leaves in a proof (docs/proof_format.md); a checker keeps its own list."""
 
-    Attributes
-    ----------
-    balls : int
-        Decided by error bounds in double arithmetic.
-    rationals : int
-        Decided in rational arithmetic.
-    refined : int
-        Prunings whose inequality failed; they were branched on.
-    undecided : int
-    """
+    EXCLUDED = "x"
+    EXCLUDED_IN_RATIONALS = "X"
+    NO_ROOT = "n"
+    NO_ROOT_IN_RATIONALS = "N"
+    REGULAR_ROOT = "r"
+    POLYTOPE = "D"
+    UNLOADED = "z"
+    UNDECIDED = "u"
 
-    balls: int = 0
-    rationals: int = 0
-    refined: int = 0
-    undecided: int = 0
 
-    def add(self, other: Escalations) -> None:
-        """Add the counts of another part of the search."""
-        self.balls += other.balls
-        self.rationals += other.rationals
-        self.refined += other.refined
-        self.undecided += other.undecided
+#: What begins the record of a branching, which is no leaf.
+_BRANCHING = "b"
 
 
 class VerifiedCertifier:
@@ -94,48 +83,53 @@ class VerifiedCertifier:
         self._exact = exact
         self.recorder = recorder
         self._node_ids = node_ids
-        self.escalations = Escalations()
-        self.verified: dict[Codes, VerifiedSelection] = {}
-        self.leaves = 0
+        self._escalations = Escalations()
+        self._verified: dict[Codes, VerifiedSelection] = {}
+        self._leaves = 0
+
+    @property
+    def certified(self) -> Certified:
+        """What was proven so far."""
+        return Certified(self._verified, self._escalations, self._leaves)
 
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
         rows, values = relaxation.multipliers()
         if self._margin is not None:
             if self._margin(codes, rows, values) > 0:
-                self.escalations.balls += 1
-                self._leaf("x", *packed(rows, values))
+                self._escalations.balls += 1
+                self._leaf(Leaf.EXCLUDED, *packed(rows, values))
                 return True
         elif (certifier := self._exact()) is not None and certifier.excluded(codes, relaxation):
             # no balls for an S that is positive definite only within rounding
-            self.escalations.rationals += 1
+            self._escalations.rationals += 1
             # the certifier passes over multipliers that prove nothing, a checker refuses them
             kind, node = np.divmod(rows, self._scaled.p)
             signs = row_signs(np.array(codes), self._scaled.F)[node, kind]
             keep = (signs == FREE) | ((signs == NONNEGATIVE) & (values > 0))
-            self._leaf("X", *packed(rows[keep], values[keep]))
+            self._leaf(Leaf.EXCLUDED_IN_RATIONALS, *packed(rows[keep], values[keep]))
             return True
-        self.escalations.refined += 1
+        self._escalations.refined += 1
         return False
 
     def branching(self, node: int, children: Sequence[int]) -> None:
         """Write a branching of the tree."""
-        self.recorder.write(["b", node, list(children)])
+        self.recorder.write([_BRANCHING, node, list(children)])
 
     def skipped(self, codes: Codes, reason: str) -> None:
         """Write a subtree that was not examined."""
         del codes
-        self._leaf("u", reason)
+        self._leaf(Leaf.UNDECIDED, reason)
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in a complete selection."""
         ball = None if self._enclosed is None else solve_selection(self._enclosed, codes)
         if ball is not None and ball.is_root:
-            self.escalations.balls += 1
+            self._escalations.balls += 1
             return self._regular(codes, ball)
         if self._enclosed is not None and holds_no_root(self._enclosed, codes, ball):
-            self.escalations.balls += 1
-            self._leaf("n")
+            self._escalations.balls += 1
+            self._leaf(Leaf.NO_ROOT)
             return None
         certifier = self._exact()
         if certifier is None:
@@ -143,33 +137,40 @@ class VerifiedCertifier:
         solution = certifier.selection(codes)
         if isinstance(solution, UndecidedPart):
             return self._undecided(codes, solution.reason, solution.hint)
-        self.escalations.rationals += 1
+        self._escalations.rationals += 1
         if solution is None:
-            self._leaf("N")
+            self._leaf(Leaf.NO_ROOT_IN_RATIONALS)
         else:
             points = [[_fraction(v) for v in vertex] for vertex in solution.vertices]
-            self._leaf("D", points, solution.dimension)
+            self._leaf(Leaf.POLYTOPE, points, solution.dimension)
         return solution
 
     def unloaded(self) -> None:
         """Write the proof of the unloaded body."""
-        self._leaf("z")
+        self._leaf(Leaf.UNLOADED)
+
+    def add(self, part: Certified) -> None:
+        """Take over what the certifier of a subtree has proven."""
+        self._verified |= part.verified
+        self._leaves += part.leaves
+        if part.escalations is not None:
+            self._escalations.add(part.escalations)
 
     def _regular(self, codes: Codes, ball: VerifiedSelection) -> SelectionSolution:
-        self.verified[codes] = ball
+        self._verified[codes] = ball
         force = ball.force * self._scaled.force
         radius = ball.force_rad * self._scaled.force * _WIDEN
-        self._leaf("r", force.tolist(), radius.tolist(), ball.det_sign)
+        self._leaf(Leaf.REGULAR_ROOT, force.tolist(), radius.tolist(), ball.det_sign)
         return SelectionSolution(codes, (ball.force,), 0, ball.det_sign, strict=True)
 
     def _undecided(self, codes: Codes, reason: str, hint: str) -> UndecidedPart:
-        self.escalations.undecided += 1
-        self._leaf("u", reason)
+        self._escalations.undecided += 1
+        self._leaf(Leaf.UNDECIDED, reason)
         return UndecidedPart(codes, reason, hint)
 
-    def _leaf(self, *record: Any) -> None:
-        self.leaves += 1
-        self.recorder.write(list(record))
+    def _leaf(self, kind: Leaf, *record: Any) -> None:
+        self._leaves += 1
+        self.recorder.write([kind, *record])
 
 
 def _margins(system: EnclosedSystem) -> Callable[[Codes, NDArray[np.intp], Array], float]:

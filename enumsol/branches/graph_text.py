@@ -1,0 +1,64 @@
+"""A branch graph as text."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from enumsol.branches.elements import VertexKind
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from enumsol.branches.elements import Branch
+    from enumsol.branches.graph_data import GraphData
+
+#: Branches that are printed one by one.
+_PRINTED_BRANCHES = 20
+
+
+def completeness(data: GraphData) -> str:
+    """Whether the graph is complete, and of what, or why not."""
+    reasons = data.all_reasons
+    if reasons:
+        more = f" and {len(reasons) - 1} more" if len(reasons) > 1 else ""
+        return f"complete: no ({reasons[0]}{more})"
+    if not data.complete:
+        return "complete: not proven (degrees balance at every vertex)"
+    about = "" if data.certified_data == "problem" else " for S and g as computed"
+    return f"complete: yes (proven{about})"
+
+
+def graph_text(data: GraphData, components: int, branches: Sequence[Branch]) -> str:
+    """Counts, a line a branch, and whether the graph is complete."""
+    kinds = Counter(v.kind for v in data.vertices)
+    numbers = ", ".join(f"{kinds[kind]} {kind}" for kind in VertexKind if kinds[kind])
+    a, b = (float(end) for end in data.interval)
+    found = "" if data.claims.whole else ", not complete; of what was found:"
+    lines = [
+        f"BranchGraph for alpha in [{a:g}, {b:g}] ({data.arithmetic}){found}",
+        f"  components {components}, branches {len(branches)}, arcs {len(data.arcs)}",
+        f"  vertices {len(data.vertices)}" + (f": {numbers}" if numbers else ""),
+        *map(_branch_line, branches[:_PRINTED_BRANCHES]),
+    ]
+    if len(branches) > _PRINTED_BRANCHES:
+        lines.append(f"  ... {len(branches) - _PRINTED_BRANCHES} more branches")
+    return "\n".join([*lines, completeness(data)])
+
+
+def _branch_line(branch: Branch) -> str:
+    lo, hi = branch.interval
+    folds = ", ".join(f"{v.alpha:.6g}" for v in branch.folds)
+    width = f", length {hi - lo:.3g}" if f"{lo:.6g}" == f"{hi:.6g}" else ""
+    return (
+        f"  branch {branch.number}: {_shape(branch)}, {len(branch.arcs)} arcs, alpha in [{lo:.6g}, {hi:.6g}]{width}"
+        + (f", folds at {folds}" if folds else "")
+    )
+
+
+def _shape(branch: Branch) -> str:
+    if branch.sheet:
+        return "sheet"
+    if branch.closed:
+        return "closed"
+    return "unfinished" if any(v.kind is VertexKind.UNSETTLED for v in branch.vertices) else "open"

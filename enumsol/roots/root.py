@@ -1,0 +1,279 @@
+"""Isolated solutions and families of them at one alpha."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.roots.local_branch import branch_test
+from enumsol.sealed import Sealed, sealed
+from enumsol.statuses import ContactStatus, sign_array
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.checks import Alpha
+    from enumsol.condensation.condensed import CondensedProblem
+    from enumsol.roots.linearisation import SelectionTangent
+    from enumsol.roots.local_branch import LocalBranchTest
+    from enumsol.roots.slip_signs import SlipSigns
+
+#: Contact nodes of a printed root; of larger ones the first are shown.
+_PRINTED_NODES = 20
+
+
+@dataclass(frozen=True)
+class Enclosure(Sealed):
+    """Proven bounds of a root's forces and displacements.
+
+    Attributes
+    ----------
+    lambda_n, lambda_t : (p, 2) arrays
+        Lower and upper bounds [force].
+    u_n, u_t : (p, 2) arrays
+        Lower and upper bounds of u_n = Bn u - gap and u_t = Bt u - slip_offset [length].
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> root = enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), alpha=5)[1]  # lambda_n = 1 / 3
+    >>> low, high = root.enclosure.lambda_n[0]
+    >>> bool(low < 1 / 3 < high < low + 1e-12)
+    True
+    """
+
+    lambda_n: NDArray[np.float64]
+    lambda_t: NDArray[np.float64]
+    u_n: NDArray[np.float64]
+    u_t: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ContactState(Sealed):
+    """Statuses, forces and displacements of all contact nodes at a solution.
+
+    Attributes
+    ----------
+    alpha : float or Fraction
+    statuses : tuple of p ContactStatus
+        Where several hold, the first of OPEN, STICK, SLIP_PLUS, SLIP_MINUS.
+    active : tuple of p frozensets of ContactStatus
+        All statuses that hold at the node.
+    lambda_n, lambda_t : (p,) arrays
+        Contact forces on the nodes (nodal forces, not pressures) [force].
+    u_n, u_t : (p,) arrays
+        Bn u - gap <= 0 and Bt u - slip_offset [length].
+    """
+
+    alpha: Alpha
+    statuses: tuple[ContactStatus, ...]
+    active: tuple[frozenset[ContactStatus], ...]
+    lambda_n: NDArray[np.float64]
+    lambda_t: NDArray[np.float64]
+    u_n: NDArray[np.float64]
+    u_t: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Root(ContactState):
+    """An isolated solution at one alpha: a ContactState with its index.
+
+    At a node with F = 0 in contact the sign of u_t names its status: in verified and exact arithmetic that of the
+    enclosure, or in rationals. ``active`` then holds all names that this sign does not exclude (of a body too large for
+    rationals, n > 250, the enclosure of u_t may hold zero and leave the sign open).
+
+    Attributes
+    ----------
+    alpha, statuses, active, lambda_n, lambda_t, u_n, u_t
+        See ContactState.
+    index : int or None
+        Local degree (theory, section 6.7): sign det of the selection at a regular root. It says nothing about physical
+        stability. None when it could not be found within the limits of the local analysis.
+    regular : bool
+        Exactly one status holds at every node, strictly, and the selection is not singular.
+    enclosure : Enclosure or None
+        Proven bounds, in verified and exact arithmetic.
+    margin : float
+        Distance to the next change of status, the least slack of the conditions that hold [-]: forces measured by
+        their largest possible values at a solution, displacements likewise. 0 at a degenerate root.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), alpha=5)
+    >>> roots[2]
+    Root at alpha = 5: index +1, regular, margin 2.70e-01
+    node status      lambda_n     lambda_t          u_n          u_t
+       0 stick            1.5           -4            0            0
+    """
+
+    index: int | None
+    regular: bool
+    margin: float
+    enclosure: Enclosure | None = field(repr=False, compare=False)
+    _condensed: CondensedProblem = field(repr=False, compare=False)
+    _tangent: SelectionTangent | None = field(repr=False, compare=False)
+    _slips: SlipSigns | None = field(repr=False, compare=False, default=None)
+
+    @cached_property
+    def condition(self) -> float:
+        """Condition number of the selection's matrix after scaling; infinite unless the root is regular."""
+        return np.inf if self._tangent is None else self._tangent.condition()
+
+    @cached_property
+    def dlambda_dalpha(self) -> NDArray[np.float64] | None:
+        """Derivatives of (lambda_n, lambda_t) along the branch, shape (p, 2); None unless the root is regular."""
+        derivative = None if self._tangent is None else self._tangent.derivative()
+        return None if derivative is None else sealed(derivative)
+
+    @property
+    def u(self) -> NDArray[np.float64]:
+        """Displacement of all degrees of freedom, shape (n,) [length]; computed at every access."""
+        return self._condensed.displacement(self.alpha, np.concatenate([self.lambda_n, self.lambda_t]))
+
+    def local_branch_test(self) -> LocalBranchTest:
+        """Whether a local Lipschitz branch of solutions passes through the root (theory, section 3.2).
+
+        Its ``exists`` is True when the determinants of all selections that hold at the root have one and the same
+        sign; ``differing`` names those that break this. A regular root always has such a branch. ``premise`` tells
+        whether F > 0 at every node, without which the branch in the load need not be one in F.
+
+        Raises
+        ------
+        TooLargeError
+            Too many selections hold at the root to examine each of them.
+        """
+        return branch_test(self._condensed, self)
+
+    def _slip_sign(self, node: int) -> int:
+        sign = None if self._slips is None else self._slips.sign(node)
+        return int(np.sign(self.u_t[node])) if sign is None else sign
+
+    @property
+    def signs(self) -> NDArray[np.int8]:
+        """Signs of the test functions at the root, shape (p, 3); 0 where a test function vanishes.
+
+        At an open node theta2 and theta3 have the sign of u_t. In verified and exact arithmetic it follows from the
+        enclosure or from rationals; of a body too large for these (n > 250) whose enclosure holds zero, it is that of
+        the computed value.
+        """
+        signs = sign_array(self.statuses)
+        for i, holds in enumerate(self.active):
+            if ContactStatus.OPEN in holds:
+                signs[i, 0] = 0 if len(holds) > 1 else -1
+                signs[i, 1:] = self._slip_sign(i)
+            else:
+                if ContactStatus.SLIP_PLUS in holds and ContactStatus.STICK in holds:
+                    signs[i, 1] = 0
+                if ContactStatus.SLIP_MINUS in holds and ContactStatus.STICK in holds:
+                    signs[i, 2] = 0
+        return signs
+
+    def __repr__(self) -> str:
+        index = "?" if self.index is None else f"{self.index:+d}"
+        regular = "regular" if self.regular else "not regular"
+        labels = self._condensed.problem.node_ids
+        shown = min(len(labels), _PRINTED_NODES)
+        width = max(4, *(len(str(label)) for label in labels[:shown]))
+        lines = [
+            f"Root at alpha = {float(self.alpha):g}: index {index}, {regular}, margin {self.margin:.2e}",
+            node_heading(width),
+            *(node_line(self, i, labels[i], width) for i in range(shown)),
+        ]
+        if shown < len(labels):
+            lines.append(f"... {len(labels) - shown} more nodes; all of them: {summary(self.statuses)}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class Polytope(Sealed):
+    """A convex set of roots in one selection.
+
+    Attributes
+    ----------
+    statuses : tuple of p ContactStatus
+    vertices : (k, p, 2) array
+        (lambda_n, lambda_t) at every vertex [force].
+    dimension : int
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(f=(1, -2)), alpha=2)
+    >>> segment = roots.families[0].polytopes[0]
+    >>> segment.dimension, segment.vertices.tolist()
+    (1, [[[0.0, 0.0]], [[1.0, -2.0]]])
+    """
+
+    statuses: tuple[ContactStatus, ...]
+    vertices: NDArray[np.float64]
+    dimension: int
+
+
+@dataclass(frozen=True)
+class RootFamily:
+    """A connected continuum of solutions at one alpha: a union of polytopes.
+
+    Attributes
+    ----------
+    alpha : float or Fraction
+    polytopes : tuple of Polytope
+        The maximal ones.
+    index : int or None
+        Local degree of the whole family; None when it could not be found within the limits.
+    vertices_proven : bool
+        The lists of vertices were found in rational arithmetic.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> family = enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(f=(1, -2)), alpha=2).families[0]
+    >>> len(family.polytopes), family.index
+    (1, 1)
+    """
+
+    alpha: Alpha
+    polytopes: tuple[Polytope, ...]
+    index: int | None
+    vertices_proven: bool
+
+    @property
+    def dimension(self) -> int:
+        """Largest dimension of its polytopes."""
+        return max(part.dimension for part in self.polytopes)
+
+    @cached_property
+    def vertices(self) -> NDArray[np.float64]:
+        """All vertices, shape (k, p, 2), without repetition, in lexical order."""
+        return sealed(np.unique(np.concatenate([part.vertices for part in self.polytopes]), axis=0))
+
+
+def node_heading(width: int) -> str:
+    """The heading of lines over contact nodes, whose labels take that width."""
+    return f"{'node':>{width}} {'status':<7} {'lambda_n':>12} {'lambda_t':>12} {'u_n':>12} {'u_t':>12}"
+
+
+def node_line(state: ContactState, i: int, label: object, width: int) -> str:
+    """Status, forces and displacements of a contact node, below `node_heading`."""
+    numbers = (state.lambda_n[i], state.lambda_t[i], state.u_n[i], state.u_t[i])
+    # + 0.0 turns a negative zero, which means nothing to a reader, into zero
+    text = " ".join(f"{number + 0.0:>12.6g}" for number in numbers)
+    return f"{label!s:>{width}} {state.statuses[i].value:<7} {text}"
+
+
+def summary(statuses: Sequence[ContactStatus]) -> str:
+    """Runs of equal statuses as text: ``3 open, 2 stick, 1 slip+``."""
+    parts: list[str] = []
+    run = 0
+    for k, status in enumerate(statuses):
+        run += 1
+        if k + 1 == len(statuses) or statuses[k + 1] is not status:
+            parts.append(f"{run} {status.value}" if len(statuses) > 1 else status.value)
+            run = 0
+    text = ", ".join(parts)
+    return text if len(text) <= 60 else text[:57] + "..."

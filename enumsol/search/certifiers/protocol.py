@@ -1,0 +1,128 @@
+"""What every certifier offers to the search, whatever its arithmetic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from enumsol.kernel.point import VerifiedSelection
+    from enumsol.proof.proof_file import Recorder
+    from enumsol.relaxation.engine import Relaxation
+    from enumsol.selections.solution import Codes, SelectionSolution
+
+
+@dataclass(frozen=True)
+class UndecidedPart:
+    """A part of the selections that the search left undecided."""
+
+    codes: Codes
+    reason: str
+    hint: str
+
+
+@dataclass
+class Escalations:
+    """How many selections and prunings needed which arithmetic.
+
+    Attributes
+    ----------
+    balls : int
+        Decided by error bounds in double arithmetic.
+    rationals : int
+        Decided in rational arithmetic.
+    refined : int
+        Prunings whose inequality failed; they were branched on.
+    undecided : int
+    """
+
+    balls: int = 0
+    rationals: int = 0
+    refined: int = 0
+    undecided: int = 0
+
+    def add(self, other: Escalations) -> None:
+        """Add the counts of another part of the search."""
+        self.balls += other.balls
+        self.rationals += other.rationals
+        self.refined += other.refined
+        self.undecided += other.undecided
+
+
+@dataclass(frozen=True)
+class Certified:
+    """What a certifier has proven; of one that writes no proof, nothing.
+
+    Attributes
+    ----------
+    verified : balls of the regular roots, by their codes
+    escalations : Escalations or None
+    leaves : int
+        Leaves written to the proof.
+    """
+
+    verified: Mapping[Codes, VerifiedSelection] = field(default_factory=dict)
+    escalations: Escalations | None = None
+    leaves: int = 0
+
+
+class Certifier(Protocol):
+    """Decides in one arithmetic what the tree may conclude, and writes the proof of it, if there is to be one.
+
+    Attributes
+    ----------
+    recorder : Recorder
+        Where the records of the proof go.
+    """
+
+    recorder: Recorder
+
+    @property
+    def certified(self) -> Certified:
+        """What was proven so far."""
+
+    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+        """Whether the relaxation's multipliers prove that the partial assignment holds no solution."""
+
+    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
+        """All roots in a complete selection, None when it holds none, or why that is open."""
+
+    def branching(self, node: int, children: Sequence[int]) -> None:
+        """Take note that a partial assignment is split at ``node`` (called in preorder, for the proof)."""
+
+    def skipped(self, codes: Codes, reason: str) -> None:
+        """Take note that a subtree was not examined, and why."""
+
+    def unloaded(self) -> None:
+        """Take note that the body is unloaded, which decides the whole tree."""
+
+    def add(self, part: Certified) -> None:
+        """Take over what the certifier of a subtree has proven; its records were written already."""
+
+
+class Unrecorded:
+    """Where the records of no proof go."""
+
+    def write(self, record: Any) -> None:
+        """Nothing to write."""
+
+
+class WithoutProof:
+    """Base of certifiers that write no proof."""
+
+    recorder: Recorder = Unrecorded()
+    certified = Certified()
+
+    def branching(self, node: int, children: Sequence[int]) -> None:
+        """Nothing to write."""
+
+    def skipped(self, codes: Codes, reason: str) -> None:
+        """Nothing to write."""
+
+    def unloaded(self) -> None:
+        """Nothing to write."""
+
+    def add(self, part: Certified) -> None:
+        """Nothing to take over."""

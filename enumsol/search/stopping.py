@@ -1,0 +1,61 @@
+"""Why a search ended early."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+
+class StopReason(enum.Enum):
+    """What ended a search before its tree did."""
+
+    NODE_LIMIT = enum.auto()
+    ENOUGH_ROOTS = enum.auto()
+    TIME_LIMIT = enum.auto()
+    INTERRUPTED = enum.auto()
+    WORKER_LOST = enum.auto()
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Why a search ended early, and how far it came; ``str`` gives the sentence that results show.
+
+    Attributes
+    ----------
+    reason : StopReason
+    count : int or None
+        The limit (NODE_LIMIT), or what was done by then (INTERRUPTED).
+    counted : str
+        What ``count`` counts: "nodes" or "selections".
+    arcs_of : int or None
+        Of how many selections the arcs were to be worked out, where that was interrupted and not the search.
+    unexamined : int or None
+        Subtrees that are listed as not examined; None where the search keeps no such list.
+    loss : str
+        What befell the worker (WORKER_LOST).
+    """
+
+    reason: StopReason
+    count: int | None = None
+    counted: str = "nodes"
+    arcs_of: int | None = None
+    unexamined: int | None = None
+    loss: str = ""
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the user pressed Ctrl-C: what was left then is not accounted for."""
+        return self.reason is StopReason.INTERRUPTED
+
+    def __str__(self) -> str:
+        done = f"{self.count} {self.counted}"
+        if self.arcs_of is not None:
+            done = f"the arcs of {self.count} of {self.arcs_of} selections"
+        text = {
+            StopReason.NODE_LIMIT: f"stopped after max_nodes = {done}",
+            StopReason.ENOUGH_ROOTS: "stopped after enough roots",
+            StopReason.TIME_LIMIT: "stopped by the time limit",
+            StopReason.INTERRUPTED: f"interrupted after {done}",
+            StopReason.WORKER_LOST: self.loss,
+        }[self.reason]
+        return text if self.unexamined is None else f"{text}, {self.unexamined} subtrees not examined"
