@@ -28,6 +28,7 @@ LAYERS = (
     ("branches",),
     ("continuation",),
     ("fem", "io"),
+    ("gallery3d",),
     ("gallery",),
     (".",),
     ("cli",),
@@ -41,6 +42,7 @@ STRANGERS = {
     "continuation": {"checker"},
     "fem": {"checker", "search", "roots", "branches", "continuation"},
     "io": {"checker", "search", "roots", "branches", "continuation"},
+    "gallery3d": {"checker", "search", "roots", "branches", "continuation"},
     "gallery": {"checker", "search", "roots", "branches", "continuation"},
 }
 
