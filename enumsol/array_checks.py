@@ -246,12 +246,24 @@ def vector_2d(value: Any, name: str) -> NDArray[np.float64]:
     InvalidArgumentError
         The value is not two finite real numbers.
     """
+    return short_vector(value, name, 2)
+
+
+def short_vector(value: Any, name: str, size: int) -> NDArray[np.float64]:
+    """Value as a finite array of shape (2,) or (3,).
+
+    Raises
+    ------
+    InvalidArgumentError
+        The value is not as many finite real numbers.
+    """
     try:
         array = real_array(value, name, error=InvalidArgumentError)
     except InvalidArgumentError:
         array = np.empty(0)
-    if array.shape != (2,):
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected two finite numbers")
+    if array.shape != (size,):
+        expected = {2: "two", 3: "three"}[size]
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected {expected} finite numbers")
     return array
 
 

@@ -360,10 +360,11 @@ def one_of(value: Any, name: str, known: Collection[str | None]) -> Any:
 
 
 def instance_of(value: Any, kind: type[T], name: str) -> T:
-    """Value, which is of a type."""
+    """Value, which is of a type; another one may say in ``taken_by`` what takes it."""
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        raise InvalidArgumentError(f"{name} is a {type(value).__name__}; expected {article} {kind.__name__}")
+        hint = getattr(type(value), "taken_by", "")
+        raise InvalidArgumentError(f"{name} is a {type(value).__name__}; expected {article} {kind.__name__}{hint}")
     return value
 
 

@@ -1,7 +1,8 @@
 """Named contact problems for documentation, tests and benchmarks: small closed forms, blocks, wedges and chains.
 
-Every function returns a `ContactProblem`. `GALLERY` lists ready-made ones with a parameter value at which each is worth
-a look and, where it is known, the number of its roots there; `get` finds one by name.
+Every function returns a `ContactProblem`, `one_node_3d` and `block3d` a `ContactProblem3D`. `GALLERY` lists ready-made
+ones with a parameter value at which each is worth a look and, where it is known, the number of its roots there; `get`
+finds one by name.
 """
 
 from __future__ import annotations
@@ -21,12 +22,15 @@ from enumsol.array_checks import vector_2d
 from enumsol.checks import finite_number, nonnegative_number, positive_integer, positive_number, shown
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.assembly import lame_coefficients
+from enumsol.gallery3d import block3d, one_node_3d
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from numpy.typing import ArrayLike, NDArray
+
+    from enumsol.problem3d import ContactProblem3D
 
     Friction = float | tuple[ArrayLike, ArrayLike]
 
@@ -355,13 +359,16 @@ class GalleryEntry:
         Number of its roots at that alpha; None where they are not all isolated or the number is not known.
     build : callable
         Makes the problem.
+    dimension : int
+        2 or 3.
     """
 
     name: str
     summary: str
     alpha: float
     roots: int | None
-    build: Callable[[], ContactProblem] = field(repr=False)
+    build: Callable[[], ContactProblem | ContactProblem3D] = field(repr=False)
+    dimension: int = 2
 
 
 def get(name: str) -> GalleryEntry:
@@ -446,8 +453,17 @@ def _large() -> Iterator[GalleryEntry]:
         yield GalleryEntry(f"chain-{p}-coupled", f"{p} one-node triangles joined by weak springs", 5.0, 3**p, build)
 
 
+def _solids() -> Iterator[GalleryEntry]:
+    yield GalleryEntry("one-node-3d", "one node by its compliance: a public test", 0.0, None, one_node_3d, 3)
+    for p, cells in ((4, (2, 1, 2)), (9, (3, 2, 2)), (16, (4, 3, 2)), (100, (10, 9, 4))):
+        summary = f"block in 3D on {p} contact nodes, pressed and sheared"
+        yield GalleryEntry(f"block3d-{p}", summary, 0.5, None, partial(block3d, *cells), 3)
+
+
 #: All named problems, by name.
-GALLERY: Mapping[str, GalleryEntry] = MappingProxyType({entry.name: entry for entry in (*_small(), *_large())})
+GALLERY: Mapping[str, GalleryEntry] = MappingProxyType(
+    {entry.name: entry for entry in (*_small(), *_large(), *_solids())}
+)
 
 
 def _one_node_stiffness(lame: Pair) -> NDArray[np.float64]:

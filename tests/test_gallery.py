@@ -195,9 +195,12 @@ def test_registry_builds(name):
     problem = entry.build()
     assert entry.name == name
     assert entry.summary
-    assert problem.coordinates.shape == (problem.p, 2)
+    assert problem.coordinates.shape == (problem.p, entry.dimension)
     assert np.all(problem.friction_at(entry.alpha) > 0)
-    if problem.p <= 4 and entry.roots is not None:
+    if entry.dimension == 3:
+        assert entry.roots is None
+        assert name in {"one-node-3d", f"block3d-{problem.p}"}
+    elif problem.p <= 4 and entry.roots is not None:
         roots = brute_force(problem, entry.alpha)
         assert len(roots) == entry.roots
         assert min(slack for _, _, slack in roots) > 1e-3
@@ -234,3 +237,87 @@ def test_unknown_name_is_answered_with_close_ones():
 def test_bad_arguments_are_named(build, message):
     with pytest.raises(InvalidArgumentError, match=message):
         build()
+
+
+def test_one_node_3d_has_the_compliance_and_free_displacement_of_the_public_test():
+    problem = gallery.one_node_3d()
+    W = np.array([[15.0, -1.0, -2.0], [-1.0, 14.0, 1.0], [-2.0, 1.0, 16.0]])
+    assert np.array_equal(problem.A.toarray(), W)
+    assert np.allclose(problem.condensed.S, W, rtol=1e-15)
+    assert np.allclose(problem.condensed.g0, [1.0, -2.0, -3.0], rtol=1e-15)
+    # sliding with friction 0.1 by hand: u_n = 0 and r_t = -0.1 r_n u_t / |u_t| leave one equation for the direction
+    q, angle = np.array([-1.0, 2.0, 3.0]), np.linspace(0, 2 * np.pi, 100_001)
+    pull = np.stack([np.ones_like(angle), -0.1 * np.cos(angle), -0.1 * np.sin(angle)])
+    normal = -q[0] / (W[0] @ pull)
+    u = (W @ pull) * normal + q[:, None]
+    along = np.cos(angle) * u[1] + np.sin(angle) * u[2]
+    across = np.cos(angle) * u[2] - np.sin(angle) * u[1]
+    found = int(np.argmin(np.abs(across) + np.where(along > 0, 0, 10)))
+    w = problem.condensed.free_displacements(0) - problem.condensed.S @ (pull[:, found] * normal[found])
+    assert np.allclose(w, -u[:, found], atol=1e-12)
+    assert normal[found] > 0
+    assert abs(w[0]) < 1e-14
+
+
+def test_block3d_geometry_and_load():
+    problem = gallery.block3d(4, 3, 2, pull=(0.1, 0.2, -1.0), size=(2.0, 1.5, 0.5), friction=(0.5, 0.3), gap=0.1)
+    assert (problem.p, problem.n) == (16, 3 * 4 * 4 * 3)
+    assert np.array_equal(np.unique(problem.coordinates[:, 0]), [0.5, 1.0, 1.5, 2.0])
+    assert not np.any(problem.coordinates[:, 2])
+    assert np.all(problem.gap == 0.1)
+    # the top carries the traction, of which the clamped side takes its share
+    assert np.allclose(problem.f.reshape(-1, 3).sum(axis=0), np.array([0.1, 0.2, -1.0]) * 3.0 * (1 - 1 / 8))
+    assert np.array_equal(problem.friction_at(7.0), np.tile([0.5, 0.3], (16, 1)))
+    assert np.array_equal(gallery.block3d(1, 1, 1).friction_at(2.0), [[2.0, 1.2], [2.0, 1.2]])
+    # hexahedra and tetrahedra tell much the same of a load without contact
+    whole, cut = (gallery.block3d(6, 6, 6, cells=cells).condensed.g0 for cells in ("hexahedra", "tetrahedra"))
+    assert np.linalg.norm(whole - cut) < 0.2 * np.linalg.norm(whole)
+
+
+def test_block3d_is_its_own_mirror_image():
+    """Mirrored at y = 1/2 under a pull in the plane: nodes change places, second tangents their sign."""
+    problem = gallery.block3d(3, 3, 2, pull=(0.5, 0.0, -1.0))
+    rows = np.arange(12).reshape(4, 3)[::-1].ravel()
+    mirror = np.concatenate([rows, 12 + rows, 24 + rows])
+    sign = np.repeat([1.0, 1.0, -1.0], 12)
+    S = problem.condensed.S
+    assert np.allclose(S, sign[:, None] * S[np.ix_(mirror, mirror)] * sign, rtol=0, atol=1e-13)
+    assert np.allclose(problem.condensed.g0, sign * problem.condensed.g0[mirror], rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: gallery.one_node_3d(W=np.eye(2)), r"W has shape \(2, 2\); expected \(3, 3\)"),
+        (lambda: gallery.one_node_3d(W=-np.eye(3)), "W is not symmetric positive definite"),
+        (lambda: gallery.one_node_3d(W=np.triu(np.ones((3, 3)))), "W is not symmetric positive definite"),
+        (lambda: gallery.one_node_3d(q=(1, 2)), r"q is \(1, 2\); expected three finite numbers"),
+        (lambda: gallery.block3d(0, 1, 1), "nx is 0; expected an integer of at least 1"),
+        (lambda: gallery.block3d(1, 1, 1, pull=(0, 1)), r"pull is \(0, 1\); expected three finite numbers"),
+        (lambda: gallery.block3d(1, 1, 1, gap="wide"), "gap is 'wide'; expected a finite number"),
+    ],
+)
+def test_bad_arguments_of_problems_in_3d_are_named(build, message):
+    with pytest.raises(InvalidArgumentError, match=message):
+        build()
+
+
+def test_functions_for_2d_say_what_takes_problems_in_3d():
+    import enumsol
+
+    problem = gallery.block3d(1, 1, 1)
+    calls = [
+        lambda: enumsol.enumerate_roots(problem, 1.0),
+        lambda: enumsol.branch_graph(problem, (0.0, 1.0)),
+        lambda: enumsol.multiplicity_table(problem, [1.0]),
+        lambda: enumsol.link_samples(problem, [0.0, 1.0]),
+        lambda: enumsol.newton(problem, 1.0),
+        lambda: enumsol.follow(problem, [0.0] * 5, interval=(0.0, 1.0)),
+        lambda: enumsol.follow_all(problem, (0.0, 1.0)),
+        lambda: enumsol.local_branch_test(problem, [0.0] * 5),
+        lambda: enumsol.PiecewiseSmoothEquation(problem),
+        lambda: enumsol.verify(problem, None),
+    ]
+    for call in calls:
+        with pytest.raises(InvalidArgumentError, match=r"is a ContactProblem3D; .* \(problems in 3D are taken by succ"):
+            call()

@@ -17,7 +17,7 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.graph import GraphChecker
 from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport, VerificationReport
-from enumsol.checks import optional_callable
+from enumsol.checks import instance_of, optional_callable
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
@@ -90,9 +90,8 @@ def verify(
       certified data: A, Bn, Bt, f as given
       complete: yes
     """
-    for name, value, kind in (("problem", problem, ContactProblem), ("proof", proof, Proof)):
-        if not isinstance(value, kind):
-            raise InvalidArgumentError(f"{name} is a {type(value).__name__}; expected a {kind.__name__}")
+    instance_of(problem, ContactProblem, "problem")
+    instance_of(proof, Proof, "proof")
     optional_callable(progress, "progress")
     proof.check_integrity()
     records = proof.records()

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from enumsol.checks import Alpha
     from enumsol.problem import ContactProblem
+    from enumsol.problem3d import ContactProblem3D
 
 T = TypeVar("T")
 
@@ -41,7 +42,23 @@ class ExitStatus(enum.IntEnum):
 
 
 def load_problem(name: str) -> ContactProblem:
-    """The problem in a file, or the one of the gallery for ``gallery:NAME``.
+    """The problem in 2D in a file, or the one of the gallery for ``gallery:NAME``.
+
+    Raises
+    ------
+    InvalidProblemError, InvalidArgumentError
+        It cannot be read, the gallery has none of that name (the message gives names that are close), or it is one
+        in 3D.
+    """
+    problem = load_any_problem(name)
+    from enumsol.checks import instance_of  # numpy: not for --help
+    from enumsol.problem import ContactProblem
+
+    return instance_of(problem, ContactProblem, name)
+
+
+def load_any_problem(name: str) -> ContactProblem | ContactProblem3D:
+    """As load_problem, of 2D and 3D.
 
     Raises
     ------

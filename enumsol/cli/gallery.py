@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from enumsol.gallery import GalleryEntry
 
 app = typer.Typer(help="Named problems to try things on.", no_args_is_help=False)
 
@@ -21,10 +24,7 @@ def list_() -> None:
     """List the problems, each with an alpha worth a look and the number of its roots there."""
     from enumsol import gallery  # numpy and scipy: not for --help
 
-    rows = [
-        (entry.name, f"{entry.alpha:g}", "family" if entry.roots is None else str(entry.roots), entry.summary)
-        for entry in gallery.GALLERY.values()
-    ]
+    rows = [(entry.name, f"{entry.alpha:g}", _count(entry), entry.summary) for entry in gallery.GALLERY.values()]
     if not sys.stdout.isatty():
         # for other programs: one line a problem, however long
         widths = [max(len(row[k]) for row in rows) for k in range(3)]
@@ -51,6 +51,12 @@ def list_() -> None:
     console.print("\nTry one: enumsol roots gallery:NAME --alpha ALPHA", style="dim", markup=False)
 
 
+def _count(entry: GalleryEntry) -> str:
+    if entry.dimension == 3:
+        return "-"  # not enumerated
+    return "family" if entry.roots is None else str(entry.roots)
+
+
 @app.command()
 def write(
     name: Annotated[str, typer.Argument(metavar="NAME", help="As in enumsol gallery list.", show_default=False)],
@@ -69,4 +75,5 @@ def write(
 
     entry = gallery.get(name.removeprefix("gallery:"))
     write_problem(entry.build(), file)
-    typer.echo(f"wrote {entry.name} to {file}; try: enumsol roots {file} --alpha {entry.alpha:g}")
+    command = "roots" if entry.dimension == 2 else "fixed-point"
+    typer.echo(f"wrote {entry.name} to {file}; try: enumsol {command} {file} --alpha {entry.alpha:g}")

@@ -15,18 +15,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.array_checks import plain_array, real_array, vector_2d
+from enumsol.array_checks import vector_2d
 from enumsol.checks import shown
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.mesh_checks import (
+    check_every_node_is_used,
+    elements,
+    held_mask,
+    nodal_vectors,
+    node_numbers,
+    positions,
+    spring_stiffnesses,
+    unit_vectors,
+    vectors_of_all,
+)
+from enumsol.fem.numbering import by_nodes
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
-
-#: Areas are computed of coordinates up to this.
-LARGEST_COORDINATE = 1e150
 
 
 def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]) -> sp.csc_array:
@@ -63,23 +72,14 @@ def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]
     from skfem.models.elasticity import linear_elasticity
 
     lam, mu = lame_coefficients(lame)
-    nodes = _points(points)
-    cells = _elements(triangles, "triangles", 3, len(nodes))
+    nodes = positions(points, 2)
+    cells = elements(triangles, "triangles", 3, len(nodes))
     _check_areas(nodes, cells)
-    used = np.unique(cells)
-    if len(used) != len(nodes):
-        lone = int(np.setdiff1d(np.arange(len(nodes)), used)[0])
-        raise InvalidArgumentError(f"triangles leave node {lone} out; expected every node in some triangle")
+    check_every_node_is_used(cells, len(nodes), "triangles", "triangle")
     # sorting is ours, so that scikit-fem has no reason to renumber or to log
     mesh = MeshTri(np.ascontiguousarray(nodes.T), np.ascontiguousarray(np.sort(cells, axis=1).T))
     basis = Basis(mesh, ElementVector(ElementTriP1()), intorder=0)
-    matrix = sp.coo_array(linear_elasticity(lam, mu).assemble(basis))
-    # scikit-fem's number of each (node, component), turned into 2 node + component
-    ours = np.empty(2 * len(nodes), dtype=np.int64)
-    ours[basis.nodal_dofs.T.ravel()] = np.arange(2 * len(nodes))
-    row, column = ours[matrix.coords[0]], ours[matrix.coords[1]]
-    A = sp.csc_array((matrix.data, (row, column)), shape=matrix.shape)
-    return sp.csc_array(0.5 * (A + A.T))
+    return by_nodes(linear_elasticity(lam, mu).assemble(basis), basis)
 
 
 def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> NDArray[np.float64]:
@@ -104,7 +104,7 @@ def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> NDArray
     [2.0, 1.0, -1.5, -0.5, -0.5, -0.5]
     """
     lam, mu = lame_coefficients(lame)
-    nodes, cells = _points(corners), np.array([[0, 1, 2]])
+    nodes, cells = positions(corners, 2), np.array([[0, 1, 2]])
     if nodes.shape != (3, 2):
         raise InvalidArgumentError(f"corners has shape {nodes.shape}; expected (3, 2)")
     _check_areas(nodes, cells)
@@ -139,9 +139,9 @@ def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> NDA
     >>> fem.edge_forces([[0, 0], [2, 0]], [[0, 1]], traction=(0, -1)).tolist()
     [[0.0, -1.0], [0.0, -1.0]]
     """
-    nodes = _points(points)
-    ends = _elements(edges, "edges", 2, len(nodes))
-    density = _rows(traction, "traction", len(ends))
+    nodes = positions(points, 2)
+    ends = elements(edges, "edges", 2, len(nodes))
+    density = vectors_of_all(traction, "traction", (len(ends), 2))
     lengths = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
     forces = np.zeros_like(nodes)
     for end in range(2):
@@ -172,9 +172,9 @@ def body_forces(points: ArrayLike, triangles: ArrayLike, density: ArrayLike) -> 
     >>> fem.body_forces([[0, 0], [3, 0], [0, 2]], [[0, 1, 2]], density=(0, -1)).tolist()
     [[0.0, -1.0], [0.0, -1.0], [0.0, -1.0]]
     """
-    nodes = _points(points)
-    cells = _elements(triangles, "triangles", 3, len(nodes))
-    values = _rows(density, "density", len(cells))
+    nodes = positions(points, 2)
+    cells = elements(triangles, "triangles", 3, len(nodes))
+    values = vectors_of_all(density, "density", (len(cells), 2))
     third = np.abs(_double_areas(nodes, cells)) / 6.0
     forces = np.zeros_like(nodes)
     for corner in range(3):
@@ -246,22 +246,22 @@ def contact_problem(
     >>> problem.n, problem.p
     (24, 4)
     """
-    nodes = _points(points)
-    free = np.flatnonzero(~_held_mask(held, len(nodes)).ravel())
-    touching = _node_numbers(contact, "contact", len(nodes))
+    nodes = positions(points, 2)
+    free = np.flatnonzero(~held_mask(held, nodes.shape).ravel())
+    touching = node_numbers(contact, "contact", len(nodes))
     A = stiffness(nodes, triangles, lame)
     if springs is not None:
-        A = sp.csc_array(A + sp.diags_array(_springs(springs, len(nodes)).ravel()))
-    normal = _unit(_rows(normals, "normals", len(touching)), "normals")
+        A = sp.csc_array(A + sp.diags_array(spring_stiffnesses(springs, nodes.shape).ravel()))
+    normal = unit_vectors(vectors_of_all(normals, "normals", (len(touching), 2)), "normals")
     tangent = _tangents(tangents, normal)
     return ContactProblem(
         sp.csc_array(A[free][:, free]),
         _contact_rows(touching, normal, free, len(nodes)),
         _contact_rows(touching, tangent, free, len(nodes)),
-        _nodal(forces, "forces", len(nodes))[free],
+        nodal_vectors(forces, "forces", nodes.shape)[free],
         gap=gap,
         friction=friction,
-        load_slope=None if forces_slope is None else _nodal(forces_slope, "forces_slope", len(nodes))[free],
+        load_slope=None if forces_slope is None else nodal_vectors(forces_slope, "forces_slope", nodes.shape)[free],
         slip_offset=slip_offset,
         node_ids=[int(node) for node in touching] if node_ids is None else node_ids,
         coordinates=nodes[touching],
@@ -285,7 +285,7 @@ def _contact_rows(
 def _tangents(tangents: ArrayLike | None, normal: NDArray[np.float64]) -> NDArray[np.float64]:
     if tangents is None:
         return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-    tangent = _unit(_rows(tangents, "tangents", len(normal)), "tangents")
+    tangent = unit_vectors(vectors_of_all(tangents, "tangents", normal.shape), "tangents")
     skew = np.abs(np.sum(tangent * normal, axis=1))
     if np.any(skew > 1e-12):  # both have length one: this is the cosine between them, up to rounding
         k = int(np.argmax(skew))
@@ -307,85 +307,6 @@ def lame_coefficients(value: Any) -> tuple[float, float]:
             f"lame is {shown(value)}; expected Lame coefficients (l, m) with m > 0 and l + m > 0"
         )
     return lam, mu
-
-
-def _points(points: ArrayLike) -> NDArray[np.float64]:
-    nodes = real_array(points, "points", error=InvalidArgumentError)
-    if nodes.ndim != 2 or nodes.shape[1] != 2:
-        raise InvalidArgumentError(f"points has shape {nodes.shape}; expected (N, 2)")
-    size = float(np.max(np.abs(nodes), initial=0.0))
-    if size > LARGEST_COORDINATE:
-        raise InvalidArgumentError(
-            f"points has the coordinate {size:g}, whose square overflows; expected at most {LARGEST_COORDINATE:g}"
-        )
-    return nodes
-
-
-def _elements(value: ArrayLike, name: str, corners: int, count: int) -> NDArray[np.int64]:
-    array = plain_array(value, name, error=InvalidArgumentError)
-    if array.ndim != 2 or array.shape[1] != corners or len(array) == 0:
-        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected (k, {corners}) node numbers, k >= 1")
-    return _node_numbers(array.ravel(), name, count, distinct=False).reshape(array.shape)
-
-
-def _node_numbers(value: ArrayLike, name: str, count: int, *, distinct: bool = True) -> NDArray[np.int64]:
-    array = plain_array(value, name, error=InvalidArgumentError)
-    if array.ndim != 1 or array.size == 0 or array.dtype.kind not in "iu":
-        raise InvalidArgumentError(
-            f"{name} has shape {array.shape} and type {array.dtype}; expected at least one node number (integers)"
-        )
-    if np.min(array) < 0 or np.max(array) >= count:
-        raise InvalidArgumentError(
-            f"{name} has node numbers from {np.min(array)} to {np.max(array)}; expected them in 0 .. {count - 1}"
-        )
-    if distinct and len(np.unique(array)) != len(array):
-        raise InvalidArgumentError(f"{name} names a node twice; expected distinct nodes")
-    return array.astype(np.int64)
-
-
-def _held_mask(held: ArrayLike, count: int) -> NDArray[np.bool_]:
-    array = plain_array(held, "held", error=InvalidArgumentError)
-    mask = np.zeros((count, 2), dtype=bool)
-    if array.size == 0:
-        return mask
-    if array.dtype == bool:
-        if array.shape != (count, 2):
-            raise InvalidArgumentError(f"held has shape {array.shape}; expected ({count}, 2) for a mask of components")
-        return array
-    mask[_node_numbers(array, "held", count, distinct=False)] = True
-    return mask
-
-
-def _rows(value: ArrayLike, name: str, count: int) -> NDArray[np.float64]:
-    array = real_array(value, name, error=InvalidArgumentError)
-    if array.ndim == 1:
-        return np.tile(vector_2d(value, name), (count, 1))
-    if array.shape != (count, 2):
-        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected (2,) or ({count}, 2)")
-    return array
-
-
-def _unit(vectors: NDArray[np.float64], name: str) -> NDArray[np.float64]:
-    lengths = np.linalg.norm(vectors, axis=1)
-    if np.any(lengths == 0):
-        raise InvalidArgumentError(f"{name} row {int(np.argmin(lengths))} is zero; expected directions")
-    return np.asarray(vectors / lengths[:, None])
-
-
-def _springs(springs: ArrayLike, count: int) -> NDArray[np.float64]:
-    values = _rows(springs, "springs", count)
-    if np.min(values) < 0:
-        raise InvalidArgumentError(f"springs has the value {np.min(values):g}; expected stiffnesses >= 0")
-    return values
-
-
-def _nodal(forces: ArrayLike | None, name: str, count: int) -> NDArray[np.float64]:
-    if forces is None:
-        return np.zeros(2 * count)
-    array = real_array(forces, name, error=InvalidArgumentError)
-    if array.shape != (count, 2):
-        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected ({count}, 2), a force for every node")
-    return array.ravel()
 
 
 def _double_areas(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     import os
     from pathlib import Path
 
+    from enumsol.problem3d import ContactProblem3D
+
 __all__ = ["read_problem", "write_problem"]
 
 _A_PLACE = "the name of a file or directory"
@@ -85,7 +87,7 @@ def read_problem(path: str | os.PathLike[str]) -> ContactProblem:
         raise InvalidProblemError(f"{place}: it cannot be read ({reason}); expected a readable place") from error
 
 
-def write_problem(problem: ContactProblem, path: str | os.PathLike[str]) -> None:
+def write_problem(problem: ContactProblem | ContactProblem3D, path: str | os.PathLike[str]) -> None:
     """Write a contact problem to a file or directory; `enumsol.io` describes the formats.
 
     An existing file is replaced. In an existing directory the MatrixMarket files of an earlier problem are replaced.
@@ -115,11 +117,11 @@ def write_problem(problem: ContactProblem, path: str | os.PathLike[str]) -> None
     ...     sorted(file.name for file in pathlib.Path(folder).glob("*.mtx"))
     ['A.mtx', 'Bn.mtx', ..., 'slip_offset.mtx']
     """
-    instance_of(problem, ContactProblem, "problem")
+    plane = instance_of(problem, ContactProblem, "problem")
     place = file_path(path, "path", _A_PLACE)
     with writing(place, "path"):
         try:
-            _write(problem, place)
+            _write(plane, place)
         except InvalidProblemError as error:
             raise InvalidProblemError(f"{place}: {error}") from error
 

@@ -160,6 +160,22 @@ def test_gallery_list_and_write(capsys, tmp_path):
     assert (tmp_path / "market" / "A.mtx").exists()
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("roots", "gallery:block3d-4", "--alpha", 1),
+        ("table", "gallery:block3d-4", "--from", 0, "--to", 1),
+        ("graph", "gallery:block3d-4", "--from", 0, "--to", 1),
+        ("follow", "gallery:one-node-3d", "--from", 0, "--to", 1, "--start", 1),
+        ("verify", "gallery:one-node-3d", "some.proof"),
+        ("audit", "gallery:one-node-3d", "some.csv"),
+    ],
+)
+def test_commands_for_2d_refuse_a_problem_in_3d(capsys, arguments):
+    found = f"{arguments[1]} is a ContactProblem3D; expected a ContactProblem (problems in 3D are taken by"
+    assert_refused(*run(capsys, *arguments), found)
+
+
 def test_help_and_version(capsys):
     for arguments in ((), ("gallery",), ("--help",), ("roots", "-h"), ("gallery", "write", "--help")):
         status, out, _ = run(capsys, *arguments)

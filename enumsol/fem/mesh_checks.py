@@ -1,0 +1,117 @@
+"""Arguments that describe meshes and what acts on their nodes, in two and in three dimensions.
+
+Each function gives the value in a plain type and raises InvalidArgumentError for anything else.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.array_checks import plain_array, real_array, short_vector
+from enumsol.errors import InvalidArgumentError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+#: Areas and volumes are computed of coordinates up to this, in two and in three dimensions.
+LARGEST_COORDINATE = {2: 1e150, 3: 1e100}
+
+
+def positions(points: ArrayLike, dimension: int) -> NDArray[np.float64]:
+    """Positions of nodes, (N, dimension), small enough for areas and volumes."""
+    nodes = real_array(points, "points", error=InvalidArgumentError)
+    if nodes.ndim != 2 or nodes.shape[1] != dimension:
+        raise InvalidArgumentError(f"points has shape {nodes.shape}; expected (N, {dimension})")
+    size, most = float(np.max(np.abs(nodes), initial=0.0)), LARGEST_COORDINATE[dimension]
+    if size > most:
+        power = {2: "square", 3: "cube"}[dimension]
+        raise InvalidArgumentError(
+            f"points has the coordinate {size:g}, whose {power} overflows; expected at most {most:g}"
+        )
+    return nodes
+
+
+def elements(value: ArrayLike, name: str, corners: int | tuple[int, ...], count: int) -> NDArray[np.int64]:
+    """Nodes of each of some elements, (k, corners) with k >= 1, all below ``count``."""
+    array = plain_array(value, name, error=InvalidArgumentError)
+    numbers = (corners,) if isinstance(corners, int) else corners
+    if array.ndim != 2 or array.shape[1] not in numbers or len(array) == 0:
+        expected = " or ".join(f"(k, {number})" for number in numbers)
+        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected {expected} node numbers, k >= 1")
+    return node_numbers(array.ravel(), name, count, distinct=False).reshape(array.shape)
+
+
+def node_numbers(value: ArrayLike, name: str, count: int, *, distinct: bool = True) -> NDArray[np.int64]:
+    """Node numbers below ``count``, (k,) with k >= 1."""
+    array = plain_array(value, name, error=InvalidArgumentError)
+    if array.ndim != 1 or array.size == 0 or array.dtype.kind not in "iu":
+        raise InvalidArgumentError(
+            f"{name} has shape {array.shape} and type {array.dtype}; expected at least one node number (integers)"
+        )
+    if np.min(array) < 0 or np.max(array) >= count:
+        raise InvalidArgumentError(
+            f"{name} has node numbers from {np.min(array)} to {np.max(array)}; expected them in 0 .. {count - 1}"
+        )
+    if distinct and len(np.unique(array)) != len(array):
+        raise InvalidArgumentError(f"{name} names a node twice; expected distinct nodes")
+    return array.astype(np.int64)
+
+
+def check_every_node_is_used(cells: NDArray[np.int64], count: int, name: str, kind: str) -> None:
+    """Raise InvalidArgumentError where a node belongs to no cell: nothing would hold it."""
+    used = np.unique(cells)
+    if len(used) != count:
+        lone = int(np.setdiff1d(np.arange(count), used)[0])
+        raise InvalidArgumentError(f"{name} leave node {lone} out; expected every node in some {kind}")
+
+
+def held_mask(held: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Mask (N, dimension) of held components, of node numbers or a mask."""
+    array = plain_array(held, "held", error=InvalidArgumentError)
+    mask = np.zeros(shape, dtype=bool)
+    if array.size == 0:
+        return mask
+    if array.dtype == bool:
+        if array.shape != shape:
+            raise InvalidArgumentError(f"held has shape {array.shape}; expected {shape} for a mask of components")
+        return array
+    mask[node_numbers(array, "held", shape[0], distinct=False)] = True
+    return mask
+
+
+def vectors_of_all(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Vectors (k, dimension), one each or one for all."""
+    array = real_array(value, name, error=InvalidArgumentError)
+    if array.ndim == 1:
+        return np.tile(short_vector(value, name, shape[1]), (shape[0], 1))
+    if array.shape != shape:
+        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected ({shape[1]},) or {shape}")
+    return array
+
+
+def unit_vectors(vectors: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    """Vectors (k, dimension) scaled to length one."""
+    lengths = np.linalg.norm(vectors, axis=1)
+    if np.any(lengths == 0):
+        raise InvalidArgumentError(f"{name} row {int(np.argmin(lengths))} is zero; expected directions")
+    return np.asarray(vectors / lengths[:, None])
+
+
+def spring_stiffnesses(springs: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Stiffnesses of springs to the ground, (N, dimension)."""
+    values = vectors_of_all(springs, "springs", shape)
+    if np.min(values) < 0:
+        raise InvalidArgumentError(f"springs has the value {np.min(values):g}; expected stiffnesses >= 0")
+    return values
+
+
+def nodal_vectors(forces: ArrayLike | None, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Forces on all nodes in the order of degrees of freedom, (dimension N,); zero for None."""
+    if forces is None:
+        return np.zeros(shape[0] * shape[1])
+    array = real_array(forces, name, error=InvalidArgumentError)
+    if array.shape != shape:
+        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected {shape}, a force for every node")
+    return array.ravel()

@@ -1,0 +1,18 @@
+"""Matrices of scikit-fem in our numbering of degrees of freedom, ``dimension node + component``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+
+def by_nodes(assembled: Any, basis: Any) -> sp.csc_array:
+    """A symmetric matrix that scikit-fem assembled on a basis of nodal vectors, renumbered and symmetric exactly."""
+    matrix = sp.coo_array(assembled)
+    ours = np.empty(matrix.shape[0], dtype=np.int64)
+    ours[basis.nodal_dofs.T.ravel()] = np.arange(matrix.shape[0])
+    row, column = ours[matrix.coords[0]], ours[matrix.coords[1]]
+    A = sp.csc_array((matrix.data, (row, column)), shape=matrix.shape)
+    return sp.csc_array(0.5 * (A + A.T))

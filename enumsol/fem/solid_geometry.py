@@ -1,0 +1,168 @@
+"""Geometry of tetrahedra and hexahedra: their facets, volumes, and quadrature on facets.
+
+Corners of hexahedra and quadrilaterals are in the order of VTK: around the bottom, then around the top above it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem.mesh_checks import check_every_node_is_used, elements, positions
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
+
+#: Corners of the reference hexahedron (0, 1)^3.
+HEXAHEDRON = np.array(
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=np.float64
+)
+#: Corners of each facet of a cell of positive volume, counterclockwise as seen from outside; by corners of the cell.
+CELL_FACETS = {
+    4: np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
+    8: np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]),
+}
+#: Names of cells, by their corners.
+CELL_NAMES = {4: "tetrahedra", 8: "hexahedra"}
+#: A volume below this share of the cubed extent of its cell is rounding.
+FLAT = 1e-14
+_GAUSS_2 = (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)), (0.5, 0.5)
+_GAUSS_3 = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)), (5 / 18, 8 / 18, 5 / 18)
+
+
+def solid_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[Floats, Integers]:
+    """Points (N, 3) and cells (M, 4) or (M, 8) of positive volume; tetrahedra may come in any orientation.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The arguments are no mesh: shapes, node numbers, a node in no cell, a cell that is flat or turned inside out.
+    """
+    nodes = positions(points, 3)
+    bodies = elements(cells, "cells", (4, 8), len(nodes))
+    corners = nodes[bodies]
+    size = np.max(np.ptp(corners, axis=1), axis=1) ** 3
+    volumes = _tetrahedron_volumes(corners)[:, None] if bodies.shape[1] == 4 else _corner_volumes(corners)
+    if bodies.shape[1] == 4:
+        turned = volumes[:, 0] < 0
+        bodies[turned] = bodies[turned][:, [0, 2, 1, 3]]
+        volumes = np.abs(volumes)
+    _refuse(np.max(np.abs(volumes), axis=1) <= FLAT * size, "has no volume; expected proper cells")
+    _refuse(
+        np.min(volumes, axis=1) <= FLAT * size,
+        "is turned inside out at a corner; expected hexahedra of positive volume with corners in the order of VTK",
+    )
+    check_every_node_is_used(bodies, len(nodes), "cells", "cell")
+    return nodes, bodies
+
+
+def _refuse(wrong: NDArray[np.bool_], found: str) -> None:
+    if np.any(wrong):
+        raise InvalidArgumentError(f"cells row {int(np.argmax(wrong))} {found}")
+
+
+def _tetrahedron_volumes(corners: Floats) -> Floats:
+    edges = corners[:, 1:] - corners[:, :1]
+    return np.asarray(np.linalg.det(edges) / 6.0)
+
+
+def _corner_volumes(corners: Floats) -> Floats:
+    """Volumes (M, 8) of the parallelepipeds that the three edges at each corner of a hexahedron span."""
+    return np.stack([_jacobians(corners, corner)[1] for corner in HEXAHEDRON], axis=1)
+
+
+def _jacobians(corners: Floats, place: Floats) -> tuple[Floats, Floats]:
+    """Shape functions (8,) of the hexahedron at a place of the reference, and the determinants (M,) there."""
+    factors = np.where(HEXAHEDRON == 1, place, 1.0 - place)
+    slopes = np.where(HEXAHEDRON == 1, 1.0, -1.0)
+    gradients = np.stack([slopes[:, k] * np.prod(np.delete(factors, k, axis=1), axis=1) for k in range(3)])
+    return np.prod(factors, axis=1), np.asarray(np.linalg.det(np.einsum("ka,mai->mki", gradients, corners)))
+
+
+def shape_volumes(nodes: Floats, cells: Integers) -> Floats:
+    """Integral of every corner's shape function over its cell, (M, 4) or (M, 8) [length^3]."""
+    corners = nodes[cells]
+    if cells.shape[1] == 4:
+        return np.tile(_tetrahedron_volumes(corners)[:, None] / 4.0, (1, 4))
+    points, weights = _GAUSS_2
+    total = np.zeros(cells.shape)
+    for i, j, k in np.ndindex(2, 2, 2):
+        values, determinants = _jacobians(corners, np.array([points[i], points[j], points[k]]))
+        total += weights[i] * weights[j] * weights[k] * determinants[:, None] * values
+    return total
+
+
+def boundary_facets(cells: Integers) -> Integers:
+    """Facets (k, 3) or (k, 4) that belong to one cell only, counterclockwise as seen from outside the body."""
+    local = CELL_FACETS[cells.shape[1]]
+    facets = cells[:, local].reshape(-1, local.shape[1])
+    _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(facets[np.sort(first[count == 1])])
+
+
+def outward(facets: Integers, cells: Integers) -> Integers:
+    """The same facets with the corners in the body's order: counterclockwise as seen from outside.
+
+    Raises
+    ------
+    InvalidArgumentError
+        One is no facet on the boundary of the body, or comes twice; they have another number of corners.
+    """
+    boundary = boundary_facets(cells)
+    if facets.shape[1] != boundary.shape[1]:
+        raise InvalidArgumentError(
+            f"contact has facets of {facets.shape[1]} nodes; expected {boundary.shape[1]}, as {_name(cells)} have"
+        )
+    known = {tuple(key): row for row, key in enumerate(np.sort(boundary, axis=1).tolist())}
+    rows = [known.get(tuple(key), -1) for key in np.sort(facets, axis=1).tolist()]
+    if -1 in rows:
+        k = rows.index(-1)
+        raise InvalidArgumentError(
+            f"contact row {k}, nodes {facets[k].tolist()}, is no facet on the boundary of the body; "
+            "expected facets of one cell each"
+        )
+    if len(set(rows)) != len(rows):
+        raise InvalidArgumentError("contact names a facet twice; expected distinct facets")
+    return boundary[rows]
+
+
+def _name(cells: Integers) -> str:
+    return CELL_NAMES[cells.shape[1]]
+
+
+def facet_vectors(nodes: Floats, facets: Integers) -> Floats:
+    """Normals of facets times their areas (of the projection for quadrilaterals that are not plane), (k, 3)."""
+    corners = nodes[facets]
+    if facets.shape[1] == 3:
+        return np.asarray(0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    return np.asarray(0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]))
+
+
+def facet_quadrature(nodes: Floats, facets: Integers) -> tuple[Floats, Floats]:
+    """Quadrature of degree 2 on triangles, 5 in each direction on quadrilaterals.
+
+    Returns
+    -------
+    values : (q, 3) or (q, 4) array
+        Shape functions of the corners at the q points of a facet [-].
+    weights : (k, q) array
+        Weights of the points of each facet, which add up to its area [length^2].
+    """
+    if facets.shape[1] == 3:
+        values = np.full((3, 3), 1.0 / 6.0) + 0.5 * np.eye(3)
+        areas = np.linalg.norm(facet_vectors(nodes, facets), axis=1)
+        return values, np.tile(areas[:, None] / 3.0, (1, 3))
+    corners, (points, gauss) = nodes[facets], _GAUSS_3
+    shapes, weights = [], []
+    for i, j in np.ndindex(3, 3):
+        x, y = points[i], points[j]
+        along_x = np.array([-(1 - y), 1 - y, y, -y]) @ corners
+        along_y = np.array([-(1 - x), -x, x, 1 - x]) @ corners
+        shapes.append([(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y])
+        weights.append(gauss[i] * gauss[j] * np.linalg.norm(np.cross(along_x, along_y), axis=1))
+    return np.array(shapes), np.stack(weights, axis=1)

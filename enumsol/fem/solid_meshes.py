@@ -1,0 +1,199 @@
+"""Meshes of bodies in three dimensions: boxes, and what a mesh and its named facets are."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.array_checks import short_vector
+from enumsol.checks import one_of, positive_integer, shown
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem.mesh_checks import elements, positions
+from enumsol.fem.solid_geometry import CELL_NAMES, boundary_facets
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+#: Most cells along one side of a box.
+MOST_CELLS_OF_A_SIDE = 1_000
+#: Coordinates that differ by less than this share of the extent are equal.
+_SAME = 1e-9
+#: The six tetrahedra of a cell: ways along its edges from its first corner to the opposite one.
+_PATHS = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
+
+
+@dataclass(frozen=True)
+class SolidMesh:
+    """A mesh of tetrahedra or hexahedra with named sets of facets.
+
+    Attributes
+    ----------
+    points : (N, 3) array
+        Positions of the nodes [length].
+    cells : (M, 4) or (M, 8) int array
+        Nodes of each tetrahedron, or of each hexahedron in the order of VTK.
+    facets : mapping of names to (k, 3) or (k, 4) int arrays
+        Nodes of the triangles or quadrilaterals of parts of the boundary.
+    """
+
+    points: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    facets: Mapping[str, NDArray[np.int64]]
+
+    def part(self, name: str) -> NDArray[np.int64]:
+        """Facets of this name.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There are none.
+        """
+        if name not in self.facets:
+            close = difflib.get_close_matches(str(name), self.facets, n=1)
+            found = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(self.facets) or 'none'}"
+            raise InvalidArgumentError(f"the mesh has no facets named {shown(name)}; {found}")
+        return self.facets[name]
+
+    def nodes(self, name: str) -> NDArray[np.int64]:
+        """Nodes of the facets of this name, in order.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There are none.
+        """
+        return np.unique(self.part(name))
+
+    def __repr__(self) -> str:
+        parts = ", ".join(f"{name} ({len(part)})" for name, part in self.facets.items()) or "none"
+        return (
+            f"SolidMesh with {len(self.points)} nodes\n"
+            f"  cells   {len(self.cells)} {CELL_NAMES[self.cells.shape[1]]}\n"
+            f"  facets  {parts}"
+        )
+
+
+def box(nx: int, ny: int, nz: int, size: ArrayLike = (1.0, 1.0, 1.0), cells: str = "hexahedra") -> SolidMesh:
+    """Mesh of (0, a) x (0, b) x (0, c) with nx by ny by nz cells and its six sides.
+
+    Node (i, j, k) has the number ``(k (ny + 1) + j) (nx + 1) + i``. The sides are named left and right (x = 0, a),
+    front and back (y = 0, b), bottom and top (z = 0, c).
+
+    Parameters
+    ----------
+    nx, ny, nz : int
+        Cells along x, y and z, 1 to MOST_CELLS_OF_A_SIDE.
+    size : (3,) array_like
+        Lengths a, b, c of the sides [length].
+    cells : {"hexahedra", "tetrahedra"}
+        Whole cells, or six tetrahedra of each that share its diagonal; those of neighbours fit together.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> fem.box(4, 3, 2, cells="tetrahedra")
+    SolidMesh with 60 nodes
+      cells   144 tetrahedra
+      facets  left (12), right (12), front (16), back (16), bottom (24), top (24)
+    """
+    counts = [
+        positive_integer(count, name, most=MOST_CELLS_OF_A_SIDE) for name, count in (("nx", nx), ("ny", ny), ("nz", nz))
+    ]
+    lengths = short_vector(size, "size", 3)
+    if np.min(lengths) <= 0:
+        raise InvalidArgumentError(f"size is {shown(size)}; expected three lengths > 0")
+    one_of(cells, "cells", tuple(CELL_NAMES.values()))
+    z, y, x = np.meshgrid(*(np.linspace(0.0, lengths[k], counts[k] + 1) for k in (2, 1, 0)), indexing="ij")
+    points = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
+    number = np.arange(len(points)).reshape(z.shape)
+    low, high = slice(None, -1), slice(1, None)
+    corners = [(k, j, i) for k in (low, high) for j, i in ((low, low), (low, high), (high, high), (high, low))]
+    hexahedra = np.stack([number[corner].ravel() for corner in corners], axis=1)
+    bodies = hexahedra if cells == "hexahedra" else hexahedra[:, np.array(_PATHS)].reshape(-1, 4)
+    return SolidMesh(points, bodies, _sides(points, bodies, lengths))
+
+
+def _sides(points: NDArray[np.float64], cells: NDArray[np.int64], size: NDArray[np.float64]) -> Any:
+    facets = boundary_facets(cells)
+    corners = points[facets]
+    names = (("left", "right"), ("front", "back"), ("bottom", "top"))
+    return MappingProxyType(
+        {
+            name: facets[np.all(corners[:, :, axis] == place, axis=1)]
+            for axis, pair in enumerate(names)
+            for name, place in zip(pair, (0.0, size[axis]), strict=True)
+        }
+    )
+
+
+def blocks(points: ArrayLike, facets: ArrayLike, ratio: int) -> NDArray[np.int64]:
+    """Labels (k,) of facets in a rectangular grid, joined to blocks of ratio by ratio cells of the grid.
+
+    The grid lies in a plane perpendicular to an axis, its cells are quadrilaterals or pairs of triangles, and need not
+    be equally large. Where ratio does not divide their number along a side the last blocks are smaller.
+
+    Parameters
+    ----------
+    points : (N, 3) array_like
+        Positions of the nodes [length].
+    facets : (k, 3) or (k, 4) array_like of int
+        Nodes of each facet.
+    ratio : int
+        Cells along the side of a block: the ratio H/h of the paper.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The facets form no such grid.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> mesh = fem.box(4, 2, 1)
+    >>> fem.blocks(mesh.points, mesh.facets["bottom"], ratio=2).tolist()
+    [0, 0, 1, 1, 0, 0, 1, 1]
+    """
+    nodes = positions(points, 3)
+    surface = elements(facets, "facets", (3, 4), len(nodes))
+    width = positive_integer(ratio, "ratio")
+    low, high = nodes[surface].min(axis=1), nodes[surface].max(axis=1)
+    same = _SAME * max(float(np.max(high.max(axis=0) - low.min(axis=0))), np.finfo(np.float64).tiny)
+    flat = np.max(high, axis=0) - np.min(low, axis=0) <= same
+    if np.sum(flat) != 1:
+        raise _no_grid("they do not lie in one plane perpendicular to an axis")
+    axes = np.flatnonzero(~flat)
+    starts = np.stack([_steps(low[:, axis], same) for axis in axes], axis=1)
+    ends = np.stack([_steps(high[:, axis], same) for axis in axes], axis=1)
+    counts = starts.max(axis=0) + 1
+    # every cell of the grid is filled by one quadrilateral or two triangles, which lie in no other cell
+    filled = np.bincount(starts[:, 1] * counts[0] + starts[:, 0], minlength=int(np.prod(counts)))
+    if np.any(starts != ends) or np.any(filled != (1 if surface.shape[1] == 4 else 2)):
+        raise _no_grid("they do not fill a rectangular grid")
+    block = starts // width
+    return np.asarray(block[:, 1] * (block[:, 0].max() + 1) + block[:, 0])
+
+
+def _steps(values: NDArray[np.float64], same: float) -> NDArray[np.int64]:
+    """For each value how many smaller ones there are, not counting those that are the same."""
+    order = np.argsort(values, kind="stable")
+    step = np.concatenate([[0], np.cumsum(np.diff(values[order]) > same)])
+    ranks = np.empty(len(values), dtype=np.int64)
+    ranks[order] = step
+    return ranks
+
+
+def _no_grid(found: str) -> InvalidArgumentError:
+    return InvalidArgumentError(
+        f"ratio needs contact facets in a rectangular grid, and {found}; expected patches, a label for every facet"
+    )

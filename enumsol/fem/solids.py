@@ -1,0 +1,157 @@
+"""Linear elastic bodies of P1 tetrahedra or Q1 hexahedra: stiffness by scikit-fem, body forces and tractions.
+
+Degrees of freedom before constraints are ``3 node + component``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.array_checks import short_vector
+from enumsol.checks import shown
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem.mesh_checks import elements, positions, vectors_of_all
+from enumsol.fem.numbering import by_nodes
+from enumsol.fem.solid_geometry import HEXAHEDRON, facet_quadrature, shape_volumes, solid_mesh
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) -> sp.csc_array:
+    """Stiffness of the unconstrained body, (3N, 3N), assembled by scikit-fem.
+
+    Parameters
+    ----------
+    points : (N, 3) array_like
+        Positions of the nodes [length].
+    cells : (M, 4) or (M, 8) array_like of int
+        Nodes of each tetrahedron, in any orientation, or of each hexahedron, in the order of VTK.
+    lame : (float, float)
+        Lame coefficients l, m with m > 0, 3 l + 2 m > 0 [force / length^2].
+
+    Returns
+    -------
+    csc_array of shape (3N, 3N)
+        Its kernel holds the rigid motions [force / length].
+
+    Raises
+    ------
+    InvalidArgumentError
+        The mesh is not one (shapes, node numbers, a cell without volume or inside out, a node in no cell) or the
+        coefficients are not admissible.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> mesh = fem.box(2, 1, 1)
+    >>> fem.solid_stiffness(mesh.points, mesh.cells, lame=(1, 1)).shape
+    (36, 36)
+    """
+    from skfem.models.elasticity import linear_elasticity  # as below
+
+    lam, mu = solid_lame(lame)
+    basis = vector_basis(*solid_mesh(points, cells))
+    return by_nodes(linear_elasticity(lam, mu).assemble(basis), basis)
+
+
+def vector_basis(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> Any:
+    """scikit-fem's basis of nodal vectors; Gauss quadrature with two points a direction on hexahedra."""
+    # scikit-fem takes a while to import and is needed for meshes only
+    from skfem import Basis, ElementHex1, ElementTetP1, ElementVector, MeshHex, MeshTet
+
+    points = np.ascontiguousarray(nodes.T)
+    if cells.shape[1] == 4:
+        # sorted by us, so that scikit-fem has no reason to renumber or to log
+        mesh = MeshTet(points, np.ascontiguousarray(np.sort(cells, axis=1).T))
+        return Basis(mesh, ElementVector(ElementTetP1()), intorder=1)
+    # scikit-fem has an order of its own
+    order = [int(np.argmin(np.linalg.norm(HEXAHEDRON - corner, axis=1))) for corner in ElementHex1.doflocs]
+    mesh = MeshHex(points, np.ascontiguousarray(cells[:, order].T))
+    return Basis(mesh, ElementVector(ElementHex1()), intorder=3)
+
+
+def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -> NDArray[np.float64]:
+    """Nodal forces of a body force constant on each cell, (N, 3) [force].
+
+    Parameters
+    ----------
+    points, cells
+        The mesh, see `solid_stiffness`.
+    density : (3,) or (M, 3) array_like
+        Force per volume in x, y and z, one for all or one for each cell [force / length^3].
+
+    Raises
+    ------
+    InvalidArgumentError
+        The mesh is not one, or density has the wrong shape.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> mesh = fem.box(1, 1, 1)
+    >>> fem.solid_body_forces(mesh.points, mesh.cells, density=(0, 0, -8)).sum(axis=0).round(12).tolist()
+    [0.0, 0.0, -8.0]
+    """
+    nodes, bodies = solid_mesh(points, cells)
+    values = vectors_of_all(density, "density", (len(bodies), 3))
+    return _gathered(bodies, shape_volumes(nodes, bodies), values, len(nodes))
+
+
+def facet_forces(points: ArrayLike, facets: ArrayLike, traction: ArrayLike) -> NDArray[np.float64]:
+    """Nodal forces of tractions constant on each facet, (N, 3) [force].
+
+    Parameters
+    ----------
+    points : (N, 3) array_like
+        Positions of the nodes [length].
+    facets : (k, 3) or (k, 4) array_like of int
+        Nodes of each loaded triangle or (bilinear) quadrilateral, one after the other along its outline.
+    traction : (3,) or (k, 3) array_like
+        Force per area in x, y and z, one for all or one for each facet [force / length^2].
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument has the wrong shape, or a node number is out of range.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> corners = [[0, 0, 0], [6, 0, 0], [0, 1, 0]]
+    >>> fem.facet_forces(corners, [[0, 1, 2]], traction=(0, 0, -1)).round(12)[:, 2].tolist()
+    [-1.0, -1.0, -1.0]
+    """
+    nodes = positions(points, 3)
+    surface = elements(facets, "facets", (3, 4), len(nodes))
+    density = vectors_of_all(traction, "traction", (len(surface), 3))
+    values, weights = facet_quadrature(nodes, surface)
+    return _gathered(surface, weights @ values, density, len(nodes))
+
+
+def _gathered(
+    elements_: NDArray[np.int64], shares: NDArray[np.float64], density: NDArray[np.float64], count: int
+) -> NDArray[np.float64]:
+    forces = np.zeros((count, 3))
+    for corner in range(elements_.shape[1]):
+        np.add.at(forces, elements_[:, corner], shares[:, corner, None] * density)
+    return forces
+
+
+def solid_lame(value: Any) -> tuple[float, float]:
+    """Value as the Lame coefficients (l, m) with m > 0 and 3 l + 2 m > 0, which make the energy positive.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The value is not two such numbers.
+    """
+    lam, mu = (float(entry) for entry in short_vector(value, "lame", 2))
+    if not (mu > 0 and 3 * lam + 2 * mu > 0):
+        raise InvalidArgumentError(
+            f"lame is {shown(value)}; expected Lame coefficients (l, m) with m > 0 and 3 l + 2 m > 0"
+        )
+    return lam, mu
