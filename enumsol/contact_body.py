@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from enumsol.array_checks import real_array, real_matrix
 from enumsol.checks import alpha_value, shown
@@ -197,6 +196,10 @@ def _check_row_rank(contact: Mapping[str, sp.csr_array]) -> None:
     if np.any(norms == 0):
         row = int(np.argmin(norms))
         raise InvalidProblemError(f"{names[row]} is zero; expected linearly independent rows of {stack}")
+    from scipy.sparse.csgraph import (
+        connected_components,
+    )  # comes with scipy's solvers: not for an import of this module
+
     unit = sp.csr_array(sp.diags_array(1.0 / norms) @ rows)
     gram = sp.csr_array(unit @ unit.T)
     # rows that share no degree of freedom, directly or through others, are independent of each other

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from enumsol.cli import audit, follow, gallery, graph, roots, table, verify
+from enumsol.cli import audit, fixed_point, follow, gallery, graph, roots, table, verify
 from enumsol.cli.common import ExitStatus
 from enumsol.cli.streams import guarded_streams
 from enumsol.errors import EnumsolError, OutputError, WorkerError
@@ -33,6 +33,7 @@ app.command("table")(table.table)
 app.command("graph")(graph.graph)
 app.command("follow")(follow.follow)
 app.command("audit")(audit.audit)
+app.command("fixed-point")(fixed_point.fixed_point)
 app.command("verify")(verify.verify)
 app.add_typer(gallery.app, name="gallery")
 

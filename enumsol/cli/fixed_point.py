@@ -1,0 +1,157 @@
+"""``enumsol fixed-point``: a solution with Coulomb friction by successive approximations, in 2D and 3D."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from enumsol.cli.common import ExitStatus, finish, load_any_problem, load_problem, parse_alpha, so_far
+from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, count, csv, file, number
+from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure
+from enumsol.cli.progress import Display
+from enumsol.errors import InvalidArgumentError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from enumsol.checks import Alpha
+    from enumsol.fixed_points import FixedPoint, FixedPointProgress
+    from enumsol.problem import ContactProblem
+    from enumsol.problem3d import ContactProblem3D
+
+
+def fixed_point(
+    problem: ProblemArgument,
+    alpha: Annotated[str, number("--alpha", "Parameter value: a decimal number, or a fraction such as 8/3.")],
+    start: Annotated[float, typer.Option(metavar="FORCE", help="Slip bound of every node to begin with.")] = 0.0,
+    tolerance: Annotated[
+        float, typer.Option(help="Converged when a step is this small, relative to the load.")
+    ] = 1e-10,
+    max_iterations: Annotated[int, count("Most Tresca problems solved.")] = 1000,
+    anderson: Annotated[int, typer.Option(min=0, metavar="N", help="Mix the last N steps (Anderson).")] = 0,
+    starts: Annotated[
+        int | None, count("In 2D: try N random starts, and tell which of all solutions they reach.", panel="Starts")
+    ] = None,
+    json_file: JsonFile = None,
+    csv_file: Annotated[str | None, csv("a contact node, or with --starts a start")] = None,
+    npz_file: Annotated[str | None, file("--npz", "Write all arrays, for FixedPoint.load.")] = None,
+    vtu_file: Annotated[str | None, file("--vtu", "Write the deformed body for ParaView (3D).")] = None,
+    plot_file: PlotFile = None,
+) -> None:
+    """Find one solution of PROBLEM at one ALPHA, as a limit of contact problems with given slip bounds.
+
+    The iteration converges for small friction, and where it converges its limit is a solution; there may be others:
+    enumsol roots finds all of them in 2D.
+
+    Exit status: 0 when converged (with --starts: from every start); 3 when not; 2 on bad input; 130 on Ctrl-C, after
+    printing the last iterate; 74 when a result could not be written, 141 when nobody read it any more.
+    """
+    check_outputs(json=json_file, csv=csv_file, npz=npz_file, vtu=vtu_file)
+    check_plot(plot_file)
+    _check_combination(starts, npz_file, vtu_file, plot_file)
+    value = parse_alpha(alpha)
+    options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations, "anderson": anderson}
+    if starts is not None:
+        _basins(load_problem(problem), problem, value, starts, options, json_file, csv_file, plot_file)
+    body = load_any_problem(problem)
+    found, ended = so_far(lambda: _approximate(body, value, start, options))
+    deliver(
+        (npz_file, found.save),
+        (vtu_file, lambda path: _write_vtu(body, found, path)),
+        json_file=json_file,
+        csv_file=csv_file,
+        text=lambda: repr(found),
+        content=lambda: as_json(_content(found, problem)),
+        frame=found.to_frame,
+    )
+    finish(ended, ExitStatus.DONE if found.converged else ExitStatus.INCOMPLETE)
+
+
+def _check_combination(starts: int | None, npz_file: str | None, vtu_file: str | None, plot_file: str | None) -> None:
+    if starts is None and plot_file is not None:
+        raise InvalidArgumentError("--plot is given without --starts; expected both, for a picture of what is reached")
+    for option, path in (("--npz", npz_file), ("--vtu", vtu_file)):
+        if path == "-":
+            raise InvalidArgumentError(f"{option} is -, but it is a binary file; expected the name of a file")
+        if starts is not None and path is not None:
+            raise InvalidArgumentError(f"{option} and --starts are both given; expected one of them")
+
+
+def _approximate(
+    body: ContactProblem | ContactProblem3D, alpha: Alpha, start: float, options: dict[str, Any]
+) -> FixedPoint:
+    from enumsol.fixed_points import successive_approximations  # numpy and scipy: not for --help
+
+    with Display("iterating") as display:
+
+        def show(state: FixedPointProgress) -> None:
+            display.show(min(1.0, 1.0 / max(state.increment, 1e-300)), f"iteration {state.iteration}")
+
+        return successive_approximations(body, alpha, start, progress=show, **options)
+
+
+def _write_vtu(body: ContactProblem | ContactProblem3D, found: FixedPoint, path: str) -> None:
+    from enumsol.io import write_vtu  # meshio
+
+    write_vtu(body, found, path)
+
+
+def _content(found: FixedPoint, name: str) -> dict[str, Any]:
+    return {
+        "problem": name,
+        "alpha": float(found.alpha),
+        "alpha_text": str(found.alpha),
+        "converged": found.converged,
+        "outcome": found.outcome.value,
+        "why": found.why,
+        "iterations": found.iterations,
+        "contraction_factor": found.contraction_factor,
+        "residuals": dict(found.residuals),
+        "node_ids": list(found.problem.node_ids),
+        "statuses": [status.value for status in found.statuses],
+        **{name: getattr(found, name) for name in ("coefficients", "lambda_n", "lambda_t", "u_n", "u_t")},
+        "increments": found.increments,
+    }
+
+
+def _basins(
+    body: ContactProblem,
+    name: str,
+    alpha: Alpha,
+    starts: int,
+    options: dict[str, Any],
+    json_file: str | None,
+    csv_file: str | None,
+    plot_file: str | None,
+) -> None:
+    from enumsol.fixed_points import basin_table, plot_basins  # as above
+    from enumsol.roots.enumerate import enumerate_roots
+
+    roots = enumerate_roots(body, alpha)
+    table, ended = so_far(lambda: basin_table(body, roots, starts, **options))
+    deliver(
+        (plot_file, lambda path: write_figure(path, plot_basins(table).figure)),
+        json_file=json_file,
+        csv_file=csv_file,
+        text=lambda: _basin_text(table, len(roots), roots.completeness()),
+        content=lambda: as_json({"problem": name, "alpha": float(alpha), **_basin_content(table, len(roots))}),
+        frame=lambda: table,
+    )
+    finish(ended, ExitStatus.DONE if table["root"].notna().all() else ExitStatus.INCOMPLETE)
+
+
+def _basin_content(table: pd.DataFrame, roots: int) -> dict[str, Any]:
+    rows = table.astype(object).where(table.notna(), None).to_dict("records")
+    return {"roots": roots, "never": table.attrs["never"], "starts": rows}
+
+
+def _basin_text(table: pd.DataFrame, roots: int, completeness: str) -> str:
+    lines = []
+    for root in range(roots):
+        rows = table[table["root"] == root]
+        most = f", up to {rows['iterations'].max()} iterations" if len(rows) else ""
+        lines.append(f"root {root}: reached from {len(rows)} of {len(table)} starts{most}")
+    lost = table[table["root"].isna()]
+    lines += [f"no root ({outcome}): {len(rows)} starts" for outcome, rows in lost.groupby("outcome")]
+    return "\n".join([*lines, f"the list of roots is {completeness}"])
