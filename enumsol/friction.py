@@ -69,6 +69,12 @@ class FrictionTable(Sealed):
     ------
     InvalidProblemError
         The slips do not increase from 0, or a coefficient is negative or of the wrong shape.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> enumsol.FrictionTable(slip=[0, 0.1, 1], F1=[0.6, 0.4, 0.3])
+    FrictionTable of 3 slips up to 1: F1 in [0.3, 0.6], F2 in [0.3, 0.6], by a table of |u_t|
     """
 
     depends_on_slip = True

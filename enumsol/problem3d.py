@@ -39,6 +39,13 @@ class BodyMesh(Sealed):
         Tetrahedra, or hexahedra in the order of VTK.
     dofs : (n,) array of int
         The degree of freedom ``3 node + component`` that each entry of u is; the others are held at 0.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> mesh = enumsol.gallery.block3d(1, 1, 1).mesh
+    >>> mesh.points.shape, mesh.cells.shape, mesh.dofs.shape
+    ((8, 3), (1, 8), (12,))
     """
 
     points: NDArray[np.float64]
@@ -66,6 +73,13 @@ class SlipMean(Sealed):
         Tangential positions from which slip is counted there [length].
     weights : (p, q) csr_array
         Of nonnegative rows that add up to one.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.block3d(4, 4, 1, multipliers="elements", ratio=2)
+    >>> problem.slip_mean.weights.sum(axis=1)
+    array([1., 1., 1., 1.])
     """
 
     T1: sp.csr_array
@@ -127,6 +141,18 @@ class ContactProblem3D(ContactBody):
     ------
     InvalidProblemError
         The data cannot be used; the message names the argument, what was found and what was expected.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> import numpy as np
+    >>> rows = np.eye(3)
+    >>> enumsol.ContactProblem3D(np.diag([2, 1, 1]), rows[:1], rows[1:2], rows[2:], [1, 3, 4], friction=(0.5, 0.3))
+    ContactProblem3D with 1 contact node
+      degrees of freedom  3  (A: 3 nonzeros)
+      friction            F1 in 0.5, F2 in 0.3
+      load                constant,  max |f| = 4
+      gap                 0
     """
 
     taken_by: ClassVar[str] = " (problems in 3D are taken by successive_approximations and solve_tresca so far)"

@@ -78,6 +78,13 @@ def is_fixed_point(problem: Problem, root: Any, tolerance: float = 1e-8) -> bool
     ------
     InvalidArgumentError
         The root is none, or is one of another problem; the tolerance is not positive.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> [enumsol.is_fixed_point(problem, root) for root in enumsol.enumerate_roots(problem, 5)]
+    [True, True, True]
     """
     tolerance = positive_number(tolerance, "tolerance")
     return fixed_point_residual(problem, root) <= tolerance
@@ -123,6 +130,15 @@ def basin_table(
         There are no roots, they belong to several alpha, or starts have the wrong shape.
     Interrupted
         Ctrl-C; ``partial`` is the table so far.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> roots = enumsol.enumerate_roots(problem, 5)
+    >>> table = enumsol.basin_table(problem, roots, starts=[[0.0], [0.1], [1.0], [10.0]])
+    >>> table["root"].to_list(), table.attrs["never"]
+    ([0, 0, 2, 2], [1])
     """
     import pandas as pd  # for frames only
 

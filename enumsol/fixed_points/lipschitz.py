@@ -108,6 +108,13 @@ def lipschitz_estimate(
     ------
     InvalidArgumentError
         An argument is not of the stated form, or alpha makes a coefficient negative.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> estimate = enumsol.lipschitz_estimate(enumsol.gallery.one_node_triangle(), alpha=0.5)
+    >>> estimate.unique, round(estimate.C1, 3), round(0.5 * estimate.factor, 3)  # unique for F below that
+    (True, 0.577, 0.866)
     """
     body = contact_problem(problem)
     p = body.p

@@ -64,6 +64,15 @@ class FixedPoint(ContactState):
         Increments at most this fraction of the load's norm count as none.
     period : int or None
         Of a cycle.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> limit = enumsol.successive_approximations(enumsol.gallery.one_node_3d(), alpha=0)
+    >>> limit.converged, [str(status) for status in limit.statuses]
+    (True, ['slip'])
+    >>> max(limit.residuals.values()) < 1e-9
+    True
     """
 
     outcome: Outcome

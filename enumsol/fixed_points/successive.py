@@ -103,6 +103,16 @@ def successive_approximations(
     -----
     FrictionJumpWarning
         A coefficient that depends on the slip seems to jump.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> for start in (0, 10):  # two of the three solutions at alpha = 5
+    ...     limit = enumsol.successive_approximations(problem, 5, start)
+    ...     print(limit.outcome, [str(status) for status in limit.statuses], limit.lambda_n.round(9))
+    converged ['open'] [0.]
+    converged ['stick'] [1.5]
     """
     body = contact_problem(problem)
     tolerance = positive_number(tolerance, "tolerance")

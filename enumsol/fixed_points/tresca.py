@@ -42,6 +42,13 @@ class TrescaSolution(ContactState):
         Largest violation of (theory, (11.3)), in forces relative to the load [-].
     solver : str
         What found it: "newton", "clarabel" or "cvxpy".
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> solution = enumsol.solve_tresca(enumsol.gallery.one_node_triangle(), slip_bound=1, alpha=2)
+    >>> [str(status) for status in solution.statuses], solution.slip_bound
+    (['slip-'], array([1.]))
     """
 
     residual: float
@@ -96,6 +103,13 @@ def solve_tresca(
         No solver came close.
     MissingDependencyError
         CVXPY is asked for and not installed.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()  # f = (1.5, -4)
+    >>> enumsol.solve_tresca(problem, slip_bound=1, alpha=3)  # slides: |lambda_t| = 3
+    TrescaSolution at alpha = 3 on 1 contact node: sum of lambda_n 1, residual ..., by newton
     """
     body = contact_problem(problem)
     one_of(solver, "solver", SOLVERS)
