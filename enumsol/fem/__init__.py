@@ -12,12 +12,14 @@ from enumsol.fem.assembly import body_forces, contact_problem, edge_forces, stif
 from enumsol.fem.meshes import Mesh, edges_along, rectangle, trapezoid
 
 if TYPE_CHECKING:
+    from enumsol.fem.norms import MeshNorms, h1_norms
     from enumsol.fem.solid_meshes import SolidMesh, blocks, box
     from enumsol.fem.solid_problems import solid_contact_problem
     from enumsol.fem.solids import facet_forces, solid_body_forces, solid_stiffness
 
 __all__ = [
     "Mesh",
+    "MeshNorms",
     "SolidMesh",
     "blocks",
     "body_forces",
@@ -26,6 +28,7 @@ __all__ = [
     "edge_forces",
     "edges_along",
     "facet_forces",
+    "h1_norms",
     "rectangle",
     "solid_body_forces",
     "solid_contact_problem",
@@ -36,6 +39,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "norms": ("MeshNorms", "h1_norms"),
     "solid_meshes": ("SolidMesh", "blocks", "box"),
     "solid_problems": ("solid_contact_problem",),
     "solids": ("facet_forces", "solid_body_forces", "solid_stiffness"),

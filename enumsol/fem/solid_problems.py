@@ -167,7 +167,9 @@ def _displacements(means: sp.csr_array, directions: Floats, free: Integers) -> s
     columns = 3 * node[:, None] + np.arange(3)
     data = entries.data[:, None] * directions[row]
     shape = (means.shape[0], 3 * means.shape[1])
-    return sp.csr_array(sp.csr_array((data.ravel(), (np.repeat(row, 3), columns.ravel())), shape=shape)[:, free])
+    rows = sp.csr_array(sp.csr_array((data.ravel(), (np.repeat(row, 3), columns.ravel())), shape=shape)[:, free])
+    rows.eliminate_zeros()
+    return rows
 
 
 def _slip_mean(

@@ -58,8 +58,11 @@ def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, floa
     return by_nodes(linear_elasticity(lam, mu).assemble(basis), basis)
 
 
-def vector_basis(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> Any:
-    """scikit-fem's basis of nodal vectors; Gauss quadrature with two points a direction on hexahedra."""
+def vector_basis(nodes: NDArray[np.float64], cells: NDArray[np.int64], degree: int = 0) -> Any:
+    """scikit-fem's basis of nodal vectors, with quadrature of that degree on tetrahedra.
+
+    On hexahedra it is Gauss quadrature with two points a direction.
+    """
     # scikit-fem takes a while to import and is needed for meshes only
     from skfem import Basis, ElementHex1, ElementTetP1, ElementVector, MeshHex, MeshTet
 
@@ -67,7 +70,7 @@ def vector_basis(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> Any:
     if cells.shape[1] == 4:
         # sorted by us, so that scikit-fem has no reason to renumber or to log
         mesh = MeshTet(points, np.ascontiguousarray(np.sort(cells, axis=1).T))
-        return Basis(mesh, ElementVector(ElementTetP1()), intorder=1)
+        return Basis(mesh, ElementVector(ElementTetP1()), intorder=degree)
     # scikit-fem has an order of its own
     order = [int(np.argmin(np.linalg.norm(HEXAHEDRON - corner, axis=1))) for corner in ElementHex1.doflocs]
     mesh = MeshHex(points, np.ascontiguousarray(cells[:, order].T))

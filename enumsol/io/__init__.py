@@ -1,6 +1,7 @@
-"""Contact problems in files: NumPy archives, MatrixMarket directories and fclib HDF5 files.
+"""Contact problems in files: NumPy archives, MatrixMarket directories, fclib HDF5 files; results in VTU for ParaView.
 
-All three hold the arrays of `ContactProblem` by name. `read_problem` and `write_problem` choose the format by the path.
+The first three hold the arrays of `ContactProblem` or, but for fclib, of `ContactProblem3D` by name. `read_problem` and
+`write_problem` choose the format by the path.
 
 ``.npz``
     A NumPy archive. ``A``, ``Bn``, ``Bt`` as dense matrices or in sparse parts, and the vector ``f``::
@@ -22,6 +23,17 @@ directory
     One MatrixMarket file a name: ``A.mtx``, ``Bn.mtx``, ``Bt.mtx``, ``f.mtx`` and optionally ``gap.mtx``,
     ``friction0.mtx`` and so on, with the names above. Vectors are matrices with one column (or one row), one entry
     stands for all nodes. Labels are in ``node_ids.json``, a list. Files of other kinds are ignored.
+In 3D both take ``Bt1`` and ``Bt2`` instead of ``Bt``, which tell a problem in 3D from one in 2D, and optionally
+
+- ``friction``: one number; or ``friction_1`` and ``friction_2``: F1 and F2, each a number or a (p,) array; or
+  ``friction_table_slip`` (k,), ``friction_table_1`` and ``friction_table_2``, (k,) or (p, k): a `FrictionTable`. With
+  none of them F = 0.5, as in `ContactProblem3D`. A friction given by a callable cannot be written.
+- ``friction_slope_1``, ``friction_slope_2``: derivatives with respect to alpha, 0 when left out.
+- ``gap``, ``load_slope``, ``slip_offset`` (p, 2), ``coordinates`` (p, 3), ``areas`` (p,), ``node_ids``.
+- ``mesh_points`` (N, 3), ``mesh_cells`` (M, 4) or (M, 8), ``mesh_dofs`` (n,): a `BodyMesh`, all or none.
+- ``slip_mean_T1``, ``slip_mean_T2``, ``slip_mean_offset``, ``slip_mean_weights``: a `SlipMean`, all or none; like the
+  other matrices dense or in sparse parts.
+
 ``.h5``, ``.hdf5``
     The format of the Frictional Contact Library (`enumsol.io.fclib`); needs h5py.
 
@@ -30,9 +42,10 @@ NumPy archives and MatrixMarket directories give every number back bit by bit. P
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from enumsol.checks import file_path, instance_of
+from enumsol.contact_body import ContactBody
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.files import writing
 from enumsol.io import fclib, matrix_market, npz
@@ -52,8 +65,8 @@ SUFFIXES = (".npz", *fclib.SUFFIXES)
 _FORMATS = "a .npz file, a directory of MatrixMarket files, or an fclib file (.h5, .hdf5)"
 
 
-def read_problem(path: str | os.PathLike[str]) -> ContactProblem:
-    """Contact problem from a file or directory; `enumsol.io` describes the formats.
+def read_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProblem3D:
+    """Contact problem in 2D or 3D from a file or directory; `enumsol.io` describes the formats.
 
     Parameters
     ----------
@@ -94,7 +107,7 @@ def write_problem(problem: ContactProblem | ContactProblem3D, path: str | os.Pat
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     path : str or path-like
         Ends in .npz, .h5 or .hdf5, or is a directory (made if its name has no suffix).
 
@@ -105,7 +118,8 @@ def write_problem(problem: ContactProblem | ContactProblem3D, path: str | os.Pat
     OutputError
         There is no room for it.
     InvalidProblemError
-        The format cannot hold the problem: mixed node labels; friction or load that depend on alpha (fclib).
+        The format cannot hold the problem: mixed node labels; friction given by a callable; friction or load that
+        depend on alpha, or three dimensions (fclib).
     MissingDependencyError
         An fclib file, and h5py is not installed.
 
@@ -117,16 +131,18 @@ def write_problem(problem: ContactProblem | ContactProblem3D, path: str | os.Pat
     ...     sorted(file.name for file in pathlib.Path(folder).glob("*.mtx"))
     ['A.mtx', 'Bn.mtx', ..., 'slip_offset.mtx']
     """
-    plane = instance_of(problem, ContactProblem, "problem")
+    given: Any = problem
+    if not isinstance(given, ContactBody):
+        instance_of(given, ContactProblem, "problem")
     place = file_path(path, "path", _A_PLACE)
     with writing(place, "path"):
         try:
-            _write(plane, place)
+            _write(problem, place)
         except InvalidProblemError as error:
             raise InvalidProblemError(f"{place}: {error}") from error
 
 
-def _read(place: Path) -> ContactProblem:
+def _read(place: Path) -> ContactProblem | ContactProblem3D:
     if place.is_dir():
         return matrix_market.read(place)
     if not place.exists():
@@ -143,7 +159,7 @@ def _read(place: Path) -> ContactProblem:
     raise InvalidProblemError(f"{found}; expected {_FORMATS}")
 
 
-def _write(problem: ContactProblem, place: Path) -> None:
+def _write(problem: ContactProblem | ContactProblem3D, place: Path) -> None:
     if place.is_dir() or not place.suffix:
         matrix_market.write(problem, place)
     elif place.suffix == ".npz":

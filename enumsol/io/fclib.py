@@ -21,13 +21,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidProblemError, MissingDependencyError
-from enumsol.io.arrays import refusing
+from enumsol.io.layouts import refusing
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+    from enumsol.problem3d import ContactProblem3D
 
 SUFFIXES = (".h5", ".hdf5")
 
@@ -51,8 +53,12 @@ def read(path: Path) -> ContactProblem:
         )
 
 
-def write(problem: ContactProblem, path: Path) -> None:
+def write(problem: ContactProblem | ContactProblem3D, path: Path) -> None:
     """Write a global problem; node labels and coordinates have no place in it."""
+    if not isinstance(problem, ContactProblem):
+        raise InvalidProblemError(
+            "fclib files of problems in 3D are not written yet; expected another format (.npz, MatrixMarket directory)"
+        )
     h5py = _h5py()
     F0, F1 = problem.friction
     if np.any(F1) or (problem.load_slope is not None and np.any(problem.load_slope)):

@@ -10,38 +10,39 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidProblemError
-from enumsol.io.arrays import MATRICES, check_names, problem_from_arrays, refusing, vectors_of
+from enumsol.io.arrays import arrays_of, problem_from_arrays
+from enumsol.io.layouts import LAYOUT_2D, LAYOUT_3D, check_names, layout_of, refusing
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
+    from enumsol.io.layouts import Layout
     from enumsol.problem import ContactProblem
+    from enumsol.problem3d import ContactProblem3D
 
 _LABELS = "node_ids.json"
-#: Read as vectors of which one entry may stand for all nodes.
-_BROADCAST = ("gap", "friction", "friction0", "friction1", "slip_offset")
 #: Digits after which a float64 is read back as itself.
 _DIGITS = 17
 
 
-def read(path: Path) -> ContactProblem:
+def read(path: Path) -> ContactProblem | ContactProblem3D:
     """The problem in a directory of .mtx files."""
     files = {file.stem: file for file in sorted(path.glob("*.mtx")) if not file.name.startswith("_")}
-    check_names(files, ".mtx")
-    arrays: dict[str, Any] = {name: _values(name, file) for name, file in files.items()}
+    layout = layout_of(files)
+    check_names(files, layout, ".mtx")
+    arrays: dict[str, Any] = {name: _values(name, file, layout) for name, file in files.items()}
     if (path / _LABELS).exists():
         arrays["node_ids"] = _labels(path / _LABELS)
-    return problem_from_arrays(arrays)
+    return problem_from_arrays(arrays, layout)
 
 
-def write(problem: ContactProblem, path: Path) -> None:
+def write(problem: ContactProblem | ContactProblem3D, path: Path) -> None:
     """Write a problem into a directory, which is made if need be; an earlier problem there is replaced."""
     from scipy.io import mmwrite  # slow to import
 
-    matrices = {name: getattr(problem, name) for name in MATRICES}
-    columns = {name: array if array.ndim == 2 else array[:, None] for name, array in vectors_of(problem).items()}
+    columns = {name: array if array.ndim == 2 else array[:, None] for name, array in arrays_of(problem).items()}
     try:
         labels = json.dumps(list(problem.node_ids))
         kept = json.loads(labels) == list(problem.node_ids)
@@ -50,10 +51,10 @@ def write(problem: ContactProblem, path: Path) -> None:
     if not kept:
         raise InvalidProblemError("node_ids cannot be kept in node_ids.json; expected integers, floats or strings")
     path.mkdir(exist_ok=True)
-    stale = [file for file in path.glob("*.mtx") if file.stem not in matrices and file.stem not in columns]
+    stale = [file for file in path.glob("*.mtx") if file.stem not in columns]
     if stale:
         _remove(stale)
-    for name, matrix in {**matrices, **columns}.items():
+    for name, matrix in columns.items():
         text = BytesIO()  # the writer of scipy passes over what the disk refuses
         mmwrite(text, matrix, field="real", precision=_DIGITS)
         (path / f"{name}.mtx").write_bytes(text.getvalue())
@@ -62,28 +63,30 @@ def write(problem: ContactProblem, path: Path) -> None:
 
 def _remove(files: list[Path]) -> None:
     """Delete what an earlier problem left and this one lacks, provided that there are no files of others."""
-    check_names([*MATRICES, "f", *(file.stem for file in files if not file.name.startswith("_"))], ".mtx")
+    names = [file.stem for file in files if not file.name.startswith("_")]
+    layout = LAYOUT_2D if all(name in LAYOUT_2D.known for name in names) else LAYOUT_3D
+    check_names([*layout.required, *names], layout, ".mtx")
     for file in files:
         if not file.name.startswith("_"):
             file.unlink()
 
 
-def _values(name: str, file: Path) -> sp.coo_array | NDArray[Any]:
+def _values(name: str, file: Path, layout: Layout) -> sp.coo_array | NDArray[Any]:
     from scipy.io import mminfo, mmread  # slow to import
 
     with refusing(
         (ValueError, OverflowError, OSError), f"{file.name} is no readable MatrixMarket file", "a complete one"
     ):
         rows, columns = mminfo(file)[:2]
-        if name not in MATRICES and name != "coordinates" and 1 not in (rows, columns):
+        if name not in layout.matrices and name not in layout.tables and 1 not in (rows, columns):
             raise InvalidProblemError(f"{file.name} holds a {rows} x {columns} matrix; expected a vector in one column")
         values: Any = mmread(file, spmatrix=False)
-    if name in MATRICES:
+    if name in layout.matrices:
         return values
     dense = np.asarray(values.toarray() if sp.issparse(values) else values)
-    if name == "coordinates":
+    if name in layout.tables:
         return dense
-    return dense.reshape(()) if name in _BROADCAST and dense.size == 1 else dense.ravel()
+    return dense.reshape(()) if name in layout.broadcast and dense.size == 1 else dense.ravel()
 
 
 def _labels(file: Path) -> list[Any]:

@@ -10,7 +10,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidProblemError
-from enumsol.io.arrays import FORMAT_VERSION, MATRICES, check_names, problem_from_arrays, refusing, vectors_of
+from enumsol.io.arrays import arrays_of, problem_from_arrays
+from enumsol.io.layouts import FORMAT_VERSION, check_names, layout_of, refusing
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.problem import ContactProblem
+    from enumsol.problem3d import ContactProblem3D
 
 _VERSION = "enumsol_format"
 _PARTS = ("data", "indices", "indptr", "shape", "format")
@@ -34,7 +36,7 @@ _DAMAGE = (
 )
 
 
-def read(path: Path) -> ContactProblem:
+def read(path: Path) -> ContactProblem | ContactProblem3D:
     """The problem in a .npz file."""
     arrays = _load(path)
     version = arrays.pop(_VERSION, np.array(FORMAT_VERSION))
@@ -43,25 +45,27 @@ def read(path: Path) -> ContactProblem:
             f"{_VERSION} is {version}; expected a whole number up to {FORMAT_VERSION} (is it from a newer enumsol?)"
         )
     named: dict[str, Any] = dict(arrays)
-    for name in MATRICES:
+    layout = layout_of(named)
+    for name in layout.matrices:
         parts = {part: named.pop(f"{name}_{part}") for part in _PARTS if f"{name}_{part}" in named}
         if parts and name in named:
             raise InvalidProblemError(f"{name} is given as a matrix and in sparse parts; expected one of both")
         if parts:
             named[name] = _matrix(name, parts)
-    check_names(named)
+    check_names(named, layout)
     if "node_ids" in named:
         named["node_ids"] = _labels(named["node_ids"])
-    return problem_from_arrays(named)
+    return problem_from_arrays(named, layout)
 
 
-def write(problem: ContactProblem, path: Path) -> None:
+def write(problem: ContactProblem | ContactProblem3D, path: Path) -> None:
     """Write a problem with its matrices in sparse parts."""
     arrays: dict[str, NDArray[Any]] = {_VERSION: np.array(FORMAT_VERSION)}
-    for name in MATRICES:
-        matrix = getattr(problem, name)
-        arrays |= {f"{name}_{part}": np.asarray(getattr(matrix, part)) for part in _PARTS}
-    arrays |= vectors_of(problem)
+    for name, value in arrays_of(problem).items():
+        if sp.issparse(value):
+            arrays |= {f"{name}_{part}": np.asarray(getattr(value, part)) for part in _PARTS}
+        else:
+            arrays[name] = value
     labels = np.array(problem.node_ids)
     if labels.dtype.kind not in "iufU" or _labels(labels) != list(problem.node_ids):
         raise InvalidProblemError(

@@ -1,0 +1,113 @@
+"""Norms of displacements, slips and normal forces on the mesh of a problem in 3D (theory, section 11.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.array_checks import real_array
+from enumsol.checks import instance_of
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem.numbering import by_nodes
+from enumsol.fem.solids import vector_basis
+from enumsol.problem3d import ContactProblem3D
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+#: Columns that are solved for at a time.
+_BLOCK = 64
+
+
+@dataclass(frozen=True, eq=False)
+class MeshNorms:
+    """Norms of a problem in 3D whose mesh is known.
+
+    Attributes
+    ----------
+    G : (n, n) csc_array
+        Gram matrix of H^1 on the free degrees of freedom: mass and gradients [length^3, length].
+    Bn : (p, n) csr_array
+        Normal contact rows of the problem.
+    areas : (p,) array
+        Area of each contact row [length^2].
+    """
+
+    G: sp.csc_array
+    Bn: sp.csr_array
+    areas: NDArray[np.float64]
+
+    @cached_property
+    def dual(self) -> NDArray[np.float64]:
+        """Bn G^-1 Bn', (p, p)."""
+        from enumsol.condensation.factorization import Factorization  # scipy's solvers come with the first use
+
+        factorization, p = Factorization(self.G), self.Bn.shape[0]
+        columns = [
+            self.Bn @ factorization.solve(self.Bn[start : start + _BLOCK].T.toarray()) for start in range(0, p, _BLOCK)
+        ]
+        matrix = np.hstack(columns)
+        return np.asarray(0.5 * (matrix + matrix.T))
+
+    def of_displacement(self, u: ArrayLike) -> float:
+        """||u||_1 for u of shape (n,)."""
+        v = _vector(u, "u", self.G.shape[0])
+        return float(np.sqrt(v @ (self.G @ v)))
+
+    def of_force(self, mu: ArrayLike) -> float:
+        """||mu||_(-1/2,h) for normal forces mu of shape (p,): the supremum of mu' Bn v over ||v||_1 = 1."""
+        v = _vector(mu, "mu", len(self.areas))
+        return float(np.sqrt(v @ self.dual @ v))
+
+    def of_slip(self, phi: ArrayLike) -> float:
+        """||phi||_0 for slips of shape (p,), the root of sum_i m_i phi_i^2 (theory, (11.4))."""
+        v = _vector(phi, "phi", len(self.areas))
+        return float(np.sqrt(self.areas @ v**2))
+
+
+def h1_norms(problem: ContactProblem3D) -> MeshNorms:
+    """Norms on the mesh of a problem, such as `solid_contact_problem` makes.
+
+    Parameters
+    ----------
+    problem : ContactProblem3D
+        With ``mesh`` and ``areas``.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It has no mesh or no areas.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> norms = enumsol.fem.h1_norms(enumsol.gallery.block3d(2, 2, 2))
+    >>> norms.dual.shape
+    (6, 6)
+    """
+    from skfem import BilinearForm  # as in solids
+    from skfem.helpers import ddot, dot, grad
+
+    instance_of(problem, ContactProblem3D, "problem")
+    if problem.mesh is None or problem.areas is None:
+        raise InvalidArgumentError("problem has no mesh or no areas; expected one made of a mesh")
+
+    def product(u: Any, v: Any, _: Any) -> Any:
+        return dot(u, v) + ddot(grad(u), grad(v))
+
+    # products of linear functions have degree two: exact on tetrahedra and parallelepipeds
+    basis = vector_basis(problem.mesh.points, problem.mesh.cells, degree=2)
+    G = by_nodes(BilinearForm(product).assemble(basis), basis)
+    dofs = problem.mesh.dofs
+    return MeshNorms(sp.csc_array(G[dofs][:, dofs]), problem.Bn, problem.areas)
+
+
+def _vector(value: ArrayLike, name: str, size: int) -> NDArray[np.float64]:
+    array = real_array(value, name, error=InvalidArgumentError)
+    if array.shape != (size,):
+        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected ({size},)")
+    return array
