@@ -32,7 +32,7 @@ def test_enumeration(elsewhere):
 
 
 def test_branches_and_continuation(elsewhere):
-    assert len(BLOCKS) == 2
+    assert len(BLOCKS) == 3
     seen = {}
     exec(BLOCKS[1], seen)
     graph, path = seen["graph"], seen["path"]
@@ -45,6 +45,14 @@ def test_branches_and_continuation(elsewhere):
     assert list(seen["table"]["roots"]) == [1, 1, 1]
     assert enumsol.verify(seen["problem"], graph.proof).complete
     assert (elsewhere / "branches.png").stat().st_size > 1000
+
+
+def test_three_dimensions_and_fixed_points(elsewhere):
+    seen = {}
+    exec(BLOCKS[2], seen)
+    assert seen["limit"].converged
+    assert seen["weakening"].converged
+    assert (elsewhere / "block.vtu").stat().st_size > 1000
 
 
 def test_commands(elsewhere, capsys):

@@ -1,0 +1,105 @@
+"""``enumsol fixed-point``: what is printed and written, exit statuses, and options that do not go together."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import enumsol
+from enumsol.cli import main
+from enumsol.fixed_points import FixedPoint, successive
+
+
+def run(capsys, *arguments):
+    status = main(["fixed-point", *map(str, arguments)])
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def test_a_limit_is_printed(capsys):
+    status, out, err = run(capsys, "gallery:one-node-6.1", "--alpha", 5, "--start", 10)
+    assert (status, err) == (0, "")
+    assert out.startswith("FixedPoint at alpha = 5: converged after 2 iterations")
+    assert "stick" in out
+
+
+def test_3d_with_every_output(capsys, tmp_path):
+    files = {name: tmp_path / f"limit.{name}" for name in ("json", "csv", "npz", "vtu")}
+    options = [part for name, file in files.items() for part in (f"--{name}", file)]
+    status, out, _ = run(capsys, "gallery:block3d-4", "--alpha", "1/2", *options)
+    assert status == 0
+    assert "converged" in out
+    content = json.loads(files["json"].read_text())
+    assert content["converged"]
+    assert content["alpha_text"] == "1/2"
+    frame = pd.read_csv(files["csv"])
+    np.testing.assert_allclose(frame["lambda_n"], content["lambda_n"])
+    problem = enumsol.gallery.get("block3d-4").build()
+    again = FixedPoint.load(files["npz"], problem)
+    np.testing.assert_allclose(again.lambda_t, content["lambda_t"])
+    assert files["vtu"].stat().st_size > 500
+
+
+def test_a_problem_in_a_file(capsys, tmp_path):
+    enumsol.write_problem(enumsol.gallery.one_node_3d(), tmp_path / "node.npz")
+    status, out, _ = run(capsys, tmp_path / "node.npz", "--alpha", 0)
+    assert status == 0
+    assert "slip" in out
+
+
+def test_not_converged_is_status_3(capsys):
+    status, out, _ = run(capsys, "gallery:one-node-3d", "--alpha", 0, "--max-iterations", 2)
+    assert status == 3
+    assert "not converged within 2 iterations" in out
+
+
+def test_starts_in_2d(capsys, tmp_path):
+    table, picture = tmp_path / "starts.csv", tmp_path / "starts.png"
+    status, out, _ = run(
+        capsys, "gallery:one-node-6.1", "--alpha", 5, "--starts", 10, "--csv", table, "--plot", picture
+    )
+    assert status == 0
+    assert "root 1: reached from 0 of 10 starts" in out
+    assert "complete: yes (proven)" in out
+    assert len(pd.read_csv(table)) == 10
+    assert picture.stat().st_size > 1000
+    status, out, _ = run(capsys, "gallery:one-node-6.1", "--alpha", 5, "--starts", 5, "--json", "-")
+    assert json.loads(out)["never"] == [1]
+
+
+def test_ctrl_c_prints_the_last_iterate(capsys, monkeypatch):
+    whole, count = successive.solve, iter(range(100))
+
+    def solve(*arguments):
+        if next(count) == 2:
+            raise KeyboardInterrupt
+        return whole(*arguments)
+
+    monkeypatch.setattr(successive, "solve", solve)
+    status, out, _ = run(capsys, "gallery:one-node-3d", "--alpha", 0)
+    assert status == 130
+    assert "interrupted after 2 iterations" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["gallery:block3d-4", "--alpha", "x"], "--alpha is 'x'"),
+        (["gallery:block3d-5", "--alpha", "1"], "did you mean"),
+        (["gallery:block3d-4", "--alpha", "-1"], "friction F1 at alpha = -1 is -1"),
+        (["gallery:block3d-4", "--alpha", "1", "--start", "-1"], "start is -1"),
+        (["gallery:block3d-4", "--alpha", "1", "--starts", "5"], "is a ContactProblem3D; expected a ContactProblem"),
+        (["gallery:one-node-6.1", "--alpha", "1", "--plot", "p.png"], "--plot is given without --starts"),
+        (["gallery:one-node-6.1", "--alpha", "1", "--npz", "-"], "--npz is -, but it is a binary file"),
+        (["gallery:one-node-6.1", "--alpha", "1", "--vtu", "x.vtu", "--starts", "5"], "--vtu and --starts are both"),
+        (["gallery:one-node-6.1", "--alpha", "1", "--npz", "/nowhere/x.npz"], "--npz is /nowhere/x.npz"),
+    ],
+)
+def test_bad_input_is_one_sentence(capsys, arguments, message):
+    status, out, err = run(capsys, *arguments)
+    assert status == 2
+    assert out == ""
+    assert err.startswith("enumsol: error: ")
+    assert err.count("\n") == 1
+    assert message in err
