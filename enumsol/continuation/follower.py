@@ -10,6 +10,7 @@ import numpy as np
 
 from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
+from enumsol.continuation.path_data import PointKind
 from enumsol.continuation.recorder import PathRecorder
 from enumsol.continuation.tangents import curve_tangent, orientation
 from enumsol.continuation.transitions import (
@@ -99,7 +100,7 @@ class Follower:
         self._low, self._high = (low - margin) / equation.alpha_scale, (high + margin) / equation.alpha_scale
         self._landmarks = list(_landmarks(equation, visited))
         self.record = PathRecorder(equation)
-        self.record.add(first, "start")
+        self.record.add(first, PointKind.START)
 
     def run(self) -> PathData:
         """Follow until a stop condition is met."""
@@ -267,7 +268,7 @@ class Follower:
         stop = self._piece(origin, step.end)
         if stop is not None:
             return stop
-        self.record.add(step.end, "step", step.length, step.corrections)
+        self.record.add(step.end, PointKind.STEP, step.length, step.corrections)
         self.current = step.end
         return None
 
@@ -346,7 +347,7 @@ class Follower:
 
     def _end(self, point: CurvePoint) -> None:
         if self.equation.norm(point.x - self.record.points[-1].x) > FORWARD_TOLERANCE:
-            self.record.add(point, "end")
+            self.record.add(point, PointKind.END)
         self.current = point
 
     def _closed(self) -> _Stop:
@@ -375,7 +376,7 @@ def _landmarks(equation: CondensedEquation, visited: Sequence[PathData]) -> Iter
     """Starts, transition points and ends of other paths, with the statuses on both sides."""
     for path in visited:
         for k, kind in enumerate(path.kinds):
-            if kind == "step":
+            if kind is PointKind.STEP:
                 continue
             x = equation.point(float(path.alpha[k]), np.concatenate([path.lambda_n[k], path.lambda_t[k]]))
             if not math.isfinite(float(np.sum(x))):

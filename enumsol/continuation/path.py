@@ -31,7 +31,7 @@ class Path(PathData):
     lambda_n, lambda_t, u_n, u_t : (m, p) arrays
     codes : (m, p) array of status codes
         On which the path leaves each point.
-    kinds : tuple of m str
+    kinds : tuple of m PointKind
         "start", "step", "transition" or "end".
     steps : (m,) array
         Step length that led to the point; 0 where it was located.
