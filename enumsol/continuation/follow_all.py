@@ -14,7 +14,7 @@ from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follow import follow, start_tangents
 from enumsol.continuation.graph_map import GraphMap, PlaceKind, checked_graph
 from enumsol.continuation.path import Path
-from enumsol.continuation.path_data import PathStats
+from enumsol.continuation.path_data import PathStats, PathStatus
 from enumsol.continuation.points import read_points
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.problem import ContactProblem
@@ -156,7 +156,7 @@ class _Coverage:
                 self.failures.append((float(start.alpha), str(error)))
                 continue
             self.paths.append(path)
-            if path.status in ("stalled", "dead end", "step limit"):
+            if path.status in (PathStatus.STALLED, PathStatus.DEAD_END, PathStatus.STEP_LIMIT):
                 self.failures.append((float(path.alpha[-1]), path.message))
             self.visited |= audit_on(self.chart, read_points(path, self.problem), DETOUR).visited
             if self.progress is not None:

@@ -6,7 +6,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from enumsol.continuation.follower import Follower
-from enumsol.continuation.path_data import PathData
+from enumsol.continuation.path_data import PathData, PathStatus
 from enumsol.continuation.start import Start
 from enumsol.continuation.storage import load_path, save_path
 from enumsol.continuation.tangents import curve_tangent
@@ -40,8 +40,9 @@ class Path(PathData):
     arclength : (m,) array
         Without units, see ContinuationOptions.
     transitions : tuple of Transition
-    status : str
-        Why the path ended: "interval left", "closed", "visited", "step limit", "friction", "dead end" or "stalled".
+    status : PathStatus
+        Why the path ended: "interval left", "closed", "visited", "step limit", "friction", "dead end", "stalled" or
+        "interrupted".
     message : str
         The same as a sentence, with what may be done.
     orientation : int
@@ -155,7 +156,7 @@ def _resumed(
     """The path and what follows from its end."""
     if problem is None:
         raise InvalidArgumentError("problem is missing; a path loaded from a file needs it: path.resume(problem)")
-    if path.status in ("closed", "dead end"):
+    if path.status in (PathStatus.CLOSED, PathStatus.DEAD_END):
         raise InvalidArgumentError(f"the path cannot go on: {path.message}")
     span = path.interval if interval is None else interval
     start = Start(problem, path[-1], span, path.options if options is None else options, smooth_path)

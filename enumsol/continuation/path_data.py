@@ -44,6 +44,26 @@ class PointKind(enum.StrEnum):
         return repr(self.value)
 
 
+class PathStatus(enum.StrEnum):
+    """Why a path ended; members compare with their texts."""
+
+    INTERVAL_LEFT = "interval left"
+    CLOSED = "closed"
+    #: It arrived at a point that another path has passed.
+    VISITED = "visited"
+    STEP_LIMIT = "step limit"
+    #: A friction coefficient becomes negative.
+    FRICTION = "friction"
+    #: No direction keeps the orientation.
+    DEAD_END = "dead end"
+    #: No step was accepted, however short.
+    STALLED = "stalled"
+    INTERRUPTED = "interrupted"
+
+    def __repr__(self) -> str:
+        return repr(self.value)
+
+
 @dataclass(frozen=True)
 class PathPoint(Sealed):
     """One point of a path.
@@ -153,7 +173,7 @@ class PathData(Sequence[PathPoint], Sealed):
     corrections: NDArray[np.int64]
     arclength: NDArray[np.float64]
     transitions: tuple[Transition, ...]
-    status: str
+    status: PathStatus
     message: str
     orientation: int
     interval: tuple[float, float]
@@ -213,7 +233,7 @@ class PathData(Sequence[PathPoint], Sealed):
     @property
     def closed(self) -> bool:
         """The path returned to its start."""
-        return self.status == "closed"
+        return self.status is PathStatus.CLOSED
 
     # -- output ------------------------------------------------------------------------------------------------------
 

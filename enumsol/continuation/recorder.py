@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.continuation.path_data import PathData, PathStats, PointKind, Transition
+from enumsol.continuation.path_data import PathData, PathStats, PathStatus, PointKind, Transition
 from enumsol.errors import TooLargeError
 from enumsol.roots.local_branch import coherent_orientation
 
@@ -71,7 +71,7 @@ class PathRecorder:
 
     def path(
         self,
-        status: str,
+        status: PathStatus,
         message: str,
         *,
         orientation: int,

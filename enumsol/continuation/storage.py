@@ -10,7 +10,7 @@ import numpy as np
 
 from enumsol.checks import file_path, writing
 from enumsol.continuation.options import ContinuationOptions
-from enumsol.continuation.path_data import ARRAYS, PathData, PathStats, PointKind, Transition
+from enumsol.continuation.path_data import ARRAYS, PathData, PathStats, PathStatus, PointKind, Transition
 from enumsol.errors import InvalidArgumentError
 from enumsol.roots.local_branch import LocalBranchTest
 from enumsol.statuses import ContactStatus
@@ -68,7 +68,7 @@ def _unpacked(meta: dict[str, Any], arrays: dict[str, Any]) -> PathData:
         **arrays,
         kinds=tuple(PointKind(kind) for kind in meta["kinds"]),
         transitions=tuple(_unpack(item) for item in meta["transitions"]),
-        status=meta["status"],
+        status=PathStatus(meta["status"]),
         message=meta["message"],
         orientation=meta["orientation"],
         interval=(float(low), float(high)),
