@@ -21,7 +21,7 @@ from enumsol.checks import optional_callable
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
-from enumsol.kernel.rows import FRICTIONLESS, UNDECIDED, children_of, row_signs
+from enumsol.kernel.rows import FRICTIONLESS, ROW_KINDS, UNDECIDED, children_of, row_signs
 from enumsol.problem import ContactProblem
 from enumsol.proof.proof_file import Proof, fraction_text
 from enumsol.proof.reading import (
@@ -269,7 +269,7 @@ class Checker:
         if len(record) != _ENTRIES[kind]:
             return f"its record has {len(record)} entries; expected {_ENTRIES[kind]}"
         if kind == "x":
-            self._waiting.append((self.leaves, codes, *multipliers_from(record[1:], 7 * self.problem.p)))
+            self._waiting.append((self.leaves, codes, *multipliers_from(record[1:], ROW_KINDS * self.problem.p)))
             return None
         if kind == "X":
             return self._rational_exclusion(codes, record)
@@ -307,9 +307,9 @@ class Checker:
 
     def _rational_exclusion(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         p = self.problem.p
-        rows, values = multipliers_from(record[1:], 7 * p)
+        rows, values = multipliers_from(record[1:], ROW_KINDS * p)
         signs = row_signs(np.array(codes), np.array(self.friction, dtype=float))
-        units = [Fraction(self.length[r % p] if r // p < 4 else self.force[r % p]) for r in range(7 * p)]
+        units = [Fraction(self.length[r % p] if r // p < 4 else self.force[r % p]) for r in range(ROW_KINDS * p)]
         positive = self.rational.energy_bound_positive(signs, rows.tolist(), values.tolist(), units)
         return None if positive else "its multipliers do not exclude it in rational arithmetic"
 

@@ -23,7 +23,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, contact_status
+from enumsol.statuses import (
+    CONDITIONS,
+    FRICTIONLESS,
+    OPEN,
+    SIGNS,
+    SLIP_MINUS,
+    SLIP_PLUS,
+    STICK,
+    RowKind,
+    active_within,
+    contact_status,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,14 +53,6 @@ if TYPE_CHECKING:
 STATUS_TOLERANCE = 1e-9
 #: Interval points at which the size of a load that varies is measured.
 _LOAD_SAMPLES = 9
-
-_ROWS = {
-    OPEN: (False, False, False),
-    STICK: (True, False, True),
-    SLIP_PLUS: (True, True, True),
-    SLIP_MINUS: (True, False, False),
-    FRICTIONLESS: (True, True, True),
-}
 
 
 class CondensedEquation:
@@ -193,7 +196,7 @@ class CondensedEquation:
 
     def selection(self, codes: Codes) -> NDArray[np.bool_]:
         """Sign rows of the selection in which the nodes have these statuses, shape (p, 3)."""
-        return np.array([_ROWS[code] for code in codes], dtype=bool).reshape(-1, 3)
+        return np.array([SIGNS[code] for code in codes]).reshape(-1, 3) > 0
 
     def selection_residual(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
         """The named selection function of H, shape (2p,), its rows scaled by positive factors to size one."""
@@ -230,73 +233,49 @@ class CondensedEquation:
 
     # -- statuses and their conditions -------------------------------------------------------------------------------
 
+    def _row_values(self, x: Vector) -> Vector:
+        """Values of all rows in the order of RowKind, those of the cone over 1 + F, shape (7, p)."""
+        p, F, w = self.p, self.at(x).F, self.w(x)
+        n, t, cone = x[:p], x[p:-1], 1.0 + F
+        return np.stack([n, t, (F * n - t) / cone, (F * n + t) / cone, -w[:p], w[p:], -w[p:]])
+
     def slacks(self, codes: Codes, x: Vector) -> Vector:
         """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
-        p, F, w = self.p, self.at(x).F, self.w(x)
-        out = np.full((p, 2), np.inf)
+        values, out = self._row_values(x), np.full((self.p, 2), np.inf)
         for i, code in enumerate(codes):
-            if code == OPEN:
-                out[i, 0] = -w[i]
-            elif code == STICK:
-                size = 1.0 + F[i]
-                out[i] = (F[i] * x[i] - x[p + i]) / size, (F[i] * x[i] + x[p + i]) / size
-            else:
-                out[i, 0] = x[i]
-                if code != FRICTIONLESS:
-                    out[i, 1] = w[p + i] if code == SLIP_PLUS else -w[p + i]
+            kinds = CONDITIONS[code].inequalities
+            out[i, : len(kinds)] = values[kinds, i]
         return out
 
     def slack_gradient(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Vector:
         """Gradient of one slack with respect to x, shape (2p + 1,)."""
         (i, k), p, values = which, self.p, self.at(x)
-        row = np.zeros(2 * p + 1)
-        code = codes[i]
-        if code == OPEN:
-            row[:-1], row[-1] = self.S[i], -values.dg[i]
-        elif code == STICK:
+        row, kind = np.zeros(2 * p + 1), CONDITIONS[codes[i]].inequalities[k]
+        if kind == RowKind.NORMAL_FORCE:
+            row[i] = 1.0
+        elif kind in (RowKind.CONE_PLUS, RowKind.CONE_MINUS):
             F, dF = values.F[i], values.dF[i]
-            sign = 1.0 if k else -1.0
+            sign = -1.0 if kind == RowKind.CONE_PLUS else 1.0
             row[i], row[p + i], row[-1] = F, sign, dF * x[i]
             row /= 1.0 + F
             row[-1] -= dF / (1.0 + F) ** 2 * (F * x[i] + sign * x[p + i])
-        elif k == 0:
-            row[i] = 1.0
         else:
-            sign = 1.0 if code == SLIP_PLUS else -1.0
-            row[:-1], row[-1] = -sign * self.S[p + i], sign * values.dg[p + i]
+            at, sign = (i, -1.0) if kind == RowKind.PENETRATION else (p + i, 1.0)
+            sign = -1.0 if kind == RowKind.SLIP_BACKWARD else sign
+            row[:-1], row[-1] = -sign * self.S[at], sign * values.dg[at]
         return row
 
     def slack_rates(self, codes: Codes, x: Vector, tangent: Vector) -> Vector:
         """Derivatives of the slacks along a tangent, shape (p, 2); zero where there is one condition."""
         out = np.zeros((self.p, 2))
         for i, code in enumerate(codes):
-            for k in range(1 if code in (OPEN, FRICTIONLESS) else 2):
+            for k in range(len(CONDITIONS[code].inequalities)):
                 out[i, k] = self.slack_gradient(codes, x, (i, k)) @ tangent
         return out
 
     def active(self, x: Vector, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
-        p, F, w = self.p, self.at(x).F, self.w(x)
-        cone = 1.0 + F
-        upper, lower = (F * x[:p] - x[p:-1]) / cone, (F * x[:p] + x[p:-1]) / cone
-        result = []
-        for i in range(p):
-            holds = set()
-            if max(abs(x[i]), abs(x[p + i]), w[i]) <= tolerance:
-                holds.add(OPEN)
-            if abs(w[i]) <= tolerance and x[i] >= -tolerance:
-                if self.frictionless[i]:
-                    holds.add(FRICTIONLESS)
-                else:
-                    slip = w[p + i]
-                    if abs(slip) <= tolerance and min(upper[i], lower[i]) >= -tolerance:
-                        holds.add(STICK)
-                    if abs(upper[i]) <= tolerance and slip >= -tolerance:
-                        holds.add(SLIP_PLUS)
-                    if abs(lower[i]) <= tolerance and slip <= tolerance:
-                        holds.add(SLIP_MINUS)
-            result.append(frozenset(holds))
-        return tuple(result)
+        return active_within(self._row_values(x), ~self.frictionless, tolerance)
 
     def codes(self, x: Vector, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
         """Statuses at a solution by the signs of the test functions; ``prefer`` is kept where it holds too."""

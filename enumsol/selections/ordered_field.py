@@ -10,12 +10,12 @@ from enumsol.arithmetic.rationals import to_fraction
 from enumsol.condensation.exact import ExactSystem
 from enumsol.selections.polytopes import dot
 from enumsol.selections.rationals import ExactSelections
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import STICK, RowKind
 
 if TYPE_CHECKING:
     from enumsol.condensation.exact import ExactPath
     from enumsol.selections.polytopes import Form, Point, Table
-    from enumsol.selections.solution import ActiveSets, Codes
+    from enumsol.selections.solution import Codes
 
 
 class FiberSelections(ExactSelections):
@@ -53,30 +53,12 @@ class FiberSelections(ExactSelections):
         """Equations and inequalities (>= 0) of a selection as forms over lambda."""
         equations, inequalities = super().forms(codes)
         # where F = 0 the cone of a sticking node does not imply that its normal force is none of tension
-        return equations, inequalities + [self.force_form(i) for i, code in enumerate(codes) if code == STICK]
+        return equations, inequalities + [
+            self.form(RowKind.NORMAL_FORCE, i) for i, code in enumerate(codes) if code == STICK
+        ]
 
     def _w(self, point: Point) -> list[Any]:
         return [g - dot(row, point) for g, row in zip(self.system.g, self._S, strict=True)]
-
-    def active(self, point: Point) -> ActiveSets:
-        """Per node the codes whose conditions hold at the point, exactly."""
-        p, w = self.p, self._w(point)
-        result = []
-        for i, F in enumerate(self.system.F):
-            n, t, w_t = point[i], point[p + i], w[p + i]
-            holds = set()
-            if n == 0 and t == 0 and w[i] <= 0:
-                holds.add(OPEN)
-            if w[i] == 0 and n >= 0:
-                bound = F * n
-                if self.path.frictionless[i]:
-                    holds |= {FRICTIONLESS} if t == 0 else set()
-                else:
-                    holds |= {STICK} if w_t == 0 and -bound <= t <= bound else set()
-                    holds |= {SLIP_PLUS} if t == bound and w_t >= 0 else set()
-                    holds |= {SLIP_MINUS} if t == -bound and w_t <= 0 else set()
-            result.append(frozenset(holds))
-        return tuple(result)
 
     # -- the field -------------------------------------------------------------------------------------------------
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from flint import fmpq, fmpq_mat
-
 from enumsol.arithmetic.rationals import rational
-from enumsol.relaxation.interval import IntervalRowKind, imposed_interval_rows
-from enumsol.relaxation.rows import INEQUALITY, RowKind
+from enumsol.condensation.exact import ExactSystem
+from enumsol.relaxation.interval import IntervalRowKind, interval_rows
+from enumsol.relaxation.rows import with_implied
+from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
+from enumsol.selections.rationals import ExactSelections
+from enumsol.statuses import RowKind
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -17,14 +19,10 @@ if TYPE_CHECKING:
     from enumsol.relaxation.interval import IntervalSystem
     from enumsol.search.interval import EmptyLeaf, Piece
 
-_FORCE_ROWS = (
-    RowKind.NORMAL_FORCE,
-    RowKind.TANGENTIAL_FORCE,
-    RowKind.CONE_PLUS,
-    RowKind.CONE_MINUS,
-    IntervalRowKind.SLIP_AT_LEAST_PLUS,
-    IntervalRowKind.SLIP_AT_LEAST_MINUS,
-)
+_CONES: dict[int, RowKind] = {
+    IntervalRowKind.SLIP_AT_LEAST_PLUS: RowKind.CONE_PLUS,
+    IntervalRowKind.SLIP_AT_LEAST_MINUS: RowKind.CONE_MINUS,
+}
 
 
 class ExactIntervalCertifier:
@@ -40,7 +38,6 @@ class ExactIntervalCertifier:
     def __init__(self, path: ExactPath) -> None:
         self._path = path
         self._inverse: Any = None
-        self._S = path.rows
         self._bounds: tuple[Piece, tuple[Any, ...], tuple[Any, ...]] | None = None
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
@@ -48,17 +45,12 @@ class ExactIntervalCertifier:
         if self._inverse is None:
             self._inverse = self._path.S.inv()
         lowest, highest = self._friction(piece)
-        terms = []
-        for row, value in zip(leaf.rows, leaf.values, strict=True):
-            kind, node = divmod(int(row), self._path.p)
-            mode = imposed_interval_rows(
-                leaf.codes[node], friction=highest[node] > 0, constant=lowest[node] == highest[node]
-            ).get(kind)
-            if mode is None or (mode == INEQUALITY and value <= 0):
-                continue
-            # multipliers of the scaled problem, back in the problem's units
-            unit = system.scaled.length[node] if kind in _FORCE_ROWS else system.scaled.force[node]
-            terms.append((kind, node, rational(float(value)) * rational(float(unit))))
+
+        def imposed(node: int) -> dict[int, int]:
+            constant, code = lowest[node] == highest[node], leaf.codes[node]
+            return with_implied(code, interval_rows(code, friction=highest[node] > 0, constant=constant))
+
+        terms = list(accepted(leaf.rows, leaf.values, imposed, system.scaled))
         return all(self._positive(terms, g, lowest, highest) for g in self._loads(piece))
 
     def _friction(self, piece: Piece) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -89,25 +81,11 @@ class ExactIntervalCertifier:
         lowest: tuple[Any, ...],
         highest: tuple[Any, ...],
     ) -> bool:
-        """Whether -1/4 v' S^-1 v - sum u * constant > 0 with v = g + sum u * form."""
-        p, v, total = self._path.p, list(g), fmpq(0)
-        for kind, node, u in terms:
-            if kind == RowKind.NORMAL_FORCE:
-                v[node] += u
-            elif kind == RowKind.TANGENTIAL_FORCE:
-                v[p + node] += u
-            elif kind in (RowKind.CONE_PLUS, RowKind.CONE_MINUS):
-                v[node] += u * highest[node]
-                v[p + node] += -u if kind == RowKind.CONE_PLUS else u
-            elif kind in (IntervalRowKind.SLIP_AT_LEAST_PLUS, IntervalRowKind.SLIP_AT_LEAST_MINUS):
-                v[node] -= u * lowest[node]
-                v[p + node] += u if kind == IntervalRowKind.SLIP_AT_LEAST_PLUS else -u
-            else:
-                index = node if kind == RowKind.PENETRATION else p + node
-                factor = u if kind == RowKind.SLIP_FORWARD else -u
-                # a row factor * w, w = g - S lambda
-                v = [x - factor * s for x, s in zip(v, self._S[index], strict=True)]
-                total -= factor * g[index]
-        column = fmpq_mat([[x] for x in v])
-        square = (column.transpose() * (self._inverse * column))[0, 0]
-        return bool(4 * total > square)
+        """Whether the energy is bounded below by a positive number, at g and for all friction of the piece."""
+        solver, least = (ExactSelections(ExactSystem(self._path.S, g, F)) for F in (highest, lowest))
+        forms = (
+            # lambda_t - F_lo lambda_n is the cone's row of F_lo with its sign changed
+            (-u, least.form(_CONES[kind], node)) if kind in _CONES else (u, solver.form(RowKind(kind), node))
+            for kind, node, u in terms
+        )
+        return energy_bound_positive(g, self._inverse, forms)
