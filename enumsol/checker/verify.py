@@ -38,6 +38,8 @@ from enumsol.proof.reading import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from numpy.typing import NDArray
+
     from enumsol.checker.rational import RationalSystem
     from enumsol.condensation.data import Data
 
@@ -233,10 +235,13 @@ class Checker:
         numbers, codes, rows, values = zip(*self._waiting, strict=True)
         self._waiting.clear()
         leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
-        margins = exclusion_margins(
-            self.system, np.array(codes, dtype=np.intp), leaf, np.concatenate(rows), np.concatenate(values)
-        )
-        for number in np.array(numbers)[~(margins > 0)]:
+        arrays = np.array(codes, dtype=np.intp), leaf, np.concatenate(rows), np.concatenate(values)
+        self._check_exclusions(np.array(numbers), arrays)
+
+    def _check_exclusions(self, numbers: NDArray[np.intp], leaves: tuple[Any, ...]) -> None:
+        """``leaves``: codes, leaf, rows and values as exclusion_margins takes them."""
+        margins = exclusion_margins(self.system, *leaves)
+        for number in numbers[~(margins > 0)]:
             self.fail(f"leaf {number}: its multipliers do not exclude it")
 
     def _children(self, codes: tuple[int, ...], record: list[Any]) -> list[tuple[int, ...]]:
