@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.equation import pieces
 from enumsol.statuses import (
     CONDITIONS,
     FRICTIONLESS,
@@ -189,7 +190,7 @@ class CondensedEquation:
     def _projected(self, x: Vector, r: Vector) -> Vector:
         """H(x), piece by piece: the projections lose nothing of w where r is small, nor of lambda where it is large."""
         p, w = self.p, self.w(x)
-        closed, slips, count = _pieces(self._test_functions(x, r) > 0)
+        closed, slips, count = pieces(self._test_functions(x, r) > 0)
         bound = self.at(x).F * x[:p]
         tangential = (1 - count) * x[p:-1] - slips * bound - count * r[p:] * w[p:]
         return np.concatenate([np.where(closed, -r[:p] * w[:p], x[:p]), tangential])
@@ -201,7 +202,7 @@ class CondensedEquation:
     def selection_residual(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
         """The named selection function of H, shape (2p,), its rows scaled by positive factors to size one."""
         p = self.p
-        closed, slips, count = _pieces(rows)
+        closed, slips, count = pieces(rows)
         lengths, forces = self._shares(count)
         w = self.w(x)
         normal = np.where(closed, -w[:p], x[:p])
@@ -218,7 +219,7 @@ class CondensedEquation:
     def jacobian(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
         """Gradient of the named selection function (see selection_residual), shape (2p, 2p + 1)."""
         p, values = self.p, self.at(x)
-        closed, slips, count = _pieces(rows)
+        closed, slips, count = pieces(rows)
         lengths, forces = self._shares(count)
         share = np.concatenate([closed.astype(float), lengths])
         J = np.empty((2 * p, 2 * p + 1))
@@ -299,11 +300,3 @@ class CondensedEquation:
     def statuses(self, codes: Sequence[int], slip: Vector) -> tuple[ContactStatus, ...]:
         """Names of the statuses; a frictionless node in contact is named by the sign of its u_t."""
         return tuple(contact_status(code, float(u)) for code, u in zip(codes, slip, strict=True))
-
-
-def _pieces(rows: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Vector, Vector]:
-    """Contact, slip sign, and how often the stick piece enters the tangential row (1, 0; -1 for the fourth piece)."""
-    closed, upper, lower = rows[:, 0], rows[:, 1], rows[:, 2]
-    slips = upper.astype(float) - (~lower).astype(float)
-    count = lower.astype(float) - upper.astype(float)
-    return closed, slips, count
