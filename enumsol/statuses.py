@@ -80,25 +80,6 @@ CONDITIONS = {
 }
 #: Final statuses of a node with friction, and of one without.
 FINAL = {True: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), False: (OPEN, FRICTIONLESS)}
-
-
-def active_within(
-    rows: NDArray[np.float64], friction: Sequence[bool] | NDArray[np.bool_], tolerance: float
-) -> tuple[frozenset[int], ...]:
-    """Per node the final codes whose conditions hold within the tolerance, for values of all rows, shape (7, p)."""
-    zero, held = np.abs(rows) <= tolerance, rows >= -tolerance
-    return tuple(
-        frozenset(
-            code
-            for code in FINAL[bool(friction[i])]
-            if held[_R.NORMAL_FORCE, i]
-            and all(zero[kind, i] for kind in CONDITIONS[code].equations)
-            and all(held[kind, i] for kind in CONDITIONS[code].inequalities)
-        )
-        for i in range(rows.shape[1])
-    )
-
-
 #: Signs of the test functions in the final statuses.
 SIGNS = {
     OPEN: (-1, -1, -1),
@@ -107,6 +88,20 @@ SIGNS = {
     SLIP_MINUS: (1, -1, -1),
     FRICTIONLESS: (1, 1, 1),
 }
+
+
+def active_within(
+    rows: NDArray[np.float64], friction: Sequence[bool] | NDArray[np.bool_], tolerance: float
+) -> tuple[frozenset[int], ...]:
+    """Per node the final codes whose conditions hold within the tolerance, for values of all rows, shape (7, p)."""
+    zero, held = np.abs(rows) <= tolerance, rows >= -tolerance
+    holds = {
+        code: held[_R.NORMAL_FORCE]
+        & np.all(zero[list(CONDITIONS[code].equations)], axis=0)
+        & np.all(held[list(CONDITIONS[code].inequalities)], axis=0)
+        for code in SIGNS
+    }
+    return tuple(frozenset(code for code in FINAL[bool(friction[i])] if holds[code][i]) for i in range(rows.shape[1]))
 
 
 def sign_array(statuses: Sequence[ContactStatus]) -> NDArray[np.int8]:

@@ -56,6 +56,10 @@ STATUS_TOLERANCE = 1e-9
 _LOAD_SAMPLES = 9
 
 
+#: Rows of the inequalities of every status, -1 where there is one only.
+_KINDS = np.array([[*CONDITIONS[code].inequalities, -1][:2] for code in SIGNS])
+
+
 class CondensedEquation:
     """H, its selections, their conditions and the metric of the path.
 
@@ -242,11 +246,8 @@ class CondensedEquation:
 
     def slacks(self, codes: Codes, x: Vector) -> Vector:
         """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
-        values, out = self._row_values(x), np.full((self.p, 2), np.inf)
-        for i, code in enumerate(codes):
-            kinds = CONDITIONS[code].inequalities
-            out[i, : len(kinds)] = values[kinds, i]
-        return out
+        kinds = _KINDS[np.array(codes, dtype=np.intp)]
+        return np.where(kinds < 0, np.inf, self._row_values(x)[kinds, np.arange(self.p)[:, None]])
 
     def slack_gradient(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Vector:
         """Gradient of one slack with respect to x, shape (2p + 1,)."""

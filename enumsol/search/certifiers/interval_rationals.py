@@ -38,31 +38,32 @@ class ExactIntervalCertifier:
     def __init__(self, path: ExactPath) -> None:
         self._path = path
         self._inverse: Any = None
-        self._bounds: tuple[Piece, tuple[Any, ...], tuple[Any, ...]] | None = None
+        self._systems: tuple[Piece, list[tuple[ExactSelections, ExactSelections]]] | None = None
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
         if self._inverse is None:
             self._inverse = self._path.S.inv()
-        lowest, highest = self._friction(piece)
+        if self._systems is None or self._systems[0] != piece:
+            self._systems = piece, self._systems_of(piece)
+        ends = self._systems[1]
+        lowest, highest = (solver.system.F for solver in ends[0])
 
         def imposed(node: int) -> dict[int, int]:
             constant, code = lowest[node] == highest[node], leaf.codes[node]
             return with_implied(code, interval_rows(code, friction=highest[node] > 0, constant=constant))
 
         terms = list(accepted(leaf.rows, leaf.values, imposed, system.scaled))
-        return all(self._positive(terms, g, lowest, highest) for g in self._loads(piece))
+        return all(self._positive(terms, *solvers) for solvers in ends)
 
-    def _friction(self, piece: Piece) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        """Smallest and largest coefficients on the piece."""
-        if self._bounds is None or self._bounds[0] != piece:
-            ends = [self._path.at(rational(alpha))[1] for alpha in (piece.a, piece.b)]
-            self._bounds = (
-                piece,
-                tuple(min(pair) for pair in zip(*ends, strict=True)),
-                tuple(max(pair) for pair in zip(*ends, strict=True)),
-            )
-        return self._bounds[1], self._bounds[2]
+    def _systems_of(self, piece: Piece) -> list[tuple[ExactSelections, ExactSelections]]:
+        """At both ends, with the smallest and with the largest coefficients on the piece."""
+        S, F = self._path.S, [self._path.at(rational(alpha))[1] for alpha in (piece.a, piece.b)]
+        bounds = [tuple(bound(pair) for pair in zip(*F, strict=True)) for bound in (min, max)]
+        lowest, highest = (
+            [ExactSelections(ExactSystem(S, g, coefficients)) for g in self._loads(piece)] for coefficients in bounds
+        )
+        return list(zip(lowest, highest, strict=True))
 
     def _loads(self, piece: Piece) -> list[tuple[Any, ...]]:
         """g at both ends, once where it does not vary; at an end where g vanishes its direction stands for it."""
@@ -74,18 +75,11 @@ class ExactIntervalCertifier:
             return [tuple(direction * v for v in path.g1)]
         return [path.at(rational(end))[0] for end in (ends if path.loaded else ends[:1])]
 
-    def _positive(
-        self,
-        terms: list[tuple[int, int, Any]],
-        g: tuple[Any, ...],
-        lowest: tuple[Any, ...],
-        highest: tuple[Any, ...],
-    ) -> bool:
-        """Whether the energy is bounded below by a positive number, at g and for all friction of the piece."""
-        solver, least = (ExactSelections(ExactSystem(self._path.S, g, F)) for F in (highest, lowest))
+    def _positive(self, terms: list[tuple[int, int, Any]], lowest: ExactSelections, highest: ExactSelections) -> bool:
+        """Whether the energy is bounded below by a positive number, at one g and for all friction of the piece."""
         forms = (
             # lambda_t - F_lo lambda_n is the cone's row of F_lo with its sign changed
-            (-u, least.form(_CONES[kind], node)) if kind in _CONES else (u, solver.form(RowKind(kind), node))
+            (-u, lowest.form(_CONES[kind], node)) if kind in _CONES else (u, highest.form(RowKind(kind), node))
             for kind, node, u in terms
         )
-        return energy_bound_positive(g, self._inverse, forms)
+        return energy_bound_positive(highest.system.g, self._inverse, forms)
