@@ -1,0 +1,20 @@
+"""Named contact problems for documentation, tests and benchmarks: small closed forms, blocks, wedges and chains.
+
+Every function returns a `ContactProblem`. `GALLERY` lists ready-made ones with a parameter value at which each is worth
+a look and, where it is known, the number of its roots there; `get` finds one by name.
+"""
+
+from enumsol.gallery.catalogue import GALLERY, GalleryEntry, close_names, get
+from enumsol.gallery.problems import chain, clamped_block, one_node_triangle, two_node_square, wedge
+
+__all__ = [
+    "GALLERY",
+    "GalleryEntry",
+    "chain",
+    "clamped_block",
+    "close_names",
+    "get",
+    "one_node_triangle",
+    "two_node_square",
+    "wedge",
+]
