@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     Friction = float | tuple[ArrayLike, ArrayLike]
 
 Pair = tuple[float, float]
-#: Most triangles of a chain.
+#: Largest number of triangles in a chain.
 _MOST_TRIANGLES = 1_000_000
 
 
@@ -370,7 +370,7 @@ def get(name: str) -> GalleryEntry:
     Raises
     ------
     InvalidArgumentError
-        There is none; the message lists the names most like it, or all.
+        There is no such entry; the message lists similar names, or all.
 
     Examples
     --------
@@ -389,7 +389,7 @@ def get(name: str) -> GalleryEntry:
 
 
 def close_names(name: str) -> list[str]:
-    """Up to five names of `GALLERY` that are like this one, the most alike first; its own alone if it is one.
+    """Up to five names in `GALLERY` similar to this one, the most similar first; only itself if it is one of them.
 
     Examples
     --------
@@ -435,7 +435,7 @@ def _large() -> Iterator[GalleryEntry]:
     for p in (8, 14, 20, 32):
         build = partial(wedge, 4, p // 2)
         yield GalleryEntry(f"wedge-{p}-3", "wedge pulled straight: jammed, free or sliding out", 1.0, 3, build)
-    # at each of these alpha the five roots keep well clear of changes of status
+    # at each of these alpha the five roots are well away from changes of status
     for p, alpha in ((8, 3.0), (14, 2.2), (20, 2.25), (32, 2.2)):
         build = partial(wedge, 4, p // 2, (4e-4, 1e-3))
         yield GalleryEntry(f"wedge-{p}-5", "wedge pulled obliquely: it may hang tilted too", alpha, 5, build)
@@ -459,7 +459,7 @@ def _top_springs(mesh: fem.Mesh, springs: Pair) -> NDArray[np.float64]:
     total = vector_2d(springs, "springs")
     if np.min(total) <= 0:
         raise InvalidArgumentError(
-            f"springs is {shown(springs)}; expected two stiffnesses > 0, or the wedge is not held"
+            f"springs is {shown(springs)}; expected two stiffnesses > 0, otherwise nothing holds the wedge"
         )
     share = np.full(len(mesh.top), 1.0 / (len(mesh.top) - 1))
     share[[0, -1]] *= 0.5
