@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-#: Areas are computed of coordinates up to this.
+#: Largest coordinate; its square must not overflow.
 LARGEST_COORDINATE = 1e150
 
 
@@ -49,7 +49,7 @@ def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]
     Raises
     ------
     InvalidArgumentError
-        The mesh is not one (shapes, node numbers, a triangle without area) or the coefficients are not admissible.
+        The mesh is not valid (shapes, node numbers, a triangle without area) or the coefficients are not admissible.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]
     if len(used) != len(nodes):
         lone = int(np.setdiff1d(np.arange(len(nodes)), used)[0])
         raise InvalidArgumentError(f"triangles leave node {lone} out; expected every node in some triangle")
-    # sorting is ours, so that scikit-fem has no reason to renumber or to log
+    # sorted here, so that scikit-fem neither renumbers nor logs
     mesh = MeshTri(np.ascontiguousarray(nodes.T), np.ascontiguousarray(np.sort(cells, axis=1).T))
     basis = Basis(mesh, ElementVector(ElementTriP1()), intorder=0)
     matrix = sp.coo_array(linear_elasticity(lam, mu).assemble(basis))
@@ -287,7 +287,7 @@ def _tangents(tangents: ArrayLike | None, normal: NDArray[np.float64]) -> NDArra
         return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
     tangent = _unit(_rows(tangents, "tangents", len(normal)), "tangents")
     skew = np.abs(np.sum(tangent * normal, axis=1))
-    if np.any(skew > 1e-12):  # both have length one: this is the cosine between them, up to rounding
+    if np.any(skew > 1e-12):  # of unit vectors, the cosine of the angle between them, up to rounding
         k = int(np.argmax(skew))
         raise InvalidArgumentError(f"tangents row {k} is not perpendicular to normals row {k}; expected right angles")
     return tangent

@@ -50,7 +50,7 @@ def get(name: str) -> GalleryEntry:
     Raises
     ------
     InvalidArgumentError
-        There is none; the message lists the names most like it, or all.
+        There is no such entry; the message lists similar names, or all.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def get(name: str) -> GalleryEntry:
 
 
 def close_names(name: str) -> list[str]:
-    """Up to five names of `GALLERY` that are like this one, the most alike first; its own alone if it is one.
+    """Up to five names in `GALLERY` similar to this one, the most similar first; only itself if it is one of them.
 
     Examples
     --------
@@ -115,7 +115,7 @@ def _large() -> Iterator[GalleryEntry]:
     for p in (8, 14, 20, 32):
         build = partial(wedge, 4, p // 2)
         yield GalleryEntry(f"wedge-{p}-3", "wedge pulled straight: jammed, free or sliding out", 1.0, 3, build)
-    # at each of these alpha the five roots keep well clear of changes of status
+    # at each of these alpha the five roots are well away from changes of status
     for p, alpha in ((8, 3.0), (14, 2.2), (20, 2.25), (32, 2.2)):
         build = partial(wedge, 4, p // 2, (4e-4, 1e-3))
         yield GalleryEntry(f"wedge-{p}-5", "wedge pulled obliquely: it may hang tilted too", alpha, 5, build)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     Friction = float | tuple[ArrayLike, ArrayLike]
 
 Pair = tuple[float, float]
-#: Most triangles of a chain.
+#: Largest number of triangles in a chain.
 _MOST_TRIANGLES = 1_000_000
 
 
@@ -338,7 +338,7 @@ def _top_springs(mesh: fem.Mesh, springs: Pair) -> NDArray[np.float64]:
     total = vector_2d(springs, "springs")
     if np.min(total) <= 0:
         raise InvalidArgumentError(
-            f"springs is {shown(springs)}; expected two stiffnesses > 0, or the wedge is not held"
+            f"springs is {shown(springs)}; expected two stiffnesses > 0, otherwise nothing holds the wedge"
         )
     share = np.full(len(mesh.top), 1.0 / (len(mesh.top) - 1))
     share[[0, -1]] *= 0.5
