@@ -28,7 +28,7 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Callable, Collection
 
     from numpy.typing import NDArray
 
@@ -48,6 +48,7 @@ _RANGE = "expected a finite real number in the range of float64: 0, or 5e-324 to
 _SHOWN = 60
 
 T = TypeVar("T")
+N = TypeVar("N", float, Alpha)
 
 
 # -- what was found ------------------------------------------------------------------------------------------------
@@ -85,6 +86,10 @@ def shown(value: object) -> str:
         text = f"<{type(value).__name__}>"
     text = " ".join(text.split())
     return text if len(text) <= 2 * _SHOWN else text[: 2 * _SHOWN - 3] + "..."
+
+
+def _refusal(value: object, name: str, expected: str) -> InvalidArgumentError:
+    return InvalidArgumentError(f"{name} is {shown(value)}; expected {expected}")
 
 
 # -- alpha -----------------------------------------------------------------------------------------------------------
@@ -211,9 +216,7 @@ def alpha_interval(value: Any, name: str = "interval") -> tuple[Alpha, Alpha]:
         It is no pair of alphas of which the first is below the second.
     """
     low, high = (alpha_value(end, f"{name}[{k}]") for k, end in enumerate(_pair(value, name)))
-    if not low < high:
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected its first alpha below its last")
-    return low, high
+    return _in_order(low, high, value, name)
 
 
 def unbounded_interval(value: Any, name: str = "interval") -> tuple[float, float]:
@@ -229,9 +232,12 @@ def unbounded_interval(value: Any, name: str = "interval") -> tuple[float, float
         number = exact_number(end)
         infinite = isinstance(number, float) and math.isinf(number)
         ends.append(float(end) if infinite else float(alpha_value(end, f"{name}[{k}]")))
-    low, high = ends
+    return _in_order(ends[0], ends[1], value, name)
+
+
+def _in_order(low: N, high: N, value: Any, name: str) -> tuple[N, N]:
     if not low < high:
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected its first alpha below its last")
+        raise _refusal(value, name, "its first alpha below its last")
     return low, high
 
 
@@ -243,7 +249,7 @@ def _pair(value: Any, name: str) -> list[Any]:
         except TypeError:
             ends = []
     if len(ends) != 2:
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a pair of numbers (first alpha, last alpha)")
+        raise _refusal(value, name, "a pair of numbers (first alpha, last alpha)")
     return ends
 
 
@@ -255,9 +261,9 @@ def positive_integer(value: Any, name: str, least: int = 1, most: int | None = N
     """Value as an int of at least ``least`` and, where that is given, at most ``most``."""
     number = _integer(value)
     if number is None or number < least:
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected an integer of at least {least}")
+        raise _refusal(value, name, f"an integer of at least {least}")
     if most is not None and number > most:
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected an integer of at most {most}")
+        raise _refusal(value, name, f"an integer of at most {most}")
     return number
 
 
@@ -267,7 +273,7 @@ def optional_count(value: Any, name: str) -> int | None:
         return None
     number = _integer(value)
     if number is None or number < 1:
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a positive integer or None")
+        raise _refusal(value, name, "a positive integer or None")
     return number
 
 
@@ -275,7 +281,7 @@ def row_number(value: Any, name: str, count: int, expected: str = "") -> int:
     """Value as an int in 0 .. count - 1; ``expected`` says in messages what it counts."""
     number = _integer(value)
     if number is None or not 0 <= number < count:
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected {expected or f'a row number below {count}'}")
+        raise _refusal(value, name, expected or f"a row number below {count}")
     return number
 
 
@@ -283,25 +289,17 @@ def optional_seconds(value: Any, name: str = "time_limit") -> float | None:
     """Value as a positive number of seconds, or None for no limit."""
     if value is None:
         return None
-    number = real_or_nan(value)
-    if not number > 0:
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a positive number of seconds or None")
-    return number
+    return _real(value, name, lambda x: x > 0, "a positive number of seconds or None")
 
 
 def share(value: Any, name: str = "tolerance") -> float:
     """Value as a float of at least zero and below one."""
-    number = real_or_nan(value)
-    if not 0 <= number < 1:
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a number in [0, 1)")
-    return number
+    return _real(value, name, lambda x: 0 <= x < 1, "a number in [0, 1)")
 
 
 def finite_number(value: Any, name: str) -> float:
     """Value as a finite float, which it is exactly."""
-    number = real_or_nan(value)
-    if not math.isfinite(number):
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number")
+    number = _real(value, name, math.isfinite, "a finite number")
     if number != exact_number(value):
         raise InvalidArgumentError(f"{name} is {shown(value)}, which float64 would round; expected a finite number")
     return number
@@ -317,17 +315,18 @@ def direction_value(value: Any) -> int:
 
 def positive_number(value: Any, name: str) -> float:
     """Value as a finite float above zero, rounded if need be."""
-    number = real_or_nan(value)
-    if not (math.isfinite(number) and number > 0):
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number > 0")
-    return number
+    return _real(value, name, lambda x: 0 < x < math.inf, "a finite number > 0")
 
 
 def nonnegative_number(value: Any, name: str) -> float:
     """Value as a finite float of at least zero, rounded if need be."""
+    return _real(value, name, lambda x: 0 <= x < math.inf, "a finite number >= 0")
+
+
+def _real(value: Any, name: str, admissible: Callable[[float], bool], expected: str) -> float:
     number = real_or_nan(value)
-    if not (math.isfinite(number) and number >= 0):
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a finite number >= 0")
+    if not admissible(number):
+        raise _refusal(value, name, expected)
     return number
 
 
@@ -355,7 +354,7 @@ def real_or_nan(value: Any) -> float:
 def one_of(value: Any, name: str, known: Collection[str | None]) -> Any:
     """Value, which is one of the known texts (or None, where that is one of them)."""
     if not (value is None or isinstance(value, str)) or value not in known:
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected one of {', '.join(map(repr, known))}")
+        raise _refusal(value, name, f"one of {', '.join(map(repr, known))}")
     return value
 
 
@@ -371,14 +370,14 @@ def instance_of(value: Any, kind: type[T], name: str) -> T:
 def optional_callable(value: Any, name: str) -> Any:
     """Value, which can be called, or None."""
     if value is not None and not callable(value):
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a function or None")
+        raise _refusal(value, name, "a function or None")
     return value
 
 
 def optional_executor(value: Any, name: str = "executor") -> Any:
     """Value, which is like a concurrent.futures.Executor, or None."""
     if value is not None and not callable(getattr(value, "submit", None)):
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a concurrent.futures.Executor or None")
+        raise _refusal(value, name, "a concurrent.futures.Executor or None")
     return value
 
 

@@ -1,4 +1,4 @@
-"""Why a compiled module is not there, and what to do about it."""
+"""Why a compiled module is missing, and what to do about it."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from urllib.parse import unquote, urlsplit
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-#: What ends the names of compiled modules, for whichever Python.
+#: Suffixes of compiled modules, for any version of Python.
 _BINARY = (".so", ".pyd")
 
 
 def why_missing(module: str, error: ImportError) -> str:
-    """What is the case when a compiled module of this package cannot be imported, and what to do, in one clause.
+    """Why a compiled module of this package cannot be imported, and what to do, in one clause.
 
-    Python imports the first enumsol that it finds. In a checkout that is the source, where nothing is compiled,
-    although the installed package beside it may be whole.
+    Python imports the first enumsol that it finds. In a checkout that is the source, where nothing is compiled, even if
+    the package is also installed with all of its modules.
 
     Parameters
     ----------
@@ -57,12 +57,12 @@ def why_missing(module: str, error: ImportError) -> str:
 
 
 def _built(module: Path) -> bool:
-    """Whether the module is there in a form that this Python loads."""
+    """Whether the module exists in a form that this Python loads."""
     return any(module.with_name(module.name + suffix).is_file() for suffix in EXTENSION_SUFFIXES)
 
 
 def _others(package: str, here: Path) -> Iterator[Path]:
-    """Directories of the same package that Python would have imported had it not found this one first."""
+    """Other directories of the same package, which Python would have imported had it not found this one first."""
     seen = {here}
     for root in _roots(package):
         other = (root / package).resolve()
@@ -72,7 +72,7 @@ def _others(package: str, here: Path) -> Iterator[Path]:
 
 
 def _roots(package: str) -> Iterator[Path]:
-    """Where packages may lie: the import path, and what is installed, in place or not."""
+    """Where packages may be: on the import path, and where they are installed, in place or not."""
     yield from map(Path, sys.path)
     for installed in distributions(name=package):
         yield Path(str(installed.locate_file("")))

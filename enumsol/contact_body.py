@@ -143,7 +143,7 @@ class ContactBody(Immutable):
         return digest.hexdigest()
 
     def __getstate__(self) -> dict[str, Any]:
-        # the factorization (SuperLU) cannot be pickled; workers that need it make it again
+        # the factorization (SuperLU) cannot be pickled; workers that need it compute it again
         return {key: value for key, value in self.__dict__.items() if key != "factorization"}
 
 

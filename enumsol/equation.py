@@ -103,17 +103,14 @@ class PiecewiseSmoothEquation:
         """The selection function of H that ``signs`` (p, 3) names, at x; equals H where the test functions agree."""
         u, lambda_n, lambda_t = self.split(x)
         problem, r = self.problem, self.r
-        closed, upper, lower = self._pieces(signs)
+        closed, slips, count = pieces(self._rows(signs))
         bound = problem.friction_at(alpha) * lambda_n
         u_n, u_t = problem.Bn @ u - problem.gap, problem.Bt @ u - problem.slip_offset
-        # P = [bound or trial] + [trial or -bound] - trial
-        low = np.where(upper, bound, 0.0) + np.where(lower, 0.0, -bound)
-        count = np.where(upper, 0, 1) + np.where(lower, 1, 0) - 1
         return np.concatenate(
             [
                 self._equilibrium(u, lambda_n, lambda_t, alpha),
                 np.where(closed, -r * u_n, lambda_n),
-                lambda_t - low - count * (lambda_t + r * u_t),
+                lambda_t - slips * bound - count * (lambda_t + r * u_t),
             ]
         )
 
@@ -121,29 +118,27 @@ class PiecewiseSmoothEquation:
         """Jacobian of the named selection with respect to (x, alpha), sparse (n + 2p, n + 2p + 1)."""
         _, lambda_n, _ = self.split(x)
         problem, r = self.problem, self.r
-        closed, upper, lower = self._pieces(signs)
+        closed, slips, count = pieces(self._rows(signs))
         F, slope = problem.friction_at(alpha), problem.friction[1]
-        slips = upper.astype(float) - np.where(lower, 0.0, 1.0)
-        count = np.where(upper, 0, 1) + np.where(lower, 1, 0) - 1
         load = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
         p, diag = problem.p, sp.diags_array
         column = np.concatenate([-load, np.zeros(p), -slips * slope * lambda_n])
         blocks = [
             [problem.A, problem.Bn.T, problem.Bt.T],
             [diag(np.where(closed, -r, 0.0)) @ problem.Bn, diag(np.where(closed, 0.0, 1.0)), sp.csr_array((p, p))],
-            [diag(-r * count.astype(float)) @ problem.Bt, diag(-slips * F), diag(1.0 - count.astype(float))],
+            [diag(-r * count) @ problem.Bt, diag(-slips * F), diag(1.0 - count)],
         ]
         return sp.csc_array(
             sp.hstack([sp.block_array(blocks, format="csc"), sp.csc_array(column[:, None])], format="csc")
         )
 
-    def _pieces(self, signs: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+    def _rows(self, signs: ArrayLike) -> NDArray[np.bool_]:
         array = plain_array(signs, "signs", error=InvalidArgumentError)
         if array.shape != (self.problem.p, 3) or not np.all(np.isin(array, (-1, 1))):
             raise InvalidArgumentError(
                 f"signs has shape {array.shape}; expected (p, 3) = ({self.problem.p}, 3) with entries -1 or 1"
             )
-        return array[:, 0] > 0, array[:, 1] > 0, array[:, 2] > 0
+        return np.asarray(array > 0)
 
     def _equilibrium(
         self, u: NDArray[np.float64], lambda_n: NDArray[np.float64], lambda_t: NDArray[np.float64], alpha: AlphaLike
@@ -152,3 +147,14 @@ class PiecewiseSmoothEquation:
         return np.asarray(
             problem.A @ u + problem.Bn.T @ lambda_n + problem.Bt.T @ lambda_t - problem.load_at(alpha), dtype=np.float64
         )
+
+
+def pieces(rows: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
+    """What a selection takes, by the signs of its test functions, shape (p, 3), True where one is positive.
+
+    Contact, the slip sign, and how often lambda_t + r u_t enters P: with P = [bound or trial] + [trial or -bound] -
+    trial (1 for stick, 0 for slip, -1 for the fourth piece).
+    """
+    closed, upper, lower = rows[:, 0], rows[:, 1], rows[:, 2]
+    slips = upper.astype(float) - (~lower).astype(float)
+    return closed, slips, lower.astype(float) - upper.astype(float)

@@ -1,4 +1,4 @@
-"""Errors of enumsol: every one a subclass of EnumsolError with one sentence that says what to mend."""
+"""Errors of enumsol: every one a subclass of EnumsolError with one sentence that says what to fix."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ class MissingDependencyError(EnumsolError, ImportError):
 
 
 class _PartialResultError(EnumsolError):
-    """Base of the errors that hold what was found before them."""
+    """Base of the errors that hold what was found before they were raised."""
 
     def __init__(self, message: str, partial: Any) -> None:
         super().__init__(message)
         self.partial = partial
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (str(self), self.partial)  # a worker may have to send it home
+        return type(self), (str(self), self.partial)  # a worker process may have to send it back
 
 
 class Interrupted(_PartialResultError, KeyboardInterrupt):  # noqa: N818 (the name is part of the public interface)
@@ -68,8 +68,8 @@ class Interrupted(_PartialResultError, KeyboardInterrupt):  # noqa: N818 (the na
     Attributes
     ----------
     partial : RootSet
-        The roots found before the interruption, with ``complete`` False. Of other functions than enumerate_roots: what
-        they would have returned, as far as it was done.
+        The roots found before the interruption, with ``complete`` False. For functions other than enumerate_roots: what
+        they would have returned, as far as they got.
     """
 
 
@@ -79,18 +79,19 @@ class WorkerError(_PartialResultError, RuntimeError):
     Attributes
     ----------
     partial : RootSet or pandas.DataFrame
-        Of enumerate_roots: the roots of the subtrees that were finished, with ``complete`` False and the other subtrees
-        under ``undecided``; its proof covers what was finished. Of multiplicity_table: the rows that were finished.
+        For enumerate_roots: the roots of the subtrees that were finished, with ``complete`` False and the other
+        subtrees under ``undecided``; its proof covers what was finished. For multiplicity_table: the rows that were
+        finished.
     """
 
 
 class OutputError(_PartialResultError):
-    """A result cannot be written: a disk is full, or whoever reads the output went away.
+    """A result cannot be written: the disk is full, or the reader of the output is gone.
 
     Attributes
     ----------
     partial : RootSet or None
-        Of enumerate_roots with a ``proof_path``: the result of the search, which ran on without a proof.
+        For enumerate_roots with a ``proof_path``: the result of the search, which went on without a proof.
     """
 
     def __init__(self, message: str, partial: Any = None) -> None:

@@ -1,7 +1,7 @@
 """Tasks for the workers of a concurrent.futures executor, and what is known when a worker dies.
 
-Executors say in many ways that a worker is gone: BrokenProcessPool, dask's KilledWorker, a cancelled future. Every
-task here carries what it raised itself in an `_OwnError`; whatever else a future holds was said by its executor.
+Executors report a lost worker in many ways: BrokenProcessPool, dask's KilledWorker, a cancelled future. An error that a
+task here raises itself comes back in an `_OwnError`; any other error in a future was raised by the executor.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class WorkerLost(Exception):  # noqa: N818 (callers turn it into a WorkerError, 
     Attributes
     ----------
     what : str
-        What is the case, in a few words; the text of the error goes on with what the executor says.
+        What happened, in a few words; the error's text adds the executor's own message.
     """
 
     def __init__(self, what: str, said: BaseException | None = None) -> None:
@@ -35,7 +35,7 @@ class WorkerLost(Exception):  # noqa: N818 (callers turn it into a WorkerError, 
 
 
 class _OwnError(Exception):
-    """Carries an error of the task itself, out of the worker."""
+    """Carries the task's own error out of the worker."""
 
     def __init__(self, error: Exception) -> None:
         super().__init__(error)
@@ -43,7 +43,7 @@ class _OwnError(Exception):
 
 
 def submit(executor: Executor, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
-    """The future result of a call by a worker; `result_of` reads it.
+    """The future of a call that a worker makes; `result_of` gives its result.
 
     Raises
     ------
@@ -59,12 +59,12 @@ def submit(executor: Executor, function: Callable[_P, _T], *args: _P.args, **kwa
 
 
 def result_of(future: Future[_T]) -> _T:
-    """The result of a task, waited for; what the task raised is raised here.
+    """Wait for a task and return its result; an error that the task raised is raised here.
 
     Raises
     ------
     WorkerLost
-        The executor has none: the worker died, ran out of memory, or the task was cancelled.
+        There is no result: the worker died, ran out of memory, or the task was cancelled.
     """
     try:
         error = future.exception()
@@ -82,7 +82,7 @@ def result_of(future: Future[_T]) -> _T:
 
 
 def has_result(future: Future[Any]) -> bool:
-    """Whether the result is there without waiting."""
+    """Whether the result is available without waiting."""
     return future.done() and not future.cancelled() and future.exception() is None
 
 
@@ -91,7 +91,7 @@ def _call(function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
     try:
         return function(*args, **kwargs)
     except MemoryError:
-        # says something about the worker, not about the task
+        # about the worker, not about the task
         raise
     except Exception as error:
         raise _OwnError(error) from error

@@ -1,7 +1,7 @@
-"""Data that cannot change: arrays in memory that nobody may write to, and objects whose attributes stay as they are.
+"""Data that cannot change: read-only arrays, and objects whose attributes cannot be set.
 
-A proof, a fingerprint and everything computed once and kept belong to the data they were made of. So what a problem or
-a result holds is copied when it is made, and sealed: writing to it raises, and write access cannot be taken back.
+A proof, a fingerprint and every cached result belong to the data they were computed from. So what a problem or a result
+holds is copied when it is made, and sealed: writing to it raises, and it cannot be made writable again.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 def sealed(array: NDArray[Any]) -> NDArray[Any]:
-    """The array as a read-only copy for good; one that is sealed already comes back as it is.
+    """A copy of the array that stays read-only; an array that is sealed already is returned as it is.
 
-    The copy lives in a bytes object, which Python lets nobody write to: ``setflags(write=True)`` is refused.
+    The copy is held in a bytes object, so that ``setflags(write=True)`` is refused.
     """
     if _is_sealed(array):
         return array
@@ -37,7 +37,7 @@ def _is_sealed(array: NDArray[Any]) -> bool:
 
 
 def _sealed_within(value: Any) -> Any:
-    """Arrays and those in tuples sealed; anything else as it is."""
+    """An array, or the arrays in a tuple, sealed; anything else as it is."""
     if isinstance(value, np.ndarray):
         return value if value.dtype.hasobject else sealed(value)
     if type(value) is tuple and any(isinstance(item, np.ndarray) for item in value):
@@ -46,7 +46,7 @@ def _sealed_within(value: Any) -> Any:
 
 
 class Sealed:
-    """Base of frozen dataclasses: their arrays are sealed, also those of copies and of what was pickled."""
+    """Base of frozen dataclasses: their arrays are sealed, also in copies and after unpickling."""
 
     def __post_init__(self) -> None:
         self.__setstate__(self.__dict__)
@@ -85,8 +85,8 @@ class Immutable:
 class SealedMatrix(Sealed):
     """A sparse matrix whose parts are sealed.
 
-    scipy's matrices let anyone replace their parts (``matrix.data = other``). So this keeps the parts, and every
-    ``matrix()`` is a new object on them, made without copying: what is done to one object reaches no other.
+    The parts of scipy's matrices can be replaced (``matrix.data = other``). So this keeps the parts, and every call of
+    ``matrix()`` makes a new object on them without copying: a change to one object does not reach the others.
 
     Attributes
     ----------
@@ -104,11 +104,11 @@ class SealedMatrix(Sealed):
 
     @classmethod
     def of(cls, matrix: sp.csc_array | sp.csr_array) -> SealedMatrix:
-        """A copy of a matrix; one that ``matrix()`` gave shares its parts."""
+        """A copy of a matrix; a matrix that came from ``matrix()`` shares its parts."""
         if not matrix.has_canonical_format:
             matrix = matrix.copy()
             matrix.sum_duplicates()
-        # with indices of the type that scipy would give them again at every access
+        # in the index type that scipy chooses, or every access would convert the indices again
         again = type(matrix)((matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape, copy=False)
         return cls(again.format, again.data, again.indices, again.indptr, again.shape)
 
@@ -116,6 +116,6 @@ class SealedMatrix(Sealed):
         """A csc_array or csr_array of the sealed parts."""
         kind = sp.csc_array if self.layout == "csc" else sp.csr_array
         matrix = kind((self.data, self.indices, self.indptr), shape=self.shape, copy=False)
-        # known, and so not looked for again in every new object
+        # known here, so that no new object checks it again
         matrix.has_canonical_format = True
         return matrix

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -55,12 +55,61 @@ def contact_status(code: int, u_t: float) -> ContactStatus:
     return STATUSES[code]
 
 
-_SIGNS = {
-    ContactStatus.OPEN: (-1, -1, -1),
-    ContactStatus.STICK: (1, -1, 1),
-    ContactStatus.SLIP_PLUS: (1, 1, 1),
-    ContactStatus.SLIP_MINUS: (1, -1, -1),
+class RowKind(enum.IntEnum):
+    """Rows ``row >= 0`` (or ``= 0``, as an equality) of a contact node; row number = kind * p + node."""
+
+    NORMAL_FORCE = 0  # lambda_n
+    TANGENTIAL_FORCE = 1  # lambda_t
+    CONE_PLUS = 2  # F lambda_n - lambda_t
+    CONE_MINUS = 3  # F lambda_n + lambda_t
+    PENETRATION = 4  # -w_n
+    SLIP_FORWARD = 5  # w_t
+    SLIP_BACKWARD = 6  # -w_t
+
+
+class Conditions(NamedTuple):
+    """Rows that vanish in a status, and rows that are not negative."""
+
+    equations: tuple[RowKind, ...]
+    inequalities: tuple[RowKind, ...]
+
+
+_R = RowKind
+#: What every status imposes, final or not (theory, sections 2.1 and 5.2): the one table that the search reads. Other
+#: rows follow: lambda_n >= 0 in the cone of a node with friction, and the cone at a slip bound.
+CONDITIONS = {
+    OPEN: Conditions((_R.NORMAL_FORCE, _R.TANGENTIAL_FORCE), (_R.PENETRATION,)),
+    STICK: Conditions((_R.PENETRATION, _R.SLIP_FORWARD), (_R.CONE_PLUS, _R.CONE_MINUS)),
+    SLIP_PLUS: Conditions((_R.PENETRATION, _R.CONE_PLUS), (_R.NORMAL_FORCE, _R.SLIP_FORWARD)),
+    SLIP_MINUS: Conditions((_R.PENETRATION, _R.CONE_MINUS), (_R.NORMAL_FORCE, _R.SLIP_BACKWARD)),
+    FRICTIONLESS: Conditions((_R.PENETRATION, _R.TANGENTIAL_FORCE), (_R.NORMAL_FORCE,)),
+    CONTACT: Conditions((_R.PENETRATION,), (_R.CONE_PLUS, _R.CONE_MINUS)),
+    UNDECIDED: Conditions((), (_R.PENETRATION, _R.CONE_PLUS, _R.CONE_MINUS)),
 }
+#: Final statuses of a node with friction, and of one without.
+FINAL = {True: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), False: (OPEN, FRICTIONLESS)}
+#: Signs of the test functions in the final statuses.
+SIGNS = {
+    OPEN: (-1, -1, -1),
+    STICK: (1, -1, 1),
+    SLIP_PLUS: (1, 1, 1),
+    SLIP_MINUS: (1, -1, -1),
+    FRICTIONLESS: (1, 1, 1),
+}
+
+
+def active_within(
+    rows: NDArray[np.float64], friction: Sequence[bool] | NDArray[np.bool_], tolerance: float
+) -> tuple[frozenset[int], ...]:
+    """Per node the final codes whose conditions hold within the tolerance, for values of all rows, shape (7, p)."""
+    zero, held = np.abs(rows) <= tolerance, rows >= -tolerance
+    holds = {
+        code: held[_R.NORMAL_FORCE]
+        & np.all(zero[list(CONDITIONS[code].equations)], axis=0)
+        & np.all(held[list(CONDITIONS[code].inequalities)], axis=0)
+        for code in SIGNS
+    }
+    return tuple(frozenset(code for code in FINAL[bool(friction[i])] if holds[code][i]) for i in range(rows.shape[1]))
 
 
 def sign_array(statuses: Sequence[ContactStatus]) -> NDArray[np.int8]:
@@ -75,6 +124,6 @@ def sign_array(statuses: Sequence[ContactStatus]) -> NDArray[np.int8]:
     [[1, -1, 1], [1, -1, -1]]
     """
     try:
-        return np.array([_SIGNS[status] for status in statuses], dtype=np.int8).reshape(-1, 3)
-    except (KeyError, TypeError):
+        return np.array([SIGNS[STATUSES.index(status)] for status in statuses], dtype=np.int8).reshape(-1, 3)
+    except (ValueError, TypeError):
         raise InvalidArgumentError(f"statuses is {shown(statuses)}; expected a sequence of ContactStatus") from None

@@ -28,7 +28,6 @@ LAYERS = (
     ("branches", "fixed_points"),
     ("continuation",),
     ("fem", "io"),
-    ("gallery3d",),
     ("gallery",),
     (".",),
     ("cli",),
@@ -43,7 +42,6 @@ STRANGERS = {
     "fixed_points": {"checker", "search", "relaxation", "roots"},
     "fem": {"checker", "search", "roots", "branches", "continuation"},
     "io": {"checker", "search", "roots", "branches", "continuation"},
-    "gallery3d": {"checker", "search", "roots", "branches", "continuation"},
     "gallery": {"checker", "search", "roots", "branches", "continuation"},
 }
 

@@ -77,7 +77,7 @@ class Vertex(ContactState):
     border : bool
         It lies at the first or last alpha.
     statuses, active, lambda_n, lambda_t, u_n, u_t
-        See ContactState. Of a family, ``active`` is what holds somewhere on it, and the values are those of one point.
+        As in Root. Of a family, ``active`` is what holds somewhere on it, and the arrays are those at one point of it.
     family : RootFamily or None
     index_left, index_right : int or None
         Sums of the indices of the arcs that end and begin here; equal inside the interval (balance of degrees). None

@@ -130,8 +130,16 @@ def glue(
     for codes in list(known.arcs):
         known.close(codes)
     vertices = _vertices(_joined(known))
-    edges = _edges(known, vertices)
-    return Gluing(exact, a, b, known.arcs, vertices, edges, interrupted, known.reasons)
+    return Gluing(
+        exact=exact,
+        a=a,
+        b=b,
+        arcs=known.arcs,
+        vertices=vertices,
+        edges=_edges(known, vertices),  # may unsettle vertices and add reasons
+        interrupted=interrupted,
+        reasons=known.reasons,
+    )
 
 
 def _work_out(

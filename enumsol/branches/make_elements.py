@@ -53,7 +53,7 @@ def make_arcs(gluing: Gluing) -> list[Arc]:
 
 
 def _slips(exact: ExactPath, edge: GluedArc) -> tuple[int, ...]:
-    """Signs of u_t in the middle of an arc, where any node has no friction that they name."""
+    """Signs of u_t in the middle of an arc, which name the slip of nodes without friction; zeros if there are none."""
     if not any(exact.frictionless):
         return (0,) * exact.p
     solver = FiberSelections(exact, fmpq(edge.sample))

@@ -171,7 +171,7 @@ def _vertex_record(v: Vertex) -> dict[str, Any]:
 
 
 def _fraction(text: str) -> Fraction:
-    """The fraction that str made a text of; no other text, such as one with an exponent of millions."""
+    """The fraction that a text like "-8/3" stands for; others are refused, such as one with an exponent of millions."""
     if _FRACTION.fullmatch(text) is None:
         raise ValueError(f"{text[:20]!r}, which is no fraction")
     return Fraction(text)

@@ -138,18 +138,12 @@ class _WidenedChecker(Checker):
         self.radius = good if good >= SMALLEST else 0.0
         return self.radius > 0
 
-    def _exclusions(self) -> None:
-        if not self._waiting:
-            return
-        numbers, codes, rows, values = zip(*self._waiting, strict=True)
-        self._waiting.clear()
-        leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
-        arrays = (np.array(codes, dtype=np.intp), leaf, np.concatenate(rows))
-        given = np.concatenate(values)
-        sturdy = given * _sturdiest(self.system, *arrays, given)[leaf]
+    def _check_exclusions(self, numbers: NDArray[np.intp], leaves: tuple[Any, ...]) -> None:
+        codes, leaf, rows, given = leaves
+        sturdy = given * _sturdiest(self.system, *leaves)[leaf]
 
         def excluded(system: EnclosedSystem) -> bool:
-            bounds = [exclusion_margins(system, *arrays, multipliers) for multipliers in (given, sturdy)]
+            bounds = [exclusion_margins(system, codes, leaf, rows, values) for values in (given, sturdy)]
             return bool(np.all(np.maximum(*bounds) > 0))
 
         if not self._passes(excluded):

@@ -21,7 +21,7 @@ from enumsol.checks import instance_of, optional_callable
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
-from enumsol.kernel.rows import FRICTIONLESS, UNDECIDED, children_of, row_signs
+from enumsol.kernel.rows import FRICTIONLESS, ROW_KINDS, UNDECIDED, children_of, row_signs
 from enumsol.problem import ContactProblem
 from enumsol.proof.proof_file import Proof, fraction_text
 from enumsol.proof.reading import (
@@ -37,6 +37,8 @@ from enumsol.proof.reading import (
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
 
     from enumsol.checker.rational import RationalSystem
     from enumsol.condensation.data import Data
@@ -244,10 +246,13 @@ class Checker:
         numbers, codes, rows, values = zip(*self._waiting, strict=True)
         self._waiting.clear()
         leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
-        margins = exclusion_margins(
-            self.system, np.array(codes, dtype=np.intp), leaf, np.concatenate(rows), np.concatenate(values)
-        )
-        for number in np.array(numbers)[~(margins > 0)]:
+        arrays = np.array(codes, dtype=np.intp), leaf, np.concatenate(rows), np.concatenate(values)
+        self._check_exclusions(np.array(numbers), arrays)
+
+    def _check_exclusions(self, numbers: NDArray[np.intp], leaves: tuple[Any, ...]) -> None:
+        """``leaves``: codes, leaf, rows and values as exclusion_margins takes them."""
+        margins = exclusion_margins(self.system, *leaves)
+        for number in numbers[~(margins > 0)]:
             self.fail(f"leaf {number}: its multipliers do not exclude it")
 
     def _children(self, codes: tuple[int, ...], record: list[Any]) -> list[tuple[int, ...]]:
@@ -280,7 +285,7 @@ class Checker:
         if len(record) != _ENTRIES[kind]:
             return f"its record has {len(record)} entries; expected {_ENTRIES[kind]}"
         if kind == "x":
-            self._waiting.append((self.leaves, codes, *multipliers_from(record[1:], 7 * self.problem.p)))
+            self._waiting.append((self.leaves, codes, *multipliers_from(record[1:], ROW_KINDS * self.problem.p)))
             return None
         if kind == "X":
             return self._rational_exclusion(codes, record)
@@ -318,9 +323,9 @@ class Checker:
 
     def _rational_exclusion(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         p = self.problem.p
-        rows, values = multipliers_from(record[1:], 7 * p)
+        rows, values = multipliers_from(record[1:], ROW_KINDS * p)
         signs = row_signs(np.array(codes), np.array(self.friction, dtype=float))
-        units = [Fraction(self.length[r % p] if r // p < 4 else self.force[r % p]) for r in range(7 * p)]
+        units = [Fraction(self.length[r % p] if r // p < 4 else self.force[r % p]) for r in range(ROW_KINDS * p)]
         positive = self.rational.energy_bound_positive(signs, rows.tolist(), values.tolist(), units)
         return None if positive else "its multipliers do not exclude it in rational arithmetic"
 

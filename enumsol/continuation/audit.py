@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from enumsol.checks import real_or_nan, shown
 from enumsol.continuation.audit_report import AuditedPoint, AuditReport, Jump, MissedArc
-from enumsol.continuation.graph_map import GraphLike, GraphMap, Place
+from enumsol.continuation.graph_map import GraphLike, GraphMap, Place, PlaceKind
 from enumsol.continuation.path import Path
 from enumsol.continuation.points import Columns, PointRun, read_points
 from enumsol.errors import InvalidArgumentError
@@ -90,7 +90,7 @@ def audit_on(chart: GraphMap, runs: Sequence[PointRun], detour: float) -> AuditR
     tally = _Tally(chart, detour)
     for run in runs:
         tally.add(run)
-    touched = {place.number for place in tally.on if place.kind == "vertex"}
+    touched = {place.number for place in tally.on if place.kind is PlaceKind.VERTEX}
     # the ends of a sheet are parts of it
     single = {v.number for v in graph.vertices if v.family is not None}
     single -= {end for arc in graph.arcs if arc.dimension for end in (arc.tail, arc.head)}
@@ -132,7 +132,7 @@ class _Tally:
         """Place of one point; None unless it lies on the graph."""
         chart, alpha = self.chart, float(run.alpha[k])
         if chart.outside(alpha):
-            place = Place("outside", -1, math.nan)
+            place = Place(PlaceKind.OUTSIDE, -1, math.nan)
             low, high = (float(end) for end in chart.graph.interval)
             verdict, reason = "not compared", f"outside the graph's interval [{low:.10g}, {high:.10g}]"
         else:
@@ -144,12 +144,12 @@ class _Tally:
         if verdict != "on":
             return None
         self.on.append(place)
-        if place.kind == "arc":
+        if place.kind is PlaceKind.ARC:
             self.visited.add(place.number)
         return place
 
     def _branch(self, place: Place) -> int:
-        return self._branch_of.get(place.number, -1) if place.kind == "arc" else -1
+        return self._branch_of.get(place.number, -1) if place.kind is PlaceKind.ARC else -1
 
     def _connect(self, run: PointRun, k: int, points: tuple[Vector, Vector], places: tuple[Place, Place]) -> None:
         """Arcs passed whole between two neighbouring points, or the break between them."""
@@ -175,7 +175,7 @@ class _Tally:
 
 def _between(chart: GraphMap, points: tuple[Vector, Vector], places: tuple[Place, Place]) -> set[int]:
     """The arc that joins two neighbouring vertices on which the points lie: passed although no point is inside."""
-    if places[0].kind != "vertex" or places[1].kind != "vertex" or places[0].number == places[1].number:
+    if any(place.kind is not PlaceKind.VERTEX for place in places) or places[0].number == places[1].number:
         return set()
     ends = {places[0].number, places[1].number}
     joining = [arc for arc in chart.curves if {arc.tail, arc.head} == ends]

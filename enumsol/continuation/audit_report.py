@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.continuation.graph_map import PlaceKind
 from enumsol.roots.root import summary
 
 if TYPE_CHECKING:
@@ -99,7 +100,7 @@ class Jump:
     @property
     def arcs(self) -> tuple[int, int]:
         """Numbers of the arcs on which the points lie; -1 for a vertex."""
-        first, second = (place.number if place.kind == "arc" else -1 for place in self.places)
+        first, second = (place.number if place.kind is PlaceKind.ARC else -1 for place in self.places)
         return first, second
 
 
@@ -239,7 +240,7 @@ class AuditReport:
                 "path": [point.path for point in self.points],
                 "row": np.array([point.row for point in self.points], dtype=np.int64),
                 "alpha": self.alpha,
-                "place": [point.place.kind for point in self.points],
+                "place": [point.place.kind.value for point in self.points],
                 "number": np.array([point.place.number for point in self.points], dtype=np.int64),
                 "branch": np.array([point.branch for point in self.points], dtype=np.int64),
                 "distance": self.distances,
@@ -349,7 +350,7 @@ def _line(item: AuditedPoint | Jump | MissedArc | str) -> str:
     if isinstance(item, Jump):
         if -1 in item.branches:
             ends = " -> ".join(
-                f"{place.kind} {place.number}" + (f" of branch {branch}" if place.kind == "arc" else "")
+                f"{place.kind} {place.number}" + (f" of branch {branch}" if place.kind is PlaceKind.ARC else "")
                 for place, branch in zip(item.places, item.branches, strict=True)
             )
         else:
@@ -362,9 +363,9 @@ def _line(item: AuditedPoint | Jump | MissedArc | str) -> str:
         )
     where = f"path {item.path}, row {item.row}, alpha = {item.alpha:.8g}"
     nearest = {
-        "arc": f"{item.distance:.2e} from arc {item.place.number} of branch {item.branch}",
-        "vertex": f"{item.distance:.2e} from vertex {item.place.number}",
-        "none": "the graph holds no arc",
+        PlaceKind.ARC: f"{item.distance:.2e} from arc {item.place.number} of branch {item.branch}",
+        PlaceKind.VERTEX: f"{item.distance:.2e} from vertex {item.place.number}",
+        PlaceKind.NONE: "the graph holds no arc",
     }[item.place.kind]
     return f"{where}: {nearest}"
 
@@ -375,7 +376,7 @@ def _point_record(point: AuditedPoint) -> dict[str, Any]:
 
 
 def _place_record(place: Place, branch: int) -> dict[str, Any]:
-    return {"place": place.kind, "number": place.number, "branch": branch}
+    return {"place": place.kind.value, "number": place.number, "branch": branch}
 
 
 def _jump_record(jump: Jump) -> dict[str, Any]:

@@ -23,7 +23,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, contact_status
+from enumsol.equation import pieces
+from enumsol.statuses import (
+    CONDITIONS,
+    FRICTIONLESS,
+    OPEN,
+    SIGNS,
+    SLIP_MINUS,
+    SLIP_PLUS,
+    STICK,
+    RowKind,
+    active_within,
+    contact_status,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,13 +55,9 @@ STATUS_TOLERANCE = 1e-9
 #: Interval points at which the size of a load that varies is measured.
 _LOAD_SAMPLES = 9
 
-_ROWS = {
-    OPEN: (False, False, False),
-    STICK: (True, False, True),
-    SLIP_PLUS: (True, True, True),
-    SLIP_MINUS: (True, False, False),
-    FRICTIONLESS: (True, True, True),
-}
+
+#: Rows of the inequalities of every status, -1 where there is one only.
+_KINDS = np.array([[*CONDITIONS[code].inequalities, -1][:2] for code in SIGNS])
 
 
 class CondensedEquation:
@@ -186,19 +194,19 @@ class CondensedEquation:
     def _projected(self, x: Vector, r: Vector) -> Vector:
         """H(x), piece by piece: the projections lose nothing of w where r is small, nor of lambda where it is large."""
         p, w = self.p, self.w(x)
-        closed, slips, count = _pieces(self._test_functions(x, r) > 0)
+        closed, slips, count = pieces(self._test_functions(x, r) > 0)
         bound = self.at(x).F * x[:p]
         tangential = (1 - count) * x[p:-1] - slips * bound - count * r[p:] * w[p:]
         return np.concatenate([np.where(closed, -r[:p] * w[:p], x[:p]), tangential])
 
     def selection(self, codes: Codes) -> NDArray[np.bool_]:
         """Sign rows of the selection in which the nodes have these statuses, shape (p, 3)."""
-        return np.array([_ROWS[code] for code in codes], dtype=bool).reshape(-1, 3)
+        return np.array([SIGNS[code] for code in codes]).reshape(-1, 3) > 0
 
     def selection_residual(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
         """The named selection function of H, shape (2p,), its rows scaled by positive factors to size one."""
         p = self.p
-        closed, slips, count = _pieces(rows)
+        closed, slips, count = pieces(rows)
         lengths, forces = self._shares(count)
         w = self.w(x)
         normal = np.where(closed, -w[:p], x[:p])
@@ -215,7 +223,7 @@ class CondensedEquation:
     def jacobian(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
         """Gradient of the named selection function (see selection_residual), shape (2p, 2p + 1)."""
         p, values = self.p, self.at(x)
-        closed, slips, count = _pieces(rows)
+        closed, slips, count = pieces(rows)
         lengths, forces = self._shares(count)
         share = np.concatenate([closed.astype(float), lengths])
         J = np.empty((2 * p, 2 * p + 1))
@@ -230,73 +238,46 @@ class CondensedEquation:
 
     # -- statuses and their conditions -------------------------------------------------------------------------------
 
+    def _row_values(self, x: Vector) -> Vector:
+        """Values of all rows in the order of RowKind, those of the cone over 1 + F, shape (7, p)."""
+        p, F, w = self.p, self.at(x).F, self.w(x)
+        n, t, cone = x[:p], x[p:-1], 1.0 + F
+        return np.stack([n, t, (F * n - t) / cone, (F * n + t) / cone, -w[:p], w[p:], -w[p:]])
+
     def slacks(self, codes: Codes, x: Vector) -> Vector:
         """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
-        p, F, w = self.p, self.at(x).F, self.w(x)
-        out = np.full((p, 2), np.inf)
-        for i, code in enumerate(codes):
-            if code == OPEN:
-                out[i, 0] = -w[i]
-            elif code == STICK:
-                size = 1.0 + F[i]
-                out[i] = (F[i] * x[i] - x[p + i]) / size, (F[i] * x[i] + x[p + i]) / size
-            else:
-                out[i, 0] = x[i]
-                if code != FRICTIONLESS:
-                    out[i, 1] = w[p + i] if code == SLIP_PLUS else -w[p + i]
-        return out
+        kinds = _KINDS[np.array(codes, dtype=np.intp)]
+        return np.where(kinds < 0, np.inf, self._row_values(x)[kinds, np.arange(self.p)[:, None]])
 
     def slack_gradient(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Vector:
         """Gradient of one slack with respect to x, shape (2p + 1,)."""
         (i, k), p, values = which, self.p, self.at(x)
-        row = np.zeros(2 * p + 1)
-        code = codes[i]
-        if code == OPEN:
-            row[:-1], row[-1] = self.S[i], -values.dg[i]
-        elif code == STICK:
+        row, kind = np.zeros(2 * p + 1), CONDITIONS[codes[i]].inequalities[k]
+        if kind == RowKind.NORMAL_FORCE:
+            row[i] = 1.0
+        elif kind in (RowKind.CONE_PLUS, RowKind.CONE_MINUS):
             F, dF = values.F[i], values.dF[i]
-            sign = 1.0 if k else -1.0
+            sign = -1.0 if kind == RowKind.CONE_PLUS else 1.0
             row[i], row[p + i], row[-1] = F, sign, dF * x[i]
             row /= 1.0 + F
             row[-1] -= dF / (1.0 + F) ** 2 * (F * x[i] + sign * x[p + i])
-        elif k == 0:
-            row[i] = 1.0
         else:
-            sign = 1.0 if code == SLIP_PLUS else -1.0
-            row[:-1], row[-1] = -sign * self.S[p + i], sign * values.dg[p + i]
+            at, sign = (i, -1.0) if kind == RowKind.PENETRATION else (p + i, 1.0)
+            sign = -1.0 if kind == RowKind.SLIP_BACKWARD else sign
+            row[:-1], row[-1] = -sign * self.S[at], sign * values.dg[at]
         return row
 
     def slack_rates(self, codes: Codes, x: Vector, tangent: Vector) -> Vector:
         """Derivatives of the slacks along a tangent, shape (p, 2); zero where there is one condition."""
         out = np.zeros((self.p, 2))
         for i, code in enumerate(codes):
-            for k in range(1 if code in (OPEN, FRICTIONLESS) else 2):
+            for k in range(len(CONDITIONS[code].inequalities)):
                 out[i, k] = self.slack_gradient(codes, x, (i, k)) @ tangent
         return out
 
     def active(self, x: Vector, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
-        p, F, w = self.p, self.at(x).F, self.w(x)
-        cone = 1.0 + F
-        upper, lower = (F * x[:p] - x[p:-1]) / cone, (F * x[:p] + x[p:-1]) / cone
-        result = []
-        for i in range(p):
-            holds = set()
-            if max(abs(x[i]), abs(x[p + i]), w[i]) <= tolerance:
-                holds.add(OPEN)
-            if abs(w[i]) <= tolerance and x[i] >= -tolerance:
-                if self.frictionless[i]:
-                    holds.add(FRICTIONLESS)
-                else:
-                    slip = w[p + i]
-                    if abs(slip) <= tolerance and min(upper[i], lower[i]) >= -tolerance:
-                        holds.add(STICK)
-                    if abs(upper[i]) <= tolerance and slip >= -tolerance:
-                        holds.add(SLIP_PLUS)
-                    if abs(lower[i]) <= tolerance and slip <= tolerance:
-                        holds.add(SLIP_MINUS)
-            result.append(frozenset(holds))
-        return tuple(result)
+        return active_within(self._row_values(x), ~self.frictionless, tolerance)
 
     def codes(self, x: Vector, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
         """Statuses at a solution by the signs of the test functions; ``prefer`` is kept where it holds too."""
@@ -320,11 +301,3 @@ class CondensedEquation:
     def statuses(self, codes: Sequence[int], slip: Vector) -> tuple[ContactStatus, ...]:
         """Names of the statuses; a frictionless node in contact is named by the sign of its u_t."""
         return tuple(contact_status(code, float(u)) for code, u in zip(codes, slip, strict=True))
-
-
-def _pieces(rows: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Vector, Vector]:
-    """Contact, slip sign, and how often the stick piece enters the tangential row (1, 0; -1 for the fourth piece)."""
-    closed, upper, lower = rows[:, 0], rows[:, 1], rows[:, 2]
-    slips = upper.astype(float) - (~lower).astype(float)
-    count = lower.astype(float) - upper.astype(float)
-    return closed, slips, count

@@ -12,9 +12,9 @@ from enumsol.continuation.audit import DETOUR, POINT_TOLERANCE, audit_on
 from enumsol.continuation.audit_report import AuditReport
 from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follow import follow, start_tangents
-from enumsol.continuation.graph_map import GraphMap, checked_graph
+from enumsol.continuation.graph_map import GraphMap, PlaceKind, checked_graph
 from enumsol.continuation.path import Path
-from enumsol.continuation.path_data import PathStats
+from enumsol.continuation.path_data import PathStats, PathStatus
 from enumsol.continuation.points import read_points
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.problem import ContactProblem
@@ -153,7 +153,7 @@ class _Coverage:
     def start(self, start: Any) -> None:
         """Follow a start in both directions unless its arc was passed before."""
         place = self.chart.place(self.chart.point(float(start.alpha), start.lambda_n, start.lambda_t))
-        if place.kind == "arc" and place.distance <= POINT_TOLERANCE and place.number in self.visited:
+        if place.kind is PlaceKind.ARC and place.distance <= POINT_TOLERANCE and place.number in self.visited:
             return
         for direction in (1, -1):
             try:
@@ -162,7 +162,7 @@ class _Coverage:
                 self.failures.append((float(start.alpha), str(error)))
                 continue
             self.paths.append(path)
-            if path.status in ("stalled", "dead end", "step limit"):
+            if path.status in (PathStatus.STALLED, PathStatus.DEAD_END, PathStatus.STEP_LIMIT):
                 self.failures.append((float(path.alpha[-1]), path.message))
             self.visited |= audit_on(self.chart, read_points(path, self.problem), DETOUR).visited
             if self.progress is not None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
+from enumsol.continuation.path_data import PathStatus, PointKind
 from enumsol.continuation.recorder import PathRecorder
 from enumsol.continuation.tangents import curve_tangent, orientation
 from enumsol.continuation.transitions import (
@@ -55,7 +56,7 @@ class _Step:
 
 @dataclass(frozen=True)
 class _Stop:
-    status: str
+    status: PathStatus
     message: str
 
 
@@ -99,7 +100,7 @@ class Follower:
         self._low, self._high = (low - margin) / equation.alpha_scale, (high + margin) / equation.alpha_scale
         self._landmarks = list(_landmarks(equation, visited))
         self.record = PathRecorder(equation)
-        self.record.add(first, "start")
+        self.record.add(first, PointKind.START)
 
     def run(self) -> PathData:
         """Follow until a stop condition is met."""
@@ -109,7 +110,7 @@ class Follower:
                 stop = self._advance()
         except KeyboardInterrupt as interruption:
             message = f"interrupted at alpha = {self._alpha():g}; path.resume() goes on"
-            partial = self._path(_Stop("interrupted", message))
+            partial = self._path(_Stop(PathStatus.INTERRUPTED, message))
             raise Interrupted(f"follow was {message}", partial) from interruption
         return self._path(stop)
 
@@ -132,7 +133,7 @@ class Follower:
     def _advance(self) -> _Stop | None:
         if self.record.stats.accepted >= self.options.max_steps:
             return _Stop(
-                "step limit",
+                PathStatus.STEP_LIMIT,
                 f"the limit of {self.options.max_steps} steps was reached at alpha = {self._alpha():g}; "
                 "path.resume() goes on",
             )
@@ -221,7 +222,8 @@ class Follower:
         equation, options = self.equation, self.options
         if self._friction_ends:
             return _Stop(
-                "friction", f"a friction coefficient becomes negative beyond alpha = {self._alpha():g}; expected F >= 0"
+                PathStatus.FRICTION,
+                f"a friction coefficient becomes negative beyond alpha = {self._alpha():g}; expected F >= 0",
             )
         arrival = next_kink(equation, self.current, self.sign, options.transition_tolerance)
         if arrival is None and not options.check_steps:
@@ -267,7 +269,7 @@ class Follower:
         stop = self._piece(origin, step.end)
         if stop is not None:
             return stop
-        self.record.add(step.end, "step", step.length, step.corrections)
+        self.record.add(step.end, PointKind.STEP, step.length, step.corrections)
         self.current = step.end
         return None
 
@@ -302,7 +304,7 @@ class Follower:
             self._end(CurvePoint(x, end.codes, end.tangent))
         low, high = self.interval
         return _Stop(
-            "interval left",
+            PathStatus.INTERVAL_LEFT,
             f"alpha left the interval ({low:g}, {high:g}) at {self.equation.alpha_scale * value:g}; "
             "path.resume(interval=...) goes on",
         )
@@ -346,18 +348,20 @@ class Follower:
 
     def _end(self, point: CurvePoint) -> None:
         if self.equation.norm(point.x - self.record.points[-1].x) > FORWARD_TOLERANCE:
-            self.record.add(point, "end")
+            self.record.add(point, PointKind.END)
         self.current = point
 
     def _closed(self) -> _Stop:
-        return _Stop("closed", f"the path returned to its start at alpha = {self._alpha():g}: a closed branch")
+        return _Stop(PathStatus.CLOSED, f"the path returned to its start at alpha = {self._alpha():g}: a closed branch")
 
     def _visited(self, x: Vector) -> _Stop:
-        return _Stop("visited", f"the path arrived at a point already visited, at alpha = {self.equation.alpha(x):g}")
+        return _Stop(
+            PathStatus.VISITED, f"the path arrived at a point already visited, at alpha = {self.equation.alpha(x):g}"
+        )
 
     def _stalled(self, reason: str) -> _Stop:
         return _Stop(
-            "stalled",
+            PathStatus.STALLED,
             f"no step of length {self.options.h_min:g} or more was accepted at alpha = {self._alpha():g} ({reason}); "
             "a smaller h_min or h_init may pass, and branch_graph shows which arcs meet there",
         )
@@ -365,7 +369,7 @@ class Follower:
     def _dead_end(self, arrival: CurvePoint, others: int) -> _Stop:
         self._end(arrival)
         return _Stop(
-            "dead end",
+            PathStatus.DEAD_END,
             f"no continuation keeps the orientation at alpha = {self._alpha():g}, where {others} other directions "
             "leave; start anew there with follow(tangent=k)",
         )
@@ -375,7 +379,7 @@ def _landmarks(equation: CondensedEquation, visited: Sequence[PathData]) -> Iter
     """Starts, transition points and ends of other paths, with the statuses on both sides."""
     for path in visited:
         for k, kind in enumerate(path.kinds):
-            if kind == "step":
+            if kind is PointKind.STEP:
                 continue
             x = equation.point(float(path.alpha[k]), np.concatenate([path.lambda_n[k], path.lambda_t[k]]))
             if not math.isfinite(float(np.sum(x))):

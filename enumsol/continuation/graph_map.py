@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -112,22 +113,36 @@ def checked_graph(graph: Any) -> GraphLike:
     return found
 
 
+class PlaceKind(enum.StrEnum):
+    """What a point lies on; members compare with their texts."""
+
+    #: An arc, or a sheet.
+    ARC = "arc"
+    VERTEX = "vertex"
+    #: Not compared, because its alpha is outside the graph's interval.
+    OUTSIDE = "outside"
+    #: The graph has no arc and no vertex.
+    NONE = "none"
+
+    def __repr__(self) -> str:
+        return repr(self.value)
+
+
 @dataclass(frozen=True)
 class Place:
     """Where a point lies.
 
     Attributes
     ----------
-    kind : {"arc", "vertex", "outside", "none"}
-        "arc" may be a sheet. "outside": the point was not compared, because its alpha is outside the graph's interval.
-        "none": the graph has no arc and no vertex.
+    kind : PlaceKind
+        "arc", "vertex", "outside" or "none".
     number : int
         Of the arc or vertex; -1 for none.
     distance : float
         From it, in the lengths of ContinuationOptions [-]; nan outside, infinite for none.
     """
 
-    kind: str
+    kind: PlaceKind
     number: int
     distance: float
 
@@ -186,18 +201,18 @@ class GraphMap:
     def place(self, x: Vector, near: Place | None = None) -> Place:
         """Nearest arc or vertex; the arc of the point before is tried first, until one is close enough."""
         vertex = min(
-            (Place("vertex", number, self.vertex_distance(x, number)) for number in self.vertices),
+            (Place(PlaceKind.VERTEX, number, self.vertex_distance(x, number)) for number in self.vertices),
             key=lambda place: place.distance,
-            default=Place("none", -1, math.inf),
+            default=Place(PlaceKind.NONE, -1, math.inf),
         )
         if vertex.distance <= self.tolerance:
             return self._at_vertex(x, vertex)
-        best = Place("none", -1, math.inf)
+        best = Place(PlaceKind.NONE, -1, math.inf)
         for arc in self._in_order(near):
             if self._gap(x, arc) <= min(best.distance, vertex.distance):
                 distance = self.arc_distance(x, arc)
                 if distance < best.distance:
-                    best = Place("arc", arc.number, distance)
+                    best = Place(PlaceKind.ARC, arc.number, distance)
                 if distance <= self.tolerance:
                     break
         return vertex if vertex.distance < _NEARER * best.distance else best
@@ -206,7 +221,7 @@ class GraphMap:
         """A place at a vertex with the distance from it or from an arc that ends there."""
         ends = [arc for arc in self.curves if place.number in (arc.tail, arc.head)]
         distance = min((self.arc_distance(x, arc) for arc in ends), default=math.inf)
-        return Place("vertex", place.number, min(place.distance, distance))
+        return Place(PlaceKind.VERTEX, place.number, min(place.distance, distance))
 
     def _gap(self, x: Vector, arc: ArcLike) -> float:
         """Distance in alpha alone, a lower bound."""
@@ -216,7 +231,7 @@ class GraphMap:
     def _in_order(self, near: Place | None) -> Iterable[ArcLike]:
         if near is None:
             return self.arcs.values()
-        if near.kind == "arc" and near.number in self.arcs:
+        if near.kind is PlaceKind.ARC and near.number in self.arcs:
             arc = self.arcs[near.number]
             ends, first = {arc.tail, arc.head}, arc.number
         else:
@@ -305,7 +320,7 @@ class GraphMap:
         """
         import networkx as nx  # audits only
 
-        if start.kind == end.kind and start.number == end.number:
+        if start.kind is end.kind and start.number == end.number:
             return 0.0, ()
         best: tuple[float, tuple[int, ...]] = (math.inf, ())
         leave, arrive = self._exits(x, start), self._exits(y, end)
@@ -318,7 +333,7 @@ class GraphMap:
 
     def _exits(self, x: Vector, place: Place) -> dict[int, float]:
         """Vertices next to a point with their distances."""
-        if place.kind == "vertex":
+        if place.kind is PlaceKind.VERTEX:
             return {place.number: 0.0}
         arc = self.arcs[place.number]
         return {number: self.vertex_distance(x, number) for number in (arc.tail, arc.head)}

@@ -6,7 +6,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from enumsol.continuation.follower import Follower
-from enumsol.continuation.path_data import PathData
+from enumsol.continuation.path_data import PathData, PathStatus
 from enumsol.continuation.start import Start
 from enumsol.continuation.storage import load_path, save_path
 from enumsol.continuation.tangents import curve_tangent
@@ -31,7 +31,7 @@ class Path(PathData):
     lambda_n, lambda_t, u_n, u_t : (m, p) arrays
     codes : (m, p) array of status codes
         On which the path leaves each point.
-    kinds : tuple of m str
+    kinds : tuple of m PointKind
         "start", "step", "transition" or "end".
     steps : (m,) array
         Step length that led to the point; 0 where it was located.
@@ -40,8 +40,9 @@ class Path(PathData):
     arclength : (m,) array
         Without units, see ContinuationOptions.
     transitions : tuple of Transition
-    status : str
-        Why the path ended: "interval left", "closed", "visited", "step limit", "friction", "dead end" or "stalled".
+    status : PathStatus
+        Why the path ended: "interval left", "closed", "visited", "step limit", "friction", "dead end", "stalled" or
+        "interrupted".
     message : str
         The same as a sentence, with what may be done.
     orientation : int
@@ -163,7 +164,7 @@ def _resumed(
     """The path and what follows from its end."""
     if problem is None:
         raise InvalidArgumentError("problem is missing; a path loaded from a file needs it: path.resume(problem)")
-    if path.status in ("closed", "dead end"):
+    if path.status in (PathStatus.CLOSED, PathStatus.DEAD_END):
         raise InvalidArgumentError(f"the path cannot go on: {path.message}")
     span = path.interval if interval is None else interval
     start = Start(problem, path[-1], span, path.options if options is None else options, smooth_path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -28,7 +29,39 @@ VERTICAL_TOLERANCE = 1e-9
 _PRINTED_TRANSITIONS = 12
 #: The arrays of a path, one row a point.
 ARRAYS = ("alpha", "lambda_n", "lambda_t", "u_n", "u_t", "codes", "steps", "corrections", "arclength")
-KINDS = ("start", "step", "transition", "end")
+
+
+class PointKind(enum.StrEnum):
+    """How a path came to a point; members compare with their texts."""
+
+    START = "start"
+    #: An accepted step of the paper's Algorithm 5.1; the others were located.
+    STEP = "step"
+    TRANSITION = "transition"
+    END = "end"
+
+    def __repr__(self) -> str:
+        return repr(self.value)
+
+
+class PathStatus(enum.StrEnum):
+    """Why a path ended; members compare with their texts."""
+
+    INTERVAL_LEFT = "interval left"
+    CLOSED = "closed"
+    #: It arrived at a point that another path has passed.
+    VISITED = "visited"
+    STEP_LIMIT = "step limit"
+    #: A friction coefficient becomes negative.
+    FRICTION = "friction"
+    #: No direction keeps the orientation.
+    DEAD_END = "dead end"
+    #: No step was accepted, however short.
+    STALLED = "stalled"
+    INTERRUPTED = "interrupted"
+
+    def __repr__(self) -> str:
+        return repr(self.value)
 
 
 @dataclass(frozen=True)
@@ -42,8 +75,8 @@ class PathPoint(Sealed):
         As in Root.
     statuses : tuple of p ContactStatus
         The selection on which the path leaves the point.
-    kind : {"start", "step", "transition", "end"}
-        "step" is an accepted step of the paper's Algorithm 5.1; the others were located.
+    kind : PointKind
+        "start", "step" (an accepted step of the paper's Algorithm 5.1), "transition" or "end".
     """
 
     alpha: float
@@ -52,7 +85,7 @@ class PathPoint(Sealed):
     u_n: NDArray[np.float64]
     u_t: NDArray[np.float64]
     statuses: tuple[ContactStatus, ...]
-    kind: str
+    kind: PointKind
 
 
 @dataclass(frozen=True)
@@ -135,12 +168,12 @@ class PathData(Sequence[PathPoint], Sealed):
     u_n: NDArray[np.float64]
     u_t: NDArray[np.float64]
     codes: NDArray[np.int8]
-    kinds: tuple[str, ...]
+    kinds: tuple[PointKind, ...]
     steps: NDArray[np.float64]
     corrections: NDArray[np.int64]
     arclength: NDArray[np.float64]
     transitions: tuple[Transition, ...]
-    status: str
+    status: PathStatus
     message: str
     orientation: int
     interval: tuple[float, float]
@@ -200,7 +233,7 @@ class PathData(Sequence[PathPoint], Sealed):
     @property
     def closed(self) -> bool:
         """The path returned to its start."""
-        return self.status == "closed"
+        return self.status is PathStatus.CLOSED
 
     # -- output ------------------------------------------------------------------------------------------------------
 
@@ -215,7 +248,7 @@ class PathData(Sequence[PathPoint], Sealed):
         nodes = labels if len(set(labels)) == len(labels) else range(len(labels))
         columns: dict[str, Any] = {
             "alpha": self.alpha,
-            "kind": list(self.kinds),
+            "kind": [kind.value for kind in self.kinds],
             "step": self.steps,
             "corrections": self.corrections,
             "arclength": self.arclength,

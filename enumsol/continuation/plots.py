@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from enumsol.checks import one_of, row_number
+from enumsol.continuation.path_data import PointKind
 from enumsol.errors import InvalidArgumentError
 from enumsol.figures import new_figure
 
@@ -26,7 +27,7 @@ def draw_path(path: PathData, graph: Any, node: int, quantity: str, ax: Any, gra
     elif ax is None:
         ax = new_figure().subplots()
     values = getattr(path, quantity)[:, node]
-    dots = [k for k, kind in enumerate(path.kinds) if kind in ("step", "end")]
+    dots = [k for k, kind in enumerate(path.kinds) if kind in (PointKind.STEP, PointKind.END)]
     ax.plot(path.alpha[dots], values[dots], ".", color="black", markersize=3, label="steps", zorder=3)
     folds = {item.point for item in path.folds}
     for marker, label, chosen in (

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.continuation.path_data import PathData, PathStats, Transition
+from enumsol.continuation.path_data import PathData, PathStats, PathStatus, PointKind, Transition
 from enumsol.errors import TooLargeError
 from enumsol.roots.local_branch import coherent_orientation
 
@@ -29,7 +29,7 @@ class PathRecorder:
 
     equation: CondensedEquation
     points: list[CurvePoint] = field(default_factory=list)
-    kinds: list[str] = field(default_factory=list)
+    kinds: list[PointKind] = field(default_factory=list)
     steps: list[float] = field(default_factory=list)
     corrections: list[int] = field(default_factory=list)
     arclength: list[float] = field(default_factory=list)
@@ -37,7 +37,7 @@ class PathRecorder:
     stats: PathStats = field(default_factory=PathStats)
     started: float = field(default_factory=time.perf_counter)
 
-    def add(self, point: CurvePoint, kind: str, step: float = 0.0, corrections: int = 0) -> None:
+    def add(self, point: CurvePoint, kind: PointKind, step: float = 0.0, corrections: int = 0) -> None:
         """Append a point; a point equal to the last one replaces it (the end of a path at a step or a transition)."""
         length = self.equation.norm(point.x - self.points[-1].x) if self.points else 0.0
         self.arclength.append(length + (self.arclength[-1] if self.arclength else 0.0))
@@ -49,7 +49,7 @@ class PathRecorder:
     def add_kink(self, kink: Kink) -> None:
         """Append a transition point, with its local branch test."""
         equation, before, after = self.equation, kink.before, kink.after
-        self.add(after, "transition")
+        self.add(after, PointKind.TRANSITION)
         scale = equation.alpha_scale
         self.transitions.append(
             Transition(
@@ -71,7 +71,7 @@ class PathRecorder:
 
     def path(
         self,
-        status: str,
+        status: PathStatus,
         message: str,
         *,
         orientation: int,

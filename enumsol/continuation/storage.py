@@ -10,7 +10,7 @@ import numpy as np
 
 from enumsol.checks import file_path
 from enumsol.continuation.options import ContinuationOptions
-from enumsol.continuation.path_data import ARRAYS, PathData, PathStats, Transition
+from enumsol.continuation.path_data import ARRAYS, PathData, PathStats, PathStatus, PointKind, Transition
 from enumsol.errors import InvalidArgumentError
 from enumsol.files import writing
 from enumsol.roots.local_branch import LocalBranchTest
@@ -67,9 +67,9 @@ def _unpacked(meta: dict[str, Any], arrays: dict[str, Any]) -> PathData:
     low, high = meta["interval"]
     return PathData(
         **arrays,
-        kinds=tuple(meta["kinds"]),
+        kinds=tuple(PointKind(kind) for kind in meta["kinds"]),
         transitions=tuple(_unpack(item) for item in meta["transitions"]),
-        status=meta["status"],
+        status=PathStatus(meta["status"]),
         message=meta["message"],
         orientation=meta["orientation"],
         interval=(float(low), float(high)),

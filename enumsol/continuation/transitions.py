@@ -23,6 +23,8 @@ from enumsol.continuation.tangents import (
 from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
 
 #: Conditions within this of zero hold with equality at a located transition point.
@@ -159,17 +161,24 @@ def confirm(
     return Kink(before, after) if same_curve(equation, after, end) else None
 
 
-def next_kink(equation: CondensedEquation, start: CurvePoint, sign: int, tolerance: float) -> CurvePoint | None:
-    """The nearest point ahead at which the curve of ``start`` stops being admissible; near zeros are tried first."""
-    slacks = equation.slacks(start.codes, start.x)
-    rates = equation.slack_rates(start.codes, start.x, start.tangent)
+def _vanishing(
+    equation: CondensedEquation, point: CurvePoint, size: Callable[[Vector], Vector]
+) -> Iterator[tuple[int, int]]:
+    """Slacks that fall along the tangent, in the order of the distances ``size`` of the slack by its rate."""
+    slacks = equation.slacks(point.codes, point.x)
+    rates = equation.slack_rates(point.codes, point.x, point.tangent)
     distances = np.full(slacks.shape, np.inf)
     falling = rates < -RATE_TOLERANCE
-    distances[falling] = np.maximum(slacks[falling], 0.0) / -rates[falling]
-    order = np.argsort(distances, axis=None, kind="stable")
-    for flat in order[: int(np.sum(falling))]:
+    distances[falling] = size(slacks[falling]) / -rates[falling]
+    for flat in np.argsort(distances, axis=None, kind="stable")[: int(np.sum(falling))]:
         i, k = np.unravel_index(flat, slacks.shape)
-        point = locate(equation, start, (int(i), int(k)), sign, tolerance)
+        yield int(i), int(k)
+
+
+def next_kink(equation: CondensedEquation, start: CurvePoint, sign: int, tolerance: float) -> CurvePoint | None:
+    """The nearest point ahead at which the curve of ``start`` stops being admissible; near zeros are tried first."""
+    for which in _vanishing(equation, start, lambda slacks: np.maximum(slacks, 0.0)):
+        point = locate(equation, start, which, sign, tolerance)
         if point is not None:
             return point
     return None
@@ -182,15 +191,8 @@ def passed_kink(
 
     Corrections that stop at eps may end a little beyond a fold, where H is small and no solution is.
     """
-    slacks = equation.slacks(start.codes, start.x)
-    rates = equation.slack_rates(start.codes, start.x, start.tangent)
-    distances = np.full(slacks.shape, np.inf)
-    falling = rates < -RATE_TOLERANCE
-    distances[falling] = np.abs(slacks[falling] / rates[falling])
-    order = np.argsort(distances, axis=None, kind="stable")
-    for flat in order[: int(np.sum(falling))]:
-        i, k = np.unravel_index(flat, slacks.shape)
-        x = smooth_newton(equation, start.codes, start.x, (int(i), int(k)), 0.0, tolerance)
+    for which in _vanishing(equation, start, np.abs):
+        x = smooth_newton(equation, start.codes, start.x, which, 0.0, tolerance)
         if x is None or equation.norm(x - start.x) > reach:
             continue
         if np.min(equation.slacks(start.codes, x)) >= -ACTIVE_TOLERANCE:

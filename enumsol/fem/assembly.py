@@ -58,7 +58,7 @@ def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]
     Raises
     ------
     InvalidArgumentError
-        The mesh is not one (shapes, node numbers, a triangle without area) or the coefficients are not admissible.
+        The mesh is not valid (shapes, node numbers, a triangle without area) or the coefficients are not admissible.
 
     Examples
     --------
@@ -76,7 +76,7 @@ def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]
     cells = elements(triangles, "triangles", 3, len(nodes))
     _check_areas(nodes, cells)
     check_every_node_is_used(cells, len(nodes), "triangles", "triangle")
-    # sorting is ours, so that scikit-fem has no reason to renumber or to log
+    # sorted here, so that scikit-fem neither renumbers nor logs
     mesh = MeshTri(np.ascontiguousarray(nodes.T), np.ascontiguousarray(np.sort(cells, axis=1).T))
     basis = Basis(mesh, ElementVector(ElementTriP1()), intorder=0)
     return by_nodes(linear_elasticity(lam, mu).assemble(basis), basis)
@@ -287,7 +287,7 @@ def _tangents(tangents: ArrayLike | None, normal: NDArray[np.float64]) -> NDArra
         return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
     tangent = unit_vectors(vectors_of_all(tangents, "tangents", normal.shape), "tangents")
     skew = np.abs(np.sum(tangent * normal, axis=1))
-    if np.any(skew > 1e-12):  # both have length one: this is the cosine between them, up to rounding
+    if np.any(skew > 1e-12):  # of unit vectors, the cosine of the angle between them, up to rounding
         k = int(np.argmax(skew))
         raise InvalidArgumentError(f"tangents row {k} is not perpendicular to normals row {k}; expected right angles")
     return tangent

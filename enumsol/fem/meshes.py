@@ -14,7 +14,7 @@ from enumsol.errors import InvalidArgumentError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-#: Most cells along one side of a mesh.
+#: Largest number of cells along one side of a mesh.
 MOST_CELLS = 10_000
 
 
@@ -111,7 +111,7 @@ def edges_along(nodes: ArrayLike) -> NDArray[np.int64]:
     Raises
     ------
     InvalidArgumentError
-        They are no node numbers in a row.
+        The nodes are not an array (k,) of integers.
 
     Examples
     --------

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, gamma
+from enumsol.arithmetic.balls import SAFE
 from enumsol.condensation.enclosure import CondensedEnclosure
-from enumsol.kernel.point import energy_bounds
-from enumsol.kernel.rows import FORBIDDEN, NONNEGATIVE, UNDECIDED, row_table
+from enumsol.kernel.point import margins
+from enumsol.kernel.rows import ROW_KINDS, UNDECIDED, row_table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.problem import ContactProblem
 
-KINDS = 9
+KINDS = ROW_KINDS + 2
 #: Table of rows.row_table with kinds 7 and 8; then slip+ and slip- at a node whose friction varies.
 _CONSTANT = np.hstack([row_table(), np.zeros((8, 2), dtype=np.int8)])
 _VARYING = _CONSTANT.copy()
@@ -122,47 +122,6 @@ def interval_exclusion_margins(
     -------
     (m,) array
     """
-    # what overflows gives no bound
-    with np.errstate(over="ignore", invalid="ignore"):
-        return _margins(piece, codes, leaf, rows, values, errors)
-
-
-def _margins(
-    piece: EnclosedPiece,
-    codes: NDArray[np.intp],
-    leaf: NDArray[np.intp],
-    rows: NDArray[np.intp],
-    values: Array,
-    errors: float,
-) -> Array:
-    m, p = codes.shape
-    low, high = piece.low, piece.high
-    bad = (rows < 0) | (rows >= KINDS * p) | ~np.isfinite(values)
-    rows, values = np.where(bad, 0, rows), np.where(bad, 0.0, values)
-    kind, node = np.divmod(rows, p)
-    code = np.where((codes == UNDECIDED) & (high == 0), 7, codes)
-    signs = np.where((low == high)[:, None], _CONSTANT[code], _VARYING[code])[leaf, node, kind]
-    bad |= (signs == FORBIDDEN) | ((signs == NONNEGATIVE) & (values < 0))
-    refused = np.bincount(leaf[bad], minlength=m) > 0
-    place = leaf * (KINDS * p) + rows
-    size = KINDS * p * m
-    table = np.bincount(place, values, minlength=size).reshape(m, KINDS, p)
-    reach = np.bincount(place, np.abs(values), minlength=size).reshape(m, KINDS, p)
-    y = np.hstack([table[:, 4], table[:, 6] - table[:, 5]])
-    normal = table[:, 0] + high * (table[:, 2] + table[:, 3]) - low * (table[:, 7] + table[:, 8])
-    tangential = table[:, 1] - table[:, 2] + table[:, 3] + table[:, 7] - table[:, 8]
-    c = np.hstack([normal, tangential])
-    c_size = np.hstack(
-        [
-            reach[:, 0] + high * (reach[:, 2] + reach[:, 3]) + low * (reach[:, 7] + reach[:, 8]),
-            reach[:, 1] + reach[:, 2] + reach[:, 3] + reach[:, 7] + reach[:, 8],
-        ]
-    )
-    # a component of c is a sum over at most five kinds of rows, each repeated at most so often
-    repeated = int(np.bincount(place, minlength=1).max())
-    c_rad = gamma(5 * repeated + 8) * c_size
-    # where friction is constant a cone row may be an equation, and its coefficient must be the exact one
-    constant_rad = np.max([end.F_rad for end in piece.ends], axis=0) * (low == high)
-    c_rad[:, :p] += constant_rad * (reach[:, 2] + reach[:, 3])
-    bounds = np.min([energy_bounds(end, y, c, c_rad * SAFE, errors) for end in piece.ends], axis=0)
-    return np.where(refused | ~np.isfinite(bounds), -np.inf, bounds)
+    code = np.where((codes == UNDECIDED) & (piece.high == 0), 7, codes)
+    allowed = np.where((piece.low == piece.high)[:, None], _CONSTANT[code], _VARYING[code])
+    return margins(piece.ends, allowed, (piece.low, piece.high), leaf, rows, values, errors)

@@ -15,10 +15,11 @@ from scipy.linalg.lapack import dgetrf, dtrtri
 
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma, upper_norm, upper_sum
 from enumsol.kernel.rows import (
+    CONDITIONS,
     FORBIDDEN,
-    FRICTIONLESS,
     NONNEGATIVE,
     OPEN,
+    ROW_KINDS,
     SLIP_MINUS,
     SLIP_PLUS,
     STICK,
@@ -74,42 +75,59 @@ def exclusion_margins(
     -------
     (m,) array
     """
-    with np.errstate(over="ignore", invalid="ignore"):
-        return _margins(system, codes, leaf, rows, values, errors)
+    return margins((system,), row_signs(codes, system.F), (system.F, system.F), leaf, rows, values, errors)
 
 
-def _margins(
-    system: EnclosedSystem,
-    codes: NDArray[np.intp],
+def margins(
+    ends: Sequence[EnclosedSystem],
+    allowed: NDArray[np.int8],
+    friction: tuple[Array, Array],
     leaf: NDArray[np.intp],
     rows: NDArray[np.intp],
     values: Array,
     errors: float,
 ) -> Array:
-    m, p = codes.shape
-    bad = (rows < 0) | (rows >= 7 * p) | ~np.isfinite(values)
-    rows = np.where(bad, 0, rows)
-    values = np.where(bad, 0.0, values)
+    """Bounds as of exclusion_margins that hold at all ``ends``, -inf where one is not finite.
+
+    Parameters
+    ----------
+    ends : systems that differ in g only, and in F, which enters by its bounds
+    allowed : (m, p, kinds) array, what the multipliers may be: seven kinds of rows, or nine over an interval
+    friction : two (p,) arrays, the smallest and the largest coefficients; equal where friction is constant
+    """
+    m, p, kinds = allowed.shape
+    low, high = friction
+    bad = (rows < 0) | (rows >= kinds * p) | ~np.isfinite(values)
+    rows, values = np.where(bad, 0, rows), np.where(bad, 0.0, values)
     kind, node = np.divmod(rows, p)
-    signs = row_signs(codes, system.F)[leaf, node, kind]
+    signs = allowed[leaf, node, kind]
     bad |= (signs == FORBIDDEN) | ((signs == NONNEGATIVE) & (values < 0))
     refused = np.bincount(leaf[bad], minlength=m) > 0
     # one table a leaf with a row for each kind; several multipliers of a row add up
-    place = leaf * (7 * p) + rows
-    table = np.bincount(place, values, minlength=7 * p * m).reshape(m, 7, p)
-    size = np.bincount(place, np.abs(values), minlength=7 * p * m).reshape(m, 7, p)
-    cone_size = size[:, 2] + size[:, 3]
-    y = np.hstack([table[:, 4], table[:, 6] - table[:, 5]])
-    c = np.hstack([table[:, 0] + system.F * (table[:, 2] + table[:, 3]), table[:, 1] - table[:, 2] + table[:, 3]])
-    c_size = np.hstack([size[:, 0] + system.F * cone_size, size[:, 1] + cone_size])
-    # The rounded y is as good a choice of multipliers as the exact one: every component belongs to rows of one sign, or
-    # to rows that are free, and sums of one sign keep it. c is not free in this way: cone rows tie its two halves by F.
-    # a component of c is a sum over at most four kinds of rows, each repeated at most so often
-    repeated = int(np.bincount(place, minlength=1).max())
-    c_rad = gamma(4 * repeated + 8) * c_size
-    c_rad[:, :p] += system.F_rad * cone_size
-    bound = energy_bounds(system, y, c, c_rad * SAFE, errors)
-    return np.where(refused | ~np.isfinite(bound), -np.inf, bound)
+    place, count = leaf * (kinds * p) + rows, kinds * p * m
+    table = np.bincount(place, values, minlength=count).reshape(m, kinds, p)
+    size = np.bincount(place, np.abs(values), minlength=count).reshape(m, kinds, p)
+    # what overflows gives no bound
+    with np.errstate(over="ignore", invalid="ignore"):
+        cone_size = size[:, 2] + size[:, 3]
+        y = np.hstack([table[:, 4], table[:, 6] - table[:, 5]])
+        normal, tangential = table[:, 0] + high * (table[:, 2] + table[:, 3]), table[:, 1] - table[:, 2] + table[:, 3]
+        normal_size, tangential_size = size[:, 0] + high * cone_size, size[:, 1] + cone_size
+        if kinds > ROW_KINDS:
+            normal, tangential = normal - low * (table[:, 7] + table[:, 8]), tangential + table[:, 7] - table[:, 8]
+            least_size = size[:, 7] + size[:, 8]
+            normal_size, tangential_size = normal_size + low * least_size, tangential_size + least_size
+        c, c_size = np.hstack([normal, tangential]), np.hstack([normal_size, tangential_size])
+        # The rounded y is as good a choice of multipliers as the exact one: every component belongs to rows of one
+        # sign, or to rows that are free, and sums of one sign keep it. c is not free in this way: cone rows tie its two
+        # halves by F. A component of c is a sum over at most five kinds of rows, four at one alpha, each repeated at
+        # most so often.
+        repeated = int(np.bincount(place, minlength=1).max())
+        c_rad = gamma((5 if kinds > ROW_KINDS else 4) * repeated + 8) * c_size
+        # where friction is constant a cone row may be an equation, and its coefficient must be the exact one
+        c_rad[:, :p] += np.max([end.F_rad for end in ends], axis=0) * (low == high) * cone_size
+        bounds = np.min([energy_bounds(end, y, c, c_rad * SAFE, errors) for end in ends], axis=0)
+    return np.where(refused | ~np.isfinite(bounds), -np.inf, bounds)
 
 
 def energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array, errors: float = 1.0) -> Array:
@@ -351,22 +369,11 @@ def _conditions(
     sign: int,
 ) -> VerifiedSelection:
     p = system.p
-    slack, rad = [], []
-    for i, code in enumerate(codes):
-        n, t = force[i], force[p + i]
-        if code == OPEN:
-            slack.append(-w[i])
-            rad.append(w_rad[i])
-        elif code == STICK:
-            reach = system.F[i] * n
-            error = system.F[i] * force_rad[i] + system.F_rad[i] * (abs(n) + force_rad[i]) + force_rad[p + i]
-            error = (error + 4 * UNIT * (abs(reach) + abs(t))) * SAFE + TINY
-            slack += [reach - t, reach + t]
-            rad += [error, error]
-        else:
-            slack.append(n)
-            rad.append(force_rad[i])
-            if code != FRICTIONLESS:
-                slack.append(w[p + i] if code == SLIP_PLUS else -w[p + i])
-                rad.append(w_rad[p + i])
-    return VerifiedSelection(force, force_rad, w, w_rad, np.array(slack), np.array(rad), sign)
+    (n, t), (n_rad, t_rad) = force.reshape(2, p), force_rad.reshape(2, p)
+    reach = system.F * n
+    cone_rad = system.F * n_rad + system.F_rad * (np.abs(n) + n_rad) + t_rad
+    cone_rad = (cone_rad + 4 * UNIT * (np.abs(reach) + np.abs(t))) * SAFE + TINY
+    values = np.stack([n, t, reach - t, reach + t, -w[:p], w[p:], -w[p:]])
+    radii = np.stack([n_rad, t_rad, cone_rad, cone_rad, w_rad[:p], w_rad[p:], w_rad[p:]])
+    kinds, nodes = np.array([(kind, i) for i, code in enumerate(codes.tolist()) for kind in CONDITIONS[code][1]]).T
+    return VerifiedSelection(force, force_rad, w, w_rad, values[kinds, nodes], radii[kinds, nodes], sign)

@@ -1,7 +1,7 @@
 """The proof's vocabulary: status codes, rows, which multipliers are allowed, and how branchings split an assignment.
 
 This module states the mathematics that a reader of a proof has to agree with (theory, sections 5.2, 5.4); it holds no
-algorithm.
+algorithm. It is the checkers' own copy of the table in ``enumsol.statuses``, which the search reads.
 
 Status codes: 0 open, 1 stick, 2 slip+, 3 slip-, 4 in contact at a node with F = 0, 5 in contact, 6 undecided.
 
@@ -18,10 +18,21 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+#: Rows of a node at one alpha.
+ROW_KINDS = 7
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
 
 #: What a multiplier of a row may be: the row is not imposed; it holds as an inequality; it holds as an equation.
 FORBIDDEN, NONNEGATIVE, FREE = 0, 1, 2
+
+#: Of every final status, by kinds of rows, its two equations and its inequalities; its other rows follow from these.
+CONDITIONS = {
+    OPEN: ((0, 1), (4,)),
+    STICK: ((4, 5), (2, 3)),
+    SLIP_PLUS: ((4, 2), (0, 5)),
+    SLIP_MINUS: ((4, 3), (0, 6)),
+    FRICTIONLESS: ((4, 1), (0,)),
+}
 
 # columns are the kinds of rows 0..6, rows the status codes; last: undecided at a node with F = 0
 _ROWS = np.array(

@@ -148,7 +148,7 @@ cdef class BranchingRule:
         Friction coefficients.
     slip_rows, slip_modes : (2, p) int arrays
         The row, and its mode, that puts lambda_t on the slip bound in slip+ and in slip-. Other rows are numbered
-        kind * p + node as in enumsol.relaxation.rows.RowKind.
+        kind * p + node as in enumsol.statuses.RowKind.
     candidates : int
         How many nodes are looked at.
     """

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.relaxation.engine import BRANCHING_CANDIDATES, FEASIBILITY_TOLERANCE, PRUNE_MARGIN, Relaxation
-from enumsol.relaxation.rows import EQUALITY, INEQUALITY, RowKind, row_terms
+from enumsol.relaxation.rows import EQUALITY, INEQUALITY, row_terms
+from enumsol.statuses import RowKind
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

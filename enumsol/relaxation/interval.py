@@ -22,8 +22,8 @@ from enumsol.condensation.condensed import CondensedSystem, ScaledSystem
 from enumsol.errors import InvalidProblemError, MissingDependencyError
 from enumsol.relaxation.active_set import CompiledEngine
 from enumsol.relaxation.engine import BRANCHING_CANDIDATES, COMPILED
-from enumsol.relaxation.rows import EQUALITY, INEQUALITY, RowKind, row_terms, status_rows
-from enumsol.statuses import CONTACT, FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, UNDECIDED
+from enumsol.relaxation.rows import EQUALITY, INEQUALITY, row_terms, status_rows
+from enumsol.statuses import CONDITIONS, SLIP_MINUS, SLIP_PLUS, RowKind
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -43,22 +43,7 @@ class IntervalRowKind(enum.IntEnum):
 
 
 _R, _I = RowKind, IntervalRowKind
-_SLIP_ROWS: dict[int, tuple[tuple[int, int], ...]] = {
-    SLIP_PLUS: (
-        (_R.PENETRATION, EQUALITY),
-        (_R.NORMAL_FORCE, INEQUALITY),
-        (_R.CONE_PLUS, INEQUALITY),
-        (_I.SLIP_AT_LEAST_PLUS, INEQUALITY),
-        (_R.SLIP_FORWARD, INEQUALITY),
-    ),
-    SLIP_MINUS: (
-        (_R.PENETRATION, EQUALITY),
-        (_R.NORMAL_FORCE, INEQUALITY),
-        (_R.CONE_MINUS, INEQUALITY),
-        (_I.SLIP_AT_LEAST_MINUS, INEQUALITY),
-        (_R.SLIP_BACKWARD, INEQUALITY),
-    ),
-}
+_LEAST = {SLIP_PLUS: _I.SLIP_AT_LEAST_PLUS, SLIP_MINUS: _I.SLIP_AT_LEAST_MINUS}
 
 
 def interval_rows(code: int, *, friction: bool, constant: bool) -> tuple[tuple[int, int], ...]:
@@ -70,8 +55,9 @@ def interval_rows(code: int, *, friction: bool, constant: bool) -> tuple[tuple[i
     friction : F_hi > 0
     constant : F_lo = F_hi, so that a slipping node's bound is an equation
     """
-    if code in _SLIP_ROWS and not constant:
-        return _SLIP_ROWS[code]
+    if code in _LEAST and not constant:
+        (contact, bound), (force, slip) = CONDITIONS[code]
+        return (contact, EQUALITY), *((kind, INEQUALITY) for kind in (force, bound, _LEAST[code], slip))
     return status_rows(code, friction=friction)
 
 
@@ -201,12 +187,3 @@ def _slip_rows(system: IntervalSystem) -> tuple[NDArray[np.intp], NDArray[np.int
     rows = np.where(constant, equal, least) * p + np.arange(p)
     modes = np.broadcast_to(np.where(constant, EQUALITY, INEQUALITY), (2, p))
     return rows, modes.astype(np.int8)
-
-
-def imposed_interval_rows(code: int, *, friction: bool, constant: bool) -> dict[int, int]:
-    """Mode of every row that holds in a (partial) status on an interval, those implied by others included."""
-    rows: dict[int, int] = dict.fromkeys((_R.NORMAL_FORCE, _R.CONE_PLUS, _R.CONE_MINUS, _R.PENETRATION), INEQUALITY)
-    rows |= dict(interval_rows(code, friction=friction, constant=constant))
-    if code not in (CONTACT, UNDECIDED, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS) and _R.TANGENTIAL_FORCE in rows:
-        rows |= dict.fromkeys((_R.CONE_PLUS, _R.CONE_MINUS), EQUALITY)
-    return rows

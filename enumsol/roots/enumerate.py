@@ -32,7 +32,7 @@ from enumsol.search.parallel import run_parallel
 from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.search.tree import SearchLimits, SearchOutcome, SearchProgress, TreeSearch
-from enumsol.selections.floats import SIGN_TOLERANCE, FloatSelections
+from enumsol.selections.floats import SIGN_TOLERANCE
 from enumsol.selections.solution import SelectionSolution
 
 if TYPE_CHECKING:
@@ -154,9 +154,6 @@ class _Enumeration:
         self.started = time.perf_counter()
         self.outcome = SearchOutcome()
         self.at_rest: AtRest | None = None
-        self.solver: SelectionSolver = solvers.floats
-        if solvers.arithmetic == "exact" and solvers.exact is not None:
-            self.solver = solvers.exact
         self.writer: ProofWriter | None = None
         if solvers.arithmetic == "verified":
             self.writer = ProofWriter(proof_path)
@@ -219,11 +216,9 @@ class _Enumeration:
 
     def _exhaustive(self, limits: SearchLimits) -> None:
         outcome, reported = self.outcome, self.started
-        if isinstance(self.solver, FloatSelections):
-            stream = exhaustive_float(self.solvers.scaled, self.solver)
-        else:
-            stream = exhaustive_exact(self.solver)
-        total = math.prod(4 if positive else 2 for positive in self.solver.F_positive)
+        floats, exact = self.solvers.floats, self.solvers.exact if self.solvers.arithmetic == "exact" else None
+        stream = exhaustive_float(self.solvers.scaled, floats) if exact is None else exhaustive_exact(exact)
+        total = math.prod(4 if positive else 2 for positive in (exact or floats).F_positive)
         for outcome.selections, solution in stream:
             if solution is not None:
                 outcome.solutions.append(solution)

@@ -89,8 +89,11 @@ class Root(ContactState):
 
     Attributes
     ----------
-    alpha, statuses, active, lambda_n, lambda_t, u_n, u_t
-        See ContactState.
+    alpha : float or Fraction
+    statuses, active : tuples of p ContactStatus, and of p frozensets of them
+        The first and all that hold at every node.
+    lambda_n, lambda_t, u_n, u_t : (p,) arrays
+        Contact forces [force], Bn u - gap and Bt u - slip_offset [length]; see ContactState.
     index : int or None
         Local degree (theory, section 6.7): sign det of the selection at a regular root. It says nothing about physical
         stability. None when it could not be found within the limits of the local analysis.

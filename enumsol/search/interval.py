@@ -141,8 +141,8 @@ class _Collector(WithoutProof):
         self.new += codes not in self._known
 
 
-class _Uncounted(_Collector):
-    """The certifier of a tree whose size only is asked for."""
+class _SizeOnly(_Collector):
+    """The certifier of a tree of which only the size is wanted."""
 
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         del codes, relaxation
@@ -299,7 +299,7 @@ class IntervalSearch:
         """Nodes of the tree at one alpha."""
         piece = Piece(alpha, alpha)
         system = self._system(piece)
-        certifier = _Uncounted(SearchedPiece(piece, system, []), self._leaves, set())
+        certifier = _SizeOnly(SearchedPiece(piece, system, []), self._leaves, set())
         limits = SearchLimits(max_nodes=self._max_nodes, deadline=self._deadline)
         outcome = IntervalTreeSearch(system, certifier, limits).run()
         self.nodes += outcome.nodes

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import cho_solve
 
 from enumsol.selections.solution import MAX_BASES, ActiveSets, Codes, SelectionSolution, VertexLimitError
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, active_within
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -162,23 +162,8 @@ class FloatSelections:
         cone = (F * point[:p] - np.array([[1.0], [-1.0]]) * point[p:]) / np.where(
             self._cone_scale > 0, self._cone_scale, 1
         )
-        result = []
-        for i in range(p):
-            holds = set()
-            closed = abs(w[i]) <= tol and force[i] >= -tol
-            if abs(force[i]) <= tol and abs(force[p + i]) <= tol and w[i] <= tol:
-                holds.add(OPEN)
-            if closed and not self.F_positive[i]:
-                holds.add(FRICTIONLESS)
-            elif closed:
-                if abs(w[p + i]) <= tol and min(cone[0, i], cone[1, i]) >= -tol:
-                    holds.add(STICK)
-                if abs(cone[0, i]) <= tol and w[p + i] >= -tol:
-                    holds.add(SLIP_PLUS)
-                if abs(cone[1, i]) <= tol and w[p + i] <= tol:
-                    holds.add(SLIP_MINUS)
-            result.append(frozenset(holds))
-        return tuple(result)
+        rows = np.array([force[:p], force[p:], *cone, -w[:p], w[p:], -w[p:]])  # in the order of RowKind
+        return active_within(rows, self.F_positive, tol)
 
     def equal(self, a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
         """Whether two points agree within ten tolerances in scaled forces."""

@@ -40,8 +40,11 @@ class SelectionFunctions:
         self._closed = [i for i, c in enumerate(codes) if c != OPEN]
         self._stuck = [i for i, c in enumerate(codes) if c == STICK]
         self._cache: dict[tuple[str, int], Any] = {}
-        self._unknowns: list[Any] = []
-        self._solve()
+
+    @cached_property
+    def det(self) -> Any:
+        """A polynomial with the sign of the determinant."""
+        return self._solution[0]
 
     @property
     def singular(self) -> bool:
@@ -51,7 +54,7 @@ class SelectionFunctions:
     @property
     def numerators(self) -> list[Any]:
         """Numerators of the reduced unknowns (adj(M) b up to positive factors)."""
-        return list(self._unknowns)
+        return self._solution[1]
 
     def _matrix(self, alpha: int) -> tuple[Any, Any]:
         """Integer matrix and right-hand side of the reduced system at an integer alpha."""
@@ -67,14 +70,14 @@ class SelectionFunctions:
             matrix[-1] += [S[p + i] * data.friction_unit for i in self._stuck]
         return matrix, [[data.g0[r] + alpha * data.g1[r]] for r in rows]
 
-    def _solve(self) -> None:
+    @cached_property
+    def _solution(self) -> tuple[Any, list[Any]]:
         """Determinant and unknowns by evaluation and interpolation."""
         exact, size = self.exact, len(self._closed) + len(self._stuck)
         slips = sum(1 for i, c in enumerate(self.codes) if c in (SLIP_PLUS, SLIP_MINUS) and exact.F1[i] != 0)
         needed = slips + 1 + int(exact.loaded)
         if size == 0:
-            self.det = fmpz_poly([1])
-            return
+            return fmpz_poly([1]), []
         nodes: list[int] = []
         values: list[list[Any]] = []
         zeros = trial = 0
@@ -88,11 +91,11 @@ class SelectionFunctions:
             else:
                 zeros += 1
                 if zeros > slips:
-                    self.det = fmpz_poly([])
-                    return
+                    return fmpz_poly([]), []
             trial = -trial if trial > 0 else 1 - trial
         table = (_interpolation(tuple(nodes)) * fmpz_mat(values)).transpose().tolist()
-        self.det, *self._unknowns = (fmpz_poly(row) for row in table)
+        determinant, *unknowns = (fmpz_poly(row) for row in table)
+        return determinant, unknowns
 
     # -- quantities ------------------------------------------------------------------------------------------------
 
@@ -127,15 +130,15 @@ class SelectionFunctions:
     @cached_property
     def _forces(self) -> list[Any]:
         """Numerators of lambda in units of ``_Integers.force`` (a slipping node's unknown is lambda_n / dF)."""
-        data, p = self.exact.integers, self.exact.p
+        data, p, unknowns = self.exact.integers, self.exact.p, self.numerators
         forces = [fmpz_poly([])] * (2 * p)
         for k, i in enumerate(self._closed):
-            forces[i] = self._unknowns[k] * data.friction_unit
+            forces[i] = unknowns[k] * data.friction_unit
             direction = _direction(self.codes[i])
             if direction:
-                forces[p + i] = self._unknowns[k] * fmpz_poly([direction * data.F0[i], direction * data.F1[i]])
+                forces[p + i] = unknowns[k] * fmpz_poly([direction * data.F0[i], direction * data.F1[i]])
         for k, i in enumerate(self._stuck, start=len(self._closed)):
-            forces[p + i] = self._unknowns[k] * data.friction_unit
+            forces[p + i] = unknowns[k] * data.friction_unit
         return forces
 
     def _displacement(self, row: int) -> Any:

@@ -10,7 +10,7 @@ from enumsol.arithmetic.rationals import to_fraction
 from enumsol.condensation.exact import ExactSystem
 from enumsol.selections.polytopes import dot
 from enumsol.selections.rationals import ExactSelections
-from enumsol.statuses import STICK
+from enumsol.statuses import STICK, RowKind
 
 if TYPE_CHECKING:
     from enumsol.condensation.exact import ExactPath
@@ -53,7 +53,9 @@ class FiberSelections(ExactSelections):
         """Equations and inequalities (>= 0) of a selection as forms over lambda."""
         equations, inequalities = super().forms(codes)
         # where F = 0 the cone of a sticking node does not imply that its normal force is none of tension
-        return equations, inequalities + [self.force_form(i) for i, code in enumerate(codes) if code == STICK]
+        return equations, inequalities + [
+            self.form(RowKind.NORMAL_FORCE, i) for i, code in enumerate(codes) if code == STICK
+        ]
 
     def _w(self, point: Point) -> list[Any]:
         return [g - dot(row, point) for g, row in zip(self.system.g, self._S, strict=True)]

@@ -12,12 +12,15 @@ from flint import fmpq, fmpq_mat
 from enumsol.condensation.exact import ExactSystem
 from enumsol.selections.polytopes import polytope_vertices, value
 from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import CONDITIONS, FINAL, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from enumsol.selections.polytopes import Form, Point, Table
+    from enumsol.statuses import Conditions
 
 
 def _outward(number: Any) -> tuple[float, float]:
@@ -27,6 +30,10 @@ def _outward(number: Any) -> tuple[float, float]:
     if near == exact:
         return near, near
     return math.nextafter(near, -math.inf), math.nextafter(near, math.inf)
+
+
+def _holds(conditions: Conditions, rows: Sequence[Any]) -> bool:
+    return all(rows[k] == 0 for k in conditions.equations) and all(rows[k] >= 0 for k in conditions.inequalities)
 
 
 class ExactSelections:
@@ -46,43 +53,24 @@ class ExactSelections:
 
     # -- linear forms ----------------------------------------------------------------------------------------------
 
-    def force_form(self, index: int) -> Form:
-        """lambda[index]."""
-        form = list(self._zero)
-        form[index] = fmpq(1)
-        return form, fmpq(0)
-
-    def gap_form(self, index: int, sign: int = 1) -> Form:
-        """sign * w[index]."""
-        return [-sign * v for v in self._S[index]], sign * self.system.g[index]
-
-    def cone_form(self, node: int, sign: int) -> Form:
-        """F lambda_n - sign * lambda_t."""
-        form = list(self._zero)
-        form[node] = self.system.F[node]
-        form[self.p + node] = fmpq(-sign)
+    def form(self, kind: RowKind, node: int) -> Form:
+        """A row as an affine function of lambda: 2p coefficients, and what is added."""
+        p, form = self.p, list(self._zero)
+        if kind >= RowKind.PENETRATION:
+            row, sign = (node, -1) if kind == RowKind.PENETRATION else (p + node, 1)
+            sign = -sign if kind == RowKind.SLIP_BACKWARD else sign
+            return [-sign * v for v in self._S[row]], sign * self.system.g[row]
+        if kind != RowKind.TANGENTIAL_FORCE:
+            form[node] = fmpq(1) if kind == RowKind.NORMAL_FORCE else self.system.F[node]
+        if kind != RowKind.NORMAL_FORCE:
+            form[p + node] = fmpq(-1 if kind == RowKind.CONE_PLUS else 1)
         return form, fmpq(0)
 
     def forms(self, codes: Codes) -> tuple[list[Form], list[Form]]:
         """Equations and inequalities (>= 0) of a selection as forms over lambda."""
-        p = self.p
-        equations, inequalities = [], []
-        for i, code in enumerate(codes):
-            if code == OPEN:
-                equations += [self.force_form(i), self.force_form(p + i)]
-                inequalities += [self.gap_form(i, -1)]
-                continue
-            equations.append(self.gap_form(i))
-            if code == FRICTIONLESS:
-                equations.append(self.force_form(p + i))
-                inequalities.append(self.force_form(i))
-            elif code == STICK:
-                equations.append(self.gap_form(p + i))
-                inequalities += [self.cone_form(i, 1), self.cone_form(i, -1)]
-            else:
-                sign = 1 if code == SLIP_PLUS else -1
-                equations.append(self.cone_form(i, sign))
-                inequalities += [self.force_form(i), self.gap_form(p + i, sign)]
+        equations, inequalities = (
+            [self.form(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][part]] for part in (0, 1)
+        )
         return equations, inequalities
 
     # -- the field -------------------------------------------------------------------------------------------------
@@ -165,20 +153,10 @@ class ExactSelections:
         """Per node the codes whose conditions hold at the point, exactly."""
         p, w = self.p, self._w(point)
         result = []
-        for i, F in enumerate(self.system.F):
-            n, t, w_t = point[i], point[p + i], w[p + i]
-            holds = set()
-            if n == 0 and t == 0 and w[i] <= 0:
-                holds.add(OPEN)
-            if w[i] == 0 and n >= 0:
-                bound = F * n
-                if not self.F_positive[i]:
-                    holds |= {FRICTIONLESS} if t == 0 else set()
-                else:
-                    holds |= {STICK} if w_t == 0 and -bound <= t <= bound else set()
-                    holds |= {SLIP_PLUS} if t == bound and w_t >= 0 else set()
-                    holds |= {SLIP_MINUS} if t == -bound and w_t <= 0 else set()
-            result.append(frozenset(holds))
+        for i, (F, friction) in enumerate(zip(self.system.F, self.F_positive, strict=True)):
+            n, t, bound, w_t = point[i], point[p + i], F * point[i], w[p + i]
+            rows = (n, t, bound - t, bound + t, -w[i], w_t, -w_t)  # in the order of RowKind
+            result.append(frozenset(code for code in FINAL[friction] if n >= 0 and _holds(CONDITIONS[code], rows)))
         return tuple(result)
 
     def equal(self, a: Point, b: Point) -> bool:

@@ -1,3 +1,5 @@
+import json
+
 import numpy as np
 import pytest
 
@@ -44,6 +46,22 @@ def test_load_refuses_other_files(tmp_path):
     np.savez(tmp_path / "other.npz", a=1)
     with pytest.raises(enumsol.InvalidArgumentError, match="does not hold a path"):
         Path.load(tmp_path / "other.npz")
+
+
+@pytest.mark.parametrize(("name", "value"), [("status", "tired"), ("kinds", ["start", "hop"])])
+def test_kinds_and_status_are_texts_too_and_those_of_a_file_must_exist(path, tmp_path, name, value):
+    assert (path.status, repr(path.status)) == ("interval left", "'interval left'")
+    assert (path.kinds[0], repr(path[0].kind)) == ("start", "'start'")
+    file = tmp_path / "path.npz"
+    path.save(file)
+    with np.load(file) as data:
+        stored = dict(data)
+    meta = json.loads(str(stored["meta"]))
+    assert meta["status"] == "interval left"
+    assert set(meta["kinds"]) == {"start", "step", "transition", "end"}
+    np.savez(file, **stored | {"meta": np.array(json.dumps(meta | {name: value}))})
+    with pytest.raises(enumsol.InvalidArgumentError, match=r"tired|hop"):
+        Path.load(file)
 
 
 def test_resume_after_the_step_limit_is_the_same_path(problem, path, tmp_path):

@@ -5,16 +5,24 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.relaxation.interval import imposed_interval_rows
-from enumsol.search.certifiers.rationals import DualBound, terms_of
+from enumsol.condensation.exact import ExactSystem
+from enumsol.relaxation.interval import IntervalRowKind, interval_rows
+from enumsol.relaxation.rows import with_implied
+from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
+from enumsol.selections.rationals import ExactSelections
+from enumsol.statuses import RowKind
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from fractions import Fraction
 
     from enumsol.condensation.exact import ExactPath
     from enumsol.relaxation.interval import IntervalSystem
     from enumsol.search.interval import EmptyLeaf, Piece
+
+_CONES: dict[int, RowKind] = {
+    IntervalRowKind.SLIP_AT_LEAST_PLUS: RowKind.CONE_PLUS,
+    IntervalRowKind.SLIP_AT_LEAST_MINUS: RowKind.CONE_MINUS,
+}
 
 
 class ExactIntervalCertifier:
@@ -31,26 +39,33 @@ class ExactIntervalCertifier:
 
     def __init__(self, exact: ExactPath) -> None:
         self._exact = exact
-        self._bound = DualBound(exact.S)
-        self._friction_on: tuple[Piece, tuple[Any, ...], tuple[Any, ...]] | None = None
+        self._inverse: Any = None
+        self._systems: tuple[Piece, list[tuple[ExactSelections, ExactSelections]]] | None = None
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
-        lowest, highest = self._friction(piece)
+        if self._inverse is None:
+            self._inverse = self._exact.S.inv()
+        if self._systems is None or self._systems[0] != piece:
+            self._systems = piece, self._systems_of(piece)
+        ends = self._systems[1]
+        lowest, highest = (solver.system.F for solver in ends[0])
 
-        def imposed(node: int) -> Mapping[Any, int]:
-            constant = lowest[node] == highest[node]
-            return imposed_interval_rows(leaf.codes[node], friction=highest[node] > 0, constant=constant)
+        def imposed(node: int) -> dict[int, int]:
+            constant, code = lowest[node] == highest[node], leaf.codes[node]
+            return with_implied(code, interval_rows(code, friction=highest[node] > 0, constant=constant))
 
-        terms = terms_of(leaf.rows, leaf.values, system.scaled, imposed)
-        return all(self._bound.positive(terms, g, lowest, highest) for g in self._loads(piece))
+        terms = list(accepted(leaf.rows, leaf.values, imposed, system.scaled))
+        return all(self._positive(terms, *solvers) for solvers in ends)
 
-    def _friction(self, piece: Piece) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        """Smallest and largest coefficients on the piece."""
-        if self._friction_on is None or self._friction_on[0] != piece:
-            ends = [self._exact.at(rational(alpha))[1] for alpha in (piece.a, piece.b)]
-            self._friction_on = (piece, tuple(map(min, *ends)), tuple(map(max, *ends)))
-        return self._friction_on[1], self._friction_on[2]
+    def _systems_of(self, piece: Piece) -> list[tuple[ExactSelections, ExactSelections]]:
+        """At both ends, with the smallest and with the largest coefficients on the piece."""
+        S, F = self._exact.S, [self._exact.at(rational(alpha))[1] for alpha in (piece.a, piece.b)]
+        bounds = [tuple(bound(pair) for pair in zip(*F, strict=True)) for bound in (min, max)]
+        lowest, highest = (
+            [ExactSelections(ExactSystem(S, g, coefficients)) for g in self._loads(piece)] for coefficients in bounds
+        )
+        return list(zip(lowest, highest, strict=True))
 
     def _loads(self, piece: Piece) -> list[tuple[Any, ...]]:
         """g at both ends, once where it does not vary; at an end where g vanishes its direction stands for it."""
@@ -61,3 +76,12 @@ class ExactIntervalCertifier:
             direction = 1 if rational(piece.b) > origin else -1
             return [tuple(direction * v for v in exact.g1)]
         return [exact.at(rational(end))[0] for end in (ends if exact.loaded else ends[:1])]
+
+    def _positive(self, terms: list[tuple[int, int, Any]], lowest: ExactSelections, highest: ExactSelections) -> bool:
+        """Whether the energy is bounded below by a positive number, at one g and for all friction of the piece."""
+        forms = (
+            # lambda_t - F_lo lambda_n is the cone's row of F_lo with its sign changed
+            (-u, lowest.form(_CONES[kind], node)) if kind in _CONES else (u, highest.form(RowKind(kind), node))
+            for kind, node, u in terms
+        )
+        return energy_bound_positive(highest.system.g, self._inverse, forms)

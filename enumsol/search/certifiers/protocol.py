@@ -115,14 +115,7 @@ class WithoutProof:
     recorder: Recorder = Unrecorded()
     certified = Certified()
 
-    def branching(self, node: int, children: Sequence[int]) -> None:
-        """Nothing to write."""
+    def _nothing(self, *_: object, **__: object) -> None:
+        """There is nothing to write, and nothing to take over."""
 
-    def skipped(self, codes: Codes, reason: str) -> None:
-        """Nothing to write."""
-
-    def unloaded(self) -> None:
-        """Nothing to write."""
-
-    def add(self, part: Certified) -> None:
-        """Nothing to take over."""
+    branching = skipped = unloaded = add = _nothing

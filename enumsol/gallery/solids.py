@@ -1,4 +1,4 @@
-"""Problems of the gallery in three dimensions; `enumsol.gallery` has them by name."""
+"""One node and blocks in three dimensions: every function returns a `ContactProblem3D`."""
 
 from __future__ import annotations
 

@@ -1,17 +1,8 @@
-"""Named contact problems for documentation, tests and benchmarks: small closed forms, blocks, wedges and chains.
-
-Every function returns a `ContactProblem`, `one_node_3d` and `block3d` a `ContactProblem3D`. `GALLERY` lists ready-made
-ones with a parameter value at which each is worth a look and, where it is known, the number of its roots there; `get`
-finds one by name.
-"""
+"""Small closed forms, blocks, wedges and chains: every function returns a `ContactProblem`."""
 
 from __future__ import annotations
 
-import difflib
 import math
-from dataclasses import dataclass, field
-from functools import partial
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,20 +13,15 @@ from enumsol.array_checks import vector_2d
 from enumsol.checks import finite_number, nonnegative_number, positive_integer, positive_number, shown
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.assembly import lame_coefficients
-from enumsol.gallery3d import block3d, one_node_3d
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-
     from numpy.typing import ArrayLike, NDArray
-
-    from enumsol.problem3d import ContactProblem3D
 
     Friction = float | tuple[ArrayLike, ArrayLike]
 
 Pair = tuple[float, float]
-#: Most triangles of a chain.
+#: Largest number of triangles in a chain.
 _MOST_TRIANGLES = 1_000_000
 
 
@@ -343,129 +329,6 @@ def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.
     return ContactProblem(sp.csc_array(A), dofs[0::2], dofs[1::2], load, coordinates=coordinates)
 
 
-@dataclass(frozen=True)
-class GalleryEntry:
-    """A named problem of the gallery.
-
-    Attributes
-    ----------
-    name : str
-        Its name, as in ``gallery:NAME``.
-    summary : str
-        What it shows, in a line.
-    alpha : float
-        A parameter value at which it is worth a look.
-    roots : int or None
-        Number of its roots at that alpha; None where they are not all isolated or the number is not known.
-    build : callable
-        Makes the problem.
-    dimension : int
-        2 or 3.
-    """
-
-    name: str
-    summary: str
-    alpha: float
-    roots: int | None
-    build: Callable[[], ContactProblem | ContactProblem3D] = field(repr=False)
-    dimension: int = 2
-
-
-def get(name: str) -> GalleryEntry:
-    """Return the entry of `GALLERY` with this name.
-
-    Raises
-    ------
-    InvalidArgumentError
-        There is none; the message lists the names most like it, or all.
-
-    Examples
-    --------
-    >>> import enumsol
-    >>> entry = enumsol.gallery.get("wedge-8-5")
-    >>> entry.roots == len(enumsol.enumerate_roots(entry.build(), entry.alpha))
-    True
-    """
-    if not isinstance(name, str):
-        raise InvalidArgumentError(f"name is {shown(name)}; expected a name of the gallery, such as one-node-6.1")
-    if name in GALLERY:
-        return GALLERY[name]
-    close = close_names(name)
-    known = f"did you mean {', '.join(close)}?" if close else f"expected one of {', '.join(GALLERY)}"
-    raise InvalidArgumentError(f"the gallery has no problem named {shown(name)}; {known}")
-
-
-def close_names(name: str) -> list[str]:
-    """Up to five names of `GALLERY` that are like this one, the most alike first; its own alone if it is one.
-
-    Examples
-    --------
-    >>> import enumsol
-    >>> "wedge-8-5" in enumsol.gallery.close_names("wedge8-5")
-    True
-    """
-    if name.lower() in GALLERY:
-        return [name.lower()]
-    return difflib.get_close_matches(name.lower(), GALLERY, n=5, cutoff=0.5)
-
-
-def _small() -> Iterator[GalleryEntry]:
-    def one(name: str, summary: str, alpha: float, roots: int | None, f: Pair) -> GalleryEntry:
-        return GalleryEntry(f"one-node-{name}", summary, alpha, roots, partial(one_node_triangle, f))
-
-    def two(name: str, summary: str, alpha: float, roots: int, loads: tuple[Pair, Pair]) -> GalleryEntry:
-        build = partial(two_node_square, *loads)
-        return GalleryEntry(f"two-node-{name}", f"own geometry, {summary}", alpha, roots, build)
-
-    def path(name: str, sign: float, alpha: float) -> GalleryEntry:
-        slope = ((0.1, sign * 1.1), (0.2, sign * 0.8))
-        build = partial(two_node_square, (0.4, 0.2), (1.8, -0.1), friction=4.0, load_slope=slope)
-        summary = f"own geometry, loading path of Example 6.7, tangential slopes {sign * 1.1:+g} and {sign * 0.8:+g}"
-        return GalleryEntry(f"two-node-6.7-{name}", summary, alpha, 3, build)
-
-    yield one("6.1", "two branches: open for every alpha, and a fold at alpha = 8/3", 5.0, 3, (1.5, -4.0))
-    yield one("6.2", "one branch", 5.0, 1, (1.5, 7.0))
-    yield one("6.3", "two branches that meet in a continuum of roots at alpha = 2", 2.0, None, (1.0, -2.0))
-    yield one("6.3-perturbed", "a small change of the load destroys that bifurcation", 5.0, 3, (0.98, -2.0))
-    yield two("6.4", "loads of Example 6.4: five roots between alpha = 3 and 3.8", 3.5, 5, ((1.0, -3.0), (1.0, -1.0)))
-    yield two("6.5", "loads of Example 6.5: three roots from alpha = 3.5 on", 5.0, 3, ((0.4, -1.4), (1.5, -1.3)))
-    yield two("6.6", "loads of Example 6.6: one root", 5.0, 1, ((2.0, -3.0), (1.0, -1.0)))
-    yield path("minus", -1.0, 1.6)
-    yield path("plus", 1.0, -1.0)
-    yield two("5", "own loads: five well separated roots", 5.0, 5, ((1.0, -4.0), (1.5, -3.5)))
-
-
-def _large() -> Iterator[GalleryEntry]:
-    for p in (8, 16, 32, 64, 100):
-        build = partial(clamped_block, p, p // 2)
-        yield GalleryEntry(f"clamped-block-{p}", f"block on {p} contact nodes: one root", 3.0, 1, build)
-    for p in (8, 14, 20, 32):
-        build = partial(wedge, 4, p // 2)
-        yield GalleryEntry(f"wedge-{p}-3", "wedge pulled straight: jammed, free or sliding out", 1.0, 3, build)
-    # at each of these alpha the five roots keep well clear of changes of status
-    for p, alpha in ((8, 3.0), (14, 2.2), (20, 2.25), (32, 2.2)):
-        build = partial(wedge, 4, p // 2, (4e-4, 1e-3))
-        yield GalleryEntry(f"wedge-{p}-5", "wedge pulled obliquely: it may hang tilted too", alpha, 5, build)
-    for p in (2, 4, 6, 8):
-        yield GalleryEntry(f"chain-{p}", f"{p} separate one-node triangles: 3^{p} roots", 5.0, 3**p, partial(chain, p))
-    for p in (2, 4, 6, 8):
-        build = partial(chain, p, 0.05)
-        yield GalleryEntry(f"chain-{p}-coupled", f"{p} one-node triangles joined by weak springs", 5.0, 3**p, build)
-
-
-def _solids() -> Iterator[GalleryEntry]:
-    yield GalleryEntry("one-node-3d", "one node by its compliance: a public test", 0.0, None, one_node_3d, 3)
-    for p, cells in ((4, (2, 1, 2)), (9, (3, 2, 2)), (16, (4, 3, 2)), (100, (10, 9, 4))):
-        summary = f"block in 3D on {p} contact nodes, pressed and sheared"
-        yield GalleryEntry(f"block3d-{p}", summary, 0.5, None, partial(block3d, *cells), 3)
-
-
-#: All named problems, by name.
-GALLERY: Mapping[str, GalleryEntry] = MappingProxyType(
-    {entry.name: entry for entry in (*_small(), *_large(), *_solids())}
-)
-
-
 def _one_node_stiffness(lame: Pair) -> NDArray[np.float64]:
     lam, mu = lame_coefficients(lame)
     return 0.5 * np.array([[lam + 3 * mu, -(lam + mu)], [-(lam + mu), lam + 3 * mu]])
@@ -475,7 +338,7 @@ def _top_springs(mesh: fem.Mesh, springs: Pair) -> NDArray[np.float64]:
     total = vector_2d(springs, "springs")
     if np.min(total) <= 0:
         raise InvalidArgumentError(
-            f"springs is {shown(springs)}; expected two stiffnesses > 0, or the wedge is not held"
+            f"springs is {shown(springs)}; expected two stiffnesses > 0, otherwise nothing holds the wedge"
         )
     share = np.full(len(mesh.top), 1.0 / (len(mesh.top) - 1))
     share[[0, -1]] *= 0.5

@@ -1,0 +1,144 @@
+"""The named problems, and finding one by its name."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass, field
+from functools import partial
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from enumsol.checks import shown
+from enumsol.errors import InvalidArgumentError
+from enumsol.gallery.problems import chain, clamped_block, one_node_triangle, two_node_square, wedge
+from enumsol.gallery.solids import block3d, one_node_3d
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from enumsol.gallery.problems import Pair
+    from enumsol.problem import ContactProblem
+    from enumsol.problem3d import ContactProblem3D
+
+
+@dataclass(frozen=True)
+class GalleryEntry:
+    """A named problem of the gallery.
+
+    Attributes
+    ----------
+    name : str
+        Its name, as in ``gallery:NAME``.
+    summary : str
+        What it shows, in a line.
+    alpha : float
+        A parameter value at which it is worth a look.
+    roots : int or None
+        Number of its roots at that alpha; None where they are not all isolated or the number is not known.
+    build : callable
+        Makes the problem.
+    dimension : int
+        2 or 3.
+    """
+
+    name: str
+    summary: str
+    alpha: float
+    roots: int | None
+    build: Callable[[], ContactProblem | ContactProblem3D] = field(repr=False)
+    dimension: int = 2
+
+
+def get(name: str) -> GalleryEntry:
+    """Return the entry of `GALLERY` with this name.
+
+    Raises
+    ------
+    InvalidArgumentError
+        There is no such entry; the message lists similar names, or all.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> entry = enumsol.gallery.get("wedge-8-5")
+    >>> entry.roots == len(enumsol.enumerate_roots(entry.build(), entry.alpha))
+    True
+    """
+    if not isinstance(name, str):
+        raise InvalidArgumentError(f"name is {shown(name)}; expected a name of the gallery, such as one-node-6.1")
+    if name in GALLERY:
+        return GALLERY[name]
+    close = close_names(name)
+    known = f"did you mean {', '.join(close)}?" if close else f"expected one of {', '.join(GALLERY)}"
+    raise InvalidArgumentError(f"the gallery has no problem named {shown(name)}; {known}")
+
+
+def close_names(name: str) -> list[str]:
+    """Up to five names in `GALLERY` similar to this one, the most similar first; only itself if it is one of them.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> "wedge-8-5" in enumsol.gallery.close_names("wedge8-5")
+    True
+    """
+    if name.lower() in GALLERY:
+        return [name.lower()]
+    return difflib.get_close_matches(name.lower(), GALLERY, n=5, cutoff=0.5)
+
+
+def _small() -> Iterator[GalleryEntry]:
+    def one(name: str, summary: str, alpha: float, roots: int | None, f: Pair) -> GalleryEntry:
+        return GalleryEntry(f"one-node-{name}", summary, alpha, roots, partial(one_node_triangle, f))
+
+    def two(name: str, summary: str, alpha: float, roots: int, loads: tuple[Pair, Pair]) -> GalleryEntry:
+        build = partial(two_node_square, *loads)
+        return GalleryEntry(f"two-node-{name}", f"own geometry, {summary}", alpha, roots, build)
+
+    def path(name: str, sign: float, alpha: float) -> GalleryEntry:
+        slope = ((0.1, sign * 1.1), (0.2, sign * 0.8))
+        build = partial(two_node_square, (0.4, 0.2), (1.8, -0.1), friction=4.0, load_slope=slope)
+        summary = f"own geometry, loading path of Example 6.7, tangential slopes {sign * 1.1:+g} and {sign * 0.8:+g}"
+        return GalleryEntry(f"two-node-6.7-{name}", summary, alpha, 3, build)
+
+    yield one("6.1", "two branches: open for every alpha, and a fold at alpha = 8/3", 5.0, 3, (1.5, -4.0))
+    yield one("6.2", "one branch", 5.0, 1, (1.5, 7.0))
+    yield one("6.3", "two branches that meet in a continuum of roots at alpha = 2", 2.0, None, (1.0, -2.0))
+    yield one("6.3-perturbed", "a small change of the load destroys that bifurcation", 5.0, 3, (0.98, -2.0))
+    yield two("6.4", "loads of Example 6.4: five roots between alpha = 3 and 3.8", 3.5, 5, ((1.0, -3.0), (1.0, -1.0)))
+    yield two("6.5", "loads of Example 6.5: three roots from alpha = 3.5 on", 5.0, 3, ((0.4, -1.4), (1.5, -1.3)))
+    yield two("6.6", "loads of Example 6.6: one root", 5.0, 1, ((2.0, -3.0), (1.0, -1.0)))
+    yield path("minus", -1.0, 1.6)
+    yield path("plus", 1.0, -1.0)
+    yield two("5", "own loads: five well separated roots", 5.0, 5, ((1.0, -4.0), (1.5, -3.5)))
+
+
+def _large() -> Iterator[GalleryEntry]:
+    for p in (8, 16, 32, 64, 100):
+        build = partial(clamped_block, p, p // 2)
+        yield GalleryEntry(f"clamped-block-{p}", f"block on {p} contact nodes: one root", 3.0, 1, build)
+    for p in (8, 14, 20, 32):
+        build = partial(wedge, 4, p // 2)
+        yield GalleryEntry(f"wedge-{p}-3", "wedge pulled straight: jammed, free or sliding out", 1.0, 3, build)
+    # at each of these alpha the five roots are well away from changes of status
+    for p, alpha in ((8, 3.0), (14, 2.2), (20, 2.25), (32, 2.2)):
+        build = partial(wedge, 4, p // 2, (4e-4, 1e-3))
+        yield GalleryEntry(f"wedge-{p}-5", "wedge pulled obliquely: it may hang tilted too", alpha, 5, build)
+    for p in (2, 4, 6, 8):
+        yield GalleryEntry(f"chain-{p}", f"{p} separate one-node triangles: 3^{p} roots", 5.0, 3**p, partial(chain, p))
+    for p in (2, 4, 6, 8):
+        build = partial(chain, p, 0.05)
+        yield GalleryEntry(f"chain-{p}-coupled", f"{p} one-node triangles joined by weak springs", 5.0, 3**p, build)
+
+
+def _solids() -> Iterator[GalleryEntry]:
+    yield GalleryEntry("one-node-3d", "one node by its compliance: a public test", 0.0, None, one_node_3d, 3)
+    for p, cells in ((4, (2, 1, 2)), (9, (3, 2, 2)), (16, (4, 3, 2)), (100, (10, 9, 4))):
+        summary = f"block in 3D on {p} contact nodes, pressed and sheared"
+        yield GalleryEntry(f"block3d-{p}", summary, 0.5, None, partial(block3d, *cells), 3)
+
+
+#: All named problems, by name.
+GALLERY: Mapping[str, GalleryEntry] = MappingProxyType(
+    {entry.name: entry for entry in (*_small(), *_large(), *_solids())}
+)
