@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     )
     from enumsol.friction import FrictionTable
     from enumsol.io import read_problem, write_problem
+    from enumsol.io.vtu import write_vtu
     from enumsol.problem import ContactProblem
     from enumsol.problem3d import BodyMesh, ContactProblem3D, SlipMean
     from enumsol.proof.proof_file import Proof, ProofFormatError
@@ -97,6 +98,7 @@ _HOMES = {
         "WorkerError",
     ),
     "enumsol.io": ("read_problem", "write_problem"),
+    "enumsol.io.vtu": ("write_vtu",),
     "enumsol.friction": ("FrictionTable",),
     "enumsol.problem": ("ContactProblem",),
     "enumsol.problem3d": ("BodyMesh", "ContactProblem3D", "SlipMean"),
@@ -178,6 +180,7 @@ __all__ = [
     "sign_array",
     "verify",
     "write_problem",
+    "write_vtu",
 ]
 
 
