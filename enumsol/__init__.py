@@ -64,6 +64,7 @@ if TYPE_CHECKING:
     )
     from enumsol.friction import FrictionTable
     from enumsol.io import read_problem, write_problem
+    from enumsol.io.vtu import write_vtu
     from enumsol.problem import ContactProblem
     from enumsol.problem3d import BodyMesh, ContactProblem3D, SlipMean
     from enumsol.proof.proof_file import Proof, ProofFormatError
@@ -108,6 +109,7 @@ _HOMES = {
         "WorkerError",
     ),
     "enumsol.io": ("read_problem", "write_problem"),
+    "enumsol.io.vtu": ("write_vtu",),
     "enumsol.fixed_points": (
         "FixedPoint",
         "TrescaSolution",
@@ -207,6 +209,7 @@ __all__ = [
     "successive_approximations",
     "verify",
     "write_problem",
+    "write_vtu",
 ]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Self
 
 
 class EnumsolError(Exception):
@@ -49,6 +49,14 @@ class IncompleteGraphError(EnumsolError, ValueError):
 
 class MissingDependencyError(EnumsolError, ImportError):
     """An optional package is needed for this call and is not installed."""
+
+    @classmethod
+    def of(cls, what: str, package: str, extra: str) -> Self:
+        """The error that something needs a package, which comes with an extra of this one."""
+        return cls(
+            f"{what} need the package {package}, which is not installed; "
+            f'install it with: pip install "enumsol[{extra}]"'
+        )
 
 
 class _PartialResultError(EnumsolError):

@@ -39,6 +39,10 @@ class BodyMesh(Sealed):
         Tetrahedra, or hexahedra in the order of VTK.
     dofs : (n,) array of int
         The degree of freedom ``3 node + component`` that each entry of u is; the others are held at 0.
+    facets : (k, 3) or (k, 4) array of int or None
+        Contact surface, counterclockwise as seen from outside.
+    rows : (k,) array of int or None
+        Where contact rows stand for patches, the row of each facet (-1: held); None where they stand for nodes.
 
     Examples
     --------
@@ -51,6 +55,8 @@ class BodyMesh(Sealed):
     points: NDArray[np.float64]
     cells: NDArray[np.int64]
     dofs: NDArray[np.int64]
+    facets: NDArray[np.int64] | None = None
+    rows: NDArray[np.int64] | None = None
 
     def displacements(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Displacement of every point, shape (N, 3), for u of shape (n,)."""

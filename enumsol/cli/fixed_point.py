@@ -92,7 +92,7 @@ def _approximate(
 
 
 def _write_vtu(body: ContactProblem | ContactProblem3D, found: FixedPoint, path: str) -> None:
-    from enumsol.io import write_vtu  # meshio
+    from enumsol.io.vtu import write_vtu  # meshio
 
     write_vtu(body, found, path)
 

@@ -13,6 +13,7 @@ from enumsol.fem.meshes import Mesh, edges_along, rectangle, trapezoid
 
 if TYPE_CHECKING:
     from enumsol.fem.norms import MeshNorms, h1_norms
+    from enumsol.fem.solid_files import read_solid
     from enumsol.fem.solid_meshes import SolidMesh, blocks, box
     from enumsol.fem.solid_problems import solid_contact_problem
     from enumsol.fem.solids import facet_forces, solid_body_forces, solid_stiffness
@@ -29,6 +30,7 @@ __all__ = [
     "edges_along",
     "facet_forces",
     "h1_norms",
+    "read_solid",
     "rectangle",
     "solid_body_forces",
     "solid_contact_problem",
@@ -40,6 +42,7 @@ __all__ = [
 
 _HOMES = {
     "norms": ("MeshNorms", "h1_norms"),
+    "solid_files": ("read_solid",),
     "solid_meshes": ("SolidMesh", "blocks", "box"),
     "solid_problems": ("solid_contact_problem",),
     "solids": ("facet_forces", "solid_body_forces", "solid_stiffness"),

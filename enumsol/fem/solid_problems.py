@@ -137,7 +137,7 @@ def solid_contact_problem(
         node_ids=rows.labels if node_ids is None else node_ids,
         coordinates=rows.places,
         areas=rows.areas,
-        mesh=BodyMesh(nodes, bodies, free),
+        mesh=BodyMesh(nodes, bodies, free, surface.facets, rows.rows_of_facets),
         slip_mean=mean,
     )
 

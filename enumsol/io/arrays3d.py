@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _MESH = ("mesh_points", "mesh_cells", "mesh_dofs")
+_SURFACE = ("mesh_facets", "mesh_rows")
 _MEAN = ("slip_mean_T1", "slip_mean_T2", "slip_mean_offset", "slip_mean_weights")
 _TABLE = ("friction_table_slip", "friction_table_1", "friction_table_2")
 
@@ -36,7 +37,9 @@ def problem_from_arrays_3d(arrays: Mapping[str, Any]) -> ContactProblem3D:
         options["friction"] = friction
     options["friction_slope"] = tuple(arrays.get(f"friction_slope_{axis}", 0.0) for axis in (1, 2))
     if "mesh_points" in arrays:
-        options["mesh"] = _mesh(*(arrays[name] for name in _MESH))
+        options["mesh"] = _mesh(arrays)
+    elif extra := [name for name in _SURFACE if name in arrays]:
+        raise InvalidProblemError(f"{extra[0]} has no mesh; expected {', '.join(_MESH)} as well")
     if "slip_mean_T1" in arrays:
         T1, T2, weights = (sp.csr_array(real_matrix(arrays[name], name)) for name in (_MEAN[0], _MEAN[1], _MEAN[3]))
         options["slip_mean"] = SlipMean(T1, T2, real_array(arrays[_MEAN[2]], _MEAN[2]), weights)
@@ -64,24 +67,33 @@ def _friction(arrays: Mapping[str, Any]) -> Any:
     return None
 
 
-def _mesh(points: Any, cells: Any, dofs: Any) -> BodyMesh:
-    nodes = real_array(points, "mesh_points")
+def _mesh(arrays: Mapping[str, Any]) -> BodyMesh:
+    nodes = real_array(arrays["mesh_points"], "mesh_points")
     if nodes.ndim != 2 or nodes.shape[1] != 3:
         raise InvalidProblemError(f"mesh_points has shape {nodes.shape}; expected (N, 3)")
-    bodies = _numbers(cells, "mesh_cells", len(nodes))
+    bodies = _numbers(arrays["mesh_cells"], "mesh_cells", len(nodes))
     if bodies.ndim != 2 or bodies.shape[1] not in (4, 8):
         raise InvalidProblemError(f"mesh_cells has shape {bodies.shape}; expected (M, 4) or (M, 8)")
-    free = _numbers(dofs, "mesh_dofs", nodes.size)
+    free = _numbers(arrays["mesh_dofs"], "mesh_dofs", nodes.size)
     if free.ndim != 1 or len(np.unique(free)) != len(free):
         raise InvalidProblemError(f"mesh_dofs has shape {free.shape} or repeats a number; expected (n,) distinct ones")
-    return BodyMesh(nodes, bodies, free)
+    facets = rows = None
+    if "mesh_facets" in arrays:
+        facets = _numbers(arrays["mesh_facets"], "mesh_facets", len(nodes))
+        if facets.ndim != 2 or facets.shape[1] not in (3, 4):
+            raise InvalidProblemError(f"mesh_facets has shape {facets.shape}; expected (k, 3) or (k, 4)")
+    if "mesh_rows" in arrays:
+        rows = _numbers(arrays["mesh_rows"], "mesh_rows", np.shape(arrays["Bn"])[0], least=-1)
+        if facets is None or rows.shape != facets.shape[:1]:
+            raise InvalidProblemError(f"mesh_rows has shape {rows.shape}; expected (k,), one for each of mesh_facets")
+    return BodyMesh(nodes, bodies, free, facets, rows)
 
 
-def _numbers(value: Any, name: str, count: int) -> NDArray[np.int64]:
+def _numbers(value: Any, name: str, count: int, least: int = 0) -> NDArray[np.int64]:
     array = real_array(value, name)
-    if np.any(array != np.round(array)) or np.any(array < 0) or np.any(array >= count):
+    if np.any(array != np.round(array)) or np.any(array < least) or np.any(array >= count):
         raise InvalidProblemError(
-            f"{name} holds other numbers than 0 .. {count - 1}; expected whole ones in that range"
+            f"{name} holds other numbers than {least} .. {count - 1}; expected whole ones in that range"
         )
     return array.astype(np.int64)
 
@@ -105,6 +117,9 @@ def arrays_of_3d(problem: ContactProblem3D) -> dict[str, Any]:
     }
     if (mesh := problem.mesh) is not None:
         arrays |= dict(zip(_MESH, (mesh.points, mesh.cells, mesh.dofs), strict=True))
+        arrays |= {
+            name: part for name, part in zip(_SURFACE, (mesh.facets, mesh.rows), strict=True) if part is not None
+        }
     if (mean := problem.slip_mean) is not None:
         arrays |= dict(zip(_MEAN, (mean.T1, mean.T2, mean.offset, mean.weights), strict=True))
     return arrays

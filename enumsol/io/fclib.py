@@ -85,9 +85,7 @@ def _h5py() -> Any:
     try:
         import h5py  # an extra
     except ImportError as error:
-        raise MissingDependencyError(
-            'fclib files need the package h5py, which is not installed; install it with: pip install "enumsol[fclib]"'
-        ) from error
+        raise MissingDependencyError.of("fclib files", "h5py", "fclib") from error
     return h5py
 
 

@@ -91,12 +91,12 @@ _SLOPES = ("friction_slope_1", "friction_slope_2")
 LAYOUT_3D = Layout(
     contact=("A", "Bn", "Bt1", "Bt2"),
     matrices=("A", "Bn", "Bt1", "Bt2", *_MEANS),
-    tables=("coordinates", "slip_offset", "mesh_points", "mesh_cells", "slip_mean_offset", *_TABLE[1:]),
+    tables=("coordinates", "slip_offset", "mesh_points", "mesh_cells", "mesh_facets", "slip_mean_offset", *_TABLE[1:]),
     broadcast=("gap", "friction", "friction_1", "friction_2", *_SLOPES),
     optional=(
         *_COMMON,
         *("friction_1", "friction_2", *_SLOPES, *_TABLE, "areas"),
-        *("mesh_points", "mesh_cells", "mesh_dofs", *_MEANS, "slip_mean_offset"),
+        *("mesh_points", "mesh_cells", "mesh_dofs", "mesh_facets", "mesh_rows", *_MEANS, "slip_mean_offset"),
     ),
     frictions=(("friction",), ("friction_1", "friction_2"), _TABLE),
     synonyms=_SYNONYMS

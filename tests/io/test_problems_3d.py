@@ -19,6 +19,7 @@ from enumsol import (
     write_problem,
 )
 
+MESH_PARTS = ("points", "cells", "dofs", "facets", "rows")
 PLACES = ["problem.npz", "directory"]
 TANGENTS = {"Bt1": np.eye(6)[[1, 4]], "Bt2": np.eye(6)[[2, 5]]}
 DENSE = {"A": 2 * np.eye(6), "Bn": np.eye(6)[[0, 3]], **TANGENTS, "f": np.array([1.0, -2.0, 0.5, 1.0, 3.0, -1.0])}
@@ -43,7 +44,13 @@ def awkward_problem(friction, p=5):
         node_ids=[f"node {k}" for k in range(p)],
         coordinates=rng.normal(size=(p, 3)),
         areas=rng.random(p) + 0.1,
-        mesh=BodyMesh(rng.normal(size=(9, 3)), np.array([[0, 1, 2, 3], [5, 6, 7, 8]]), np.arange(27)[3:]),
+        mesh=BodyMesh(
+            rng.normal(size=(9, 3)),
+            np.array([[0, 1, 2, 3], [5, 6, 7, 8]]),
+            np.arange(27)[3:],
+            np.array([[5, 6, 7]]),
+            np.array([-1]),
+        ),
         slip_mean=SlipMean(
             sp.csr_array(rng.normal(size=(q, n)) * (rng.random((q, n)) < 0.3)),
             sp.csr_array(rng.normal(size=(q, n)) * (rng.random((q, n)) < 0.3)),
@@ -83,7 +90,7 @@ def assert_same(one, two):
     assert one.node_ids == two.node_ids
     assert (one.mesh is None) == (two.mesh is None)
     if one.mesh is not None:
-        assert all(same_array(getattr(one.mesh, name), getattr(two.mesh, name)) for name in ("points", "cells", "dofs"))
+        assert all(same_array(getattr(one.mesh, name), getattr(two.mesh, name)) for name in MESH_PARTS)
     assert (one.slip_mean is None) == (two.slip_mean is None)
     if one.slip_mean is not None:
         assert all(
@@ -204,6 +211,14 @@ def without(arrays, *names):
         (DENSE | MESH | {"mesh_cells": [[0, 1, 0, 0.5]]}, "mesh_cells holds other numbers than"),
         (DENSE | MESH | {"mesh_cells": [[0, 1]]}, r"mesh_cells has shape \(1, 2\); expected \(M, 4\)"),
         (DENSE | MESH | {"mesh_dofs": [0, 1, 2, 3, 4, 4]}, "repeats a number"),
+        (DENSE | {"mesh_rows": [0, 1]}, "mesh_rows has no mesh; expected mesh_points, mesh_cells, mesh_dofs as well"),
+        (DENSE | MESH | {"mesh_facets": [[0, 1]]}, r"mesh_facets has shape \(1, 2\); expected \(k, 3\) or"),
+        (
+            DENSE | MESH | {"mesh_facets": [[0, 1, 0]], "mesh_rows": [2]},
+            r"mesh_rows holds other numbers than -1 \.\. 1",
+        ),
+        (DENSE | MESH | {"mesh_facets": [[0, 1, 0]], "mesh_rows": [0, 1]}, r"mesh_rows has shape \(2,\); expected"),
+        (DENSE | MESH | {"mesh_rows": [0]}, r"mesh_rows has shape \(1,\); expected \(k,\), one for each"),
         (DENSE | MESH | {"mesh_dofs": [0, 1]}, "mesh names 2 degrees of freedom; expected n = 6"),
         (DENSE | MEAN | {"slip_mean_weights": -np.eye(2, 6)}, "slip_mean has a negative weight"),
         (DENSE | MEAN | {"slip_mean_T1": np.eye(5)}, "slip_mean has T1, T2, offset, weights of shapes"),

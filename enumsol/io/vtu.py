@@ -1,0 +1,198 @@
+"""States of problems in 3D as VTU files for ParaView, written by meshio."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from enumsol.array_checks import real_array
+from enumsol.checks import file_path, instance_of, writing
+from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.problem3d import BodyMesh, ContactProblem3D
+
+if TYPE_CHECKING:
+    import os
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+#: Names that meshio has for cells and facets, by their corners; a quadrilateral has as many as a tetrahedron.
+_CELLS, _FACETS = {4: "tetra", 8: "hexahedron"}, {3: "triangle", 4: "quad"}
+_STATUS = {"open": 0.0, "stick": 1.0}
+_SLIPS = 2.0
+#: Directions of contact rows are known if they are orthonormal to this.
+_ORTHONORMAL = 1e-8
+
+
+class State(Protocol):
+    """Displacements and contact forces of a problem: a FixedPoint, a TrescaSolution, or one's own.
+
+    Attributes
+    ----------
+    u : (n,) array [length]
+    lambda_n, u_n : (p,) arrays [force, length]
+    lambda_t, u_t : (p, 2) arrays [force, length]
+    """
+
+    u: Floats
+    lambda_n: Floats
+    lambda_t: Floats
+    u_n: Floats
+    u_t: Floats
+
+
+def write_vtu(problem: ContactProblem3D, state: State, path: str | os.PathLike[str]) -> None:
+    """Write displacements and contact forces to a VTU file for ParaView, by meshio.
+
+    With ``problem.mesh`` the file holds the body, its points with their ``displacement``, and the facets of the contact
+    surface as cells of their own (cell data ``contact_surface``: 0 body, 1 surface). What belongs to contact rows is
+    data of the points if the rows stand for nodes, and of the facets if they stand for patches: ``lambda_n``,
+    ``lambda_t1``, ``lambda_t2``, ``u_n``, ``u_t1``, ``u_t2``; ``pressure`` if the problem has areas; ``status`` (0
+    open, 1 stick, 2 slip) if the state has ``statuses``; and in global axes ``contact_force``, which acts on the body,
+    its tangential part ``friction_force``, and ``slip``. Elsewhere scalars are NaN and vectors zero. Vectors are left
+    out where the rows do not tell their directions (patches that are held in some components).
+
+    Without a mesh the file holds the contact nodes at ``problem.coordinates``, with the same data but no vectors.
+
+    Parameters
+    ----------
+    problem : ContactProblem3D
+        With ``mesh`` or ``coordinates``.
+    state : FixedPoint, TrescaSolution or other
+        With u (n,), lambda_n (p,), lambda_t (p, 2), u_n (p,) and u_t (p, 2).
+    path : str or path-like
+        Ends in .vtu; an existing file is replaced.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The problem has neither mesh nor coordinates, or has patches and no facets; the state lacks an array or has one
+        of another shape; there can be no such file.
+    OutputError
+        There is no room for it.
+    MissingDependencyError
+        meshio is not installed.
+
+    Examples
+    --------
+    >>> import enumsol, pathlib, tempfile
+    >>> from types import SimpleNamespace
+    >>> problem = enumsol.gallery.block3d(2, 1, 1)
+    >>> free = SimpleNamespace(u=problem.factorization.solve(problem.f), lambda_n=[0] * 4, lambda_t=[[0, 0]] * 4)
+    >>> free.u_n, free.u_t = problem.Bn @ free.u, [[0, 0]] * 4
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     enumsol.write_vtu(problem, free, f"{folder}/free.vtu")
+    ...     pathlib.Path(folder, "free.vtu").stat().st_size > 1000
+    True
+    """
+    instance_of(problem, ContactProblem3D, "problem")
+    place = file_path(path, "path")
+    if place.suffix != ".vtu":
+        raise InvalidArgumentError(f"path is {str(place)!r}; expected a name that ends in .vtu")
+    meshio = _meshio()
+    data = _row_data(problem, state)
+    if problem.mesh is None:
+        if problem.coordinates is None:
+            raise InvalidArgumentError("problem has neither mesh nor coordinates; expected one of them for a picture")
+        vertices = np.arange(problem.p)[:, None]
+        picture = meshio.Mesh(problem.coordinates, [("vertex", vertices)], point_data=data)
+    else:
+        data |= _vectors(problem, data)
+        u = problem.mesh.displacements(_array(state, "u", (problem.n,)))
+        picture = _body(meshio, problem, problem.mesh, u, data)
+    with writing(place, "path"):
+        picture.write(place, file_format="vtu")
+
+
+def _meshio() -> Any:
+    try:
+        import meshio  # an extra
+    except ImportError as error:
+        raise MissingDependencyError.of("VTU files", "meshio", "solids") from error
+    return meshio
+
+
+def _array(state: State, name: str, shape: tuple[int, ...]) -> Floats:
+    if not hasattr(state, name):
+        raise InvalidArgumentError(
+            f"state is a {type(state).__name__} without {name}; expected u, lambda_n, lambda_t, u_n and u_t"
+        )
+    array = real_array(getattr(state, name), f"{name} of the state", error=InvalidArgumentError)
+    if array.shape != shape:
+        raise InvalidArgumentError(f"{name} of the state has shape {array.shape}; expected {shape}")
+    return array
+
+
+def _row_data(problem: ContactProblem3D, state: State) -> dict[str, Floats]:
+    """Scalars of the contact rows, each (p,)."""
+    p = problem.p
+    normal, tangential = _array(state, "lambda_n", (p,)), _array(state, "lambda_t", (p, 2))
+    u_t = _array(state, "u_t", (p, 2))
+    data = {"lambda_n": normal, "lambda_t1": tangential[:, 0], "lambda_t2": tangential[:, 1]}
+    data |= {"u_n": _array(state, "u_n", (p,)), "u_t1": u_t[:, 0], "u_t2": u_t[:, 1]}
+    if problem.areas is not None:
+        data["pressure"] = normal / problem.areas
+    statuses = getattr(state, "statuses", None)
+    if statuses is not None:
+        data["status"] = np.array([_STATUS.get(str(status), _SLIPS) for status in statuses])
+    return data
+
+
+def _vectors(problem: ContactProblem3D, data: dict[str, Floats]) -> dict[str, Floats]:
+    """Vectors of the contact rows in global axes, each (p, 3); none where the rows do not tell their directions."""
+    assert problem.mesh is not None
+    axes = np.eye(3)[problem.mesh.dofs % 3]
+    sums = np.stack([rows @ axes for rows in (problem.Bt1, problem.Bt2, problem.Bn)], axis=1)
+    lengths = np.linalg.norm(sums, axis=2, keepdims=True)
+    frames = np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > 0)
+    if np.max(np.abs(frames @ frames.transpose(0, 2, 1) - np.eye(3))) > _ORTHONORMAL:
+        return {}
+    t1, t2, n = frames.transpose(1, 0, 2)
+
+    def along(first: str, second: str) -> Floats:
+        return np.asarray(data[first][:, None] * t1 + data[second][:, None] * t2)
+
+    friction = -along("lambda_t1", "lambda_t2")
+    force = friction - data["lambda_n"][:, None] * n
+    return {"contact_force": force, "friction_force": friction, "slip": along("u_t1", "u_t2")}
+
+
+def _body(meshio: Any, problem: ContactProblem3D, mesh: BodyMesh, u: Floats, data: dict[str, Floats]) -> Any:
+    cells = [(_CELLS[mesh.cells.shape[1]], mesh.cells)]
+    if mesh.facets is not None:
+        cells.append((_FACETS[mesh.facets.shape[1]], mesh.facets))
+    point_data, cell_data = (
+        {"displacement": u},
+        {"contact_surface": [np.full(len(c), k) for k, (_, c) in enumerate(cells)]},
+    )
+    if mesh.rows is None:
+        nodes = _nodes(problem, mesh)
+        point_data |= {name: _spread(values, nodes, len(u)) for name, values in data.items()}
+    else:
+        moving = np.flatnonzero(mesh.rows >= 0)
+        for name, values in data.items():
+            on_facets = _spread(values[mesh.rows[moving]], moving, len(mesh.rows))
+            cell_data[name] = [_spread(values[:0], moving[:0], len(mesh.cells)), on_facets]
+    return meshio.Mesh(mesh.points, cells, point_data=point_data, cell_data=cell_data)
+
+
+def _nodes(problem: ContactProblem3D, mesh: BodyMesh) -> NDArray[np.int64]:
+    """The node that each contact row stands for."""
+    rows = problem.contact_rows
+    nodes = mesh.dofs[rows.indices] // 3
+    first = nodes[rows.indptr[:-1]]
+    by_direction = first.reshape(3, problem.p)
+    if np.any(nodes != np.repeat(first, np.diff(rows.indptr))) or np.any(by_direction != by_direction[0]):
+        raise InvalidArgumentError(
+            "problem has contact rows of more than one node, and its mesh has no facets and rows; expected both"
+        )
+    return np.asarray(by_direction[0])
+
+
+def _spread(values: Floats, places: NDArray[np.int64], count: int) -> Floats:
+    """Values at some of ``count`` places; elsewhere NaN for scalars and zero for vectors."""
+    full = np.full((count, *values.shape[1:]), np.nan if values.ndim == 1 else 0.0)
+    full[places] = values
+    return full

@@ -1,0 +1,195 @@
+"""VTU files: what ParaView is given, read back by meshio and as XML; bodies, patches, points alone; bad input."""
+
+import sys
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pytest
+
+from enumsol import (
+    BodyMesh,
+    ContactProblem3D,
+    InvalidArgumentError,
+    MissingDependencyError,
+    OutputError,
+    fem,
+    gallery,
+    write_vtu,
+)
+
+
+def some_state(problem, seed=0):
+    """Forces and displacements that belong together but solve nothing."""
+    rng = np.random.default_rng(seed)
+    p = problem.p
+    normal, tangential = rng.random(p), rng.normal(size=(p, 2))
+    forces = np.concatenate([normal, *tangential.T])
+    u = problem.condensed.displacement(1.0, forces)
+    u_t = np.stack([problem.Bt1 @ u, problem.Bt2 @ u], axis=1)
+    return SimpleNamespace(
+        u=u,
+        lambda_n=normal,
+        lambda_t=tangential,
+        u_n=problem.Bn @ u,
+        u_t=u_t,
+        statuses=[("open", "stick", "slip")[k % 3] for k in range(p)],
+        forces=forces,
+    )
+
+
+@pytest.mark.parametrize("cells", ["hexahedra", "tetrahedra"])
+def test_a_body_with_forces_on_nodes(tmp_path, cells):
+    def spiral(x):
+        angle = 2 * x[0] + x[1]
+        return np.array([np.cos(angle), np.sin(angle), 0.0])
+
+    mesh = fem.box(3, 2, 2, cells=cells)
+    loads = fem.facet_forces(mesh.points, mesh.facets["top"], (0.3, 0.2, -1.0))
+    problem = fem.solid_contact_problem(
+        mesh.points,
+        mesh.cells,
+        (1, 1),
+        contact=mesh.facets["bottom"],
+        held=mesh.nodes("left"),
+        forces=loads,
+        axes=spiral,
+    )
+    state = some_state(problem)
+    write_vtu(problem, state, tmp_path / "p.vtu")
+    assert ElementTree.parse(tmp_path / "p.vtu").getroot().attrib["type"] == "UnstructuredGrid"
+    picture = meshio.read(tmp_path / "p.vtu")
+    assert np.array_equal(picture.points, mesh.points)
+    (body, surface), kinds = picture.cells, {"hexahedra": ["hexahedron", "quad"], "tetrahedra": ["tetra", "triangle"]}
+    assert [body.type, surface.type] == kinds[cells]
+    assert np.array_equal(body.data, problem.mesh.cells)
+    assert np.array_equal(surface.data, mesh.facets["bottom"])
+    assert [np.unique(part).tolist() for part in picture.cell_data["contact_surface"]] == [[0], [1]]
+    data = picture.point_data
+    assert np.array_equal(data["displacement"], problem.mesh.displacements(state.u))
+    contact = np.array(problem.node_ids)
+    others = np.setdiff1d(np.arange(len(mesh.points)), contact)
+    assert np.array_equal(data["lambda_n"][contact], state.lambda_n)
+    assert np.array_equal(data["pressure"][contact], state.lambda_n / problem.areas)
+    assert np.array_equal(data["status"][contact], np.arange(problem.p) % 3)
+    assert np.array_equal(data["u_t2"][contact], state.u_t[:, 1])
+    assert all(np.all(np.isnan(data[name][others])) for name in ("lambda_n", "pressure", "status", "u_n", "lambda_t1"))
+    # forces on the body in global axes are those of the equations, -B' lambda; slip is the displacement along the floor
+    on_body = problem.mesh.displacements(-problem.contact_rows.T @ state.forces)
+    assert np.allclose(data["contact_force"], on_body, rtol=0, atol=1e-14)
+    assert np.allclose(data["friction_force"], on_body * [1, 1, 0], rtol=0, atol=1e-14)
+    assert np.allclose(data["slip"][contact], data["displacement"][contact] * [1, 1, 0], rtol=0, atol=1e-14)
+    assert not np.any(data["slip"][others])
+
+
+def test_patches_are_data_of_facets(tmp_path):
+    mesh = fem.box(4, 4, 1, cells="tetrahedra")
+    facets = mesh.facets["bottom"]
+    held = np.unique(facets[np.max(mesh.points[facets][:, :, 0], axis=1) < 0.3])
+    labels = np.where(np.isin(facets, held).all(axis=1), 100, fem.blocks(mesh.points, facets, 2))
+    problem = fem.solid_contact_problem(
+        mesh.points, mesh.cells, (1, 1), contact=facets, held=held, multipliers="elements", patches=labels
+    )
+    assert np.array_equal(problem.mesh.rows == -1, labels == 100)
+    state = some_state(problem)
+    write_vtu(problem, state, tmp_path / "p.vtu")
+    picture = meshio.read(tmp_path / "p.vtu")
+    inside, surface = picture.cell_data["lambda_n"]
+    assert np.all(np.isnan(inside))
+    row_of = {label: row for row, label in enumerate(problem.node_ids)}
+    expected = [state.lambda_n[row_of[label]] if label != 100 else np.nan for label in labels]
+    assert np.array_equal(surface, expected, equal_nan=True)
+    force = picture.cell_data["contact_force"][1]
+    assert np.allclose(force[:, 2], np.nan_to_num(expected))  # the floor pushes up
+    t1, t2 = state.lambda_t[problem.mesh.rows].T
+    assert np.allclose(force[:, :2], np.where(labels[:, None] == 100, 0, np.stack([-t1, t2], axis=1)))
+    assert set(picture.point_data) == {"displacement"}
+
+
+def test_contact_nodes_alone(tmp_path):
+    problem = gallery.one_node_3d()
+    state = some_state(problem)
+    write_vtu(problem, state, tmp_path / "p.vtu")
+    picture = meshio.read(tmp_path / "p.vtu")
+    assert picture.cells[0].type == "vertex"
+    assert np.array_equal(picture.points, problem.coordinates)
+    assert picture.point_data["lambda_n"] == state.lambda_n
+    assert "contact_force" not in picture.point_data
+
+
+def test_directions_that_the_rows_do_not_tell_are_left_out(tmp_path):
+    mesh = fem.box(2, 2, 1)
+    held = np.zeros((len(mesh.points), 3), dtype=bool)
+    held[mesh.nodes("left")] = True
+    held[mesh.nodes("front"), 1] = True
+    problem = fem.solid_contact_problem(
+        mesh.points,
+        mesh.cells,
+        (1, 1),
+        contact=mesh.facets["bottom"],
+        held=held,
+        multipliers="elements",
+        axes=(0.6, 0.8, 0),
+    )
+    write_vtu(problem, some_state(problem), tmp_path / "p.vtu")
+    data = meshio.read(tmp_path / "p.vtu").cell_data
+    assert "pressure" in data
+    assert "contact_force" not in data
+
+
+def no_mesh(problem):
+    names = ("A", "Bn", "Bt1", "Bt2", "f")
+    return ContactProblem3D(*(getattr(problem, name) for name in names))
+
+
+def no_facets(problem):
+    names, mesh = ("A", "Bn", "Bt1", "Bt2", "f"), problem.mesh
+    return ContactProblem3D(
+        *(getattr(problem, name) for name in names), mesh=BodyMesh(mesh.points, mesh.cells, mesh.dofs)
+    )
+
+
+PATCHES = gallery.block3d(4, 2, 1, multipliers="elements", ratio=2)
+
+
+def test_a_mesh_without_facets_will_do_for_nodes(tmp_path):
+    problem = gallery.block3d(2, 1, 1)
+    write_vtu(no_facets(problem), some_state(problem), tmp_path / "p.vtu")
+    picture = meshio.read(tmp_path / "p.vtu")
+    assert len(picture.cells) == 1
+    assert np.array_equal(np.flatnonzero(~np.isnan(picture.point_data["lambda_n"])), problem.node_ids)
+
+
+@pytest.mark.parametrize(
+    ("problem", "change", "name", "message"),
+    [
+        (PATCHES, {}, "p.vtk", r"path is '.*p\.vtk'; expected a name that ends in \.vtu"),
+        (PATCHES, {}, "no/such/p.vtu", "path .* cannot be written"),
+        (PATCHES, {"u_n": None}, "p.vtu", "state is a SimpleNamespace without u_n; expected u, lambda_n, lambda_t"),
+        (PATCHES, {"lambda_t": np.zeros(2)}, "p.vtu", r"lambda_t of the state has shape \(2,\); expected \(2, 2\)"),
+        (PATCHES, {"u": np.zeros(3)}, "p.vtu", r"u of the state has shape \(3,\); expected"),
+        (no_mesh(PATCHES), {}, "p.vtu", "problem has neither mesh nor coordinates"),
+        (no_facets(PATCHES), {}, "p.vtu", "problem has contact rows of more than one node, and its mesh has no facets"),
+        (gallery.one_node_triangle(), {}, "p.vtu", "problem is a ContactProblem; expected a ContactProblem3D"),
+    ],
+)
+def test_bad_arguments_are_named(tmp_path, problem, change, name, message):
+    state = vars(some_state(PATCHES)) | change
+    state = SimpleNamespace(**{key: value for key, value in state.items() if value is not None})
+    with pytest.raises(InvalidArgumentError, match=message):
+        write_vtu(problem, state, tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /dev/full")
+def test_a_full_disk_is_named(tmp_path):
+    (tmp_path / "p.vtu").symlink_to("/dev/full")
+    with pytest.raises(OutputError, match="cannot be written"):
+        write_vtu(PATCHES, some_state(PATCHES), tmp_path / "p.vtu")
+
+
+def test_meshio_is_an_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "meshio", None)
+    with pytest.raises(MissingDependencyError, match=r'VTU files need the package meshio, .* "enumsol\[solids\]"'):
+        write_vtu(PATCHES, some_state(PATCHES), tmp_path / "p.vtu")
