@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -10,9 +11,11 @@ from enumsol.cli.common import ExitStatus, finish, load_any_problem, load_proble
 from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, count, csv, file, number
 from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display
-from enumsol.errors import InvalidArgumentError
+from enumsol.errors import InvalidArgumentError, MissingDependencyError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import pandas as pd
 
     from enumsol.checks import Alpha
@@ -55,10 +58,11 @@ def fixed_point(
     if starts is not None:
         _basins(load_problem(problem), problem, value, starts, options, json_file, csv_file, plot_file)
     body = load_any_problem(problem)
+    write_vtu = None if vtu_file is None else _vtu_writer(body, problem)
     found, ended = so_far(lambda: _approximate(body, value, start, options))
     deliver(
         (npz_file, found.save),
-        (vtu_file, lambda path: _write_vtu(body, found, path)),
+        (vtu_file, lambda path: write_vtu and write_vtu(found, path)),
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: repr(found),
@@ -91,10 +95,18 @@ def _approximate(
         return successive_approximations(body, alpha, start, progress=show, **options)
 
 
-def _write_vtu(body: ContactProblem | ContactProblem3D, found: FixedPoint, path: str) -> None:
-    from enumsol.io.vtu import write_vtu  # meshio
+def _vtu_writer(body: ContactProblem | ContactProblem3D, name: str) -> Callable[[FixedPoint, str], None]:
+    """What writes a result, if there can be such a file at all."""
+    from enumsol.io.vtu import write_vtu  # as above
+    from enumsol.problem3d import ContactProblem3D
 
-    write_vtu(body, found, path)
+    if not isinstance(body, ContactProblem3D):
+        raise InvalidArgumentError(f"--vtu is given, but {name} is a problem in 2D; expected one in 3D")
+    if find_spec("meshio") is None:
+        raise MissingDependencyError(
+            '--vtu needs meshio, which is not installed; install it with: pip install "enumsol[solids]"'
+        )
+    return lambda found, path: write_vtu(body, found, path)
 
 
 def _content(found: FixedPoint, name: str) -> dict[str, Any]:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from enumsol.array_checks import real_array
-from enumsol.checks import file_path, instance_of, writing
+from enumsol.checks import file_path, instance_of
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.files import writing
 from enumsol.problem3d import BodyMesh, ContactProblem3D
 
 if TYPE_CHECKING:
@@ -27,20 +28,27 @@ _ORTHONORMAL = 1e-8
 
 
 class State(Protocol):
-    """Displacements and contact forces of a problem: a FixedPoint, a TrescaSolution, or one's own.
+    """Displacements and contact forces of a problem: a FixedPoint, a TrescaSolution, or one's own."""
 
-    Attributes
-    ----------
-    u : (n,) array [length]
-    lambda_n, u_n : (p,) arrays [force, length]
-    lambda_t, u_t : (p, 2) arrays [force, length]
-    """
+    @property
+    def u(self) -> Floats:
+        """Displacement, shape (n,) [length]."""
 
-    u: Floats
-    lambda_n: Floats
-    lambda_t: Floats
-    u_n: Floats
-    u_t: Floats
+    @property
+    def lambda_n(self) -> Floats:
+        """Normal contact forces, shape (p,) [force]."""
+
+    @property
+    def lambda_t(self) -> Floats:
+        """Tangential contact forces, shape (p, 2) [force]."""
+
+    @property
+    def u_n(self) -> Floats:
+        """Normal displacements minus the gap, shape (p,) [length]."""
+
+    @property
+    def u_t(self) -> Floats:
+        """Slips, shape (p, 2) [length]."""
 
 
 def write_vtu(problem: ContactProblem3D, state: State, path: str | os.PathLike[str]) -> None:
