@@ -98,18 +98,23 @@ SIGNS = {
 }
 
 
+_EQUATIONS = np.array([[kind in CONDITIONS[code].equations for kind in RowKind] for code in SIGNS])
+#: lambda_n >= 0 in every status, which F = 0 does not imply in a sticking one.
+_INEQUALITIES = np.array(
+    [[kind in (_R.NORMAL_FORCE, *CONDITIONS[code].inequalities) for kind in RowKind] for code in SIGNS]
+)
+
+
 def active_within(
     rows: NDArray[np.float64], friction: Sequence[bool] | NDArray[np.bool_], tolerance: float
 ) -> tuple[frozenset[int], ...]:
     """Per node the final codes whose conditions hold within the tolerance, for values of all rows, shape (7, p)."""
-    zero, held = np.abs(rows) <= tolerance, rows >= -tolerance
-    holds = {
-        code: held[_R.NORMAL_FORCE]
-        & np.all(zero[list(CONDITIONS[code].equations)], axis=0)
-        & np.all(held[list(CONDITIONS[code].inequalities)], axis=0)
-        for code in SIGNS
-    }
-    return tuple(frozenset(code for code in FINAL[bool(friction[i])] if holds[code][i]) for i in range(rows.shape[1]))
+    # products of booleans: whether any row that shall vanish, or hold, does not
+    broken = _EQUATIONS @ (np.abs(rows) > tolerance) | _INEQUALITIES @ (rows < -tolerance)
+    return tuple(
+        frozenset(code for code in FINAL[bool(friction[i])] if not column[code])
+        for i, column in enumerate(broken.T.tolist())
+    )
 
 
 def sign_array(statuses: Sequence[ContactStatus]) -> NDArray[np.int8]:

@@ -55,8 +55,8 @@ def write_text(path: str, text: str) -> None:
 
     Raises
     ------
-    OutputError
-        It cannot be written.
+    OutputError, InvalidArgumentError
+        It cannot be written, see `writing`.
     """
     if path == "-":
         typer.echo(text, nl=not text.endswith("\n"))
@@ -93,8 +93,10 @@ def deliver(
                 write(path)
         except OutputError as error:
             failures.append(error)
-        except InvalidArgumentError as error:  # a place that was there before the search and is not any more
-            failures.append(OutputError(str(error)))
+        except InvalidArgumentError as error:
+            if not isinstance(error.__cause__, OSError):
+                raise
+            failures.append(OutputError(str(error)))  # a place that was there before the search and is not any more
     if len(failures) == 1:
         raise failures[0]
     if failures:
@@ -148,8 +150,8 @@ def write_figure(path: str, figure: Any) -> None:
 
     Raises
     ------
-    OutputError
-        The file cannot be written.
+    OutputError, InvalidArgumentError
+        The file cannot be written, see `writing`.
     """
     drawn = BytesIO()  # not all of matplotlib's formats survive a file that cannot be written
     figure.savefig(drawn, dpi=150, format=Path(path).suffix.removeprefix(".").lower())

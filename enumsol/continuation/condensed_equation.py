@@ -241,13 +241,17 @@ class CondensedEquation:
     def _row_values(self, x: Vector) -> Vector:
         """Values of all rows in the order of RowKind, those of the cone over 1 + F, shape (7, p)."""
         p, F, w = self.p, self.at(x).F, self.w(x)
-        n, t, cone = x[:p], x[p:-1], 1.0 + F
-        return np.stack([n, t, (F * n - t) / cone, (F * n + t) / cone, -w[:p], w[p:], -w[p:]])
+        bound, t, cone = F * x[:p], x[p:-1], 1.0 + F
+        rows = [x[:-1], (bound - t) / cone, (bound + t) / cone, -w[:p], w[p:], -w[p:]]
+        return np.concatenate(rows).reshape(-1, p)
+
+    def _of_inequalities(self, codes: Codes, rows: Vector, missing: float) -> Vector:
+        kinds = _KINDS[np.array(codes, dtype=np.intp)]
+        return np.where(kinds < 0, missing, rows[kinds, np.arange(self.p)[:, None]])
 
     def slacks(self, codes: Codes, x: Vector) -> Vector:
         """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
-        kinds = _KINDS[np.array(codes, dtype=np.intp)]
-        return np.where(kinds < 0, np.inf, self._row_values(x)[kinds, np.arange(self.p)[:, None]])
+        return self._of_inequalities(codes, self._row_values(x), np.inf)
 
     def slack_gradient(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Vector:
         """Gradient of one slack with respect to x, shape (2p + 1,)."""
@@ -269,11 +273,14 @@ class CondensedEquation:
 
     def slack_rates(self, codes: Codes, x: Vector, tangent: Vector) -> Vector:
         """Derivatives of the slacks along a tangent, shape (p, 2); zero where there is one condition."""
-        out = np.zeros((self.p, 2))
-        for i, code in enumerate(codes):
-            for k in range(len(CONDITIONS[code].inequalities)):
-                out[i, k] = self.slack_gradient(codes, x, (i, k)) @ tangent
-        return out
+        p, values, da = self.p, self.at(x), tangent[-1]
+        F, dF, cone = values.F, values.dF * da, 1.0 + values.F
+        bound, t, dt = F * x[:p], x[p:-1], tangent[p:-1]
+        moved, turn = F * tangent[:p] + dF * x[:p], dF / cone
+        dw = values.dg * da - self.S @ tangent[:-1]
+        plus, minus = (moved - dt - turn * (bound - t)) / cone, (moved + dt - turn * (bound + t)) / cone
+        rows = np.concatenate([tangent[:-1], plus, minus, -dw[:p], dw[p:], -dw[p:]]).reshape(-1, p)
+        return self._of_inequalities(codes, rows, 0.0)
 
     def active(self, x: Vector, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""

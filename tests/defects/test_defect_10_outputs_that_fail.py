@@ -5,11 +5,13 @@ import os
 import subprocess
 import sys
 
+import pandas as pd
 import pytest
 from cli.test_cli import run
 
 import enumsol
 from enumsol import gallery
+from enumsol.cli.output import deliver
 
 FULL = "/dev/full"
 GALLERY = "gallery:one-node-6.1"
@@ -243,6 +245,13 @@ def test_one_output_that_fails_keeps_no_other_back(place, tmp_path):
     assert done.returncode == 74
     assert_one_line(done.stderr, "stdout cannot be written", f"{FULL} cannot be written", "full.png cannot be written")
     assert all(file.stat().st_size > 0 for file in good.values())
+
+
+def test_a_place_that_is_gone_after_the_search_keeps_no_other_back(tmp_path):
+    file, gone = tmp_path / "r.csv", tmp_path / "gone" / "r.json"
+    with pytest.raises(enumsol.OutputError, match=r"gone/r\.json cannot be written"):
+        deliver(json_file=str(gone), csv_file=str(file), text=lambda: "", content=lambda: "{}", frame=pd.DataFrame)
+    assert file.exists()
 
 
 def test_json_is_written_when_nobody_reads_stdout(place, tmp_path):
