@@ -3,6 +3,7 @@
 from enumsol.fixed_points.basins import basin_table, fixed_point_residual, is_fixed_point
 from enumsol.fixed_points.lipschitz import LipschitzEstimate, lipschitz_estimate
 from enumsol.fixed_points.plots import plot_basins
+from enumsol.fixed_points.reference import TrescaReference
 from enumsol.fixed_points.result import FixedPoint, Outcome
 from enumsol.fixed_points.successive import FixedPointProgress, successive_approximations
 from enumsol.fixed_points.tresca import TrescaNotSolved, TrescaSolution, solve_tresca
@@ -13,6 +14,7 @@ __all__ = [
     "LipschitzEstimate",
     "Outcome",
     "TrescaNotSolved",
+    "TrescaReference",
     "TrescaSolution",
     "basin_table",
     "fixed_point_residual",

@@ -18,9 +18,18 @@ if TYPE_CHECKING:
 
 
 class TrescaReference:
-    """Minimise u' A u / 2 - f' u + sum_i s_i |F_i u_t,i| subject to Bn u <= gap; made canonical once.
+    """Minimise u' A u / 2 - f' u + sum_i s_i |F_i u_t,i| subject to Bn u <= gap.
 
-    Slip bounds, coefficients and load are parameters. The multipliers of the constraints are the contact forces.
+    Slip bounds, coefficients and load are parameters, so that CVXPY brings the problem into the form of its solver once,
+    however many are solved. The multipliers of the constraints are the contact forces.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+
+    Attributes
+    ----------
+    program : cvxpy.Problem
 
     Raises
     ------
@@ -48,14 +57,30 @@ class TrescaReference:
         self._tangential = [tangents[k] @ self._u - offsets[:, k] == slips[:, k] for k in range(d)]
         friction = cp.sum(cp.norm(cp.multiply(self._work, slips), axis=1))
         energy = 0.5 * cp.quad_form(self._u, cp.psd_wrap(sp.csc_matrix(problem.A)))
-        self._program: Any = cp.Problem(
+        self.program: Any = cp.Problem(
             cp.Minimize(energy - self._load @ self._u + friction), [self._normal, *self._tangential]
         )
 
     def solve(self, bound: Vector, F: NDArray[np.float64], load: Vector) -> tuple[Vector, NDArray[np.float64], Vector]:
-        """lambda_n (p,), lambda_t (p, d) and u (n,) for slip bounds (p,), coefficients (p, d) and a load (n,)."""
+        """Contact forces and displacement for slip bounds and coefficients of friction.
+
+        Parameters
+        ----------
+        bound : (p,) array
+            Slip bounds s >= 0 [force].
+        F : (p, d) array
+            Friction coefficients in the d = 1 or 2 tangents [-].
+        load : (n,) array
+            f [force].
+
+        Returns
+        -------
+        lambda_n : (p,) array [force]
+        lambda_t : (p, d) array [force]
+        u : (n,) array [length]
+        """
         self._work.value, self._load.value = bound[:, None] * F, load
         settings: dict[str, Any] = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
-        self._program.solve(solver="CLARABEL", **settings)
+        self.program.solve(solver="CLARABEL", **settings)
         tangential = np.stack([constraint.dual_value for constraint in self._tangential], axis=1)
         return np.asarray(self._normal.dual_value), tangential, np.asarray(self._u.value)

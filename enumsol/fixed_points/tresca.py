@@ -89,7 +89,7 @@ def solve_tresca(
         Where Newton's method starts.
     solver : {"newton", "clarabel", "cvxpy"}
         Newton's method, with Clarabel where it does not converge; Clarabel on the condensed problem; CVXPY on the
-        problem in u, slow and readable.
+        problem in u, slow and readable (for many solutions by it, see `enumsol.fixed_points.TrescaReference`).
 
     Returns
     -------

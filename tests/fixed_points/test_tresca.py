@@ -37,6 +37,20 @@ def test_three_solvers_agree(rng, make):
         np.testing.assert_allclose(reference.forces, newton.forces, atol=1e-5 * size)
 
 
+@pytest.mark.parametrize("make", [random_2d, random_3d])
+def test_the_reference_is_made_canonical_once(rng, make):
+    problem, _ = make(rng)
+    reference = enumsol.fixed_points.TrescaReference(problem)
+    assert reference.program.is_dcp(dpp=True)  # or CVXPY would do it anew for every value of the parameters
+    F = problem.friction_at(0).reshape(problem.p, -1)
+    for bound in rng.uniform(0.1, 2.0, (3, problem.p)):
+        normal, tangential, u = reference.solve(bound, F, problem.load_at(0))
+        found = enumsol.solve_tresca(problem, bound, 0)
+        np.testing.assert_allclose(normal, found.lambda_n, atol=1e-5)
+        np.testing.assert_allclose(tangential, found.lambda_t.reshape(problem.p, -1), atol=1e-5)
+        np.testing.assert_allclose(u, found.u, atol=1e-5)
+
+
 def test_clarabel_alone_comes_close(rng):
     problem, bound = random_3d(rng)
     system = tresca.ContactSystem.at(problem, 0)
