@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import ArrayLike, NDArray
+
+    Cells = Literal["hexahedra", "tetrahedra"]
 
 #: Most cells along one side of a box.
 MOST_CELLS_OF_A_SIDE = 1_000
@@ -79,7 +81,7 @@ class SolidMesh:
         )
 
 
-def box(nx: int, ny: int, nz: int, size: ArrayLike = (1.0, 1.0, 1.0), cells: str = "hexahedra") -> SolidMesh:
+def box(nx: int, ny: int, nz: int, size: ArrayLike = (1.0, 1.0, 1.0), cells: Cells = "hexahedra") -> SolidMesh:
     """Mesh of (0, a) x (0, b) x (0, c) with nx by ny by nz cells and its six sides.
 
     Node (i, j, k) has the number ``(k (ny + 1) + j) (nx + 1) + i``. The sides are named left and right (x = 0, a),
