@@ -143,7 +143,8 @@ def blocks(points: ArrayLike, facets: ArrayLike, ratio: int) -> NDArray[np.int64
     """Labels (k,) of facets in a rectangular grid, joined to blocks of ratio by ratio cells of the grid.
 
     The grid lies in a plane perpendicular to an axis, its cells are quadrilaterals or pairs of triangles, and need not
-    be equally large. Where ratio does not divide their number along a side the last blocks are smaller.
+    be equally large. Where ratio does not divide their number along a side the last blocks are smaller. Blocks are
+    numbered along the first of the two axes, then along the second.
 
     Parameters
     ----------
