@@ -11,7 +11,19 @@ import enumsol
 from enumsol.condensation.factorization import Factorization
 
 #: Libraries that only some problems, results or commands need.
-RARE = {"flint", "networkx", "pandas", "matplotlib", "cvxpy", "skfem", "typer", "rich", "scipy.optimize", "h5py"}
+RARE = {
+    "flint",
+    "networkx",
+    "pandas",
+    "matplotlib",
+    "cvxpy",
+    "skfem",
+    "typer",
+    "rich",
+    "scipy.optimize",
+    "h5py",
+    "meshio",
+}
 GENERIC = "import enumsol; problem = enumsol.gallery.{problem}; roots = enumsol.enumerate_roots(problem, {alpha}); "
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import ArrayLike, NDArray
+
+    Cells = Literal["hexahedra", "tetrahedra"]
 
 #: Most cells along one side of a box.
 MOST_CELLS_OF_A_SIDE = 1_000
@@ -79,7 +81,7 @@ class SolidMesh:
         )
 
 
-def box(nx: int, ny: int, nz: int, size: ArrayLike = (1.0, 1.0, 1.0), cells: str = "hexahedra") -> SolidMesh:
+def box(nx: int, ny: int, nz: int, size: ArrayLike = (1.0, 1.0, 1.0), cells: Cells = "hexahedra") -> SolidMesh:
     """Mesh of (0, a) x (0, b) x (0, c) with nx by ny by nz cells and its six sides.
 
     Node (i, j, k) has the number ``(k (ny + 1) + j) (nx + 1) + i``. The sides are named left and right (x = 0, a),
@@ -141,7 +143,8 @@ def blocks(points: ArrayLike, facets: ArrayLike, ratio: int) -> NDArray[np.int64
     """Labels (k,) of facets in a rectangular grid, joined to blocks of ratio by ratio cells of the grid.
 
     The grid lies in a plane perpendicular to an axis, its cells are quadrilaterals or pairs of triangles, and need not
-    be equally large. Where ratio does not divide their number along a side the last blocks are smaller.
+    be equally large. Where ratio does not divide their number along a side the last blocks are smaller. Blocks are
+    numbered along the first of the two axes, then along the second.
 
     Parameters
     ----------

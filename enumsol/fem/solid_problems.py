@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -43,7 +43,7 @@ def solid_contact_problem(
     friction_slope: Any = 0.0,
     slip_offset: ArrayLike = 0.0,
     node_ids: Sequence[Any] | None = None,
-    multipliers: str = "nodes",
+    multipliers: Literal["nodes", "elements"] = "nodes",
     ratio: int = 1,
     patches: ArrayLike | None = None,
 ) -> ContactProblem3D:
@@ -121,7 +121,11 @@ def solid_contact_problem(
     free = np.flatnonzero(~mask.ravel())
     mean = None
     if rows.rows_of_facets is not None:
-        mean = _slip_mean(surface, rows, (first, second), real_array(slip_offset, "slip_offset"), free)
+        of_facets = rows.rows_of_facets
+        weights = sp.csr_array(rows.means[:, surface.nodes] @ surface.return_operator())
+        mean = SlipMean(
+            *_slips(surface, of_facets, (first, second), real_array(slip_offset, "slip_offset"), free), weights
+        )
     Bn, Bt1, Bt2 = (_displacements(rows.means, direction, free) for direction in (normal, first, second))
     return ContactProblem3D(
         sp.csc_array(A[free][:, free]),
@@ -172,16 +176,14 @@ def _displacements(means: sp.csr_array, directions: Floats, free: Integers) -> s
     return rows
 
 
-def _slip_mean(
-    surface: ContactSurface, rows: Multipliers, axes: tuple[Floats, Floats], offset: Floats, free: Integers
-) -> SlipMean:
-    """Means over patches of r_h |u_t|; patches that are held entirely count with slip 0."""
-    assert rows.rows_of_facets is not None
+def _slips(
+    surface: ContactSurface, of_facets: Integers, axes: tuple[Floats, Floats], offset: Floats, free: Integers
+) -> tuple[sp.csr_array, sp.csr_array, Floats]:
+    """T1, T2 and the offset of a SlipMean at all quadrature points; patches that are held entirely have slip 0."""
     values = surface.interpolation()
-    patch = np.repeat(rows.rows_of_facets, values.shape[0] // len(surface.facets))
+    patch = np.repeat(of_facets, values.shape[0] // len(surface.facets))
     moving = (patch >= 0)[:, None]
     T1, T2 = (_displacements(values, np.where(moving, axis[patch], 0.0), free) for axis in axes)
     if offset.shape != (len(axes[0]), 2):
         offset = np.zeros((len(axes[0]), 2))  # a wrong shape is for ContactProblem3D to refuse
-    weights = sp.csr_array(rows.means[:, surface.nodes] @ surface.return_operator())
-    return SlipMean(T1, T2, np.where(moving, offset[patch], 0.0), weights)
+    return T1, T2, np.where(moving, offset[patch], 0.0)

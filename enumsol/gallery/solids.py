@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -70,9 +70,9 @@ def block3d(
     lame: tuple[float, float] = (1.0, 1.0),
     *,
     size: ArrayLike = (1.0, 1.0, 1.0),
-    cells: str = "hexahedra",
+    cells: Literal["hexahedra", "tetrahedra"] = "hexahedra",
     gap: float = 0.0,
-    multipliers: str = "nodes",
+    multipliers: Literal["nodes", "elements"] = "nodes",
     ratio: int = 1,
 ) -> ContactProblem3D:
     """Elastic block clamped at its left side (x = 0), pressed onto the floor z = 0 and sheared by a traction on top.

@@ -107,7 +107,7 @@ def write_vtu(problem: ContactProblem3D, state: State, path: str | os.PathLike[s
         vertices = np.arange(problem.p)[:, None]
         picture = meshio.Mesh(problem.coordinates, [("vertex", vertices)], point_data=data)
     else:
-        data |= _vectors(problem, data)
+        data |= _vectors(problem, problem.mesh, data)
         u = problem.mesh.displacements(_array(state, "u", (problem.n,)))
         picture = _body(meshio, problem, problem.mesh, u, data)
     with writing(place, "path"):
@@ -148,10 +148,9 @@ def _row_data(problem: ContactProblem3D, state: State) -> dict[str, Floats]:
     return data
 
 
-def _vectors(problem: ContactProblem3D, data: dict[str, Floats]) -> dict[str, Floats]:
+def _vectors(problem: ContactProblem3D, mesh: BodyMesh, data: dict[str, Floats]) -> dict[str, Floats]:
     """Vectors of the contact rows in global axes, each (p, 3); none where the rows do not tell their directions."""
-    assert problem.mesh is not None
-    axes = np.eye(3)[problem.mesh.dofs % 3]
+    axes = np.eye(3)[mesh.dofs % 3]
     sums = np.stack([rows @ axes for rows in (problem.Bt1, problem.Bt2, problem.Bn)], axis=1)
     lengths = np.linalg.norm(sums, axis=2, keepdims=True)
     frames = np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > 0)

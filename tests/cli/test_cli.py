@@ -160,6 +160,19 @@ def test_gallery_list_and_write(capsys, tmp_path):
     assert (tmp_path / "market" / "A.mtx").exists()
 
 
+def test_gallery_writes_problems_in_3d(capsys, tmp_path):
+    file = tmp_path / "p.npz"
+    status, out, _ = run(capsys, "gallery", "write", "block3d-4", file)
+    assert (status, out) == (0, f"wrote block3d-4 to {file}; try: enumsol fixed-point {file} --alpha 0.5\n")
+    assert read_problem(file).fingerprint == gallery.get("block3d-4").build().fingerprint
+    assert_refused(*run(capsys, "roots", file, "--alpha", 1), f"{file} is a ContactProblem3D; expected")
+    status, out, _ = run(capsys, "gallery", "list")
+    assert [line.split()[:3] for line in out.splitlines()[-5:]] == [
+        ["one-node-3d", "0", "-"],
+        *([f"block3d-{p}", "0.5", "-"] for p in (4, 9, 16, 100)),
+    ]
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
