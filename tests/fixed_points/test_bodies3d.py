@@ -54,7 +54,7 @@ def test_a_block_pressed_and_sheared_with_orthotropic_friction_that_depends_on_t
 
 
 def plane_strain(nx, nz, length, height, traction, F):
-    """A clamped rectangle of bilinear elements in plane strain, pressed on the floor; nothing of `enumsol.fem` is used."""
+    """A clamped rectangle of bilinear elements in plane strain, pressed on the floor, without `enumsol.fem`."""
     from skfem import Basis, ElementQuad1, ElementVector, FacetBasis, LinearForm, MeshQuad
     from skfem.models.elasticity import linear_elasticity
 
