@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from scipy.linalg import eigh
 
 from enumsol.checks import nonnegative_number
+from enumsol.condensation.condensed import RHS_BLOCK
 from enumsol.fixed_points.system import ContactSystem, contact_problem
 from enumsol.fixed_points.tresca import node_values
 from enumsol.friction import FrictionTable
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from enumsol.checks import AlphaLike
     from enumsol.fixed_points.system import Problem
+    from enumsol.problem3d import SlipMean
 
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]
@@ -87,6 +89,37 @@ class _Coefficients:
         return self.lipschitz if self.anisotropy == 1.0 else self.lipschitz * (1.0 + self.anisotropy)
 
 
+@dataclass(frozen=True)
+class _Slips:
+    """The slips that coefficients depend on, by tangential displacements at other places where they are means."""
+
+    S_tt: Matrix
+    mean: SlipMean | None
+    rows: sp.csr_array | None = None
+    root: Matrix | None = None
+
+    @classmethod
+    def of(cls, body: Problem, S_tt: Matrix) -> _Slips:
+        """Of a problem; compliances are condensed to the degrees of freedom that occur in the means."""
+        mean = body.slip_mean if isinstance(body, ContactProblem3D) else None
+        if mean is None:
+            return cls(S_tt, None)
+        rows = sp.csr_array(sp.vstack([mean.T1, mean.T2]))
+        used = np.unique(rows.indices)
+        unit = sp.csc_array((np.ones(len(used)), (used, np.arange(len(used)))), shape=(body.n, len(used)))
+        starts = range(0, len(used), RHS_BLOCK)
+        solve = body.factorization.solve
+        compliance = np.hstack([solve(unit[:, k : k + RHS_BLOCK].toarray())[used] for k in starts])
+        return cls(S_tt, mean, sp.csr_array(rows[:, used]), np.linalg.cholesky(0.5 * (compliance + compliance.T)))
+
+    def largest(self, weights: Vector) -> float:
+        """Largest sum of weights * slip^2 over displacements of unit energy, weights of shape (p,)."""
+        if self.mean is None or self.rows is None or self.root is None:
+            return _largest(_weighted(self.S_tt, np.tile(np.sqrt(weights), len(self.S_tt) // len(weights))))
+        scaled = sp.diags_array(np.tile(self.mean.weights.T @ weights, 2)) @ self.rows
+        return _largest(self.root.T @ (self.rows.T @ scaled).toarray() @ self.root)
+
+
 def lipschitz_estimate(
     problem: Problem, alpha: AlphaLike, *, areas: ArrayLike | None = None, lipschitz: float | None = None
 ) -> LipschitzEstimate:
@@ -136,11 +169,12 @@ def lipschitz_estimate(
     C1 = min(_force_part(inverse_nn, S_tt, used.F, theta) for theta in _weights(inverse_nn, blocks, used.F, m))
     C2 = second = 0.0
     if used.lipschitz > 0:
+        slips = _Slips.of(body, S_tt)
         c_0 = np.sqrt(_largest(inverse_nn / np.sqrt(np.outer(m, m))))
-        c_phi = np.sqrt(_slip_compliance(body, S_tt, m))
+        c_phi = np.sqrt(slips.largest(m))
         C2 = float(used.per_change * c_0 * np.max(c_inf) * c_phi * load)
         most = np.sqrt(np.diagonal(inverse_nn)) * load
-        both = _slip_compliance(body, S_tt, most) * _largest(_weighted(S_tt, np.tile(np.sqrt(most), d)))
+        both = slips.largest(most) * _largest(_weighted(S_tt, np.tile(np.sqrt(most), d)))
         second = float(used.per_change * np.sqrt(both))
     return LipschitzEstimate(
         C1=C1,
@@ -165,16 +199,6 @@ def _weights(inverse_nn: Matrix, blocks: Matrix, F: Matrix, m: Vector) -> list[V
     tangential = np.max(F**2 * np.diagonal(blocks, axis1=1, axis2=2), axis=1)
     balanced = (np.maximum(tangential, 1e-12 * np.max(tangential)) / np.diagonal(inverse_nn)) ** 0.25
     return [1.0 / np.sqrt(m), balanced] if np.any(tangential) else [1.0 / np.sqrt(m)]
-
-
-def _slip_compliance(body: Problem, S_tt: Matrix, weights: Vector) -> float:
-    """Largest sum of weights * slip^2 over displacements of unit energy, weights of shape (p,)."""
-    mean = body.slip_mean if isinstance(body, ContactProblem3D) else None
-    if mean is None:
-        return _largest(_weighted(S_tt, np.tile(np.sqrt(weights), len(S_tt) // len(weights))))
-    root = sp.diags_array(np.tile(np.sqrt(mean.weights.T @ weights), 2))
-    T = sp.csr_array(root @ sp.vstack([mean.T1, mean.T2]))
-    return _largest(T @ body.factorization.solve(T.T.toarray()))
 
 
 def _coefficients(system: ContactSystem, reach: Vector, lipschitz: float | None) -> _Coefficients:

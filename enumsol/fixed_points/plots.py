@@ -40,10 +40,10 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
         raise InvalidArgumentError(f"table lacks {', '.join(sorted(missing))}; expected what basin_table returns")
     if ax is None:
         ax = new_figure(figsize=(6.4, 4.2)).subplots()
-    groups = list(table.groupby("root"))
-    for k, (root, rows) in enumerate(groups):
-        marker = _MARKERS[k % len(_MARKERS)]
-        ax.plot(rows["size"], rows["iterations"], marker, alpha=0.7, label=f"root {root}: {len(rows)} starts")
+    for root in sorted(table["root"].dropna().astype(int).unique().tolist()):
+        rows = table[table["root"] == root]
+        style = {"marker": _MARKERS[root % len(_MARKERS)], "color": f"C{root}"}  # the same in every picture
+        ax.plot(rows["size"], rows["iterations"], ls="", alpha=0.7, label=f"root {root}: {len(rows)} starts", **style)
     lost = table[table["root"].isna()]
     for outcome, rows in lost.groupby("outcome"):
         ax.plot(rows["size"], rows["iterations"], "x", color="black", label=f"no root ({outcome}): {len(rows)} starts")
@@ -53,6 +53,7 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     ax.set_xlabel("mean slip bound of the start [force]")
     ax.set_ylabel("iterations")
     never = table.attrs.get("never", [])
-    ax.set_title(f"never reached: {'roots ' + ', '.join(map(str, never)) if never else 'none'}")
+    names = ", ".join(map(str, never))
+    ax.set_title(f"never reached: root{'s' if len(never) > 1 else ''} {names}" if names else "never reached: none")
     ax.legend()
     return ax

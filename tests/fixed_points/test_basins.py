@@ -57,7 +57,12 @@ def test_fifty_starts_end_on_a_root_or_say_that_they_did_not(name, alpha, count)
     repelling = {k for k, root in enumerate(roots) if root.index == -1}
     assert repelling <= set(table.attrs["never"])
     assert table["root"].nunique() >= 2
-    assert "never reached: roots" in plot_basins(table).get_title()
+    axes = plot_basins(table)
+    assert axes.get_title().startswith("never reached: root")
+    # a root has its colour whichever others are reached
+    colours = {line.get_label(): line.get_color() for line in axes.lines}
+    for root, rows in table.groupby("root"):
+        assert colours[f"root {root}: {len(rows)} starts"] == f"C{root}"
 
 
 def test_below_the_bound_every_start_ends_on_the_one_root():

@@ -101,6 +101,20 @@ def test_tables_and_samples(rng):
     assert no_axis.C2 > 1e100
 
 
+def test_the_slip_constant_where_slips_are_means():
+    table = enumsol.FrictionTable([0.0, 1.0], [0.3, 0.2])
+    problem = enumsol.gallery.block3d(4, 4, 2, friction=table, multipliers="elements", ratio=2)
+    p, mean, m, S = problem.p, problem.slip_mean, problem.areas, problem.condensed.S
+    g, inverse = problem.condensed.g0, np.linalg.inv(S)
+    T = np.vstack([mean.T1.toarray(), mean.T2.toarray()])
+    root = np.tile(np.sqrt(mean.weights.T @ m), 2)[:, None] * T
+    c_phi = np.linalg.norm(root @ np.linalg.inv(np.linalg.cholesky(problem.A.toarray())).T, 2)
+    c_0 = np.sqrt(np.linalg.eigvalsh(inverse[:p, :p] / np.sqrt(np.outer(m, m)))[-1])
+    c_inf = np.sqrt(max(np.linalg.eigvalsh(S[np.ix_([p + i, 2 * p + i], [p + i, 2 * p + i])])[-1] for i in range(p)))
+    estimate = enumsol.lipschitz_estimate(problem, 0)
+    np.testing.assert_allclose(estimate.C2, 0.1 * c_0 * c_inf * c_phi * np.sqrt(g @ inverse @ g), rtol=1e-9)
+
+
 def test_without_friction_everything_is_unique():
     estimate = enumsol.lipschitz_estimate(from_compliance(np.eye(3), np.ones(3), 0.0), 0)
     assert estimate.C1 == 0.0
