@@ -101,6 +101,11 @@ class ContactProblem(ContactBody):
         """Tangential displacement of the contact nodes, sparse (p, n); a new object as A is."""
         return self._rows["Bt"].matrix()
 
+    @property
+    def depends_on_alpha(self) -> bool:
+        """Whether friction or load change with alpha."""
+        return self.load_slope is not None or bool(np.any(self.friction[1]))
+
     @cached_property
     def condensed(self) -> CondensedProblem:
         """The problem condensed to its 2p contact forces (theory, section 4.1)."""

@@ -224,6 +224,11 @@ class ContactProblem3D(ContactBody):
         """Whether the coefficients are functions of the slip: then only successive approximations are offered."""
         return self.law.depends_on_slip
 
+    @property
+    def depends_on_alpha(self) -> bool:
+        """Whether friction or load change with alpha."""
+        return self.load_slope is not None or bool(np.any(self._slope))
+
     @cached_property
     def condensed(self) -> CondensedProblem3D:
         """The problem condensed to its 3p contact forces."""

@@ -50,7 +50,17 @@ def load_problem(name: str) -> ContactProblem:
         It cannot be read, the gallery has none of that name (the message gives names that are close), or it is one
         in 3D.
     """
-    problem = load_any_problem(name)
+    return plane_problem(load_any_problem(name), name)
+
+
+def plane_problem(problem: ContactProblem | ContactProblem3D, name: str) -> ContactProblem:
+    """The problem, which is one in 2D.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is one in 3D.
+    """
     from enumsol.checks import instance_of  # numpy: not for --help
     from enumsol.problem import ContactProblem
 

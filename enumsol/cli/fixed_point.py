@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from enumsol.cli.common import ExitStatus, finish, load_any_problem, load_problem, parse_alpha, so_far
+from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, plane_problem, so_far
 from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, count, csv, file, number
 from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display
@@ -26,7 +26,10 @@ if TYPE_CHECKING:
 
 def fixed_point(
     problem: ProblemArgument,
-    alpha: Annotated[str, number("--alpha", "Parameter value: a decimal number, or a fraction such as 8/3.")],
+    alpha: Annotated[
+        str | None,
+        number("--alpha", "Parameter value: a number or a fraction; may be left out where nothing depends on it."),
+    ] = None,
     start: Annotated[float, typer.Option(metavar="FORCE", help="Slip bound of every node to begin with.")] = 0.0,
     tolerance: Annotated[
         float, typer.Option(help="Converged when a step is this small, relative to the load.")
@@ -53,11 +56,11 @@ def fixed_point(
     check_outputs(json=json_file, csv=csv_file, npz=npz_file, vtu=vtu_file)
     check_plot(plot_file)
     _check_combination(starts, npz_file, vtu_file, plot_file)
-    value = parse_alpha(alpha)
+    body = load_any_problem(problem)
+    value = _alpha(alpha, problem, body)
     options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations, "anderson": anderson}
     if starts is not None:
-        _basins(load_problem(problem), problem, value, starts, options, json_file, csv_file, plot_file)
-    body = load_any_problem(problem)
+        _basins(plane_problem(body, problem), problem, value, starts, options, json_file, csv_file, plot_file)
     write_vtu = None if vtu_file is None else _vtu_writer(body, problem)
     found, ended = so_far(lambda: _approximate(body, value, start, options))
     deliver(
@@ -80,6 +83,17 @@ def _check_combination(starts: int | None, npz_file: str | None, vtu_file: str |
             raise InvalidArgumentError(f"{option} is -, but it is a binary file; expected the name of a file")
         if starts is not None and path is not None:
             raise InvalidArgumentError(f"{option} and --starts are both given; expected one of them")
+
+
+def _alpha(text: str | None, name: str, body: ContactProblem | ContactProblem3D) -> Alpha:
+    """The alpha that was given, or any where the problem does not depend on it."""
+    if text is not None:
+        return parse_alpha(text)
+    if body.depends_on_alpha:
+        raise InvalidArgumentError(
+            f"--alpha is missing, and friction or load of {name} depends on it; expected a number"
+        )
+    return 0.0
 
 
 def _approximate(

@@ -48,6 +48,16 @@ def test_a_problem_in_a_file(capsys, tmp_path):
     assert "slip" in out
 
 
+def test_alpha_is_asked_for_where_something_depends_on_it(capsys):
+    status, out, _ = run(capsys, "gallery:one-node-3d")
+    assert status == 0
+    assert out.startswith("FixedPoint at alpha = 0")
+    status, _, err = run(capsys, "gallery:block3d-4")
+    assert status == 2
+    assert err.count("\n") == 1
+    assert "--alpha is missing, and friction or load of gallery:block3d-4 depends on it" in err
+
+
 def test_not_converged_is_status_3(capsys):
     status, out, _ = run(capsys, "gallery:one-node-3d", "--alpha", 0, "--max-iterations", 2)
     assert status == 3
