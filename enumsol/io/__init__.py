@@ -1,6 +1,6 @@
 """Contact problems in files: NumPy archives, MatrixMarket directories, fclib HDF5 files; results in VTU for ParaView.
 
-The first three hold the arrays of `ContactProblem` or, but for fclib, of `ContactProblem3D` by name. `read_problem` and
+The first three hold the arrays of `ContactProblem` or of `ContactProblem3D` by name. `read_problem` and
 `write_problem` choose the format by the path.
 
 ``.npz``
@@ -123,7 +123,7 @@ def write_problem(problem: ContactProblem | ContactProblem3D, path: str | os.Pat
         There is no room for it.
     InvalidProblemError
         The format cannot hold the problem: mixed node labels; friction given by a callable; friction or load that
-        depend on alpha, or three dimensions (fclib).
+        depend on alpha, or orthotropic friction (fclib).
     MissingDependencyError
         An fclib file, and h5py is not installed.
 

@@ -1,16 +1,16 @@
-"""Problems in the HDF5 format of the Frictional Contact Library (fclib), in two dimensions.
+"""Problems in the HDF5 format of the Frictional Contact Library (fclib), in two and three dimensions.
 
 The layout is that of fclib.h (github.com/FrictionalContactLibrary/fclib): a group ``/fclib_global`` or ``/fclib_local``
 with ``spacedim``, sparse matrices as groups of ``m``, ``n``, ``nz``, ``nzmax``, ``p``, ``i``, ``x``, and a group
-``vectors``. There r and u hold (normal, tangential) contact by contact, the gap u_N >= 0 opens, r_N >= 0 presses, and
-friction acts against u_T, so that its (u_N, u_T) are our (-u_n, -u_t) and its r our lambda.
+``vectors``. There r and u hold normal and one or two tangential components contact by contact, the gap u_N >= 0 opens,
+r_N >= 0 presses, and friction acts against u_T, so that its (u_N, u_T) are our (-u_n, -u_t) and its r our lambda.
 
 - global: M v = H r + f, u = H' v + w. Read as A = M, [Bn; Bt] = -H', gap and slip_offset from w, friction mu.
 - local: u = W r + q. It knows no displacements of a body; for u = -W v it is the contact problem with A = W,
   [Bn; Bt] = W and load -q: nothing is inverted, forces and contact displacements are those of the file, while the
   problem's u means nothing. W must be positive definite.
 
-mu does not depend on alpha. Equality constraints (G, b; V, R, s) and three dimensions are refused.
+mu is isotropic and depends neither on alpha nor on the slip. Equality constraints (G, b; V, R, s) are refused.
 """
 
 from __future__ import annotations
@@ -31,10 +31,16 @@ if TYPE_CHECKING:
 
     from enumsol.problem3d import ContactProblem3D
 
+    Problem = ContactProblem | ContactProblem3D
+
 SUFFIXES = (".h5", ".hdf5")
+#: Components of a contact, by the dimension of space, in words.
+_NUMBERS = {2: "two", 3: "three"}
+#: What the compliance of a local problem stands for.
+_READ_AS = {2: "A, Bn and Bt", 3: "A, Bn, Bt1 and Bt2"}
 
 
-def read(path: Path) -> ContactProblem:
+def read(path: Path) -> Problem:
     """The global or local problem in an fclib file; the global one if there are both."""
     h5py = _h5py()
     try:
@@ -53,32 +59,43 @@ def read(path: Path) -> ContactProblem:
         )
 
 
-def write(problem: ContactProblem | ContactProblem3D, path: Path) -> None:
-    """Write a global problem; node labels and coordinates have no place in it."""
-    if not isinstance(problem, ContactProblem):
-        raise InvalidProblemError(
-            "fclib files of problems in 3D are not written yet; expected another format (.npz, MatrixMarket directory)"
-        )
+def write(problem: Problem, path: Path) -> None:
+    """Write a global problem; node labels, coordinates, areas and meshes have no place in it."""
     h5py = _h5py()
-    F0, F1 = problem.friction
-    if np.any(F1) or (problem.load_slope is not None and np.any(problem.load_slope)):
+    if problem.depends_on_alpha:
         raise InvalidProblemError(
             "friction or load depends on alpha, which fclib cannot hold; "
             "expected a constant friction and no load_slope, or another format (.npz, MatrixMarket directory)"
         )
-    rows = sp.csr_array(sp.vstack([problem.Bn, problem.Bt], format="csr"))
-    interleaved = np.arange(2 * problem.p).reshape(2, -1).T.ravel()
-    H = sp.csc_array(-rows[interleaved].T)
+    offsets = np.column_stack([problem.gap, problem.slip_offset])
+    dimension = offsets.shape[1]
+    interleaved = np.arange(dimension * problem.p).reshape(dimension, -1).T.ravel()
+    H = sp.csc_array(-problem.contact_rows[interleaved].T)
+    mu = _isotropic(problem)
     with h5py.File(path, "w") as file:
         group = file.create_group("fclib_global")
-        group["spacedim"] = np.array([2], dtype=np.int32)
+        group["spacedim"] = np.array([dimension], dtype=np.int32)
         _write_matrix(group.create_group("M"), problem.A)
         _write_matrix(group.create_group("H"), H)
         vectors = group.create_group("vectors")
         vectors["f"] = problem.f
-        vectors["w"] = np.column_stack([problem.gap, problem.slip_offset]).ravel()
-        vectors["mu"] = F0
+        vectors["w"] = offsets.ravel()
+        vectors["mu"] = mu
         group.create_group("info")["title"] = np.bytes_(f"contact problem with {problem.p} nodes, written by enumsol")
+
+
+def _isotropic(problem: Problem) -> NDArray[np.float64]:
+    """The coefficient of every node."""
+    if isinstance(problem, ContactProblem):
+        return problem.friction[0]
+    if problem.depends_on_solution:
+        raise InvalidProblemError(
+            "friction depends on the slip, which fclib cannot hold; expected constant coefficients"
+        )
+    F1, F2 = problem.friction
+    if not np.array_equal(F1, F2):
+        raise InvalidProblemError("friction is orthotropic, which fclib cannot hold; expected F1 = F2 at every node")
+    return np.asarray(F1)
 
 
 def _h5py() -> Any:
@@ -89,47 +106,56 @@ def _h5py() -> Any:
     return h5py
 
 
-def _global(group: Any) -> ContactProblem:
-    _two_dimensional(group)
+def _global(group: Any) -> Problem:
+    dimension = _dimension(group)
     if "G" in group:
         raise InvalidProblemError("it has equality constraints (G, b); expected a problem without them")
     M, H = _matrix(group, "M", symmetric=True), _matrix(group, "H")
-    if H.shape[0] != M.shape[0] or H.shape[1] % 2 or not H.shape[1]:
-        raise InvalidProblemError(f"H has shape {H.shape}; expected {M.shape[0]} rows and two columns a contact")
+    if H.shape[0] != M.shape[0] or H.shape[1] % dimension or not H.shape[1]:
+        raise InvalidProblemError(
+            f"H has shape {H.shape}; expected {M.shape[0]} rows and {_NUMBERS[dimension]} columns a contact"
+        )
     vectors = _child(group, "vectors")
-    w, mu = _vector(vectors, "w", H.shape[1]), _vector(vectors, "mu", H.shape[1] // 2)
-    B = sp.csr_array(-H.T)
-    return ContactProblem(
-        M,
-        B[0::2],
-        B[1::2],
-        _vector(vectors, "f", M.shape[0]),
-        gap=w[0::2],
-        friction=(mu, 0.0),
-        slip_offset=w[1::2],
-    )
+    w, mu = _vector(vectors, "w", H.shape[1]), _vector(vectors, "mu", H.shape[1] // dimension)
+    return _problem(M, sp.csr_array(-H.T), _vector(vectors, "f", M.shape[0]), w, mu, dimension)
 
 
-def _local(group: Any) -> ContactProblem:
-    _two_dimensional(group)
+def _local(group: Any) -> Problem:
+    dimension = _dimension(group)
     if "V" in group or "R" in group:
         raise InvalidProblemError("it has equality constraints (V, R, s); expected a problem without them")
     W = _matrix(group, "W", symmetric=True)
-    if W.shape[0] != W.shape[1] or W.shape[0] % 2:
-        raise InvalidProblemError(f"W has shape {W.shape}; expected a square matrix with two rows a contact")
+    if W.shape[0] != W.shape[1] or W.shape[0] % dimension:
+        raise InvalidProblemError(
+            f"W has shape {W.shape}; expected a square matrix with {_NUMBERS[dimension]} rows a contact"
+        )
     vectors = _child(group, "vectors")
-    q, mu = _vector(vectors, "q", W.shape[0]), _vector(vectors, "mu", W.shape[0] // 2)
-    rows = sp.csr_array(W)
+    q, mu = _vector(vectors, "q", W.shape[0]), _vector(vectors, "mu", W.shape[0] // dimension)
     try:
-        return ContactProblem(W, rows[0::2], rows[1::2], -q, friction=(mu, 0.0))
+        return _problem(W, sp.csr_array(W), -q, np.zeros(len(q)), mu, dimension)
     except InvalidProblemError as error:
-        raise InvalidProblemError(f"its W, read as A, Bn and Bt, cannot be used: {error}") from error
+        raise InvalidProblemError(f"its W, read as {_READ_AS[dimension]}, cannot be used: {error}") from error
 
 
-def _two_dimensional(group: Any) -> None:
+def _problem(
+    A: sp.csc_array, B: sp.csr_array, f: NDArray[Any], w: NDArray[Any], mu: NDArray[Any], dimension: int
+) -> Problem:
+    """The problem whose rows and offsets come contact by contact."""
+    if dimension == 2:
+        return ContactProblem(A, B[0::2], B[1::2], f, gap=w[0::2], friction=(mu, 0.0), slip_offset=w[1::2])
+    from enumsol.problem3d import ContactProblem3D  # not for problems in 2D
+
+    offsets = w.reshape(-1, 3)
+    return ContactProblem3D(
+        A, B[0::3], B[1::3], B[2::3], f, gap=offsets[:, 0], friction=(mu, mu), slip_offset=offsets[:, 1:]
+    )
+
+
+def _dimension(group: Any) -> int:
     spacedim = _integer(group, "spacedim")
-    if spacedim != 2:
-        raise InvalidProblemError(f"it is a problem in {spacedim} dimensions; expected spacedim = 2")
+    if spacedim not in _NUMBERS:
+        raise InvalidProblemError(f"it is a problem in {spacedim} dimensions; expected spacedim = 2 or 3")
+    return spacedim
 
 
 def _matrix(group: Any, name: str, *, symmetric: bool = False) -> sp.csc_array:

@@ -7,11 +7,14 @@ import scipy.sparse as sp
 
 from enumsol import (
     ContactProblem,
+    ContactProblem3D,
+    FrictionTable,
     InvalidProblemError,
     MissingDependencyError,
     enumerate_roots,
     gallery,
     read_problem,
+    successive_approximations,
     write_problem,
 )
 
@@ -88,6 +91,42 @@ def test_local_problems(tmp_path, kind):
         assert fclib_residual(W, q, mu, u, r) < 1e-13
 
 
+def test_local_problems_in_3d(tmp_path):
+    # the file of a public test: u = W r + q with friction 0.1; put back, the solution solves the file's own equations
+    W = np.array([[15.0, -1.0, -2.0], [-1.0, 14.0, 1.0], [-2.0, 1.0, 16.0]])
+    W, q = np.kron(np.eye(2), W) + 0.1, np.array([-1.0, 2.0, 3.0, -2.0, 1.0, -1.0])
+    put_local(tmp_path / "p.hdf5", W, q, np.full(2, 0.1), spacedim=3)
+    problem = read_problem(tmp_path / "p.hdf5")
+    assert isinstance(problem, ContactProblem3D)
+    found = successive_approximations(problem, 0)
+    assert found.converged
+    u = -np.column_stack([found.u_n, found.u_t])
+    r = np.column_stack([found.lambda_n, found.lambda_t])
+    assert np.allclose(u.ravel(), W @ r.ravel() + q, atol=1e-12)
+    assert np.all(r[:, 0] > 0)
+    assert np.allclose(u[:, 0], 0.0, atol=1e-12)
+    for slide, drag, press in zip(u[:, 1:], r[:, 1:], r[:, 0], strict=True):
+        assert np.allclose(drag, -0.1 * press * slide / np.linalg.norm(slide), atol=1e-9)
+
+
+def test_global_problems_in_3d_round_trip_exactly(tmp_path):
+    rng = np.random.default_rng(1)
+    X, mu = rng.normal(size=(9, 9)), rng.random(2)
+    arguments = (X @ X.T + np.eye(9), *(rng.normal(size=(2, 9)) for _ in range(3)), rng.normal(size=9))
+    problem = ContactProblem3D(*arguments, rng.normal(size=2), (mu, mu), slip_offset=rng.normal(size=(2, 2)))
+    write_problem(problem, tmp_path / "p.h5")
+    copy = read_problem(tmp_path / "p.h5")
+    assert copy.fingerprint == problem.fingerprint
+    for change, message in (
+        ({"friction": (0.1, 0.2)}, "friction is orthotropic, which fclib cannot hold"),
+        ({"friction": FrictionTable([0, 1], [0.1, 0.2])}, "friction depends on the slip, which fclib cannot hold"),
+        ({"friction_slope": 1.0}, "friction or load depends on alpha, which fclib cannot hold"),
+    ):
+        with pytest.raises(InvalidProblemError, match=message):
+            write_problem(ContactProblem3D(*arguments, **change), tmp_path / "q.h5")
+        assert not (tmp_path / "q.h5").exists()
+
+
 def test_global_problems_round_trip_exactly(tmp_path):
     rng = np.random.default_rng(0)
     X = rng.normal(size=(9, 9))
@@ -143,8 +182,8 @@ def refused(path, pattern):
 def test_what_is_refused(tmp_path):
     path = tmp_path / "p.h5"
     W, q, mu = np.eye(4), np.ones(4), np.ones(2)
-    put_local(path, np.eye(6), np.ones(6), mu, spacedim=3)
-    refused(path, "it is a problem in 3 dimensions; expected spacedim = 2")
+    put_local(path, np.eye(6), np.ones(6), mu, spacedim=4)
+    refused(path, "it is a problem in 4 dimensions; expected spacedim = 2 or 3")
     put_local(path, W, np.ones(3), mu)
     refused(path, r"/fclib_local/vectors/q has shape \(3,\); expected \(4,\)")
     put_local(path, np.eye(5), np.ones(5), mu)

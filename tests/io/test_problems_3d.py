@@ -245,11 +245,6 @@ def test_a_callable_cannot_be_written(tmp_path, place):
     assert not (tmp_path / place).exists()
 
 
-def test_fclib_refuses_three_dimensions_for_now(tmp_path):
-    with pytest.raises(InvalidProblemError, match="fclib files of problems in 3D are not written yet"):
-        write_problem(ContactProblem3D(**DENSE), tmp_path / "p.h5")
-
-
 def test_only_problems_are_written(tmp_path):
     with pytest.raises(InvalidArgumentError, match="problem is a dict; expected a ContactProblem"):
         write_problem(DENSE, tmp_path / "p.npz")
