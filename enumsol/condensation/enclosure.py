@@ -86,12 +86,13 @@ class CondensedEnclosure(Sealed):
 
     @classmethod
     def _from_problem(cls, problem: ProblemData) -> CondensedEnclosure:
-        p, n = problem.p, problem.n
+        n = problem.n
         # np.ldexp, and not a power function, gives powers of two by definition
         scale = np.ldexp(1.0, -np.round(0.5 * np.log2(problem.A.diagonal())).astype(int))
         A = _scaled(sp.csr_array(problem.A), scale, scale)
-        rows = sp.vstack([problem.Bn, problem.Bt], format="csr")
-        B = _scaled(sp.csr_array(rows), np.ones(2 * p), scale)
+        rows = problem.contact_rows
+        size = rows.shape[0]
+        B = _scaled(rows, np.ones(size), scale)
         slope = np.zeros(n) if problem.load_slope is None else problem.load_slope
         loads = np.column_stack([_exact_product(array, scale) for array in (problem.f, slope)])
         # loads of size one, so that norms of their residuals neither overflow nor underflow
@@ -110,12 +111,12 @@ class CondensedEnclosure(Sealed):
             columns = problem.factorization.solve(K[:, part].toarray() / scale[:, None], refined=False)
             X[:, part] = columns / scale[:, None]
         mid, rad = _products(A, B, K, X, bound)
-        S, S_rad = mid[:, : 2 * p], rad[:, : 2 * p]
+        S, S_rad = mid[:, :size], rad[:, :size]
         # the exact S is symmetric and lies in both triangles' balls
         sym = 0.5 * (S + S.T)
         S_rad = (np.maximum(S_rad, S_rad.T) + np.abs(S - S.T) + 2 * UNIT * np.abs(sym)) * SAFE
-        offset = np.concatenate([problem.gap, problem.slip_offset])
-        free, free_rad = mid[:, 2 * p :] * lift, rad[:, 2 * p :] * lift + TINY
+        offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
+        free, free_rad = mid[:, size:] * lift, rad[:, size:] * lift + TINY
         # no load moves nothing, exactly: what covers underflow in a norm would be huge beside a tiny load
         still = ~np.any(loads, axis=0)
         free[:, still] = free_rad[:, still] = 0.0
@@ -128,7 +129,6 @@ class CondensedEnclosure(Sealed):
         a = alpha if isinstance(alpha, Fraction) else Fraction(alpha_value(alpha))
         exact = exactly_at(a, *self.problem.friction)
         try:
-            value = float(a)
             F = np.array([float(x) for x in exact])
         except OverflowError:
             raise NotEnclosedError(_OVERFLOW) from None
@@ -136,9 +136,24 @@ class CondensedEnclosure(Sealed):
         if np.any(inexact & (F == 0)):
             raise NotEnclosedError("a friction coefficient underflows float64")
         F_rad = np.where(inexact, 2 * UNIT * F + TINY, 0.0)
+        S, S_rad, g, g_rad = self.in_units(a, force, length)
+        return EnclosedSystem(S, S_rad, g, g_rad, F, F_rad)
+
+    def in_units(self, alpha: Fraction, force: Array, length: Array) -> tuple[Array, Array, Array, Array]:
+        """S and g(alpha) with radii, in units of every row given by powers of two.
+
+        Raises
+        ------
+        NotEnclosedError
+            Something over- or underflows.
+        """
         if np.any(np.frexp(np.concatenate([force, length]))[0] != 0.5):
             raise AssertionError("units of force and length must be powers of two")
-        slack = 0.0 if Fraction(value) == a else 2 * UNIT * abs(value) + TINY
+        try:
+            value = float(alpha)
+        except OverflowError:
+            raise NotEnclosedError(_OVERFLOW) from None
+        slack = 0.0 if Fraction(value) == alpha else 2 * UNIT * abs(value) + TINY
         with np.errstate(over="ignore", invalid="ignore"):
             g = self.g0 + value * self.g1
             size = np.abs(value * self.g1)
@@ -146,10 +161,10 @@ class CondensedEnclosure(Sealed):
             g_rad = (g_rad + 4 * UNIT * (size + np.abs(g))) * SAFE + TINY
             # scaling rounds nothing but what underflows
             pair = force[:, None] / length[None, :]
-            arrays = (self.S * pair, self.S_rad * pair + TINY, g / length, g_rad / length + TINY, F, F_rad)
+            arrays = (self.S * pair, self.S_rad * pair + TINY, g / length, g_rad / length + TINY)
         if not all(np.all(np.isfinite(array)) for array in arrays):
             raise NotEnclosedError(_OVERFLOW)
-        return EnclosedSystem(*arrays)
+        return arrays
 
 
 _OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"

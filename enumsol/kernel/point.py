@@ -299,7 +299,7 @@ def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSe
     # scale the columns by powers of two, so that the contraction is asked of comparable unknowns
     scale = np.ldexp(1.0, -np.frexp(np.max(np.abs(M), axis=0) + TINY)[1])
     # what underflows in the scaling is less than TINY
-    solved = _verified_solve(M * scale, M_rad * scale + TINY, system.g[rows], system.g_rad[rows])
+    solved = verified_solve(M * scale, M_rad * scale + TINY, system.g[rows], system.g_rad[rows])
     if solved is None:
         return None
     y, y_rad, sign = solved
@@ -319,7 +319,7 @@ def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSe
     return _conditions(system, status, force, force_rad, w, w_rad, sign)
 
 
-def _verified_solve(M: Array, M_rad: Array, b: Array, b_rad: Array) -> tuple[Array, Array, int] | None:
+def verified_solve(M: Array, M_rad: Array, b: Array, b_rad: Array) -> tuple[Array, Array, int] | None:
     """Ball of the solutions of M y = b and the sign of det M, or None when M is not proven regular.
 
     R = U^{-1} L^{-1} P with explicit triangular approximations has a determinant of known sign; ||I - R M|| < 1 then

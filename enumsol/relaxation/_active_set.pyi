@@ -22,6 +22,7 @@ class QPData:
         row_value: NDArray[np.float64],
         row_rhs: NDArray[np.float64],
     ) -> None: ...
+    def put_row(self, r: int, index: Sequence[int], value: Sequence[float]) -> None: ...
 
 class BranchingRule:
     p: int

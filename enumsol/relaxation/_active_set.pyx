@@ -51,9 +51,11 @@ cdef class QPData:
     row_start : (m + 1,) int array
     row_index : int array; an index below n means x, otherwise w
     row_value, row_rhs : float arrays
+        A row whose values are all zero is spare: `put_row` makes one of it.
     """
 
     cdef readonly Py_ssize_t n, k, m
+    cdef object inverse
     cdef double[:, ::1] J0      # rows are the columns of L^{-T}
     cdef double[::1] x0, c
     cdef double[:, ::1] W
@@ -83,19 +85,38 @@ cdef class QPData:
         value = np.array(row_value, dtype=np.float64)
         rhs = np.array(row_rhs, dtype=np.float64)
         norm = np.empty(self.m)
-        Wa = np.asarray(self.W)
-        for r in range(self.m):
+        self.inverse = inverse
+        self.value, self.rhs, self.norm = value, rhs, norm
+        norm[:] = 1.0
+        given = np.unique(np.searchsorted(self.start, np.flatnonzero(value), side="right") - 1)
+        for r in given:
             a, b = row_start[r], row_start[r + 1]
-            normal = np.zeros(self.n)
-            for j in range(a, b):
-                if row_index[j] < self.n:
-                    normal[row_index[j]] += value[j]
-                else:
-                    normal += value[j] * Wa[row_index[j] - self.n]
-            norm[r] = np.linalg.norm(inverse @ normal)
+            norm[r] = self._norm(row_index[a:b], value[a:b])
             value[a:b] /= norm[r]
             rhs[r] /= norm[r]
-        self.value, self.rhs, self.norm = value, rhs, norm
+
+    def _norm(self, index, value):
+        """Length of a row's normal in the norm of (2 S)^{-1}."""
+        normal = np.zeros(self.n)
+        Wa = np.asarray(self.W)
+        for j, v in zip(index, value):
+            if j < self.n:
+                normal[j] += v
+            else:
+                normal += v * Wa[j - self.n]
+        return np.linalg.norm(self.inverse @ normal)
+
+    def put_row(self, Py_ssize_t r, index, value):
+        """Make the row sum value * (x or w) >= 0 of a spare one, which no state may have switched on."""
+        cdef Py_ssize_t j, a = self.start[r], room = self.start[r + 1] - self.start[r]
+        if r < 0 or r >= self.m or len(index) > room:
+            raise IndexError(r)
+        norm = self._norm(index, value)
+        for j in range(room):
+            self.index[a + j] = index[j] if j < len(index) else 0
+            self.value[a + j] = value[j] / norm if j < len(index) else 0.0
+        self.norm[r] = norm
+        self.rhs[r] = 0.0
 
     def __dealloc__(self):
         while self.spares > 0:

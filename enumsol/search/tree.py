@@ -20,7 +20,7 @@ from enumsol.errors import MissingDependencyError
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
-from enumsol.search.certifiers.protocol import UndecidedPart
+from enumsol.search.certifiers.protocol import Refine, UndecidedPart
 from enumsol.search.splitting import PlaneSplitting, Splitting
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.selections.solution import Codes, SelectionSolution
@@ -220,7 +220,8 @@ class TreeSearch:
             return
         node, forced = self._choose(item, relaxation)
         if node < 0:
-            self._settle(codes)
+            node = self._settle(codes)
+        if node < 0:
             self._covered += item.weight
             return
         children = self.splitting.children(codes, node, relaxation)
@@ -232,15 +233,18 @@ class TreeSearch:
             last = k + 1 == len(children)
             yield TreeNode(usable, child, node, last, item.weight / len(children), forced)
 
-    def _settle(self, codes: Codes) -> None:
-        """Have the certifier decide a complete selection."""
+    def _settle(self, codes: Codes) -> int:
+        """Have the certifier decide a complete selection; -1, or the node that it asks to have split further."""
         outcome = self.outcome
         outcome.selections += 1
         answer = self.certifier.selection(codes)
+        if isinstance(answer, Refine):
+            return answer.node
         if isinstance(answer, UndecidedPart):
             outcome.undecided.append(answer)
         elif answer is not None:
             outcome.solutions.append(answer)
+        return -1
 
     def must_stop(self, waiting: int) -> bool:
         """Look at the limits and report progress."""
@@ -299,7 +303,7 @@ class TreeSearch:
     def _choose(item: TreeNode, relaxation: Relaxation | None) -> tuple[int, tuple[int, ...] | None]:
         """The contact node to branch on, -1 when all are decided; and the forced ones that the children begin with."""
         if relaxation is None or relaxation.pruned:
-            return next((i for i, code in enumerate(item.codes) if code >= CONTACT), -1), item.forced
+            return next((i for i, code in enumerate(item.codes) if code in (CONTACT, UNDECIDED)), -1), item.forced
         if item.forced is not None:
             forced = item.forced or relaxation.forced(item.codes)
             if forced:

@@ -23,6 +23,13 @@ class UndecidedPart:
     hint: str
 
 
+@dataclass(frozen=True)
+class Refine:
+    """A complete selection that is to be split further, at a node."""
+
+    node: int
+
+
 @dataclass
 class Escalations:
     """How many selections and prunings needed which arithmetic.

@@ -1,0 +1,139 @@
+"""A condensed problem in 3D at one alpha in the variables in which every node is isotropic (theory, section 12.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT
+from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.problem3d import ContactProblem3D
+
+    Vector = NDArray[np.float64]
+    Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SpaceSystem:
+    """w = g - S y without units, y = (lambda_n, tau) with lambda_t = F tau, w = (w_n, v) with v = F w_t.
+
+    Components of tau whose coefficient is 0 do not occur. All normals come first, then the tau node by node.
+
+    Attributes
+    ----------
+    S : (m, m) symmetric positive definite array
+    g : (m,) array
+    F : (p, 2) array
+        Friction coefficients.
+    tau : (p, 2) array of int
+        Where in y the components of tau are; -1 where they do not occur.
+    force, length : (p,) arrays
+        Forces of a node are ``force`` times the scaled ones, displacements ``length`` times; powers of two.
+    """
+
+    S: Matrix = field(repr=False)
+    g: Vector
+    F: Matrix
+    tau: NDArray[np.intp]
+    force: Vector
+    length: Vector
+
+    @classmethod
+    def scaled(cls, S: Matrix, g: Vector, F: Matrix) -> SpaceSystem:
+        """From S (3p, 3p) and g (3p,), all normals first, then both tangents, and coefficients F (p, 2)."""
+        p = len(F)
+        factor = np.exp2(-np.round(0.5 * np.mean(np.log2(np.diagonal(S).reshape(3, p)), axis=0)))
+        tau, rows, node, axis = places(F > 0)
+        weight = np.concatenate([factor, factor[node] * F[node, axis]])
+        S = weight[:, None] * S[np.ix_(rows, rows)] * weight
+        g = weight * g[rows]
+        size = 1.0
+        largest = float(np.max(np.abs(g)))
+        if largest > 0:
+            first = np.exp2(np.floor(np.log2(largest)))
+            energy = float(np.sqrt(np.linalg.solve(S, g / first) @ (g / first)))
+            size = float(first * np.exp2(np.floor(np.log2(energy))))
+        return cls(S, g / size, F, tau, factor * size, size / factor)
+
+    @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+        return len(self.F)
+
+    def tangential(self, values: Vector) -> Matrix:
+        """The parts of y or w that belong to tau, shape (p, 2), 0 where it does not occur."""
+        return np.where(self.tau >= 0, values[self.tau], 0.0)
+
+
+def places(occurs: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Where the components of tau are in y, (p, 2); the rows of S in 3p that y takes; nodes and axes of its tau."""
+    p = len(occurs)
+    node, axis = np.nonzero(occurs)
+    tau = np.full((p, 2), -1, dtype=np.intp)
+    tau[node, axis] = p + np.arange(len(node))
+    return tau, np.concatenate([np.arange(p), (1 + axis) * p + node]), node, axis
+
+
+@dataclass(frozen=True)
+class EnclosedSpace(EnclosedSystem):
+    """A SpaceSystem as balls: S, g and F for the data as given.
+
+    Attributes
+    ----------
+    tau : (p, 2) array of int
+        As in SpaceSystem.
+    """
+
+    tau: NDArray[np.intp]
+
+    @classmethod
+    def of_floats(cls, system: SpaceSystem) -> EnclosedSpace:
+        """S and g as they were computed."""
+        zero = np.zeros_like
+        return cls(system.S, zero(system.S), system.g, zero(system.g), system.F, zero(system.F), system.tau)
+
+    @classmethod
+    def of_problem(
+        cls, enclosure: CondensedEnclosure, problem: ContactProblem3D, alpha: Fraction, force: Vector, length: Vector
+    ) -> EnclosedSpace:
+        """Balls for the exact data at alpha, in units of the nodes given by powers of two (see SpaceSystem).
+
+        Raises
+        ------
+        NotEnclosedError
+            Something over- or underflows.
+        """
+        p = problem.p
+        exact = [exactly_at(alpha, *pair) for pair in zip(problem.friction, problem.friction_slope, strict=True)]
+        F = np.array([[float(x) for x in column] for column in exact]).T
+        inexact = np.array(
+            [[Fraction(y) != x for x, y in zip(*both, strict=True)] for both in zip(exact, F.T, strict=True)]
+        )
+        if np.any(inexact.T & (F == 0)):
+            raise NotEnclosedError("a friction coefficient underflows float64")
+        F_rad = np.where(inexact.T, 2 * UNIT * F + TINY, 0.0)
+        S, S_rad, g, g_rad = enclosure.in_units(alpha, np.tile(force, 3), np.tile(length, 3))
+        tau, rows, node, axis = places(F > 0)
+        weight = np.concatenate([np.ones(p), F[node, axis]])
+        rad = np.concatenate([np.zeros(p), F_rad[node, axis]])
+        with np.errstate(over="ignore", invalid="ignore"):
+            pair = np.outer(weight, weight)
+            pair_rad = np.outer(weight + rad, weight + rad) * SAFE - pair + 4 * UNIT * pair
+            S, S_rad = S[np.ix_(rows, rows)], S_rad[np.ix_(rows, rows)]
+            scaled, scaled_rad = S * pair, np.abs(S) * pair_rad + S_rad * (pair + pair_rad)
+            scaled_rad = (scaled_rad + 4 * UNIT * np.abs(scaled)) * SAFE + TINY
+            load = weight * g[rows]
+            load_rad = weight * g_rad[rows] + rad * (np.abs(g[rows]) + g_rad[rows]) + 4 * UNIT * np.abs(load)
+            load_rad = load_rad * SAFE + TINY
+        if not all(np.all(np.isfinite(array)) for array in (scaled, scaled_rad, load, load_rad)):
+            raise NotEnclosedError("the condensed problem over- or underflows float64; expected data in other units")
+        return cls(scaled, scaled_rad, load, load_rad, F, F_rad, tau)

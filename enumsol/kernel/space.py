@@ -1,0 +1,503 @@
+"""The trusted kernel in 3D: exclusions, and leaves by Krawczyk's operator, on balls (theory, section 12).
+
+A leaf gives every node a status: open, in contact without friction, slip+ or slip- along one axis, stick, or a sector
+of slip directions. What is concluded here holds for all data in the balls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_norm, upper_sum
+from enumsol.kernel.point import energy_bounds, verified_solve
+from enumsol.sectors import SECTORS, contains, direction, end_number, level_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space import EnclosedSpace
+
+    Array = NDArray[np.float64]
+
+OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
+#: Kinds of rows (theory, section 12.2); a row is (kind, node, number), the number that of a direction or sector.
+GAP, FORCE, TAU, SLIP, END, ALONG, TANGENT, CHORD, LEFT, RIGHT = range(10)
+FORBIDDEN, NONNEGATIVE, FREE = range(3)
+Row = tuple[int, int, int]
+
+#: A sector's box of directions is this share of its width wider on both sides: a root on an end lies inside two boxes.
+_WIDENED = 0.125
+#: Contractions of a box before the leaf is given up.
+_CONTRACTIONS = 10
+_LARGEST_CONTRACTION = 0.95
+_POWER_STEPS = 6
+
+
+def children_of(code: int, tangents: int) -> tuple[int, ...]:
+    """Codes that together cover a partial status of a node with so many components of tau; empty for a final one."""
+    if code == UNDECIDED:
+        return (OPEN, CONTACT) if tangents else (OPEN, FRICTIONLESS)
+    if code == CONTACT:
+        if tangents == 1:
+            return STICK, SLIP_PLUS, SLIP_MINUS
+        return STICK, *(SECTORS + i for i in range(4, 8))
+    if code > SECTORS:
+        return SECTORS + 2 * (code - SECTORS), SECTORS + 2 * (code - SECTORS) + 1
+    return ()
+
+
+def row_sign(code: int, row: Row) -> int:
+    """What the multiplier of a row may be at a node of this code."""
+    kind, _, number = row
+    if kind == GAP:
+        return NONNEGATIVE if code in (OPEN, UNDECIDED) else FREE
+    if kind == FORCE:
+        return FREE if code == OPEN else NONNEGATIVE
+    if kind == TAU:
+        return FREE if code == OPEN else FORBIDDEN
+    if kind == SLIP:
+        return FREE if code == STICK else FORBIDDEN
+    if kind == END:
+        return FREE if code == (SLIP_PLUS if number > 0 else SLIP_MINUS) else NONNEGATIVE
+    if kind == ALONG:
+        return NONNEGATIVE if code == (SLIP_PLUS if number > 0 else SLIP_MINUS) else FORBIDDEN
+    if kind == TANGENT:
+        return NONNEGATIVE
+    return NONNEGATIVE if code > SECTORS and contains(number, code - SECTORS) else FORBIDDEN
+
+
+def row_terms(row: Row, tau: NDArray[np.intp], size: int) -> tuple[list[int], list[float]]:
+    """A row as a sum over y and, from ``size`` on, over w: indices and coefficients, off by 16 units at most.
+
+    Raises
+    ------
+    ValueError
+        The node has no such row.
+    """
+    kind, node, number = row
+    if kind == GAP:
+        return [size + node], [-1.0]
+    if kind == FORCE:
+        return [node], [1.0]
+    t1, t2 = (int(t) for t in tau[node])
+    if kind in (TAU, SLIP):
+        t = (t1, t2)[number] if number in (0, 1) else -1
+        _exists(t >= 0)
+        return [t if kind == TAU else size + t], [1.0]
+    if kind in (END, ALONG):
+        _exists((t1 < 0) != (t2 < 0) and number in (1, -1))
+        t = max(t1, t2)
+        return ([node, t], [1.0, -float(number)]) if kind == END else ([size + t], [float(number)])
+    _exists(t1 >= 0 and t2 >= 0 and number >= 4)
+    x, y = direction(number)
+    if kind == TANGENT:
+        return [node, t1, t2], [1.0, -x, -y]
+    p, q = direction(end_number(number))
+    if kind == CHORD:
+        return [t1, t2, node], [x + p, y + q, -(1.0 + (x * p + y * q))]
+    return ([size + t1, size + t2], [-y, x]) if kind == LEFT else ([size + t1, size + t2], [q, -p])
+
+
+def _exists(condition: bool) -> None:
+    if not condition:
+        raise ValueError("a node has no such row")
+
+
+def exclusion_margin(
+    system: EnclosedSpace, codes: Sequence[int], rows: Sequence[Row], values: Array, errors: float = 1.0
+) -> float:
+    """Proven lower bound on the energy over a partial assignment; positive means that it holds no solution.
+
+    ``errors`` as in ``energy_bounds``; -inf where a multiplier has the wrong sign.
+    """
+    size = len(system.g)
+    y, y_size, c, c_size = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
+    for row, value in zip(rows, values.tolist(), strict=True):
+        sign = row_sign(codes[row[1]], row)
+        if sign == FORBIDDEN or (sign == NONNEGATIVE and value < 0) or not np.isfinite(value):
+            return -np.inf
+        for i, coefficient in zip(*row_terms(row, system.tau, size), strict=True):
+            term = value * coefficient
+            if i < size:
+                c[i] += term
+                c_size[i] += abs(term)
+            else:
+                # w = g - S lambda: a row on w acts on S lambda - g with the opposite sign
+                y[i - size] -= term
+                y_size[i - size] += abs(term)
+    k = gamma(len(rows) + 24)
+    with np.errstate(over="ignore", invalid="ignore"):
+        c_rad, y_rad = k * c_size * SAFE + TINY, k * y_size * SAFE + TINY
+        bound = float(energy_bounds(system, y[None], c[None], c_rad[None], errors)[0])
+        # rounded y are not quite multipliers: the bound is quadratic in y with the gradient g - v / 2, v = g + c + S y
+        v = np.abs(system.g + c + system.S @ y) + gamma(size + 4) * (np.abs(c) + np.abs(system.S) @ np.abs(y))
+        v += system.g_rad + c_rad + system.S_rad @ np.abs(y) + gamma(size + 4) * np.abs(system.g)
+        slope = np.abs(system.g) + system.g_rad + 0.5 * v * SAFE
+        lost = upper_sum(y_rad * slope) + (upper_norm(system.S) + upper_norm(system.S_rad)) * upper_norm(y_rad) ** 2
+        bound -= errors * float(lost) * SAFE * SAFE
+    return bound if np.isfinite(bound) else -np.inf
+
+
+# -- balls -------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Ball:
+    """An array with radii; every operation gives a ball that holds all results."""
+
+    mid: Array
+    rad: Array
+
+    @classmethod
+    def exact(cls, mid: Array) -> Ball:
+        """No radius."""
+        return cls(np.asarray(mid), np.zeros_like(np.asarray(mid)))
+
+    def __matmul__(self, other: Ball) -> Ball:
+        k = gamma(self.mid.shape[-1] + 4)
+        left, right = np.abs(self.mid), np.abs(other.mid)
+        rad = self.rad @ (right + other.rad) + left @ other.rad + k * (left @ right)
+        return Ball(self.mid @ other.mid, rad * (1.0 + k) * SAFE + TINY)
+
+    def __add__(self, other: Ball) -> Ball:
+        mid = self.mid + other.mid
+        return Ball(mid, (self.rad + other.rad + 2 * UNIT * np.abs(mid)) * SAFE + TINY)
+
+    def __sub__(self, other: Ball) -> Ball:
+        mid = self.mid - other.mid
+        return Ball(mid, (self.rad + other.rad + 2 * UNIT * np.abs(mid)) * SAFE + TINY)
+
+    def __mul__(self, other: Ball) -> Ball:
+        mid = self.mid * other.mid
+        rad = np.abs(self.mid) * other.rad + self.rad * (np.abs(other.mid) + other.rad) + 2 * UNIT * np.abs(mid)
+        return Ball(mid, rad * SAFE + TINY)
+
+    def __getitem__(self, item: object) -> Ball:
+        return Ball(self.mid[item], self.rad[item])  # type: ignore[index]
+
+    @property
+    def size(self) -> Array:
+        """Largest absolute values."""
+        return np.asarray((np.abs(self.mid) + self.rad) * SAFE)
+
+
+def _solution(M: Ball, B: Ball) -> Ball | None:
+    """All X with M X = B, columns of unknowns; None where M is not proven regular."""
+    n = len(M.mid)
+    if not n:
+        return Ball.exact(np.zeros_like(B.mid))
+    scale = np.ldexp(1.0, -np.frexp(np.max(np.abs(M.mid), axis=0) + TINY)[1])
+    M = Ball(M.mid * scale, M.rad * scale + TINY)
+    try:
+        R = Ball.exact(np.linalg.inv(M.mid))
+    except np.linalg.LinAlgError:
+        return None
+    defect = (R @ M - Ball.exact(np.eye(n))).size
+    # weights u > 0 near the Perron vector of the defect: it contracts in the norm max |x| / u if anywhere
+    u = np.ones(n)
+    for _ in range(_POWER_STEPS):
+        u = defect @ u + 1e-3 * u
+        u = u / np.max(u) + 1e-9
+    contraction = float(np.max(upper_sum(defect * u, axis=1) / u)) * SAFE
+    if not contraction < _LARGEST_CONTRACTION:
+        return None
+    X = Ball.exact(R.mid @ B.mid)
+    step = (R @ (B - M @ X)).size
+    # |error| <= step + defect |error|; with step <= t u in every column |error| <= t u / (1 - contraction)
+    largest = np.max(step / u[:, None], axis=0) / (1.0 - contraction) * SAFE
+    rad = (step + upper_sum(defect * u, axis=1)[:, None] * largest) * SAFE
+    return Ball(X.mid * scale[:, None], rad * scale[:, None] + TINY)
+
+
+# -- leaves ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SpaceRoot:
+    """Exactly one root in a box of directions, regular: all conditions hold strictly.
+
+    Attributes
+    ----------
+    y, w : Ball of shape (m,)
+        Forces (lambda_n, tau) and displacements, scaled.
+    centre : (q, 2) array
+        A direction for every node in a sector; angles count from there.
+    angle, angle_rad : (q,) arrays
+        The root's directions.
+    reach : (q,) array
+        There is no other root with these statuses and angles up to ``reach``.
+    index : int
+    slack : float
+        A lower bound of the least slack.
+    """
+
+    y: Ball
+    w: Ball
+    centre: Array
+    angle: Array
+    angle_rad: Array
+    reach: Array
+    index: int
+    slack: float
+
+
+@dataclass(frozen=True)
+class Open:
+    """A leaf that is not settled.
+
+    Attributes
+    ----------
+    node : int or None
+        The node whose sector is the widest, or None where there are none.
+    """
+
+    node: int | None
+
+
+def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | None:
+    """What a leaf holds: exactly one root in its box, no root (None), or it is not settled."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _Leaf(system, codes).settle()
+
+
+class _Leaf:
+    """Equations of a leaf: y = E(psi) x with x = (lambda_n of the nodes in contact, tau of the sticking ones).
+
+    psi are angles of the slip directions d = cos psi c + sin psi c' from a direction c in every sector, c' a quarter
+    turn further. P picks w_n of the nodes in contact and the slips of the sticking ones: P (g - S E x) = 0. The
+    directions are zeros of G_i = v_i1 d_i2 - v_i2 d_i1.
+    """
+
+    def __init__(self, system: EnclosedSpace, codes: Sequence[int]) -> None:
+        self.system = system
+        self.S, self.g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
+        tau = system.tau
+        self.open = [i for i, code in enumerate(codes) if code == OPEN]
+        self.closed = [i for i, code in enumerate(codes) if code != OPEN]
+        self.stick = [i for i, code in enumerate(codes) if code == STICK]
+        self.sliding = [(i, 1.0 if codes[i] == SLIP_PLUS else -1.0) for i in self.closed if codes[i] in (2, 3)]
+        self.turning = [i for i, code in enumerate(codes) if code > SECTORS]
+        self.numbers = [codes[i] - SECTORS for i in self.turning]
+        self.rows = [*self.closed, *(int(t) for i in self.stick for t in tau[i] if t >= 0)]
+        self.column = [self.closed.index(i) for i in self.turning]
+        self.t = tau[self.turning].reshape(-1, 2)
+        E = np.zeros((len(system.g), len(self.rows)))
+        E[self.rows, np.arange(len(self.rows))] = 1.0
+        for i, sign in self.sliding:
+            E[int(np.max(tau[i])), self.closed.index(i)] = sign
+        self.E0 = E
+        self.centre, self.half = self._boxes()
+
+    def _boxes(self) -> tuple[Array, Array]:
+        """A direction in the middle of every sector, and an angle on both sides that covers it."""
+        centres, halves = [], []
+        for number in self.numbers:
+            a, b = (np.array(direction(n)) for n in (number, end_number(number)))
+            c = a + b
+            c /= np.hypot(*c)
+            # the angle to an end is 2 arcsin(|a - c| / 2), at most 1.12 |a - c| for sectors of a quarter
+            halves.append(1.12 * max(np.hypot(*(a - c)), np.hypot(*(b - c))) + 1e-14)
+            centres.append(c)
+        return np.array(centres).reshape(-1, 2), np.array(halves)
+
+    # -- what the leaf holds ---------------------------------------------------------------------------------------
+
+    def settle(self) -> SpaceRoot | Open | None:
+        q = len(self.turning)
+        open_leaf = Open(self.turning[int(np.argmax(self.half))] if q else None)
+        reach = (1.0 + 2.0 * _WIDENED) * self.half
+        angle, radius = np.zeros(q), reach.copy()
+        for _ in range(_CONTRACTIONS):
+            state = self._state(angle, radius)
+            if state is None:
+                return open_leaf
+            y, w, _, J = state
+            if self._broken(y, w, angle, radius):
+                return None
+            if not q:
+                return self._root(y, w, angle, radius, reach, None, open_leaf)
+            try:
+                Y = Ball.exact(np.linalg.inv(J.mid))
+            except np.linalg.LinAlgError:
+                return open_leaf
+            point = self._state(angle, np.zeros(q))
+            if point is None:
+                return open_leaf
+            shrink = (Ball.exact(np.eye(q)) - Y @ J) @ Ball(np.zeros(q), radius)
+            K = Ball.exact(angle) - Y @ point[2] + shrink
+            low, high = K.mid - K.rad, K.mid + K.rad
+            if np.any((high < angle - radius) | (low > angle + radius)):
+                return None
+            inside = np.all((low > angle - radius) & (high < angle + radius))
+            new_low, new_high = np.maximum(low, angle - radius), np.minimum(high, angle + radius)
+            new_angle = 0.5 * (new_low + new_high)
+            new_radius = np.maximum(new_high - new_angle, new_angle - new_low) * SAFE + 4 * UNIT * reach
+            if inside:
+                return self._refined(new_angle, new_radius, reach, J, open_leaf)
+            if np.all(new_radius > 0.9 * radius):
+                return open_leaf
+            angle, radius = new_angle, new_radius
+        return open_leaf
+
+    def _refined(self, angle: Array, radius: Array, reach: Array, J: Ball, open_leaf: Open) -> SpaceRoot | Open | None:
+        """The one zero of a box, enclosed as closely as floats can."""
+        for _ in range(_CONTRACTIONS):
+            if np.all(self._outside(angle, radius)):
+                return None
+            state, point = self._state(angle, radius), self._state(angle, np.zeros(len(angle)))
+            if state is None or point is None:
+                return open_leaf
+            try:
+                Y = Ball.exact(np.linalg.inv(state[3].mid))
+            except np.linalg.LinAlgError:
+                break
+            shrink = (Ball.exact(np.eye(len(angle))) - Y @ state[3]) @ Ball(np.zeros(len(angle)), radius)
+            K = Ball.exact(angle) - Y @ point[2] + shrink
+            low, high = np.maximum(K.mid - K.rad, angle - radius), np.minimum(K.mid + K.rad, angle + radius)
+            if np.any(low > high):
+                return None
+            new = 0.5 * (low + high)
+            new_radius = np.maximum(high - new, new - low) * SAFE + 4 * UNIT * reach
+            done = np.all(new_radius > 0.5 * radius)
+            angle, radius = new, np.minimum(new_radius, radius + np.abs(new - angle))
+            if done:
+                break
+        state = self._state(angle, radius)
+        if state is None:
+            return open_leaf
+        y, w, _, J = state
+        if self._broken(y, w, angle, radius) or np.any(self._outside(angle, radius)):
+            return None
+        return self._root(y, w, angle, radius, reach, J, open_leaf)
+
+    def _outside(self, angle: Array, radius: Array) -> NDArray[np.bool_]:
+        """Which directions are outside of their sectors for certain; what lies there belongs to another leaf."""
+        return np.abs(angle) - radius > self.half * (1.0 + 1e-9)
+
+    def _root(
+        self, y: Ball, w: Ball, angle: Array, radius: Array, reach: Array, J: Ball | None, open_leaf: Open
+    ) -> SpaceRoot | Open:
+        slack = self._slacks(y, w, angle, radius)
+        if not np.all(slack > 0):
+            return open_leaf if len(angle) else Open(None)
+        E = self._directions(angle, radius)[0]
+        M = self.S[self.rows] @ E
+        sign = 1
+        if len(self.rows):
+            solved = verified_solve(M.mid, M.rad, np.zeros(len(self.rows)), np.zeros(len(self.rows)))
+            if solved is None:
+                return open_leaf
+            sign = solved[2]
+        if J is not None:
+            turned = verified_solve(J.mid, J.rad, np.zeros(len(angle)), np.zeros(len(angle)))
+            if turned is None:
+                return open_leaf
+            sign *= turned[2]
+        least = float(np.min(slack)) if len(slack) else np.inf
+        return SpaceRoot(y, w, self.centre, angle, radius, reach, sign, least)
+
+    # -- evaluation over a box -------------------------------------------------------------------------------------
+
+    def _directions(self, angle: Array, radius: Array) -> tuple[Ball, Ball, Ball]:
+        """E, d (q, 2) and d' (q, 2) over a box of angles."""
+        c, across = self.centre, np.stack([-self.centre[:, 1], self.centre[:, 0]], axis=1)
+        cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        # what is known of cos and sin is their derivatives; floats of a library are off by a few units
+        spread = (np.minimum(radius, 2.0) * SAFE + 64 * UNIT)[:, None] * np.ones((1, 2))
+        d = Ball(cos * c + sin * across, spread)
+        turned = Ball(cos * across - sin * c, spread)
+        mid, rad = self.E0.copy(), np.zeros_like(self.E0)
+        for k, column in enumerate(self.column):
+            mid[self.t[k], column], rad[self.t[k], column] = d.mid[k], d.rad[k]
+        return Ball(mid, rad), d, turned
+
+    def _state(self, angle: Array, radius: Array) -> tuple[Ball, Ball, Ball, Ball] | None:
+        """y, w, G and dG/dpsi over a box; None where the linear system is not proven regular in it."""
+        q, m = len(angle), len(self.g.mid)
+        E, d, turned = self._directions(angle, radius)
+        PS = self.S[self.rows]
+        x = _solution(PS @ E, self.g[self.rows][:, None])
+        if x is None:
+            return None
+        y = (E @ x)[:, 0]
+        w = self.g - (self.S @ y[:, None])[:, 0]
+        # w vanishes where the equations say so, exactly
+        w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
+        if not q:
+            return y, w, Ball.exact(np.zeros(0)), Ball.exact(np.zeros((0, 0)))
+        force = x[self.column]
+        push = force * turned
+        dE = Ball(np.zeros((m, q)), np.zeros((m, q)))
+        for k in range(q):
+            dE.mid[self.t[k], k], dE.rad[self.t[k], k] = push.mid[k], push.rad[k]
+        z = _solution(PS @ E, PS @ dE)
+        if z is None:
+            return None
+        dv = self.S @ (E @ z - dE)
+        t1, t2 = self.t[:, 0], self.t[:, 1]
+        d1, d2 = d[:, 0], d[:, 1]
+        G = w[t1] * d2 - w[t2] * d1
+        J = dv[t1] * d2[:, None] - dv[t2] * d1[:, None]
+        along = w[t1] * turned[:, 1] - w[t2] * turned[:, 0]
+        diagonal = np.arange(q)
+        corrected = J[diagonal, diagonal] + along
+        J.mid[diagonal, diagonal], J.rad[diagonal, diagonal] = corrected.mid, corrected.rad
+        return y, w, G, J
+
+    def _conditions(self, y: Ball, w: Ball, angle: Array, radius: Array) -> tuple[Array, Array]:
+        """Conditions that a root has to satisfy, as midpoints and radii; stick by |tau| in both."""
+        tau = self.system.tau
+        mid = [-w.mid[i] for i in self.open] + [y.mid[i] for i in self.closed]
+        rad = [w.rad[i] for i in self.open] + [y.rad[i] for i in self.closed]
+        for i in self.stick:
+            t = [int(k) for k in tau[i] if k >= 0]
+            if t:
+                length = float(np.linalg.norm(y.mid[t]))
+                mid.append(y.mid[i] - length)
+                rad.append(
+                    (y.rad[i] + float(upper_norm(y.rad[t])) + 16 * UNIT * (abs(y.mid[i]) + length)) * SAFE + TINY
+                )
+        for i, sign in self.sliding:
+            t = int(np.max(tau[i]))
+            mid.append(sign * w.mid[t])
+            rad.append(w.rad[t])
+        if self.turning:
+            _, d, _ = self._directions(angle, radius)
+            along = w[self.t[:, 0]] * d[:, 0] + w[self.t[:, 1]] * d[:, 1]
+            mid, rad = [*mid, *along.mid], [*rad, *along.rad]
+        return np.array(mid), np.array(rad)
+
+    def _broken(self, y: Ball, w: Ball, angle: Array, radius: Array) -> bool:
+        """Whether some condition is broken in the whole box."""
+        mid, rad = self._conditions(y, w, angle, radius)
+        return bool(np.any(mid < -rad))
+
+    def _slacks(self, y: Ball, w: Ball, angle: Array, radius: Array) -> Array:
+        """Lower bounds of the conditions."""
+        mid, rad = self._conditions(y, w, angle, radius)
+        return mid - rad * SAFE
+
+
+def same_root(one: SpaceRoot, other: SpaceRoot) -> bool | None:
+    """Whether two roots of leaves with the same statuses up to sectors are one; None where that is open.
+
+    The leaves have the same nodes open, sticking and slipping. They are one if one root's directions lie in the box in
+    which the other is the only root; they are two if their forces differ.
+    """
+    if np.any(np.abs(one.y.mid - other.y.mid) > (one.y.rad + other.y.rad) * SAFE):
+        return False
+    # the angle of one root's centre from the other's
+    c, e = other.centre, one.centre
+    shift = np.arctan2(c[:, 0] * e[:, 1] - c[:, 1] * e[:, 0], np.sum(c * e, axis=1))
+    away = np.abs(shift + one.angle) + one.angle_rad + 1e-12
+    return True if np.all(away < other.reach) else None
+
+
+def width_of(code: int) -> float:
+    """A bound of the angle between the ends of a sector."""
+    return 2.0 * np.pi / (1 << level_of(code - SECTORS)) * 1.3

@@ -1,0 +1,128 @@
+"""The tree in three dimensions: slip directions in sectors of the circle (theory, section 12)."""
+
+from __future__ import annotations
+
+import base64
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.kernel.space import Open, children_of, exclusion_margin, settle
+from enumsol.relaxation.engine import PRUNE_MARGIN
+from enumsol.relaxation.space import SpaceEngine, imposed
+from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart
+from enumsol.sectors import DEEPEST, SECTORS, direction, end_number, level_of
+from enumsol.statuses import CONTACT, UNDECIDED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from enumsol.condensation.space import EnclosedSpace
+    from enumsol.kernel.space import SpaceRoot
+    from enumsol.proof.proof_file import Recorder
+    from enumsol.relaxation.engine import Relaxation
+    from enumsol.selections.solution import Codes
+
+_DEGENERATE = "a condition holds with equality, or nearly so, at what may be a root"
+
+
+class SpaceSplitting:
+    """Open or in contact; then stick, or slip in one of four sectors; a sector is halved."""
+
+    def __init__(self, engine: SpaceEngine) -> None:
+        self._engine, self._system = engine, engine.system
+        self._tangents = np.sum(self._system.tau >= 0, axis=1)
+
+    def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
+        """(slot, mode) of the rows that a contact node imposes in a status."""
+        pairs = [(self._engine.slot(row), mode) for row, mode in imposed(self._system.tau, node, code)]
+        return [(slot, mode) for slot, mode in pairs if slot is not None]
+
+    def children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
+        """Codes of the children, the one nearest to the minimiser first."""
+        children = list(children_of(codes[node], int(self._tangents[node])))
+        if relaxation is None:
+            return children
+        if codes[node] == UNDECIDED:
+            return children[:: -1 if relaxation.forces[node] > -relaxation.displacements[node] else 1]
+        if codes[node] == CONTACT and self._tangents[node] == 1:
+            return children
+        tau, v = (self._system.tangential(x)[node] for x in (relaxation.forces, relaxation.displacements))
+        towards = tau / (np.linalg.norm(tau) + 1e-300) + v / (np.linalg.norm(v) + 1e-300)
+        return sorted(children, key=lambda code: -_towards(code, towards) if code > SECTORS else -10.0)
+
+
+def _towards(code: int, vector: np.ndarray) -> float:
+    """How much a vector points into the middle of a sector."""
+    number = code - SECTORS
+    middle = np.add(direction(number), direction(end_number(number)))
+    return float(middle @ vector / np.linalg.norm(middle))
+
+
+class SpaceCertifier:
+    """Proves prunings and leaves by the kernel, and writes the proof.
+
+    Parameters
+    ----------
+    engine : SpaceEngine
+    enclosed : EnclosedSpace
+        Balls for its system; without radii in fast arithmetic.
+    recorder : Recorder
+    """
+
+    def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, recorder: Recorder) -> None:
+        self._engine, self._enclosed, self.recorder = engine, enclosed, recorder
+        self.roots: list[tuple[Codes, SpaceRoot]] = []
+        self._leaves = 0
+
+    @property
+    def certified(self) -> Certified:
+        """What was proven so far."""
+        return Certified({}, None, self._leaves)
+
+    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+        """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
+        if not relaxation.bound > PRUNE_MARGIN:
+            return False
+        numbers, values = relaxation.multipliers()
+        rows = [self._engine.rows[number] for number in numbers.tolist()]
+        if not exclusion_margin(self._enclosed, codes, rows, values, errors=2.0) > 0:
+            return False
+        self._leaf("x", [list(row) for row in rows], base64.b64encode(values.astype("<f8").tobytes()).decode())
+        return True
+
+    def branching(self, node: int, children: Sequence[int]) -> None:
+        """Write a branching of the tree."""
+        self.recorder.write(["b", node, list(children)])
+
+    def skipped(self, codes: Codes, reason: str) -> None:
+        """Write a subtree that was not examined."""
+        del codes
+        self._leaf("u", reason)
+
+    def selection(self, codes: Codes) -> SpaceRoot | UndecidedPart | Refine | None:
+        """The root of a leaf, a sector to halve, or why the leaf stays open."""
+        answer = settle(self._enclosed, codes)
+        if answer is None:
+            self._leaf("n")
+        elif isinstance(answer, Open):
+            if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
+                return Refine(answer.node)
+            self._leaf("u", _DEGENERATE)
+            return UndecidedPart(codes, _DEGENERATE, "perturb the load or the friction coefficients")
+        else:
+            self.roots.append((codes, answer))
+            self._leaf("r", answer.y.mid.tolist(), (4.0 * answer.y.rad).tolist(), answer.index)
+        return answer
+
+    def unloaded(self) -> None:
+        """Write the proof of the unloaded body."""
+        self._leaf("z")
+
+    def add(self, part: Certified) -> None:
+        """Subtrees of a problem in 3D are not handed out."""
+        raise NotImplementedError
+
+    def _leaf(self, kind: str, *record: object) -> None:
+        self._leaves += 1
+        self.recorder.write([kind, *record])
