@@ -78,7 +78,7 @@ CALLS = [
     (GRAPH.arcs_at, {}, "alpha"),
     (ARC.values, {}, "alpha"),
     (ARC.displacements, {}, "alpha"),
-    (GRAPH.plot, {}, "quantity nodes samples"),
+    (GRAPH.plot, {}, "quantity nodes tolerance"),
     (GRAPH.save, {}, "file"),
     (enumsol.BranchGraph.load, {}, "file"),
     (GRAPH.write_graphml, {}, "file"),
