@@ -103,6 +103,11 @@ class ContactSystem:
         return float(np.sqrt(np.maximum(_solve(self.S, self.g) @ self.g, 0.0)))
 
     @cached_property
+    def largest_forces(self) -> Vector:
+        """What no force of a solution exceeds, by the energy bound (theory, section 11.3), over all rows."""
+        return np.asarray(self.load_energy * np.sqrt(np.diagonal(_solve(self.S, np.eye(len(self.S))))))
+
+    @cached_property
     def normal_stiffness(self) -> Matrix:
         """((S^-1)_nn)^-1, the matrix of the norm of normal forces (theory, (11.4)), shape (p, p)."""
         p = self.p

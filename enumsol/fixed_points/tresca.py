@@ -154,6 +154,8 @@ def solve(data: TrescaData, start: Vector, first: str = "newton") -> tuple[Vecto
     """
     from enumsol.fixed_points.clarabel_solver import interior_point  # a fallback
 
+    if not np.any(data.system.g):
+        return np.zeros(len(start)), 0.0, first
     found: list[tuple[float, str, Vector]] = []
     if first == "newton":
         forces, residual = data.newton(start)
@@ -163,6 +165,8 @@ def solve(data: TrescaData, start: Vector, first: str = "newton") -> tuple[Vecto
     rough = interior_point(data)
     if rough is not None:
         forces, residual = data.newton(rough)
+        if residual > ACCEPTED:
+            forces, residual = data.proximal(forces)
         found.append((residual, "clarabel", forces))
     residual, used, forces = min(found, key=lambda item: item[0], default=(np.inf, "", start))
     if residual > _INTERIOR_POINT_ACCEPTED:
