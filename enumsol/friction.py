@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.array_checks import real_array
+from enumsol.array_checks import plain_array, real_array
 from enumsol.checks import exact_number, shown
 from enumsol.contact_body import span, vector
 from enumsol.errors import FrictionJumpWarning, InvalidProblemError
@@ -142,10 +143,11 @@ class FrictionFunction:
 
     def _pair(self, node: int, slip: float) -> tuple[float, float]:
         found = self.function(node, slip)
-        try:
-            values = np.broadcast_to(np.asarray(found, dtype=np.float64), (2,))
-        except (TypeError, ValueError):
-            values = np.full(2, np.nan)
+        values = np.full(2, np.nan)
+        with np.errstate(over="ignore"), suppress(InvalidProblemError, TypeError, ValueError, OverflowError):
+            numbers = plain_array(found, "friction", error=InvalidProblemError)
+            if numbers.dtype.kind in "fiuO":
+                values = np.broadcast_to(numbers.astype(np.float64), (2,))
         if not np.all(np.isfinite(values) & (values >= 0)):
             raise InvalidProblemError(
                 f"friction returns {shown(found)} at contact node {self.labels[node]} for slip {slip:g}; "

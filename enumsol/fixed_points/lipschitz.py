@@ -11,6 +11,7 @@ from scipy.linalg import eigh
 
 from enumsol.checks import nonnegative_number
 from enumsol.condensation.condensed import RHS_BLOCK
+from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.system import ContactSystem, contact_problem
 from enumsol.fixed_points.tresca import node_values
 from enumsol.friction import FrictionTable
@@ -19,15 +20,17 @@ from enumsol.problem3d import ContactProblem3D
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from enumsol.body3d import SlipMean
     from enumsol.checks import AlphaLike
     from enumsol.fixed_points.system import Problem
-    from enumsol.problem3d import SlipMean
 
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]
 
 #: Slips per node at which a friction function is looked at for its largest values and slopes.
 _SAMPLES = 257
+#: Smallest ratio of two areas.
+_LEAST_SHARE = 1e-100
 
 
 @dataclass(frozen=True)
@@ -152,7 +155,8 @@ def lipschitz_estimate(
     body = contact_problem(problem)
     p = body.p
     known = body.areas if areas is None and isinstance(body, ContactProblem3D) else areas
-    m = np.ones(p) if known is None else node_values(known, "areas", p)
+    m = np.ones(p) if known is None else _relative(node_values(known, "areas", p))
+    given = None if lipschitz is None else nonnegative_number(lipschitz, "lipschitz")
     system = ContactSystem.at(body, alpha)
     S = body.condensed.S
     g = body.condensed.free_displacements(system.alpha)
@@ -165,7 +169,7 @@ def lipschitz_estimate(
     blocks = S_tt.reshape(d, p, d, p)[:, np.arange(p), :, np.arange(p)]
     c_inf = np.sqrt(np.linalg.eigvalsh(blocks)[:, -1])
 
-    used = _coefficients(system, c_inf * load, lipschitz)
+    used = _coefficients(system, c_inf * load, given)
     C1 = min(_force_part(inverse_nn, S_tt, used.F, theta) for theta in _weights(inverse_nn, blocks, used.F, m))
     C2 = second = 0.0
     if used.lipschitz > 0:
@@ -185,6 +189,17 @@ def lipschitz_estimate(
         anisotropy=used.anisotropy,
         sampled=used.sampled,
     )
+
+
+def _relative(areas: Vector) -> Vector:
+    """Areas as shares of the largest: a factor of all of them has no effect."""
+    shares = areas / np.max(areas) if np.all(areas > 0) else np.zeros(1)
+    if np.min(shares) < _LEAST_SHARE:
+        raise InvalidArgumentError(
+            f"areas has the values {np.min(areas):g} to {np.max(areas):g}; expected areas > 0, the smallest at least "
+            f"{_LEAST_SHARE:g} of the largest"
+        )
+    return np.asarray(shares)
 
 
 def _force_part(inverse_nn: Matrix, S_tt: Matrix, F: Matrix, theta: Vector) -> float:
@@ -219,7 +234,7 @@ def _coefficients(system: ContactSystem, reach: Vector, lipschitz: float | None)
     if isinstance(body.law, FrictionTable) or lipschitz is None:
         slope = float(np.max(np.abs(np.diff(F, axis=0)) / np.where(step > 0, step, np.inf), initial=0.0))
         return _Coefficients(most, slope, ratio, sampled=not isinstance(body.law, FrictionTable))
-    slope = nonnegative_number(lipschitz, "lipschitz")
+    slope = lipschitz
     between = 0.5 * slope * np.max(step, axis=0)
     most, least = most + between, np.maximum(least - between, 1e-300)
     return _Coefficients(most, slope, float(np.max(np.max(most, axis=1) / np.min(least, axis=1))))

@@ -31,13 +31,15 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     Raises
     ------
     InvalidArgumentError
-        The table is none of `basin_table`.
+        The table is none of `basin_table`, or ``ax`` no Axes.
     MissingDependencyError
         matplotlib is not installed.
     """
     missing = {"size", "iterations", "root", "outcome"} - set(getattr(table, "columns", ()))
     if missing:
         raise InvalidArgumentError(f"table lacks {', '.join(sorted(missing))}; expected what basin_table returns")
+    if ax is not None and not hasattr(ax, "set_xscale"):
+        raise InvalidArgumentError(f"ax is a {type(ax).__name__}; expected the Axes of a figure, or None")
     if ax is None:
         ax = new_figure(figsize=(6.4, 4.2)).subplots()
     for root in sorted(table["root"].dropna().astype(int).unique().tolist()):

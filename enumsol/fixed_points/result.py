@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checks import alpha_value, file_path
+from enumsol.array_checks import real_array
+from enumsol.checks import alpha_value, file_path, optional_count, positive_integer, positive_number
 from enumsol.errors import InvalidArgumentError
 from enumsol.files import writing
 from enumsol.fixed_points.state import ContactState
+from enumsol.fixed_points.system import contact_problem
 
 if TYPE_CHECKING:
     import os
@@ -28,6 +30,19 @@ _FORMAT = 1
 _ARRAYS = ("slip_bound", "coefficients", "lambda_n", "lambda_t", "u_n", "u_t", "slip", "increments")
 #: Nodes and iterations that a printed result shows.
 _PRINTED = 12
+
+
+def _check_shapes(arrays: dict[str, Vector], body: Problem, path: str) -> None:
+    p = body.p
+    tangential = body.slip_offset.shape  # (p,) in 2D, (p, 2) in 3D
+    shapes = {"coefficients": (p, len(tangential)), "lambda_t": tangential, "u_t": tangential}
+    shapes["increments"] = (len(arrays["increments"]), 2) if arrays["increments"].ndim else (0, 2)
+    for name, array in arrays.items():
+        expected = shapes.get(name, (p,))
+        if array.shape != expected:
+            raise InvalidArgumentError(
+                f"{path} has {name} of shape {array.shape}; expected {expected}, as the problem has it"
+            )
 
 
 class Outcome(enum.Enum):
@@ -160,14 +175,21 @@ class FixedPoint(ContactState):
         InvalidArgumentError
             The file cannot be read, or is about another problem (another number of contact nodes, other labels).
         """
+        body = contact_problem(problem)
         place = file_path(path, "path")
         try:
             with np.load(place, allow_pickle=False) as data:
                 meta: dict[str, Any] = json.loads(str(data["meta"]))
-                arrays = {name: data[name] for name in _ARRAYS}
+                arrays = {
+                    name: real_array(data[name], f"{name} in {path}", error=InvalidArgumentError) for name in _ARRAYS
+                }
             if meta["format"] != _FORMAT:
                 raise InvalidArgumentError(f"{path} has format {meta['format']!r}; this version reads format {_FORMAT}")
-            report = {name: meta[name] for name in ("iterations", "tolerance", "period")}
+            report: dict[str, Any] = {
+                "iterations": positive_integer(meta["iterations"], f"iterations in {path}", least=0),
+                "tolerance": positive_number(meta["tolerance"], f"tolerance in {path}"),
+                "period": optional_count(meta["period"], f"period in {path}"),
+            }
             alpha, outcome = alpha_value(meta["alpha"]), Outcome(meta["outcome"])
             labels = meta["node_ids"]
         except OSError as error:
@@ -181,9 +203,10 @@ class FixedPoint(ContactState):
             raise InvalidArgumentError(
                 f"{path} does not hold a fixed point ({error}); expected a file of FixedPoint.save"
             ) from error
-        if labels != [str(label) for label in problem.node_ids]:
+        if labels != [str(label) for label in body.node_ids]:
             raise InvalidArgumentError(f"{path} is about other contact nodes; expected those of the problem")
-        return cls(problem=problem, alpha=alpha, outcome=outcome, **arrays, **report)
+        _check_shapes(arrays, body, str(path))
+        return cls(problem=body, alpha=alpha, outcome=outcome, **(report | arrays))
 
     def __repr__(self) -> str:
         lines = [f"FixedPoint at alpha = {float(self.alpha):g}: {self.why}"]

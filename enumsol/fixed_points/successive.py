@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.array_checks import real_array
 from enumsol.checks import optional_callable, positive_integer, positive_number
-from enumsol.errors import Interrupted
+from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.fixed_points.anderson import AndersonMixing
 from enumsol.fixed_points.newton import TrescaData
 from enumsol.fixed_points.result import FixedPoint, Outcome
-from enumsol.fixed_points.state import scaled_forces
+from enumsol.fixed_points.state import scaled_forces, slips_of
 from enumsol.fixed_points.system import ContactSystem, contact_problem
 from enumsol.fixed_points.tresca import TrescaNotSolved, node_values, solve
 from enumsol.friction import warn_of_jumps
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 
 #: Cycles up to this length are looked for; two iterates are the same if they are this much closer than neighbours.
 LONGEST_CYCLE, _SAME = 12, 1e-9
+#: Most iterates that Anderson's mixing keeps.
+MOST_DEPTH = 1000
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,7 @@ def successive_approximations(
     body = contact_problem(problem)
     tolerance = positive_number(tolerance, "tolerance")
     limit = positive_integer(max_iterations, "max_iterations")
-    depth = positive_integer(anderson, "anderson", least=0)
+    depth = positive_integer(anderson, "anderson", least=0, most=MOST_DEPTH)
     optional_callable(progress, "progress")
     system = ContactSystem.at(body, alpha)
     return _Iteration(system, tolerance, depth, progress).run(start, limit)
@@ -177,15 +180,16 @@ class _Iteration:
         if start is None:
             bound: Any = 0.0
         elif hasattr(start, "lambda_n") and hasattr(start, "u_t"):
-            bound = np.maximum(np.asarray(start.lambda_n, dtype=np.float64), 0.0)
-            slip = getattr(start, "slip", None)
-            if slip is None:
-                slip = np.linalg.norm(np.reshape(start.u_t, (len(bound), -1)), axis=1)
+            bound = np.maximum(real_array(start.lambda_n, "lambda_n of start", error=InvalidArgumentError), 0.0)
+            slip = slips_of(start, p, "start")
         elif isinstance(start, tuple) and len(start) == 2 and any(np.ndim(part) == 1 for part in start):
             bound, slip = start
         else:
             bound = start
-        return node_values(bound, "start", p) / system.force, node_values(slip, "slips of start", p) / system.length
+        return (
+            system.scaled(node_values(bound, "start", p), system.force, "start"),
+            system.scaled(node_values(slip, "slips of start", p), system.length, "slips of start"),
+        )
 
     def _image(self, data: TrescaData, forces: Vector) -> tuple[Vector, Vector]:
         """Psi of the iterate that gave these forces: scaled normal forces and slips."""

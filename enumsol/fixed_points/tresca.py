@@ -114,9 +114,9 @@ def solve_tresca(
     body = contact_problem(problem)
     one_of(solver, "solver", SOLVERS)
     system = ContactSystem.at(body, alpha)
-    bound = node_values(slip_bound, "slip_bound", body.p) / system.force
-    slips = node_values(0.0 if slip is None else slip, "slip", body.p) / system.length
-    data = TrescaData(system, bound, system.coefficients(slips))
+    bound = system.scaled(node_values(slip_bound, "slip_bound", body.p), system.force, "slip_bound")
+    slips = node_values(0.0 if slip is None else slip, "slip", body.p)
+    data = TrescaData(system, bound, system.coefficients(system.scaled(slips, system.length, "slip")))
     if solver == "cvxpy":
         return _by_cvxpy(data)
     guess = np.zeros(len(system.g)) if start is None else scaled_forces(system, start)

@@ -40,7 +40,7 @@ def test_what_is_no_root_is_no_fixed_point():
     moved = enumsol.solve_tresca(problem, sticking.lambda_n + 0.1, 5.0)
     assert not enumsol.is_fixed_point(problem, moved)
     other = enumsol.gallery.get("two-node-5").build()
-    with pytest.raises(enumsol.InvalidArgumentError, match="expected a root of the problem, which has p = 2"):
+    with pytest.raises(enumsol.InvalidArgumentError, match=r"expected \(2,\), as the problem has p = 2"):
         enumsol.is_fixed_point(other, sticking)
     with pytest.raises(enumsol.InvalidArgumentError, match="root is a int without alpha"):
         enumsol.is_fixed_point(problem, 3)
