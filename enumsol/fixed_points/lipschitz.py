@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from enumsol.body3d import SlipMean
-    from enumsol.checks import AlphaLike
+    from enumsol.checks import Alpha, AlphaLike
     from enumsol.fixed_points.system import Problem
 
     Vector = NDArray[np.float64]
@@ -104,7 +104,7 @@ class _Slips:
     @classmethod
     def of(cls, body: Problem, S_tt: Matrix) -> _Slips:
         """Of a problem; compliances are condensed to the degrees of freedom that occur in the means."""
-        mean = body.slip_mean if isinstance(body, ContactProblem3D) else None
+        mean = body.slip_mean if isinstance(body, ContactProblem3D) and body.depends_on_solution else None
         if mean is None:
             return cls(S_tt, None)
         rows = sp.csr_array(sp.vstack([mean.T1, mean.T2]))
@@ -114,6 +114,16 @@ class _Slips:
         solve = body.factorization.solve
         compliance = np.hstack([solve(unit[:, k : k + RHS_BLOCK].toarray())[used] for k in starts])
         return cls(S_tt, mean, sp.csr_array(rows[:, used]), np.linalg.cholesky(0.5 * (compliance + compliance.T)))
+
+    def reach(self, body: ContactProblem3D, alpha: Alpha, load: float, c_inf: Vector) -> Vector:
+        """What no slip of a solution exceeds, by the energy bound, shape (p,) [length]."""
+        if self.mean is None or self.rows is None or self.root is None:
+            return c_inf * load
+        q = len(self.mean.offset)
+        moved = np.sqrt(np.sum((self.rows @ self.root).reshape(2, q, -1) ** 2, axis=(0, 2)))
+        u = body.condensed.displacement(alpha, np.zeros(len(self.S_tt) // 2 * 3))
+        free = np.hypot(self.mean.T1 @ u - self.mean.offset[:, 0], self.mean.T2 @ u - self.mean.offset[:, 1])
+        return np.asarray(self.mean.weights @ (free + moved * load))
 
     def largest(self, weights: Vector) -> float:
         """Largest sum of weights * slip^2 over displacements of unit energy, weights of shape (p,)."""
@@ -169,11 +179,12 @@ def lipschitz_estimate(
     blocks = S_tt.reshape(d, p, d, p)[:, np.arange(p), :, np.arange(p)]
     c_inf = np.sqrt(np.linalg.eigvalsh(blocks)[:, -1])
 
-    used = _coefficients(system, c_inf * load, given)
+    slips = _Slips.of(body, S_tt)
+    reach = slips.reach(body, system.alpha, load, c_inf) if isinstance(body, ContactProblem3D) else c_inf * load
+    used = _coefficients(system, reach, given)
     C1 = min(_force_part(inverse_nn, S_tt, used.F, theta) for theta in _weights(inverse_nn, blocks, used.F, m))
     C2 = second = 0.0
     if used.lipschitz > 0:
-        slips = _Slips.of(body, S_tt)
         c_0 = np.sqrt(_largest(inverse_nn / np.sqrt(np.outer(m, m))))
         c_phi = np.sqrt(slips.largest(m))
         C2 = float(used.per_change * c_0 * np.max(c_inf) * c_phi * load)

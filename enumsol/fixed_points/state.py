@@ -124,7 +124,8 @@ class ContactState(Sealed):
 
         ``equilibrium`` is |A u + B' lambda - f| / |f|; ``penetration`` the largest u_n and ``tension`` the largest
         -lambda_n, as forces and displacements of the contact nodes; ``complementarity`` the sum of |lambda_n u_n|;
-        ``cone`` the largest |tau| - lambda_n; ``dissipation`` the sum of |lambda_n |F u_t| - lambda_t . u_t|. Forces
+        ``cone`` the largest |tau| - lambda_n; ``dissipation`` the sum of |lambda_n |F u_t| - lambda_t . u_t|; where
+        friction depends on the slip ``coefficients``, the largest |F(slip) - F| [-], F those it was solved with. Forces
         are divided by the largest contact force, displacements by the largest displacement of a contact node without
         contact forces, work by g' S^-1 g.
         """
@@ -147,7 +148,14 @@ class ContactState(Sealed):
             "cone": max(np.max(tau - self.lambda_n), 0.0) / force,
             "dissipation": np.sum(np.abs(slip_work - np.sum(lambda_t * u_t, axis=1))) / work,
         }
+        if getattr(self.problem, "depends_on_solution", False):
+            values["coefficients"] = np.max(np.abs(self._coefficients_at_slips() - F))
         return MappingProxyType({name: float(value) for name, value in values.items()})
+
+    def _coefficients_at_slips(self) -> Vector:
+        problem: Any = self.problem
+        slip = np.linalg.norm(self.u_t, axis=1) if problem.slip_mean is None else problem.slip_mean(self.u)
+        return np.asarray(problem.coefficients(self.alpha, slip))
 
     def to_frame(self) -> pd.DataFrame:
         """One row a contact node: label, coordinates, status, coefficients, forces and displacements."""

@@ -81,7 +81,8 @@ def successive_approximations(
         slips [length]; a root, a FixedPoint or a TrescaSolution gives its own.
     tolerance : float
         Converged when the increment of normal forces in the norm of (theory, (11.4)) is at most this fraction of the
-        load's, and that of the slips at most this fraction of the largest slips, where coefficients depend on them.
+        load's, and, where coefficients depend on the slips, that of the slips at most this fraction of the largest
+        slips, and the change of the coefficients at most this fraction of the largest one.
     max_iterations : int
     anderson : int
         Depth of Anderson's mixing; 0 is plain iteration. With mixing, limits may be fixed points that repel Psi.
@@ -157,7 +158,7 @@ class _Iteration:
                 data = TrescaData(self.system, bound, self.system.coefficients(slip))
                 forces, _, _ = solve(data, forces)
                 image, image_slip = self._image(data, forces)
-                increment = self._record(bound, slip, image, image_slip)
+                increment = self._record(data, slip, image, image_slip)
                 if increment <= 1.0:
                     outcome = Outcome.CONVERGED
                     break
@@ -197,18 +198,21 @@ class _Iteration:
         normal = np.maximum(self.system.split(forces)[0], 0.0)
         return normal, self.system.slip(forces, w)
 
-    def _record(self, bound: Vector, slip: Vector, image: Vector, image_slip: Vector) -> float:
+    def _record(self, data: TrescaData, slip: Vector, image: Vector, image_slip: Vector) -> float:
         """Note the increment; returned relative to what counts as none."""
         system = self.system
-        force = system.force_norm(image - bound)
+        force = system.force_norm(image - data.bound)
         change = float(np.linalg.norm(self.slip_weights * (image_slip - slip)))
         if not self.increments and self.depends:
             self._look_for_jumps(image_slip)
         self.increments.append((change, force * self.work))
         self.largest_slip = max(self.largest_slip, float(np.linalg.norm(self.slip_weights * image_slip)))
         relative = [force / system.load_energy] if system.load_energy > 0 else [0.0]
-        if self.depends and self.largest_slip > 0:
-            relative.append(change / self.largest_slip)
+        if self.depends:
+            relative.append(change / (self.largest_slip or 1.0))
+            # where coefficients are steep, slips that hardly change are not enough
+            F = system.coefficients(image_slip)
+            relative.append(float(np.max(np.abs(F - data.F)) / (np.max(F) or 1.0)))
         increment = max(relative) / self.tolerance
         if self.progress is not None:
             self.progress(FixedPointProgress(len(self.increments), increment, time.perf_counter() - self.started))
