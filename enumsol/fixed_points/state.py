@@ -150,7 +150,7 @@ class ContactState(Sealed):
         }
         if getattr(self.problem, "depends_on_solution", False):
             values["coefficients"] = np.max(np.abs(self._coefficients_at_slips() - F))
-        return MappingProxyType({name: float(value) for name, value in values.items()})
+        return MappingProxyType({name: float(value) + 0.0 for name, value in values.items()})
 
     def _coefficients_at_slips(self) -> Vector:
         problem: Any = self.problem
