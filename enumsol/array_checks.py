@@ -70,7 +70,8 @@ def real_array(
         raise _inexact(name, raw[where], where, error)
     if finite and not np.all(np.isfinite(array)):
         where = _index(~np.isfinite(array))
-        raise error(f"{name} has the value {array[where]} at index {where}; expected finite numbers only")
+        at = f" at index {where}" if where else ""
+        raise error(f"{name} has the value {array[where]}{at}; expected finite numbers only")
     return array
 
 

@@ -13,7 +13,7 @@ from enumsol.array_checks import plain_array, real_array
 from enumsol.checks import exact_number, shown
 from enumsol.contact_body import span, vector
 from enumsol.errors import FrictionJumpWarning, InvalidProblemError
-from enumsol.sealed import Sealed, sealed
+from enumsol.sealed import Immutable, Sealed, sealed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -54,7 +54,7 @@ class ConstantFriction(Sealed):
         return f"F1 in {span(self.values[:, 0])}, F2 in {span(self.values[:, 1])}"
 
 
-class FrictionTable(Sealed):
+class FrictionTable(Immutable):
     """Coefficients as piecewise linear functions of the slip |u_t|, constant beyond the last one.
 
     Parameters
@@ -89,6 +89,7 @@ class FrictionTable(Sealed):
         self.slip = sealed(knots)
         self.F1 = _column(F1, "F1", len(knots))
         self.F2 = self.F1 if F2 is None else _column(F2, "F2", len(knots))
+        self._freeze()
 
     def at(self, slip: Vector) -> NDArray[np.float64]:
         """Coefficients F1, F2 at slips (p,) [length], shape (p, 2) [-]."""

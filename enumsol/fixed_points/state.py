@@ -157,6 +157,10 @@ class ContactState(Sealed):
         slip = np.linalg.norm(self.u_t, axis=1) if problem.slip_mean is None else problem.slip_mean(self.u)
         return np.asarray(problem.coefficients(self.alpha, slip))
 
+    def __getstate__(self) -> dict[str, Any]:
+        # a mappingproxy cannot be pickled; copies compute it again
+        return {name: value for name, value in self.__dict__.items() if name != "residuals"}
+
     def to_frame(self) -> pd.DataFrame:
         """One row a contact node: label, coordinates, status, coefficients, forces and displacements."""
         import pandas as pd  # for frames only
