@@ -55,7 +55,8 @@ def real_array(
         It is no array of real numbers, float64 cannot hold one of them, or one is not finite.
     """
     raw = plain_array(value, name, error=error)
-    if not hasattr(value, "dtype") and raw.dtype.kind == "f" and np.any(np.abs(raw) >= _EXACT_INTEGERS):
+    # the float64 keeps NumPy from casting the integer to float16
+    if not hasattr(value, "dtype") and raw.dtype.kind == "f" and np.any(np.abs(raw) >= np.float64(_EXACT_INTEGERS)):
         # numpy has rounded the integers of lists and frames that hold floats as well
         raw = np.asarray(value.astype(object) if hasattr(value, "astype") else value, dtype=object)
     if raw.dtype.kind not in "fiubO":
@@ -69,7 +70,8 @@ def real_array(
         raise _inexact(name, raw[where], where, error)
     if finite and not np.all(np.isfinite(array)):
         where = _index(~np.isfinite(array))
-        raise error(f"{name} has the value {array[where]} at index {where}; expected finite numbers only")
+        at = f" at index {where}" if where else ""
+        raise error(f"{name} has the value {array[where]}{at}; expected finite numbers only")
     return array
 
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.array_checks import real_array
+from enumsol.array_checks import plain_array, real_array
 from enumsol.checks import exact_number, shown
 from enumsol.contact_body import span, vector
 from enumsol.errors import FrictionJumpWarning, InvalidProblemError
-from enumsol.sealed import Sealed, sealed
+from enumsol.sealed import Immutable, Sealed, sealed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -53,7 +54,7 @@ class ConstantFriction(Sealed):
         return f"F1 in {span(self.values[:, 0])}, F2 in {span(self.values[:, 1])}"
 
 
-class FrictionTable(Sealed):
+class FrictionTable(Immutable):
     """Coefficients as piecewise linear functions of the slip |u_t|, constant beyond the last one.
 
     Parameters
@@ -88,6 +89,7 @@ class FrictionTable(Sealed):
         self.slip = sealed(knots)
         self.F1 = _column(F1, "F1", len(knots))
         self.F2 = self.F1 if F2 is None else _column(F2, "F2", len(knots))
+        self._freeze()
 
     def at(self, slip: Vector) -> NDArray[np.float64]:
         """Coefficients F1, F2 at slips (p,) [length], shape (p, 2) [-]."""
@@ -142,10 +144,11 @@ class FrictionFunction:
 
     def _pair(self, node: int, slip: float) -> tuple[float, float]:
         found = self.function(node, slip)
-        try:
-            values = np.broadcast_to(np.asarray(found, dtype=np.float64), (2,))
-        except (TypeError, ValueError):
-            values = np.full(2, np.nan)
+        values = np.full(2, np.nan)
+        with np.errstate(over="ignore"), suppress(InvalidProblemError, TypeError, ValueError, OverflowError):
+            numbers = plain_array(found, "friction", error=InvalidProblemError)
+            if numbers.dtype.kind in "fiuO":
+                values = np.broadcast_to(numbers.astype(np.float64), (2,))
         if not np.all(np.isfinite(values) & (values >= 0)):
             raise InvalidProblemError(
                 f"friction returns {shown(found)} at contact node {self.labels[node]} for slip {slip:g}; "

@@ -19,7 +19,7 @@ LAYERS = (
     ("array_checks", "statuses", "sectors"),
     ("condensation",),
     ("contact_body",),
-    ("friction",),
+    ("friction", "body3d"),
     ("problem", "problem3d"),
     ("equation", "kernel", "selections"),
     ("relaxation", "proof"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError
@@ -11,6 +12,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _MARKERS = "osD^v<>P*h"
+#: Up to as many iterations the axis of iterations is linear.
+_LINEAR = 20
 
 
 def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
@@ -31,15 +34,19 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     Raises
     ------
     InvalidArgumentError
-        The table is none of `basin_table`.
+        The table is none of `basin_table`, or ``ax`` no Axes.
     MissingDependencyError
         matplotlib is not installed.
     """
     missing = {"size", "iterations", "root", "outcome"} - set(getattr(table, "columns", ()))
     if missing:
         raise InvalidArgumentError(f"table lacks {', '.join(sorted(missing))}; expected what basin_table returns")
+    if ax is not None and not hasattr(ax, "set_xscale"):
+        raise InvalidArgumentError(f"ax is a {type(ax).__name__}; expected the Axes of a figure, or None")
     if ax is None:
         ax = new_figure(figsize=(6.4, 4.2)).subplots()
+    from matplotlib.ticker import MaxNLocator  # there, where there are axes
+
     for root in sorted(table["root"].dropna().astype(int).unique().tolist()):
         rows = table[table["root"] == root]
         style = {"marker": _MARKERS[root % len(_MARKERS)], "color": f"C{root}"}  # the same in every picture
@@ -48,8 +55,12 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     for outcome, rows in lost.groupby("outcome"):
         ax.plot(rows["size"], rows["iterations"], "x", color="black", label=f"no root ({outcome}): {len(rows)} starts")
     positive = table["size"][table["size"] > 0]
-    ax.set_xscale("symlog", linthresh=float(positive.min()) if len(positive) else 1.0)
-    ax.set_yscale("log")
+    # a power of ten, so that no tick comes to lie between 0 and the first one
+    ax.set_xscale("symlog", linthresh=10.0 ** math.floor(math.log10(positive.min())) if len(positive) else 1.0)
+    if table["iterations"].max() > _LINEAR:
+        ax.set_yscale("log")
+    else:
+        ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_xlabel("mean slip bound of the start [force]")
     ax.set_ylabel("iterations")
     never = table.attrs.get("never", [])

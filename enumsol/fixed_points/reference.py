@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import MissingDependencyError
+from enumsol.fixed_points.system import contact_problem
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,6 +39,7 @@ class TrescaReference:
     """
 
     def __init__(self, problem: Problem) -> None:
+        problem = contact_problem(problem)
         try:
             import cvxpy
         except ImportError as error:

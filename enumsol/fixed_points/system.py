@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     Matrix = NDArray[np.float64]
     Problem = ContactProblem | ContactProblem3D
 
+#: Most that coefficients may be, and given forces and slips, in units in which those of the load have size 1.
+_LARGEST = 1e100
+
 
 def contact_problem(value: Any) -> Problem:
     """Value as a contact problem in 2D or 3D.
@@ -103,6 +106,11 @@ class ContactSystem:
         return float(np.sqrt(np.maximum(_solve(self.S, self.g) @ self.g, 0.0)))
 
     @cached_property
+    def largest_forces(self) -> Vector:
+        """What no force of a solution exceeds, by the energy bound (theory, section 11.3), over all rows."""
+        return np.asarray(self.load_energy * np.sqrt(np.diagonal(_solve(self.S, np.eye(len(self.S))))))
+
+    @cached_property
     def normal_stiffness(self) -> Matrix:
         """((S^-1)_nn)^-1, the matrix of the norm of normal forces (theory, (11.4)), shape (p, p)."""
         p = self.p
@@ -116,8 +124,12 @@ class ContactSystem:
     def coefficients(self, slip: Vector) -> Matrix:
         """Friction coefficients for scaled slips of shape (p,), shape (p, d)."""
         if isinstance(self.problem, ContactProblem3D):
-            return self.problem.coefficients(self.alpha, slip * self.length)
-        return self.problem.friction_at(self.alpha)[:, None]
+            F = self.problem.coefficients(self.alpha, slip * self.length)
+        else:
+            F = self.problem.friction_at(self.alpha)[:, None]
+        if np.max(F) > _LARGEST:
+            raise InvalidArgumentError(f"friction is {np.max(F):g}; expected at most {_LARGEST:g} here")
+        return F
 
     def slip(self, forces: Vector, w: Vector) -> Vector:
         """The scaled slip that coefficients depend on, shape (p,), for scaled forces and displacements of all rows."""
@@ -130,6 +142,22 @@ class ContactSystem:
         """u in the problem's units, shape (n,), for scaled forces of all rows."""
         scaled = forces * np.tile(self.force, 1 + self.tangents)
         return self.problem.condensed.displacement(self.alpha, scaled)
+
+    def scaled(self, values: Vector, unit: Vector, name: str) -> Vector:
+        """Forces or displacements of nodes or rows by the factors ``unit``, which are those of one tangent or of all.
+
+        Raises
+        ------
+        InvalidArgumentError
+            One is so large beside the load that squares would overflow.
+        """
+        with np.errstate(over="ignore"):
+            scaled = values / np.tile(unit, len(values) // self.p)
+        if np.any(np.abs(scaled) > _LARGEST):
+            raise InvalidArgumentError(
+                f"{name} has the value {np.max(np.abs(values)):g}; expected at most {_LARGEST:g} times the load's"
+            )
+        return np.asarray(scaled)
 
     def split(self, values: Vector) -> tuple[Vector, Matrix]:
         """Normal part (p,) and tangential part (p, d) of a vector over all rows."""

@@ -5,18 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.sparse as sp
 
-from enumsol.array_checks import real_array, real_matrix
+from enumsol.body3d import BodyMesh, SlipMean
 from enumsol.errors import InvalidProblemError
 from enumsol.friction import ConstantFriction, FrictionTable
 from enumsol.io.layouts import LAYOUT_3D
-from enumsol.problem3d import BodyMesh, ContactProblem3D, SlipMean
+from enumsol.problem3d import ContactProblem3D
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from numpy.typing import NDArray
 
 _MESH = ("mesh_points", "mesh_cells", "mesh_dofs")
 _SURFACE = ("mesh_facets", "mesh_rows")
@@ -37,12 +34,12 @@ def problem_from_arrays_3d(arrays: Mapping[str, Any]) -> ContactProblem3D:
         options["friction"] = friction
     options["friction_slope"] = tuple(arrays.get(f"friction_slope_{axis}", 0.0) for axis in (1, 2))
     if "mesh_points" in arrays:
-        options["mesh"] = _mesh(arrays)
+        points, cells, dofs = (arrays[name] for name in _MESH)
+        options["mesh"] = BodyMesh(points, cells, dofs, *(arrays.get(name) for name in _SURFACE))
     elif extra := [name for name in _SURFACE if name in arrays]:
         raise InvalidProblemError(f"{extra[0]} has no mesh; expected {', '.join(_MESH)} as well")
     if "slip_mean_T1" in arrays:
-        T1, T2, weights = (sp.csr_array(real_matrix(arrays[name], name)) for name in (_MEAN[0], _MEAN[1], _MEAN[3]))
-        options["slip_mean"] = SlipMean(T1, T2, real_array(arrays[_MEAN[2]], _MEAN[2]), weights)
+        options["slip_mean"] = SlipMean(*(arrays[name] for name in _MEAN))
     return ContactProblem3D(*(arrays[name] for name in LAYOUT_3D.required), **options)
 
 
@@ -65,37 +62,6 @@ def _friction(arrays: Mapping[str, Any]) -> Any:
         # one column of a MatrixMarket file is the table of all nodes
         return FrictionTable(slip, *(F.ravel() if F.ndim == 2 and F.shape[1] == 1 else F for F in columns))
     return None
-
-
-def _mesh(arrays: Mapping[str, Any]) -> BodyMesh:
-    nodes = real_array(arrays["mesh_points"], "mesh_points")
-    if nodes.ndim != 2 or nodes.shape[1] != 3:
-        raise InvalidProblemError(f"mesh_points has shape {nodes.shape}; expected (N, 3)")
-    bodies = _numbers(arrays["mesh_cells"], "mesh_cells", len(nodes))
-    if bodies.ndim != 2 or bodies.shape[1] not in (4, 8):
-        raise InvalidProblemError(f"mesh_cells has shape {bodies.shape}; expected (M, 4) or (M, 8)")
-    free = _numbers(arrays["mesh_dofs"], "mesh_dofs", nodes.size)
-    if free.ndim != 1 or len(np.unique(free)) != len(free):
-        raise InvalidProblemError(f"mesh_dofs has shape {free.shape} or repeats a number; expected (n,) distinct ones")
-    facets = rows = None
-    if "mesh_facets" in arrays:
-        facets = _numbers(arrays["mesh_facets"], "mesh_facets", len(nodes))
-        if facets.ndim != 2 or facets.shape[1] not in (3, 4):
-            raise InvalidProblemError(f"mesh_facets has shape {facets.shape}; expected (k, 3) or (k, 4)")
-    if "mesh_rows" in arrays:
-        rows = _numbers(arrays["mesh_rows"], "mesh_rows", np.shape(arrays["Bn"])[0], least=-1)
-        if facets is None or rows.shape != facets.shape[:1]:
-            raise InvalidProblemError(f"mesh_rows has shape {rows.shape}; expected (k,), one for each of mesh_facets")
-    return BodyMesh(nodes, bodies, free, facets, rows)
-
-
-def _numbers(value: Any, name: str, count: int, least: int = 0) -> NDArray[np.int64]:
-    array = real_array(value, name)
-    if np.any(array != np.round(array)) or np.any(array < least) or np.any(array >= count):
-        raise InvalidProblemError(
-            f"{name} holds other numbers than {least} .. {count - 1}; expected whole ones in that range"
-        )
-    return array.astype(np.int64)
 
 
 def arrays_of_3d(problem: ContactProblem3D) -> dict[str, Any]:
