@@ -21,7 +21,7 @@ from enumsol.checks import (
     optional_seconds,
 )
 from enumsol.condensation.affine import exactly_at
-from enumsol.condensation.exact import FAST_EXACT_DOF, ExactPath
+from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
@@ -107,7 +107,7 @@ def branch_graph(
     _check_friction(problem, a, b)
     started = time.perf_counter()
     exactly = arithmetic == "exact" or problem.n <= FAST_EXACT_DOF
-    exact = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
+    exact = ExactCondensed.from_problem(problem) if exactly else ExactCondensed.from_condensed(problem)
     certifier = _certifier(problem, exact, arithmetic)
     search = IntervalSearch(
         problem.condensed,
@@ -149,13 +149,13 @@ def branch_graph(
     return graph
 
 
-def _certifier(problem: ContactProblem, exact: ExactPath, arithmetic: Arithmetic) -> IntervalCertifier:
+def _certifier(problem: ContactProblem, exact: ExactCondensed, arithmetic: Arithmetic) -> IntervalCertifier:
     if arithmetic == "exact":
         return ExactIntervalCertifier(exact)
     return VerifiedIntervalCertifier(problem, exact) if arithmetic == "verified" else FastIntervalCertifier()
 
 
-def _candidates(search: IntervalSearch, exact: ExactPath) -> set[Codes]:
+def _candidates(search: IntervalSearch, exact: ExactCondensed) -> set[Codes]:
     """The selections that may hold somewhere; Ctrl-C keeps those that were found."""
     if exact.unloaded:
         # nothing but lambda = 0 solves at any alpha; every selection holds there, so that one is enough
@@ -168,7 +168,7 @@ def _candidates(search: IntervalSearch, exact: ExactPath) -> set[Codes]:
 
 
 def _proof(
-    search: IntervalSearch, certifier: IntervalCertifier, problem: ContactProblem, exact: ExactPath
+    search: IntervalSearch, certifier: IntervalCertifier, problem: ContactProblem, exact: ExactCondensed
 ) -> Proof | None:
     if not certifier.checkable or not search.pieces or search.stopped is not None:
         return None

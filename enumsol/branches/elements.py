@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from enumsol.arithmetic.algebraic import CriticalAlpha
     from enumsol.checks import AlphaLike
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.roots.root import RootFamily
     from enumsol.selections.solution import Codes
     from enumsol.statuses import ContactStatus
@@ -137,7 +137,7 @@ class Arc:
     grazing: bool
     selections: tuple[Codes, ...] = field(repr=False)
     sample: Fraction = field(repr=False)
-    _exact: ExactPath = field(repr=False)
+    _exact: ExactCondensed = field(repr=False)
 
     @property
     def interval(self) -> tuple[float, float]:

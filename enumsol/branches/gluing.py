@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from enumsol.branches.selection_arcs import Event, SelectionArcs
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.roots.components import RootComponent
     from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
 
@@ -85,7 +85,7 @@ class Gluing:
 
     Attributes
     ----------
-    exact : ExactPath
+    exact : ExactCondensed
     a, b : fmpq
     arcs : dict of SelectionArcs by codes, those that hold somewhere
     vertices : list of GluedVertex in the order of alpha
@@ -96,7 +96,7 @@ class Gluing:
         What stayed undecided or contradicts completeness; empty when nothing does.
     """
 
-    exact: ExactPath
+    exact: ExactCondensed
     a: Any
     b: Any
     arcs: dict[Codes, SelectionArcs]
@@ -107,7 +107,7 @@ class Gluing:
 
 
 def glue(
-    exact: ExactPath,
+    exact: ExactCondensed,
     candidates: Iterable[Codes],
     a: Any,
     b: Any,
@@ -119,7 +119,7 @@ def glue(
 
     Parameters
     ----------
-    exact : ExactPath
+    exact : ExactCondensed
     candidates : codes of the selections that may hold somewhere in [a, b]
     a, b : fmpq
     tick : called with the share of the candidates done

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.branches.elements import Arc, Vertex
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
     from enumsol.search.interval import SearchedPiece
@@ -49,7 +49,7 @@ class GraphData:
     Attributes
     ----------
     problem : ContactProblem
-    exact : ExactPath
+    exact : ExactCondensed
         The condensed problem in rationals, on which the arcs rest.
     interval : (Fraction, Fraction)
     arithmetic : str
@@ -66,7 +66,7 @@ class GraphData:
     """
 
     problem: ContactProblem
-    exact: ExactPath
+    exact: ExactCondensed
     interval: tuple[Fraction, Fraction]
     arithmetic: str
     vertices: tuple[Vertex, ...]

@@ -14,7 +14,7 @@ from enumsol.selections.solution import VertexLimitError
 
 if TYPE_CHECKING:
     from enumsol.arithmetic.algebraic import CriticalAlpha
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.solution import ActiveSets, Codes
 
 
@@ -23,7 +23,7 @@ class KnownSelections:
 
     Parameters
     ----------
-    exact : ExactPath
+    exact : ExactCondensed
     a, b : fmpq
 
     Attributes
@@ -37,7 +37,7 @@ class KnownSelections:
         What stayed undecided or contradicts completeness.
     """
 
-    def __init__(self, exact: ExactPath, a: Any, b: Any, *, cut_short: bool) -> None:
+    def __init__(self, exact: ExactCondensed, a: Any, b: Any, *, cut_short: bool) -> None:
         self.exact, self.a, self.b, self.cut_short = exact, a, b, cut_short
         self.arcs: dict[Codes, SelectionArcs] = {}
         self.waiting: list[Event] = []

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.branches.gluing import GluedArc, GluedVertex, Gluing
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.roots.root import Polytope
 
 
@@ -52,7 +52,7 @@ def make_arcs(gluing: Gluing) -> list[Arc]:
     ]
 
 
-def _slips(exact: ExactPath, edge: GluedArc) -> tuple[int, ...]:
+def _slips(exact: ExactCondensed, edge: GluedArc) -> tuple[int, ...]:
     """Signs of u_t in the middle of an arc, which name the slip of nodes without friction; zeros if there are none."""
     if not any(exact.frictionless):
         return (0,) * exact.p

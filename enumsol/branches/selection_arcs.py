@@ -17,7 +17,7 @@ from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.ordered_field import FiberSelections
     from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
 
@@ -144,12 +144,12 @@ class SelectionArcs:
         return event, True
 
 
-def selection_arcs(exact: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionArcs | None:
+def selection_arcs(exact: ExactCondensed, codes: Codes, a: Any, b: Any) -> SelectionArcs | None:
     """Cells and events of a selection in [a, b]; None when its determinant vanishes identically.
 
     Parameters
     ----------
-    exact : ExactPath
+    exact : ExactCondensed
     codes : status codes
     a, b : fmpq, a <= b
     """
@@ -204,7 +204,7 @@ def _critical_points(det: Any, required: Sequence[Condition], a: Any, b: Any) ->
     return points + [(CriticalAlpha.rational(end), -2) for end in ((a, b) if a != b else (a,))]
 
 
-def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, exact: ExactPath) -> ActiveSets:
+def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, exact: ExactCondensed) -> ActiveSets:
     """Per node the codes that hold at the selection's solution at ``alpha``, where its determinant does not vanish.
 
     Parameters
@@ -212,7 +212,7 @@ def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, exact:
     functions : the selection's functions
     alpha : CriticalAlpha
     det_sign : sign of the determinant there
-    exact : ExactPath
+    exact : ExactCondensed
     """
 
     def at(poly: Any) -> int:

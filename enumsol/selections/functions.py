@@ -11,7 +11,7 @@ from enumsol.arithmetic.algebraic import integer_polynomial
 from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.solution import Codes
 
 
@@ -31,11 +31,11 @@ class SelectionFunctions:
 
     Parameters
     ----------
-    exact : ExactPath
+    exact : ExactCondensed
     codes : status codes, FRICTIONLESS for the nodes in contact with F = 0 throughout
     """
 
-    def __init__(self, exact: ExactPath, codes: Codes) -> None:
+    def __init__(self, exact: ExactCondensed, codes: Codes) -> None:
         self.exact, self.codes = exact, codes
         self._closed = [i for i, c in enumerate(codes) if c != OPEN]
         self._stuck = [i for i, c in enumerate(codes) if c == STICK]
