@@ -116,7 +116,7 @@ class KnownSelections:
             sets = []
         else:
             functions = self.arcs[event.codes].functions
-            sets = [active_sets(functions, event.alpha, int(event.alpha.sign_of(functions.det)), self.exact)]
+            sets = [active_sets(functions, event.alpha, self.exact)]
         event.active = tuple(
             frozenset({code}.union(*(active[i] for active in sets))) for i, code in enumerate(event.codes)
         )

@@ -15,7 +15,7 @@ from enumsol.roots.root import RootFamily
 from enumsol.roots.slip_signs import shown_status, sign_over, slip_names
 from enumsol.selections.ordered_field import FiberSelections, as_float
 from enumsol.selections.polytopes import dot
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, RowKind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -139,7 +139,7 @@ def _slip_sign(gluing: Gluing, glued: GluedVertex, node: int) -> int:
     for codes in glued.members:
         functions = gluing.arcs[codes].functions
         if not functions.singular and (det := glued.alpha.sign_of(functions.det)) != 0:
-            slip = functions.slip(node)
+            slip = functions.row(RowKind.SLIP_FORWARD, node)
             return 0 if slip.is_zero() else int(det * glued.alpha.sign_of(slip))
     return 0  # the unloaded body at rest
 
