@@ -13,6 +13,7 @@ from enumsol.checks import alpha_value, exact_number, shown
 from enumsol.condensation.affine import exactly_at
 from enumsol.contact_body import ContactBody, span, vector
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -158,7 +159,7 @@ class ContactProblem(ContactBody):
         path = f"F0 in {span(F0)}, F1 in {span(F1)}"
         load = "constant" if self.load_slope is None else "f + alpha load_slope"
         return (
-            f"ContactProblem with {self.p} contact node{'s' if self.p != 1 else ''}\n"
+            f"ContactProblem with {counted(self.p, 'contact node')}\n"
             f"  degrees of freedom  {self.n}  (A: {self.A.nnz} nonzeros)\n"
             f"  friction            F0 + alpha F1,  {path}\n"
             f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"

@@ -16,6 +16,7 @@ from enumsol.contact_body import ContactBody, span, vector
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.friction import ConstantFriction, friction_law, friction_pair
 from enumsol.sealed import Sealed, sealed
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -293,7 +294,7 @@ class ContactProblem3D(ContactBody):
         slope = "" if not np.any(self._slope) else f" + alpha [{span(self._slope[:, 0])}, {span(self._slope[:, 1])}]"
         load = "constant" if self.load_slope is None else "f + alpha load_slope"
         return (
-            f"ContactProblem3D with {self.p} contact node{'s' if self.p != 1 else ''}\n"
+            f"ContactProblem3D with {counted(self.p, 'contact node')}\n"
             f"  degrees of freedom  {self.n}  (A: {self.A.nnz} nonzeros)\n"
             f"  friction            {self.law}{slope}\n"
             f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.branches.elements import VertexKind
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -111,6 +112,11 @@ class Claims:
     ) -> None:
         self._vertices, self._arcs, self._interval = vertices, arcs, interval
         self.standing = standing
+
+    def __repr__(self) -> str:
+        low, high = self._interval
+        arcs, vertices = counted(len(self._arcs), "arc"), counted(len(self._vertices), "vertex", "vertices")
+        return f"Claims of {arcs} and {vertices} for alpha in [{low:g}, {high:g}]: {self.standing.value}"
 
     @property
     def whole(self) -> bool:

@@ -25,8 +25,8 @@ What checker and search share
       definite matrix, and floats as rationals;
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file;
     - ``problem``, ``contact_body``, ``condensation.data``, ``condensation.condensed``, ``condensation.factorization``,
-      ``sealed``, ``checks``, ``array_checks``, ``files`` and ``errors``: the data, their checks and their fingerprint,
-      the factorization of A (no bound assumes that it is accurate), S and g as computed;
+      ``sealed``, ``checks``, ``array_checks``, ``files``, ``texts`` and ``errors``: the data, their checks and their
+      fingerprint, the factorization of A (no bound assumes that it is accurate), S and g as computed;
     - numpy, scipy and python-flint.
 
     They are shared because the two must agree. A leaf is written when its inequality is proven positive, and a second

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from enumsol.proof.reading import shown_alpha
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -58,13 +59,13 @@ class VerificationReport:
     def __repr__(self) -> str:
         where = "" if self.alpha is None else f" at alpha = {shown_alpha(self.alpha)}"
         if not self.ok:
-            return _refusal(where, self.failures, _count(self.leaves, "leaf", "leaves"))
+            return _refusal(where, self.failures, counted(self.leaves, "leaf", "leaves"))
         return "\n".join(
             (
                 f"proof: verified{where}",
-                f"  {_count(self.leaves, 'leaf covers', 'leaves cover')} all selections, {self.undecided} of them "
+                f"  {counted(self.leaves, 'leaf covers', 'leaves cover')} all selections, {self.undecided} of them "
                 "undecided",
-                f"  {_count(self.roots, 'isolated root')}, {_count(self.families, 'family', 'families')}",
+                f"  {counted(self.roots, 'isolated root')}, {counted(self.families, 'family', 'families')}",
                 f"  certified data: {_DATA[self.data]}",
                 f"  complete: {'yes' if self.complete else 'no'}",
             )
@@ -105,13 +106,13 @@ class GraphVerificationReport:
     def __repr__(self) -> str:
         ends = () if self.interval is None else tuple(float(end) for end in self.interval)
         where = f" for alpha in [{ends[0]:g}, {ends[1]:g}]" if ends else ""
-        found = f"{_count(self.leaves, 'leaf', 'leaves')} in {_count(self.pieces, 'piece')}"
+        found = f"{counted(self.leaves, 'leaf', 'leaves')} in {counted(self.pieces, 'piece')}"
         if not self.ok:
             return _refusal(where, self.failures, found)
         return "\n".join(
             (
                 f"proof: verified{where}",
-                f"  {found}; every solution lies in one of {_count(len(self.selections), 'selection')}",
+                f"  {found}; every solution lies in one of {counted(len(self.selections), 'selection')}",
                 f"  certified data: {_DATA[self.data]}",
             )
         )
@@ -123,7 +124,3 @@ _DATA = {"problem": "A, Bn, Bt, f as given", "condensed": "S and g as computed"}
 def _refusal(where: str, failures: tuple[str, ...], read: str) -> str:
     lines = [f"proof: REFUSED{where}", *(f"  failure: {failure}" for failure in failures)]
     return "\n".join([*lines, f"  checked until then: {read}, which show nothing", "  complete: no"])
-
-
-def _count(number: int, singular: str, plural: str | None = None) -> str:
-    return f"{number} {singular if number == 1 else plural or singular + 's'}"

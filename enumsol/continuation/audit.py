@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from enumsol.checks import real_or_nan, shown
-from enumsol.continuation.audit_report import AuditedPoint, AuditReport, Jump, MissedArc
+from enumsol.continuation.audit_report import AuditedPoint, AuditReport, Jump, MissedArc, Verdict
 from enumsol.continuation.graph_map import GraphLike, GraphMap, Place, PlaceKind
 from enumsol.continuation.path import Path
 from enumsol.continuation.points import Columns, PointRun, read_points
@@ -134,14 +134,14 @@ class _Tally:
         if chart.outside(alpha):
             place = Place(PlaceKind.OUTSIDE, -1, math.nan)
             low, high = (float(end) for end in chart.graph.interval)
-            verdict, reason = "not compared", f"outside the graph's interval [{low:.10g}, {high:.10g}]"
+            verdict, reason = Verdict.NOT_COMPARED, f"outside the graph's interval [{low:.10g}, {high:.10g}]"
         else:
             place = chart.place(x, near)
-            verdict, reason = "on", ""
+            verdict, reason = Verdict.ON, ""
             if place.distance > chart.tolerance:
-                verdict, reason = ("not compared", _UNPLACED) if chart.graph.reasons else ("off", "")
+                verdict, reason = (Verdict.NOT_COMPARED, _UNPLACED) if chart.graph.reasons else (Verdict.OFF, "")
         self.points.append(AuditedPoint(run.path, int(run.rows[k]), alpha, place, self._branch(place), verdict, reason))
-        if verdict != "on":
+        if verdict is not Verdict.ON:
             return None
         self.on.append(place)
         if place.kind is PlaceKind.ARC:

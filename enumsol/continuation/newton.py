@@ -15,6 +15,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.roots.root import Root
 from enumsol.statuses import FRICTIONLESS, STATUSES, STICK
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -131,7 +132,7 @@ def _iterate(equation: CondensedEquation, x: Vector, alpha: float, max_iteration
             raise NotConverged(alpha, history, "no step along Newton's direction lowers the residual")
         x = x.copy()
         x[:-1] -= fraction * step
-    raise NotConverged(alpha, history, f"the limit of {max_iterations} iterations was reached")
+    raise NotConverged(alpha, history, f"the limit of {counted(max_iterations, 'iteration')} was reached")
 
 
 def _newton_step(equation: CondensedEquation, rows: NDArray[np.bool_], x: Vector) -> Vector:

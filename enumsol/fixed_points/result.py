@@ -14,6 +14,7 @@ from enumsol.checks import alpha_value, file_path
 from enumsol.errors import InvalidArgumentError
 from enumsol.files import writing
 from enumsol.fixed_points.state import ContactState
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     import os
@@ -113,20 +114,21 @@ class FixedPoint(ContactState):
         """How the iteration ended, in a sentence."""
         slips, forces = self.increments[-1] if len(self.increments) else (np.nan, np.nan)
         last = f"last increment {forces:.2e} in forces, {slips:.2e} in slips"
+        done = counted(self.iterations, "iteration")
         match self.outcome:
             case Outcome.CONVERGED:
-                return f"converged after {self.iterations} iterations ({last})"
+                return f"converged after {done} ({last})"
             case Outcome.CYCLE:
                 return (
                     f"not converged: from iteration {self.iterations} on it repeats {self.period} iterates ({last}); "
                     "another start or anderson=5 may reach a solution, enumerate_roots reaches all in 2D"
                 )
             case Outcome.ITERATION_LIMIT:
-                return f"not converged within {self.iterations} iterations ({last})"
+                return f"not converged within {done} ({last})"
             case Outcome.NOT_SOLVED:
-                return f"stopped after {self.iterations} iterations: a Tresca problem was not solved ({last})"
+                return f"stopped after {done}: a Tresca problem was not solved ({last})"
             case _:
-                return f"interrupted after {self.iterations} iterations ({last})"
+                return f"interrupted after {done} ({last})"
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write all arrays and the report to a .npz file; the problem itself is not in it.

@@ -34,6 +34,7 @@ from enumsol.search.stopping import Stop, StopReason
 from enumsol.search.tree import SearchLimits, SearchOutcome, SearchProgress, TreeSearch
 from enumsol.selections.floats import SIGN_TOLERANCE
 from enumsol.selections.solution import SelectionSolution
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -136,7 +137,11 @@ def enumerate_roots(
     seconds, tolerance = optional_seconds(time_limit), share(tolerance)
     _check_proof(arithmetic, method, proof_path)
     solvers = Solvers(problem, value, arithmetic, tolerance)
-    return _Enumeration(solvers, method, progress, engine, proof_path).run(executor, *counts, seconds)
+    writer = None
+    if arithmetic == "verified":
+        writer = ProofWriter(proof_path)
+        writer.write(solvers.proof_header())
+    return _Enumeration(solvers, method, progress, engine, writer).run(executor, *counts, seconds)
 
 
 class _Enumeration:
@@ -148,17 +153,14 @@ class _Enumeration:
         method: Method,
         progress: Callable[[SearchProgress], object] | None,
         engine: str | None,
-        proof_path: str | Path | None,
+        writer: ProofWriter | None,
     ) -> None:
         self.solvers, self.method, self.progress, self.engine = solvers, method, progress, engine
         self.started = time.perf_counter()
         self.outcome = SearchOutcome()
         self.at_rest: AtRest | None = None
-        self.writer: ProofWriter | None = None
-        if solvers.arithmetic == "verified":
-            self.writer = ProofWriter(proof_path)
-            self.writer.write(solvers.proof_header())
-        self.certifier = solvers.certifier(self.writer)
+        self.writer = writer
+        self.certifier = solvers.certifier(writer)
 
     def run(
         self, executor: Executor | None, stop_after: int | None, max_nodes: int | None, time_limit: float | None
@@ -174,11 +176,11 @@ class _Enumeration:
         except KeyboardInterrupt as interruption:
             self.outcome.stopped = Stop(StopReason.INTERRUPTED, self.outcome.nodes + self.outcome.selections)
             partial = self._result()
-            message = f"enumerate_roots was interrupted; {len(partial)} roots so far"
+            message = f"enumerate_roots was interrupted; {counted(len(partial), 'root')} so far"
             raise Interrupted(message, partial) from interruption
         except WorkerLost as loss:
             partial = self._result()
-            raise WorkerError(f"{loss}; {len(partial)} roots so far", partial) from loss
+            raise WorkerError(f"{loss}; {counted(len(partial), 'root')} so far", partial) from loss
         result = self._result()
         if self.writer is not None and self.writer.failure is not None:
             raise OutputError(self.writer.failure, result)
@@ -232,7 +234,7 @@ class _Enumeration:
             if solution is not None and limits.enough is not None and limits.enough(outcome.solutions):
                 outcome.stopped = Stop(StopReason.ENOUGH_ROOTS)
             elif limits.max_nodes is not None and limits.max_nodes <= outcome.selections < total:
-                outcome.stopped = Stop(StopReason.NODE_LIMIT, limits.max_nodes, "selections")
+                outcome.stopped = Stop(StopReason.NODE_LIMIT, limits.max_nodes, "selection")
             elif limits.deadline is not None and now > limits.deadline and outcome.selections < total:
                 outcome.stopped = Stop(StopReason.TIME_LIMIT)
             if outcome.stopped is not None:
@@ -241,8 +243,7 @@ class _Enumeration:
     def _components(self) -> list[tuple[list[RootComponent], SelectionSolver]]:
         """Components of the root set with the solver whose points they hold."""
         solutions = self.outcome.solutions
-        exact = [s for s in solutions if isinstance(s.vertices[0], tuple)]
-        floats = [s for s in solutions if not isinstance(s.vertices[0], tuple)]
+        exact, floats = [s for s in solutions if s.exact], [s for s in solutions if not s.exact]
         parts: list[tuple[list[RootComponent], SelectionSolver]] = []
         if floats:
             parts.append((connected_components(floats, self.solvers.floats, self._degree), self.solvers.floats))

@@ -11,6 +11,7 @@ import numpy as np
 
 from enumsol.roots.root import Root, summary
 from enumsol.sealed import Immutable
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -213,9 +214,9 @@ class RootSet(Sequence[Root], Immutable):
         return f"complete: yes (proven{about})"
 
     def __repr__(self) -> str:
-        heading = f"RootSet at alpha = {float(self.alpha):g}: {_count(len(self), 'root')}"
+        heading = f"RootSet at alpha = {float(self.alpha):g}: {counted(len(self), 'root')}"
         if self.families:
-            heading += f", {_count(len(self.families), 'family', 'families')}"
+            heading += f", {counted(len(self.families), 'family', 'families')}"
         if not self.whole:
             heading += f" found, at least {self.at_least} in all"
         lines = [f"{heading} ({self.arithmetic}, {self.method})"]
@@ -232,8 +233,8 @@ class RootSet(Sequence[Root], Immutable):
         for k, family in enumerate(self.families[:_PRINTED_ROOTS]):
             index = "?" if family.index is None else f"{family.index:+d}"
             lines.append(
-                f"family {k}: dimension {family.dimension}, {_count(len(family.polytopes), 'polytope')}, "
-                f"{_count(len(family.vertices), 'vertex', 'vertices')}, index {index}"
+                f"family {k}: dimension {family.dimension}, {counted(len(family.polytopes), 'polytope')}, "
+                f"{counted(len(family.vertices), 'vertex', 'vertices')}, index {index}"
             )
         # a search that was cut short leaves many alike
         alike = Counter((item.reason, item.hint) for item in self.undecided)
@@ -244,7 +245,3 @@ class RootSet(Sequence[Root], Immutable):
         lines.append(f"index sum: {note}")
         lines.append(self.completeness())
         return "\n".join(lines)
-
-
-def _count(number: int, singular: str, plural: str | None = None) -> str:
-    return f"{number} {singular if number == 1 else plural or singular + 's'}"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+from enumsol.texts import counted
+
 
 class StopReason(enum.Enum):
     """What ended a search before its tree did."""
@@ -25,8 +27,8 @@ class Stop:
     reason : StopReason
     count : int or None
         The limit (NODE_LIMIT), or what was done by then (INTERRUPTED).
-    counted : str
-        What ``count`` counts: "nodes" or "selections".
+    unit : str
+        What ``count`` counts: "node" or "selection".
     arcs_of : int or None
         Of how many selections the arcs were to be worked out, where that was interrupted and not the search.
     unexamined : int or None
@@ -37,7 +39,7 @@ class Stop:
 
     reason: StopReason
     count: int | None = None
-    counted: str = "nodes"
+    unit: str = "node"
     arcs_of: int | None = None
     unexamined: int | None = None
     loss: str = ""
@@ -48,7 +50,7 @@ class Stop:
         return self.reason is StopReason.INTERRUPTED
 
     def __str__(self) -> str:
-        done = f"{self.count} {self.counted}"
+        done = "" if self.count is None else counted(self.count, self.unit)
         if self.arcs_of is not None:
             done = f"the arcs of {self.count} of {self.arcs_of} selections"
         text = {
@@ -58,4 +60,4 @@ class Stop:
             StopReason.INTERRUPTED: f"interrupted after {done}",
             StopReason.WORKER_LOST: self.loss,
         }[self.reason]
-        return text if self.unexamined is None else f"{text}, {self.unexamined} subtrees not examined"
+        return text if self.unexamined is None else f"{text}, {counted(self.unexamined, 'subtree')} not examined"
