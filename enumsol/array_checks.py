@@ -238,17 +238,6 @@ def _check_sums(
         raise error(f"{name} has integers at index {where} that add up to 2^53 or more; expected float64 values")
 
 
-def vector_2d(value: Any, name: str) -> NDArray[np.float64]:
-    """Value as a finite array of shape (2,).
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is not two finite real numbers.
-    """
-    return short_vector(value, name, 2)
-
-
 def short_vector(value: Any, name: str, size: int) -> NDArray[np.float64]:
     """Value as a finite array of shape (2,) or (3,).
 

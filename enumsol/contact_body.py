@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from enumsol.array_checks import real_array, real_matrix
 from enumsol.checks import alpha_value, shown
 from enumsol.condensation.affine import exactly_at
-from enumsol.errors import InvalidProblemError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.sealed import Immutable, SealedMatrix, sealed
 
 if TYPE_CHECKING:
@@ -145,6 +145,22 @@ class ContactBody(Immutable):
     def __getstate__(self) -> dict[str, Any]:
         # the factorization (SuperLU) cannot be pickled; workers that need it compute it again
         return {key: value for key, value in self.__dict__.items() if key != "factorization"}
+
+
+def friction_values(alpha: Fraction, first: NDArray[np.float64], slope: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coefficients first + alpha slope, rounded once from the exact values: zero and the sign are decided exactly.
+
+    Raises
+    ------
+    InvalidArgumentError
+        One is too large for float64.
+    """
+    try:
+        return np.array([float(x) for x in exactly_at(alpha, first, slope)])
+    except OverflowError:
+        raise InvalidArgumentError(
+            f"friction at alpha = {float(alpha):g} is too large for float64; expected a finite value"
+        ) from None
 
 
 def span(values: NDArray[np.float64]) -> str:

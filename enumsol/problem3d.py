@@ -11,8 +11,7 @@ import numpy as np
 
 from enumsol.array_checks import real_array
 from enumsol.checks import alpha_value, instance_of
-from enumsol.condensation.affine import exactly_at
-from enumsol.contact_body import ContactBody, span, vector
+from enumsol.contact_body import ContactBody, friction_values, span, vector
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.friction import ConstantFriction, friction_law, friction_pair
 from enumsol.sealed import Sealed, sealed
@@ -243,18 +242,8 @@ class ContactProblem3D(ContactBody):
             A callable returns something else than finite numbers >= 0.
         """
         exact = Fraction(alpha_value(alpha))
-        value = float(exact)
-        try:
-            # rounded once from the exact values, so that zero and its sign are decided exactly
-            F = np.array([float(x) for x in exactly_at(exact, self.law.at(slip).ravel(), self._slope.ravel())])
-        except OverflowError:
-            F = np.full(2 * self.p, np.inf)
-        F = F.reshape(self.p, 2)
-        if not np.all(np.isfinite(F)):
-            raise InvalidArgumentError(
-                f"friction at alpha = {value:g} is too large for float64; expected a finite value"
-            )
-        _check_signs(F, self.node_ids, f" at alpha = {value:g}", error=InvalidArgumentError)
+        F = friction_values(exact, self.law.at(slip).ravel(), self._slope.ravel()).reshape(self.p, 2)
+        _check_signs(F, self.node_ids, f" at alpha = {float(exact):g}", error=InvalidArgumentError)
         return F
 
     def friction_at(self, alpha: AlphaLike) -> NDArray[np.float64]:

@@ -5,11 +5,12 @@ Each function gives the value in a plain type and raises InvalidArgumentError fo
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.array_checks import plain_array, real_array, short_vector
+from enumsol.checks import shown
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -65,6 +66,17 @@ def check_every_node_is_used(cells: NDArray[np.int64], count: int, name: str, ki
     if len(used) != count:
         lone = int(np.setdiff1d(np.arange(count), used)[0])
         raise InvalidArgumentError(f"{name} leave node {lone} out; expected every node in some {kind}")
+
+
+def lame_coefficients(value: Any, dimension: int) -> tuple[float, float]:
+    """Value as the Lame coefficients (l, m) of a body, in plane strain or in 3D, that make its energy positive."""
+    lam, mu = (float(entry) for entry in short_vector(value, "lame", 2))
+    if not (mu > 0 and dimension * lam + 2 * mu > 0):
+        bulk = {2: "l + m", 3: "3 l + 2 m"}[dimension]
+        raise InvalidArgumentError(
+            f"lame is {shown(value)}; expected Lame coefficients (l, m) with m > 0 and {bulk} > 0"
+        )
+    return lam, mu
 
 
 def held_mask(held: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:

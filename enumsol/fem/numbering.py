@@ -1,11 +1,14 @@
-"""Matrices of scikit-fem in our numbering of degrees of freedom, ``dimension node + component``."""
+"""Matrices and forces in our numbering of degrees of freedom, ``dimension node + component``."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 def by_nodes(assembled: Any, basis: Any) -> sp.csc_array:
@@ -16,3 +19,13 @@ def by_nodes(assembled: Any, basis: Any) -> sp.csc_array:
     row, column = ours[matrix.coords[0]], ours[matrix.coords[1]]
     A = sp.csc_array((matrix.data, (row, column)), shape=matrix.shape)
     return sp.csc_array(0.5 * (A + A.T))
+
+
+def gathered(
+    cells: NDArray[np.int64], shares: NDArray[np.float64], density: NDArray[np.float64], count: int
+) -> NDArray[np.float64]:
+    """Nodal forces (count, dimension) of densities (k, dimension) constant on cells, by the corners' shares of them."""
+    forces = np.zeros((count, density.shape[1]))
+    for corner in range(cells.shape[1]):
+        np.add.at(forces, cells[:, corner], shares[:, corner, None] * density)
+    return forces

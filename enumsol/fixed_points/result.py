@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import enum
-import json
-import zipfile
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.checks import alpha_value, file_path
 from enumsol.errors import InvalidArgumentError
-from enumsol.files import writing
+from enumsol.files import read_arrays, reading, write_arrays
 from enumsol.fixed_points.state import ContactState
 from enumsol.texts import counted
 
@@ -138,8 +136,7 @@ class FixedPoint(ContactState):
         InvalidArgumentError
             The file cannot be written.
         """
-        meta = {
-            "format": _FORMAT,
+        report = {
             "alpha": str(self.alpha),
             "outcome": self.outcome.value,
             "iterations": self.iterations,
@@ -148,10 +145,8 @@ class FixedPoint(ContactState):
             "node_ids": [str(label) for label in self.problem.node_ids],
             "statuses": [status.value for status in self.statuses],
         }
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
-        place = file_path(path, "path")
-        with writing(place, "path"), place.open("wb") as stream:
-            np.savez_compressed(stream, allow_pickle=False, meta=np.array(json.dumps(meta)), u=self.u, **arrays)
+        arrays = {name: getattr(self, name) for name in (*_ARRAYS, "u")}
+        write_arrays(file_path(path, "path"), _FORMAT, report, arrays)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], problem: Problem) -> FixedPoint:
@@ -163,29 +158,13 @@ class FixedPoint(ContactState):
             The file cannot be read, or is about another problem (another number of contact nodes, other labels).
         """
         place = file_path(path, "path")
-        try:
-            with np.load(place, allow_pickle=False) as data:
-                meta: dict[str, Any] = json.loads(str(data["meta"]))
-                arrays = {name: data[name] for name in _ARRAYS}
-            if meta["format"] != _FORMAT:
-                raise InvalidArgumentError(f"{path} has format {meta['format']!r}; this version reads format {_FORMAT}")
-            report = {name: meta[name] for name in ("iterations", "tolerance", "period")}
-            alpha, outcome = alpha_value(meta["alpha"]), Outcome(meta["outcome"])
-            labels = meta["node_ids"]
-        except OSError as error:
-            reason = error.strerror or error
-            raise InvalidArgumentError(
-                f"{path} cannot be read ({reason}); expected a file of FixedPoint.save"
-            ) from error
-        except (LookupError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
-            if isinstance(error, InvalidArgumentError):
-                raise
-            raise InvalidArgumentError(
-                f"{path} does not hold a fixed point ({error}); expected a file of FixedPoint.save"
-            ) from error
+        with reading(place, "a fixed point", "FixedPoint.save"):
+            report, arrays = read_arrays(place, _FORMAT, _ARRAYS)
+            numbers = {name: report[name] for name in ("iterations", "tolerance", "period")}
+            alpha, outcome, labels = alpha_value(report["alpha"]), Outcome(report["outcome"]), report["node_ids"]
         if labels != [str(label) for label in problem.node_ids]:
             raise InvalidArgumentError(f"{path} is about other contact nodes; expected those of the problem")
-        return cls(problem=problem, alpha=alpha, outcome=outcome, **arrays, **report)
+        return cls(problem=problem, alpha=alpha, outcome=outcome, **arrays, **numbers)
 
     def __repr__(self) -> str:
         lines = [f"FixedPoint at alpha = {float(self.alpha):g}: {self.why}"]
