@@ -32,7 +32,7 @@ class GraphStats:
     selections : int
         Complete selections whose arcs were computed.
     search_seconds, seconds : float
-        Wall time of the search, and of all.
+        Wall time of the search, and of everything.
     """
 
     pieces: int = 0
@@ -93,7 +93,7 @@ class GraphData:
 
     @cached_property
     def claims(self) -> Claims:
-        """What may be said about the number of solutions: numbers of a graph without gaps, lower bounds otherwise."""
+        """What is known about the number of solutions: exact counts, or lower bounds for a graph with gaps."""
         whole = Standing.PROVEN if self.complete else Standing.NOT_PROVEN
         ends = (float(self.interval[0]), float(self.interval[1]))
         return Claims(self.vertices, self.arcs, ends, Standing.INCOMPLETE if self.all_reasons else whole)

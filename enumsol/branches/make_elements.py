@@ -76,7 +76,7 @@ def _vertex(gluing: Gluing, number: int, glued: GluedVertex, left: Sequence[Arc]
     border = glued.alpha.is_rational and glued.alpha.lo in (gluing.a, gluing.b)
     p = gluing.exact.p
     degrees = (_sum(left), _sum(right)) if glued.settled else (None, None)
-    # at the last alpha only the arcs from the left tell the degree
+    # at the last alpha there are arcs from the left only
     degree = degrees[0] if border and glued.alpha.lo == gluing.b else degrees[1]
     forces, w = _values(gluing, glued)
     active = tuple(
@@ -150,7 +150,7 @@ def _values(gluing: Gluing, glued: GluedVertex) -> tuple[Any, Any]:
     if glued.solutions and glued.solver is not None:
         point = glued.solutions[0].vertices[0]
         return glued.solver.forces(point) + 0.0, glued.solver.displacements(point) + 0.0
-    # an irrational alpha is replaced by a rational one that agrees with it to many more digits than a float has
+    # an irrational alpha is replaced by a rational one that agrees with it far beyond float precision
     glued.alpha.narrow(fmpq(1, 2**256))
     alpha = (glued.alpha.lo + glued.alpha.hi) / 2
     point = next(

@@ -37,7 +37,7 @@ class LinkRule(enum.StrEnum):
 
 @dataclass(frozen=True)
 class Missed:
-    """What a sampled graph lacks, measured against the exact graph.
+    """What a sampled graph lacks, compared with the exact graph.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ def link_samples(
     Parameters
     ----------
     problem : ContactProblem
-    alphas : iterable of float, Fraction or whatever enumerate_roots takes for alpha
+    alphas : iterable of float, Fraction or whatever enumerate_roots accepts as alpha
         Sorted by the function; at least one.
     arithmetic : str
         Of ``enumerate_roots``.

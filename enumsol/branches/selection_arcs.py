@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from enumsol.selections.ordered_field import FiberSelections
     from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
 
-#: What vanishes at a critical point, beside the rows by their numbers: the determinant; nothing, at an end.
+#: What makes a critical point, apart from the numbers of rows: the determinant vanishes; an end of the interval.
 _DET, _END = -1, -2
 
 

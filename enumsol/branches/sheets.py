@@ -28,7 +28,7 @@ def sheet_arcs(exact: ExactCondensed, codes: Codes, a: Any, b: Any) -> Selection
 
     A vertex of its polytope solves the equations and as many of the inequalities as its kernel has dimensions. All
     alpha at which the determinant of such a basis, another condition or an equation's residual vanishes are
-    candidates for events; those at which nothing changes are taken out again. Cost: exponential in the dimension of
+    candidates for events; those at which nothing changes are removed. Cost: exponential in the dimension of
     the kernel.
 
     Raises

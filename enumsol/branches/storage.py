@@ -75,8 +75,8 @@ def load_graph(file: str | Path) -> GraphData:
     try:
         if record["version"] == 1 and record["reasons"]:
             raise InvalidArgumentError(
-                f"graph {file} is not complete and was saved by an earlier version, which said more about such graphs "
-                "than is known; expected a complete one, or one saved by this version"
+                f"graph {file} is not complete and was saved by an earlier version, which claimed more about such "
+                "graphs than is known; expected a complete one, or one saved by this version"
             )
         return _from_record(record)
     except (LookupError, TypeError, ValueError, AttributeError) as error:
@@ -171,7 +171,7 @@ def _vertex_record(v: Vertex) -> dict[str, Any]:
 
 
 def _fraction(text: str) -> Fraction:
-    """The fraction that a text like "-8/3" stands for; others are refused, such as one with an exponent of millions."""
+    """The fraction written like "-8/3"; other texts are refused, such as numbers with an exponent."""
     if _FRACTION.fullmatch(text) is None:
         raise ValueError(f"{text[:20]!r}, which is no fraction")
     return Fraction(text)

@@ -1,4 +1,4 @@
-"""What the checkers report: what a proof was found to show, or why it was refused."""
+"""Reports of the checkers: what a proof shows, or why it was refused."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class VerificationReport:
     ok : bool
         Every leaf was checked and the counts agree; with ``undecided`` 0 the list of roots is proven complete.
     failures : tuple of str
-        Why the proof was refused. The check ends where the records cease to make sense, and after MAX_FAILURES.
+        Why the proof was refused. The check ends where the records stop making sense, and after MAX_FAILURES.
     roots, families, undecided, leaves : int
-        Counts that were checked: isolated roots, families, undecided leaves, all leaves. Of a refused proof they only
-        tell how far the check went.
+        Counts that were checked: isolated roots, families, undecided leaves, all leaves. For a refused proof they only
+        show how far the check got.
     data : str
         "problem": the theorem holds for the problem's own matrices; "condensed": for S, g and F as computed.
     alpha : Fraction or None
@@ -81,10 +81,10 @@ class GraphVerificationReport:
     ok : bool
         Every solution for every alpha in the interval lies in one of ``selections``.
     failures : tuple of str
-        Why the proof was refused. The check ends where the records cease to make sense, and after MAX_FAILURES.
+        Why the proof was refused. The check ends where the records stop making sense, and after MAX_FAILURES.
     interval : (Fraction, Fraction) or None
     pieces, leaves : int
-        Of a refused proof they only tell how far the check went; so do the selections.
+        For a refused proof they, and the selections, only show how far the check got.
     selections : frozenset of tuples of status codes
     data : str
         "problem": about the problem's own matrices; "condensed": about S and g as computed.

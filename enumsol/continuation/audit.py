@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 POINT_TOLERANCE = 1e-5
 #: Two points follow each other on the graph when the way along it is at most this many times their distance.
 DETOUR = 10.0
-#: Why a point on none of its arcs is not said to be off a graph from which something is known to be missing.
+#: Why a point that lies on no arc of an incomplete graph is not reported as off.
 _UNPLACED = "on no arc that the graph holds, and the graph is not complete"
 
 
@@ -50,7 +50,7 @@ def audit(
     tolerance : float
         Distance from the nearest arc or vertex at which a point lies off the graph, above 0 and below 1. For points of
         another code, about ten times the relative error of its contact forces. Solutions closer to each other than
-        this are not told apart.
+        this are not distinguished.
     detour : float
         Neighbouring points of a path with a longer way between them along the graph, in multiples of their distance,
         are a jump.

@@ -1,4 +1,4 @@
-"""What an audit found, and the one place that decides what it may claim."""
+"""What an audit found, and what it may claim."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from enumsol.continuation.graph_map import Place
     from enumsol.statuses import ContactStatus
 
-#: How the rows of points are counted, for whoever reads a report.
+#: How rows are counted, printed with a report.
 ROWS = "rows are counted from 0: in a file from the first row below the names of the columns, in a frame as by iloc"
 _PRINTED = 8
 
@@ -142,9 +142,8 @@ class MissedArc:
 class AuditReport:
     """Result of an audit.
 
-    Against a graph from which something is known to be missing (``graph_reasons``), a point on none of its arcs may lie
-    on one that it lacks, and two points that it does not join may be joined by one: then ``off`` and ``jumps`` are
-    empty, such points are ``not_compared``, and such pairs ``unjoined``.
+    An incomplete graph (one with ``graph_reasons``) may lack the arc on which a point lies, or the arc that joins two
+    points. Then ``off`` and ``jumps`` are empty; such points are ``not_compared`` and such pairs ``unjoined``.
 
     Attributes
     ----------
@@ -163,8 +162,8 @@ class AuditReport:
     graph_complete : bool
         Whether it is proven that the graph holds every solution.
     graph_reasons : tuple of str
-        Why solutions may be missing from it. Empty and not ``graph_complete``: nothing is known to be missing, and that
-        nothing is was not proven (fast arithmetic).
+        Why solutions may be missing from it. Empty without ``graph_complete``: nothing is known to be missing, but
+        completeness is not proven (fast arithmetic).
     """
 
     points: tuple[AuditedPoint, ...]

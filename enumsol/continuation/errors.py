@@ -1,4 +1,4 @@
-"""Errors of continuation, each with what a user needs to go on."""
+"""Errors of continuation, with what a user needs to proceed."""
 
 from __future__ import annotations
 

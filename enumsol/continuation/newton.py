@@ -44,13 +44,13 @@ def newton(
     """One root at alpha, by the piecewise smooth Newton method from any start.
 
     Every iteration solves the selection of H that is active at the iterate. Full steps are taken until a selection
-    comes back; from then on a line search on the norm of H. Which root is found depends on the start; a start near a
+    recurs; from then on a line search lowers the norm of H. Which root is found depends on the start; a start near a
     regular root leads to it in one step. Each iteration costs one dense solve of size 2p.
 
     Parameters
     ----------
     problem : ContactProblem
-    alpha : float, Fraction or whatever enumerate_roots takes for alpha
+    alpha : float, Fraction or whatever enumerate_roots accepts as alpha
     start : Root, (2p,) or (p, 2) array_like, or None
         Contact forces: those of a root, lambda_n followed by lambda_t, or a row (lambda_n, lambda_t) per node [force].
         None: zero.

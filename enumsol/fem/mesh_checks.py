@@ -16,7 +16,7 @@ from enumsol.errors import InvalidArgumentError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-#: Areas and volumes are computed of coordinates up to this, in two and in three dimensions.
+#: Largest coordinates of which areas and volumes are computed, by dimension.
 LARGEST_COORDINATE = {2: 1e150, 3: 1e100}
 
 
@@ -35,7 +35,7 @@ def positions(points: ArrayLike, dimension: int) -> NDArray[np.float64]:
 
 
 def elements(value: ArrayLike, name: str, corners: int | tuple[int, ...], count: int) -> NDArray[np.int64]:
-    """Nodes of each of some elements, (k, corners) with k >= 1, all below ``count``."""
+    """Nodes of each element, (k, corners) with k >= 1, all below ``count``."""
     array = plain_array(value, name, error=InvalidArgumentError)
     numbers = (corners,) if isinstance(corners, int) else corners
     if array.ndim != 2 or array.shape[1] not in numbers or len(array) == 0:
@@ -61,7 +61,7 @@ def node_numbers(value: ArrayLike, name: str, count: int, *, distinct: bool = Tr
 
 
 def check_every_node_is_used(cells: NDArray[np.int64], count: int, name: str, kind: str) -> None:
-    """Raise InvalidArgumentError where a node belongs to no cell: nothing would hold it."""
+    """Raise InvalidArgumentError if a node belongs to no cell: it would have no stiffness."""
     used = np.unique(cells)
     if len(used) != count:
         lone = int(np.setdiff1d(np.arange(count), used)[0])

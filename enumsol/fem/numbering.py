@@ -1,4 +1,4 @@
-"""Matrices and forces in our numbering of degrees of freedom, ``dimension node + component``."""
+"""Matrices and forces numbered by degrees of freedom, ``dimension node + component``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def by_nodes(assembled: Any, basis: Any) -> sp.csc_array:
-    """A symmetric matrix that scikit-fem assembled on a basis of nodal vectors, renumbered and symmetric exactly."""
+    """A matrix that scikit-fem assembled on a basis of nodal vectors, renumbered and made exactly symmetric."""
     matrix = sp.coo_array(assembled)
     ours = np.empty(matrix.shape[0], dtype=np.int64)
     ours[basis.nodal_dofs.T.ravel()] = np.arange(matrix.shape[0])
@@ -24,7 +24,7 @@ def by_nodes(assembled: Any, basis: Any) -> sp.csc_array:
 def gathered(
     cells: NDArray[np.int64], shares: NDArray[np.float64], density: NDArray[np.float64], count: int
 ) -> NDArray[np.float64]:
-    """Nodal forces (count, dimension) of densities (k, dimension) constant on cells, by the corners' shares of them."""
+    """Nodal forces (count, dimension): ``shares`` (k, corners) of the densities (k, dimension) on cells."""
     forces = np.zeros((count, density.shape[1]))
     for corner in range(cells.shape[1]):
         np.add.at(forces, cells[:, corner], shares[:, corner, None] * density)

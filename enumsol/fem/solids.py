@@ -38,7 +38,7 @@ def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, floa
     Raises
     ------
     InvalidArgumentError
-        The mesh is not one (shapes, node numbers, a cell without volume or inside out, a node in no cell) or the
+        The mesh is not valid (shapes, node numbers, a cell without volume or inside out, a node in no cell) or the
         coefficients are not admissible.
 
     Examples
@@ -71,7 +71,7 @@ def vector_basis(nodes: NDArray[np.float64], cells: NDArray[np.int64], degree: i
 
     points = np.ascontiguousarray(nodes.T)
     if cells.shape[1] == 4:
-        # sorted by us, so that scikit-fem has no reason to renumber or to log
+        # sorted here, so that scikit-fem neither renumbers nor logs
         mesh = MeshTet(points, np.ascontiguousarray(np.sort(cells, axis=1).T))
         return Basis(mesh, ElementVector(ElementTetP1()), intorder=degree)
     # scikit-fem has an order of its own
@@ -93,7 +93,7 @@ def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -
     Raises
     ------
     InvalidArgumentError
-        The mesh is not one, or density has the wrong shape.
+        The mesh is not valid, or density has the wrong shape.
 
     Examples
     --------

@@ -32,7 +32,7 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     Raises
     ------
     InvalidArgumentError
-        The table is none of `basin_table`.
+        The table was not made by `basin_table`.
     MissingDependencyError
         matplotlib is not installed.
     """

@@ -60,7 +60,7 @@ class FixedPoint(ContactState):
         Distance of every iterate from its image under Psi in the norms of (theory, (11.4)): slips
         [length * sqrt(area)], and normal forces [sqrt(work)].
     tolerance : float
-        Increments at most this fraction of the load's norm count as none.
+        Increments of at most this fraction of the load's norm count as zero.
     period : int or None
         Of a cycle.
 

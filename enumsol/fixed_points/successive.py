@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     Vector = NDArray[np.float64]
 
-#: Cycles up to this length are looked for; two iterates are the same if they are this much closer than neighbours.
+#: Longest cycle that is detected; two iterates are the same if they are this much closer than neighbours.
 LONGEST_CYCLE, _SAME = 12, 1e-9
 
 
@@ -66,7 +66,7 @@ def successive_approximations(
 
     Every iterate solves the Tresca problem whose slip bounds are the normal forces of the one before, and whose
     coefficients, where they depend on the solution, are those at its slips. Convergence is certain only where Psi
-    contracts (`lipschitz_estimate`); a limit is a solution wherever it is, but others may exist.
+    contracts (`lipschitz_estimate`); every limit is a solution, but others may exist.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ class _Iteration:
         return normal, self.system.slip(forces, w)
 
     def _record(self, bound: Vector, slip: Vector, image: Vector, image_slip: Vector) -> float:
-        """Note the increment; returned relative to what counts as none."""
+        """Record the increment; returned relative to the tolerance."""
         system = self.system
         force = system.force_norm(image - bound)
         change = float(np.linalg.norm(self.slip_weights * (image_slip - slip)))

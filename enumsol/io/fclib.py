@@ -3,7 +3,7 @@
 The layout is that of fclib.h (github.com/FrictionalContactLibrary/fclib): a group ``/fclib_global`` or ``/fclib_local``
 with ``spacedim``, sparse matrices as groups of ``m``, ``n``, ``nz``, ``nzmax``, ``p``, ``i``, ``x``, and a group
 ``vectors``. There r and u hold (normal, tangential) contact by contact, the gap u_N >= 0 opens, r_N >= 0 presses, and
-friction acts against u_T, so that its (u_N, u_T) are our (-u_n, -u_t) and its r our lambda.
+friction acts against u_T, so its (u_N, u_T) are (-u_n, -u_t) here, and its r is lambda.
 
 - global: M v = H r + f, u = H' v + w. Read as A = M, [Bn; Bt] = -H', gap and slip_offset from w, friction mu.
 - local: u = W r + q. It knows no displacements of a body; for u = -W v it is the contact problem with A = W,
@@ -54,7 +54,7 @@ def read(path: Path) -> ContactProblem:
 
 
 def write(problem: ContactProblem | ContactProblem3D, path: Path) -> None:
-    """Write a global problem; node labels and coordinates have no place in it."""
+    """Write a global problem; node labels and coordinates are not stored."""
     if not isinstance(problem, ContactProblem):
         raise InvalidProblemError(
             "fclib files of problems in 3D are not written yet; expected another format (.npz, MatrixMarket directory)"

@@ -107,14 +107,14 @@ LAYOUT_3D = Layout(
 
 
 def layout_of(names: Iterable[str]) -> Layout:
-    """The layout that the names of some arrays, or of their sparse parts, belong to: a second tangent tells."""
+    """The layout of arrays, or sparse parts, with these names: a second tangent means 3D."""
     second = any(_plain(name) in _TANGENTS or name.partition("_")[0] in ("Bt1", "Bt2") for name in names)
     return LAYOUT_3D if second else LAYOUT_2D
 
 
 @contextmanager
 def refusing(errors: tuple[type[Exception], ...], found: str, expected: str) -> Iterator[None]:
-    """Turn what other packages raise on unusable files into one sentence: ``found (reason); expected ...``."""
+    """Turn errors of other packages on unusable files into one sentence: ``found (reason); expected ...``."""
     try:
         yield
     except InvalidProblemError:
@@ -146,7 +146,7 @@ def check_names(found: Collection[str], layout: Layout, suffix: str = "") -> Non
         hint = f" (is {close}{suffix} meant?)" if close else ""
         raise InvalidProblemError(
             f"{strangers[0]}{suffix} is not known{hint}; expected {_listing(layout.known)}, "
-            "or a name that begins with an underscore for what enumsol is to ignore"
+            "or a name that begins with an underscore for what enumsol should ignore"
         )
     kinds = [kind for kind in layout.frictions if any(name in found for name in kind)]
     if len(kinds) > 1:

@@ -107,7 +107,7 @@ class _InteriorPointRelaxation:
         return largest_violation(codes, self._engine.system.F, self.forces, self.displacements)
 
     def forced(self, codes: Codes) -> tuple[int, ...]:
-        """None: this method has no bound at hand for a child but by solving it."""
+        """None: this method bounds a child only by solving it."""
         del codes
         return ()
 

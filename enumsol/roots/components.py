@@ -98,7 +98,7 @@ def connected_components(
 def _grow(
     degenerate: Sequence[SelectionSolution], known: dict[Codes, SelectionSolution], solver: SelectionSolver
 ) -> list[tuple[list[SelectionSolution], bool]]:
-    """Complete every degenerate solution by the selections that hold with it, and join those that meet."""
+    """Add to every degenerate solution the selections that hold with it, and join those that meet."""
     solved: dict[Codes, SelectionSolution | None] = dict(known)
     refused: set[Codes] = set()
 

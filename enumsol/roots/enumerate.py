@@ -75,7 +75,7 @@ def enumerate_roots(
         which is read as float64.
     arithmetic : {"verified", "fast", "exact"}
         "verified": every root is enclosed and every excluded selection proven by rigorous error bounds for the data as
-        given, in rationals where a sign cannot be decided otherwise; what stays open is listed. "fast": float64 and a
+        given, in rationals where a sign cannot be decided otherwise; what stays open is listed. "fast": float64 with a
         tolerance, never claimed to be complete. "exact": the data are read as exact rationals and everything is
         decided without rounding (small problems).
     method : {"tree", "exhaustive"}
@@ -83,13 +83,13 @@ def enumerate_roots(
     executor : concurrent.futures.Executor, optional
         Runs subtrees in parallel (method "tree").
     progress : callable, optional
-        Called now and then with a SearchProgress.
+        Called regularly with a SearchProgress.
     stop_after : int, optional
-        Stop when this many roots and families are found; 2 answers "is it unique?".
+        Stop when this many roots and families are found; 2 decides about uniqueness.
     max_nodes : int, optional
-        Stop after so many nodes of the tree (selections, for the exhaustive method).
+        Stop after this many nodes of the tree (selections, for the exhaustive method).
     time_limit : float, optional
-        Stop after so many seconds.
+        Stop after this many seconds.
     proof_path : path, optional
         Stream the proof to this file (arithmetic "verified"); by default it is kept, compressed, in memory.
     tolerance : float
@@ -112,7 +112,7 @@ def enumerate_roots(
     WorkerError
         A worker of the executor died; ``partial`` holds what was found.
     OutputError
-        The proof could not be written to the end, for want of space; ``partial`` holds the result without a proof.
+        There was no space to write the whole proof; ``partial`` holds the result without it.
 
     Examples
     --------
@@ -266,7 +266,7 @@ class _Enumeration:
         if self.at_rest is not None:
             roots, apart = [self._root(self.at_rest.component, self.at_rest)], 1
         for components, solver in self._components():
-            # of a component that was not examined whole it is not known what joins it
+            # what joins a component that was not examined whole is not known
             apart += sum(c.whole for c in components)
             joinable = joinable or not all(c.whole for c in components)
             roots += [self._root(c, solver) for c in components if c.dimension == 0]

@@ -34,7 +34,7 @@ LOCATED_SINGULAR_TOLERANCE = 1e-8
 
 
 class SolutionPoint(Protocol):
-    """What the test asks of a root: its alpha, the statuses that hold at every node, and u_t."""
+    """What the test needs of a root: its alpha, the statuses that hold at every node, and u_t."""
 
     @property
     def alpha(self) -> Alpha:

@@ -105,7 +105,7 @@ class RootSet(Sequence[Root], Immutable):
         Why the search ended early, or None.
     at_least : int
         Number of isolated roots and families together if nothing is known to be missing; otherwise a lower bound of it,
-        in which roots and families that a continuum not found may join are counted as one.
+        in which roots and families that an undiscovered continuum may connect are counted as one.
     stats : SearchStats
     certified_data : str
         What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed).

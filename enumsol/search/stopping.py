@@ -26,15 +26,15 @@ class Stop:
     ----------
     reason : StopReason
     count : int or None
-        The limit (NODE_LIMIT), or what was done by then (INTERRUPTED).
+        The limit (NODE_LIMIT), or the number done by then (INTERRUPTED).
     unit : str
         What ``count`` counts: "node" or "selection".
     arcs_of : int or None
-        Of how many selections the arcs were to be worked out, where that was interrupted and not the search.
+        Number of selections whose arcs were wanted, if that stage was interrupted and not the search.
     unexamined : int or None
         Subtrees that are listed as not examined; None where the search keeps no such list.
     loss : str
-        What befell the worker (WORKER_LOST).
+        What happened to the worker (WORKER_LOST).
     """
 
     reason: StopReason
@@ -46,7 +46,7 @@ class Stop:
 
     @property
     def interrupted(self) -> bool:
-        """Whether the user pressed Ctrl-C: what was left then is not accounted for."""
+        """Whether the user pressed Ctrl-C: the rest of the search is unaccounted for."""
         return self.reason is StopReason.INTERRUPTED
 
     def __str__(self) -> str:

@@ -100,7 +100,7 @@ class SelectionFunctions:
     # -- quantities ------------------------------------------------------------------------------------------------
 
     def row(self, kind: RowKind, node: int) -> Any:
-        """A row of a node, of which selections require that it vanishes or is not negative."""
+        """A row of a node: a selection requires that it vanishes, or that it is not negative."""
         key = (kind, node)
         if key not in self._cache:
             self._cache[key] = integer_polynomial(self._row(kind, node))

@@ -52,7 +52,7 @@ class FiberSelections(ExactSelections):
     def forms(self, codes: Codes) -> tuple[list[Form], list[Form]]:
         """Equations and inequalities (>= 0) of a selection as forms over lambda."""
         equations, inequalities = super().forms(codes)
-        # where F = 0 the cone of a sticking node does not imply that its normal force is none of tension
+        # where F = 0 the cone of a sticking node does not imply lambda_n >= 0
         return equations, inequalities + [
             self.form(RowKind.NORMAL_FORCE, i) for i, code in enumerate(codes) if code == STICK
         ]

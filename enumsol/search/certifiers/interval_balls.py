@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from enumsol.search.interval import EmptyLeaf, Piece
 
 
-#: Bounds must be this large [energy unit of the piece], so that a checker that adds up in another order agrees.
+#: Bounds must be this large [energy unit of the piece], so that a checker that sums in another order agrees.
 _MARGIN = 1e-12
 
 

@@ -1,4 +1,4 @@
-"""The certifier of arithmetic "verified" (and the one that writes proofs): nothing is concluded that is not proven.
+"""The certifier of arithmetic "verified" (and the one that writes proofs): only proven conclusions.
 
 Escalation only where needed: balls in double arithmetic first, rationals where a sign cannot be decided and the
 problem is small enough, otherwise the selection is left undecided with the reason.
@@ -58,7 +58,7 @@ _ROW_NAMES = {
     RowKind.SLIP_FORWARD: "the slip condition of node {}",
     RowKind.SLIP_BACKWARD: "the slip condition of node {}",
 }
-#: What begins the record of a branching, which is no leaf.
+#: Begins the record of a branching, which is not a leaf.
 _BRANCHING = "b"
 
 
