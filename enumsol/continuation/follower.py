@@ -24,6 +24,7 @@ from enumsol.continuation.transitions import (
     same_curve,
 )
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -134,7 +135,7 @@ class Follower:
         if self.record.stats.accepted >= self.options.max_steps:
             return _Stop(
                 PathStatus.STEP_LIMIT,
-                f"the limit of {self.options.max_steps} steps was reached at alpha = {self._alpha():g}; "
+                f"the limit of {counted(self.options.max_steps, 'step')} was reached at alpha = {self._alpha():g}; "
                 "path.resume() goes on",
             )
         step = self._step()
@@ -370,8 +371,9 @@ class Follower:
         self._end(arrival)
         return _Stop(
             PathStatus.DEAD_END,
-            f"no continuation keeps the orientation at alpha = {self._alpha():g}, where {others} other directions "
-            "leave; start anew there with follow(tangent=k)",
+            f"no continuation keeps the orientation at alpha = {self._alpha():g}, where "
+            f"{counted(others, 'other direction leaves', 'other directions leave')}; start anew there with "
+            "follow(tangent=k)",
         )
 
 

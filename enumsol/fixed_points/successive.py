@@ -154,7 +154,7 @@ class _Iteration:
                 data = TrescaData(self.system, bound, self.system.coefficients(slip))
                 forces, _, _ = solve(data, forces)
                 image, image_slip = self._image(data, forces)
-                increment = self._record(bound, slip, image, image_slip)
+                increment = self._increment(bound, slip, image, image_slip)
                 if increment <= 1.0:
                     outcome = Outcome.CONVERGED
                     break
@@ -193,8 +193,8 @@ class _Iteration:
         normal = np.maximum(self.system.split(forces)[0], 0.0)
         return normal, self.system.slip(forces, w)
 
-    def _record(self, bound: Vector, slip: Vector, image: Vector, image_slip: Vector) -> float:
-        """Record the increment; returned relative to the tolerance."""
+    def _increment(self, bound: Vector, slip: Vector, image: Vector, image_slip: Vector) -> float:
+        """How far Psi moved the iterate, relative to the tolerance: at most 1 has converged."""
         system = self.system
         force = system.force_norm(image - bound)
         change = float(np.linalg.norm(self.slip_weights * (image_slip - slip)))

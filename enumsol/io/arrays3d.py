@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from enumsol.array_checks import real_array, real_matrix
 from enumsol.errors import InvalidProblemError
 from enumsol.friction import ConstantFriction, FrictionTable
-from enumsol.io.layouts import LAYOUT_3D
+from enumsol.io.layouts import LAYOUT_3D, constant_friction
 from enumsol.problem3d import BodyMesh, ContactProblem3D, SlipMean
 
 if TYPE_CHECKING:
@@ -48,13 +48,7 @@ def problem_from_arrays_3d(arrays: Mapping[str, Any]) -> ContactProblem3D:
 
 def _friction(arrays: Mapping[str, Any]) -> Any:
     if "friction" in arrays:
-        constant = np.asarray(arrays["friction"])
-        if constant.ndim:
-            raise InvalidProblemError(
-                f"friction is an array of shape {constant.shape}, which is ambiguous; expected one number, "
-                "or friction_1 and friction_2, each a number or an array of shape (p,)"
-            )
-        return constant
+        return constant_friction(arrays["friction"], LAYOUT_3D)
     given = [name for name in ("friction_1", "friction_2") if name in arrays]
     if len(given) == 1:
         raise InvalidProblemError(f"{given[0]} stands alone; expected friction_1 and friction_2, or friction")

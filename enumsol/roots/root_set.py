@@ -43,7 +43,7 @@ class Undecided:
     >>> import enumsol
     >>> roots = enumsol.enumerate_roots(enumsol.gallery.two_node_square(), alpha=3.5, max_nodes=2)
     >>> roots.undecided[0].reason
-    'the search was stopped before it came here'
+    'the search was stopped before it got here'
     """
 
     statuses: tuple[ContactStatus | str | None, ...]
