@@ -74,12 +74,12 @@ def real_array(
 
 
 def plain_array(value: Any, name: str, *, error: type[EnumsolError]) -> NDArray[Any]:
-    """The value as an array of whatever it holds.
+    """The value as an array of its own type.
 
     Raises
     ------
     ``error``
-        It is no array: something else, sparse, with masked values, or of rows that differ in length.
+        It is not an array, or sparse, with masked values, or of rows that differ in length.
     """
     try:
         if sp.issparse(value):

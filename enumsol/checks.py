@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 Alpha = float | Fraction
 #: What is accepted as alpha.
 AlphaLike = float | Fraction | Decimal | str | np.number[Any] | np.ndarray[Any, Any]
-#: Most binary digits of a numerator or denominator: four times those of any float64, so that nothing takes for ever.
+#: Most binary digits of a numerator or denominator: four times those of any float64, which bounds the cost.
 MAX_BITS = 4096
 #: Most characters of a text: enough for every fraction within MAX_BITS.
 MAX_TEXT = 2600
@@ -157,7 +157,7 @@ def exact_number(value: Any) -> float | Fraction | None:
 
 
 def _without_array(value: Any) -> Any:
-    """What an array without dimensions holds; anything else as it is (a masked value too)."""
+    """The content of an array without dimensions; anything else unchanged (a masked value too)."""
     if isinstance(value, np.ndarray) and value.ndim == 0 and not np.ma.is_masked(value):
         return np.asarray(value)[()]
     return value

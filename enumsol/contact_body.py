@@ -212,9 +212,7 @@ def _check_row_rank(contact: Mapping[str, sp.csr_array]) -> None:
     if np.any(norms == 0):
         row = int(np.argmin(norms))
         raise InvalidProblemError(f"{names[row]} is zero; expected linearly independent rows of {stack}")
-    from scipy.sparse.csgraph import (
-        connected_components,
-    )  # comes with scipy's solvers: not for an import of this module
+    from scipy.sparse.csgraph import connected_components  # with it come scipy's solvers
 
     unit = sp.csr_array(sp.diags_array(1.0 / norms) @ rows)
     gram = sp.csr_array(unit @ unit.T)

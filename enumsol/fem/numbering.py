@@ -1,4 +1,4 @@
-"""Matrices and forces numbered by degrees of freedom, ``dimension node + component``."""
+"""Matrices and forces numbered as ``dimension node + component``."""
 
 from __future__ import annotations
 

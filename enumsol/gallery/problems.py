@@ -71,8 +71,8 @@ def two_node_square(
 ) -> ContactProblem:
     """Two contact nodes on one square: up to five roots, several branches, and loading paths (n = 4, p = 2).
 
-    The geometry is our own, not that of the paper's Examples 6.4-6.7, whose coordinates were never published; their
-    loads can be applied to it, their printed figures are not to be expected. The unit square is clamped along its top
+    The geometry is not that of the paper's Examples 6.4-6.7, whose coordinates were never published; their loads can
+    be applied to it, but their printed figures do not follow. The unit square is clamped along its top
     and stands in a corner: node 0 at (0, 0) touches the floor (normal (0, -1), tangent (1, 0)), node 1 at (1, 0) the
     wall on the right (normal (1, 0), tangent (0, 1)). Two P1 triangles share the diagonal from (1, 0) to (0, 1). The
     degrees of freedom are (u_n, u_t) of node 0, then of node 1; for l = m = 1 the entries of A are exact in binary.
