@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from enumsol.array_checks import real_array, real_matrix
 from enumsol.errors import InvalidProblemError
 from enumsol.friction import ConstantFriction, FrictionTable
-from enumsol.io.layouts import LAYOUT_3D, constant_friction
+from enumsol.io.layouts import LAYOUT_3D, MEAN, MESH, SURFACE, TABLE, constant_friction
 from enumsol.problem3d import BodyMesh, ContactProblem3D, SlipMean
 
 if TYPE_CHECKING:
@@ -18,15 +18,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-_MESH = ("mesh_points", "mesh_cells", "mesh_dofs")
-_SURFACE = ("mesh_facets", "mesh_rows")
-_MEAN = ("slip_mean_T1", "slip_mean_T2", "slip_mean_offset", "slip_mean_weights")
-_TABLE = ("friction_table_slip", "friction_table_1", "friction_table_2")
-
 
 def problem_from_arrays_3d(arrays: Mapping[str, Any]) -> ContactProblem3D:
     """The problem made of arrays whose names have been checked."""
-    for parts in (_MESH, _MEAN, _TABLE):
+    for parts in (MESH, MEAN, TABLE):
         missing = [name for name in parts if name not in arrays]
         if 0 < len(missing) < len(parts):
             raise InvalidProblemError(f"{', '.join(missing)} is missing; expected {', '.join(parts)}, all or none")
@@ -38,11 +33,11 @@ def problem_from_arrays_3d(arrays: Mapping[str, Any]) -> ContactProblem3D:
     options["friction_slope"] = tuple(arrays.get(f"friction_slope_{axis}", 0.0) for axis in (1, 2))
     if "mesh_points" in arrays:
         options["mesh"] = _mesh(arrays)
-    elif extra := [name for name in _SURFACE if name in arrays]:
-        raise InvalidProblemError(f"{extra[0]} has no mesh; expected {', '.join(_MESH)} as well")
+    elif extra := [name for name in SURFACE if name in arrays]:
+        raise InvalidProblemError(f"{extra[0]} has no mesh; expected {', '.join(MESH)} as well")
     if "slip_mean_T1" in arrays:
-        T1, T2, weights = (sp.csr_array(real_matrix(arrays[name], name)) for name in (_MEAN[0], _MEAN[1], _MEAN[3]))
-        options["slip_mean"] = SlipMean(T1, T2, real_array(arrays[_MEAN[2]], _MEAN[2]), weights)
+        T1, T2, weights = (sp.csr_array(real_matrix(arrays[name], name)) for name in (MEAN[0], MEAN[1], MEAN[3]))
+        options["slip_mean"] = SlipMean(T1, T2, real_array(arrays[MEAN[2]], MEAN[2]), weights)
     return ContactProblem3D(*(arrays[name] for name in LAYOUT_3D.required), **options)
 
 
@@ -55,7 +50,7 @@ def _friction(arrays: Mapping[str, Any]) -> Any:
     if given:
         return arrays["friction_1"], arrays["friction_2"]
     if "friction_table_slip" in arrays:
-        slip, *columns = (np.asarray(arrays[name]) for name in _TABLE)
+        slip, *columns = (np.asarray(arrays[name]) for name in TABLE)
         # one column of a MatrixMarket file is the table of all nodes
         return FrictionTable(slip, *(F.ravel() if F.ndim == 2 and F.shape[1] == 1 else F for F in columns))
     return None
@@ -100,7 +95,7 @@ def arrays_of_3d(problem: ContactProblem3D) -> dict[str, Any]:
     if isinstance(law, ConstantFriction):
         arrays |= {"friction_1": law.values[:, 0], "friction_2": law.values[:, 1]}
     elif isinstance(law, FrictionTable):
-        arrays |= dict(zip(_TABLE, (law.slip, law.F1, law.F2), strict=True))
+        arrays |= dict(zip(TABLE, (law.slip, law.F1, law.F2), strict=True))
     else:
         raise InvalidProblemError(f"friction is {law}, which no file can hold; expected constants or a FrictionTable")
     arrays |= {f"friction_slope_{axis}": slope for axis, slope in zip((1, 2), problem.friction_slope, strict=True)}
@@ -110,10 +105,8 @@ def arrays_of_3d(problem: ContactProblem3D) -> dict[str, Any]:
         if getattr(problem, name) is not None
     }
     if (mesh := problem.mesh) is not None:
-        arrays |= dict(zip(_MESH, (mesh.points, mesh.cells, mesh.dofs), strict=True))
-        arrays |= {
-            name: part for name, part in zip(_SURFACE, (mesh.facets, mesh.rows), strict=True) if part is not None
-        }
+        arrays |= dict(zip(MESH, (mesh.points, mesh.cells, mesh.dofs), strict=True))
+        arrays |= {name: part for name, part in zip(SURFACE, (mesh.facets, mesh.rows), strict=True) if part is not None}
     if (mean := problem.slip_mean) is not None:
-        arrays |= dict(zip(_MEAN, (mean.T1, mean.T2, mean.offset, mean.weights), strict=True))
+        arrays |= dict(zip(MEAN, (mean.T1, mean.T2, mean.offset, mean.weights), strict=True))
     return arrays

@@ -89,20 +89,21 @@ LAYOUT_2D = Layout(
     | {"f0": "friction0", "mu0": "friction0", "f1": "friction1", "mu1": "friction1"},
 )
 _TANGENTS = {"bt1": "Bt1", "t1": "Bt1", "tangential1": "Bt1", "bt2": "Bt2", "t2": "Bt2", "tangential2": "Bt2"}
-_MEANS = ("slip_mean_T1", "slip_mean_T2", "slip_mean_weights")
-_TABLE = ("friction_table_slip", "friction_table_1", "friction_table_2")
+#: Names of the arrays of a BodyMesh, required and optional, of a SlipMean and of a FrictionTable.
+MESH, SURFACE = ("mesh_points", "mesh_cells", "mesh_dofs"), ("mesh_facets", "mesh_rows")
+MEAN = ("slip_mean_T1", "slip_mean_T2", "slip_mean_offset", "slip_mean_weights")
+TABLE = ("friction_table_slip", "friction_table_1", "friction_table_2")
 _SLOPES = ("friction_slope_1", "friction_slope_2")
 LAYOUT_3D = Layout(
     contact=("A", "Bn", "Bt1", "Bt2"),
-    matrices=("A", "Bn", "Bt1", "Bt2", *_MEANS),
-    tables=("coordinates", "slip_offset", "mesh_points", "mesh_cells", "mesh_facets", "slip_mean_offset", *_TABLE[1:]),
+    matrices=("A", "Bn", "Bt1", "Bt2", *MEAN[:2], MEAN[3]),
+    tables=("coordinates", "slip_offset", "mesh_points", "mesh_cells", "mesh_facets", "slip_mean_offset", *TABLE[1:]),
     broadcast=("gap", "friction", "friction_1", "friction_2", *_SLOPES),
     optional=(
         *_COMMON,
-        *("friction_1", "friction_2", *_SLOPES, *_TABLE, "areas"),
-        *("mesh_points", "mesh_cells", "mesh_dofs", "mesh_facets", "mesh_rows", *_MEANS, "slip_mean_offset"),
+        *("friction_1", "friction_2", *_SLOPES, *TABLE, "areas", *MESH, *SURFACE, *MEAN),
     ),
-    frictions=(("friction",), ("friction_1", "friction_2"), _TABLE),
+    frictions=(("friction",), ("friction_1", "friction_2"), TABLE),
     synonyms=_SYNONYMS
     | _TANGENTS
     | {"f1": "friction_1", "mu1": "friction_1", "f2": "friction_2", "mu2": "friction_2"}
