@@ -8,7 +8,7 @@ import numpy as np
 
 from enumsol.checks import positive_integer, positive_number
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.fixed_points.state import scaled_forces
+from enumsol.fixed_points.state import scaled_forces, slips_of
 from enumsol.fixed_points.successive import successive_approximations
 from enumsol.fixed_points.system import ContactSystem, contact_problem
 from enumsol.fixed_points.tresca import solve_tresca
@@ -52,9 +52,7 @@ def fixed_point_residual(problem: Problem, root: Any) -> float:
             f"root has lambda_n of shape {np.shape(root.lambda_n)} and lambda_t of shape {np.shape(root.lambda_t)}; "
             f"expected a root of the problem, which has p = {body.p} contact nodes"
         )
-    slip = getattr(root, "slip", None)
-    if slip is None:
-        slip = np.linalg.norm(np.reshape(root.u_t, (body.p, -1)), axis=1)
+    slip = slips_of(root, body.p)
     image = solve_tresca(body, np.maximum(root.lambda_n, 0.0), root.alpha, slip=slip, start=root)
     system = ContactSystem.at(body, root.alpha)
     return float(np.max(np.abs(scaled_forces(system, image) - scaled_forces(system, root))))

@@ -168,6 +168,12 @@ class ContactState(Sealed):
         return pd.DataFrame(columns)
 
 
+def slips_of(state: Any, p: int) -> Vector:
+    """Slips on which coefficients depend, shape (p,): the ``slip`` of a fixed point, |u_t| of a root [length]."""
+    slip = getattr(state, "slip", None)
+    return np.asarray(np.linalg.norm(np.reshape(state.u_t, (p, -1)), axis=1) if slip is None else slip)
+
+
 def scaled_forces(system: ContactSystem, state: Any) -> Vector:
     """Scaled forces of a state or root, as a start."""
     forces = np.concatenate([state.lambda_n, np.asarray(state.lambda_t).ravel(order="F")])

@@ -14,7 +14,7 @@ from enumsol.errors import Interrupted
 from enumsol.fixed_points.anderson import AndersonMixing
 from enumsol.fixed_points.newton import TrescaData
 from enumsol.fixed_points.result import FixedPoint, Outcome
-from enumsol.fixed_points.state import scaled_forces
+from enumsol.fixed_points.state import scaled_forces, slips_of
 from enumsol.fixed_points.system import ContactSystem, contact_problem
 from enumsol.fixed_points.tresca import TrescaNotSolved, node_values, solve
 from enumsol.friction import warn_of_jumps
@@ -178,9 +178,7 @@ class _Iteration:
             bound: Any = 0.0
         elif hasattr(start, "lambda_n") and hasattr(start, "u_t"):
             bound = np.maximum(np.asarray(start.lambda_n, dtype=np.float64), 0.0)
-            slip = getattr(start, "slip", None)
-            if slip is None:
-                slip = np.linalg.norm(np.reshape(start.u_t, (len(bound), -1)), axis=1)
+            slip = slips_of(start, len(bound))
         elif isinstance(start, tuple) and len(start) == 2 and any(np.ndim(part) == 1 for part in start):
             bound, slip = start
         else:
