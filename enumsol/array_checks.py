@@ -76,12 +76,12 @@ def real_array(
 
 
 def plain_array(value: Any, name: str, *, error: type[EnumsolError]) -> NDArray[Any]:
-    """The value as an array of whatever it holds.
+    """The value as an array of its own type.
 
     Raises
     ------
     ``error``
-        It is no array: something else, sparse, with masked values, or of rows that differ in length.
+        It is not an array, or sparse, with masked values, or of rows that differ in length.
     """
     try:
         if sp.issparse(value):
@@ -238,17 +238,6 @@ def _check_sums(
     if np.any(large):
         where = _place(sizes, int(np.argmax(large)))
         raise error(f"{name} has integers at index {where} that add up to 2^53 or more; expected float64 values")
-
-
-def vector_2d(value: Any, name: str) -> NDArray[np.float64]:
-    """Value as a finite array of shape (2,).
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is not two finite real numbers.
-    """
-    return short_vector(value, name, 2)
 
 
 def short_vector(value: Any, name: str, size: int) -> NDArray[np.float64]:

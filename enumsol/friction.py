@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Vector = NDArray[np.float64]
 
 _EXPECTED = "expected a number, a pair (F1, F2) of numbers or (p,) arrays, a FrictionTable, or a callable F(node, slip)"
-#: Slips per node at which a function is looked at for jumps; bisections of the largest step; the share of the step
+#: Slips per node at which a function is sampled for jumps; bisections of the largest step; the share of the step
 #: that must be left for it to count as a jump.
 _JUMP_SAMPLES, _JUMP_BISECTIONS, _JUMP_SHARE = 33, 40, 0.5
 
@@ -161,12 +161,12 @@ class FrictionFunction:
 
 
 def friction_law(value: Any, p: int, labels: tuple[Any, ...]) -> FrictionLaw:
-    """The coefficients of p contact nodes that a user's argument stands for.
+    """The coefficients of p contact nodes from a number, pair, FrictionTable or callable.
 
     Raises
     ------
     InvalidProblemError
-        It is nothing of what is expected, or has the wrong shape.
+        It is none of these, or has the wrong shape.
     """
     if isinstance(value, FrictionTable):
         value.check_nodes(p)
@@ -219,7 +219,7 @@ def warn_of_jumps(law: FrictionLaw, reach: Vector, labels: tuple[Any, ...]) -> N
             f"friction jumps by {_size(at_high - at_low)[node]:.3g} near slip {high[node]:.6g} at contact node "
             f"{labels[node]}; expected a Lipschitz function of the slip, without which there may be no fixed point",
             FrictionJumpWarning,
-            stacklevel=6,  # from here up to who called successive_approximations
+            stacklevel=6,  # the caller of successive_approximations
         )
 
 

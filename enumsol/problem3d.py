@@ -11,11 +11,11 @@ import numpy as np
 from enumsol.array_checks import real_array
 from enumsol.body3d import BodyMesh, SlipMean
 from enumsol.checks import alpha_value, instance_of
-from enumsol.condensation.affine import exactly_at
-from enumsol.contact_body import ContactBody, span, vector
+from enumsol.contact_body import ContactBody, friction_values, span, vector
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.friction import ConstantFriction, friction_law, friction_pair
 from enumsol.sealed import sealed
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -192,21 +192,11 @@ class ContactProblem3D(ContactBody):
             A callable returns something else than finite numbers >= 0.
         """
         exact = Fraction(alpha_value(alpha))
-        value = float(exact)
         slip = real_array(slip, "slip", error=InvalidArgumentError)
         if slip.shape != (self.p,):
             raise InvalidArgumentError(f"slip has shape {slip.shape}; expected (p,) = ({self.p},)")
-        try:
-            # rounded once from the exact values, so that zero and its sign are decided exactly
-            F = np.array([float(x) for x in exactly_at(exact, self.law.at(slip).ravel(), self._slope.ravel())])
-        except OverflowError:
-            F = np.full(2 * self.p, np.inf)
-        F = F.reshape(self.p, 2)
-        if not np.all(np.isfinite(F)):
-            raise InvalidArgumentError(
-                f"friction at alpha = {value:g} is too large for float64; expected a finite value"
-            )
-        _check_signs(F, self.node_ids, f" at alpha = {value:g}", error=InvalidArgumentError)
+        F = friction_values(exact, self.law.at(slip).ravel(), self._slope.ravel()).reshape(self.p, 2)
+        _check_signs(F, self.node_ids, f" at alpha = {float(exact):g}", error=InvalidArgumentError)
         return F
 
     def friction_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
@@ -246,7 +236,7 @@ class ContactProblem3D(ContactBody):
         slope = "" if not np.any(self._slope) else f" + alpha [{span(self._slope[:, 0])}, {span(self._slope[:, 1])}]"
         load = "constant" if self.load_slope is None else "f + alpha load_slope"
         return (
-            f"ContactProblem3D with {self.p} contact node{'s' if self.p != 1 else ''}\n"
+            f"ContactProblem3D with {counted(self.p, 'contact node')}\n"
             f"  degrees of freedom  {self.n}  (A: {self.A.nnz} nonzeros)\n"
             f"  friction            {self.law}{slope}\n"
             f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 #: Largest radius that is tried; below 1 a positive friction coefficient stays positive.
 LARGEST = 0.5
-#: Below this a radius is no better than rounding, and 0 is returned.
+#: A smaller radius is within rounding, and 0 is returned.
 SMALLEST = 2.0**-50
 #: Multipliers are stretched or shrunk by at most this.
 _STRETCH = 1e9
@@ -47,7 +47,8 @@ def stability_radius(problem: ContactProblem, proof: Proof) -> float:
     the problem has as many roots as the proof lists, all of them regular, in the same selections and with the same
     indices, and no families. (For the units: sqrt(S_ii S_jj) bounds |S_ij|, and a displacement is measured by the root
     of its own compliance.) A change of load, gap, slip offset, friction or alpha is such a change of g and F. The
-    largest radius is larger: only the multipliers of this proof are tried. It costs some checks of the proof.
+    largest radius is larger: only the multipliers of this proof are tried. The cost is that of several
+    checks of the proof.
 
     Parameters
     ----------
@@ -81,7 +82,7 @@ def stability_radius(problem: ContactProblem, proof: Proof) -> float:
 
 @dataclass
 class _WidenedChecker(Checker):
-    """A checker whose balls are wider; ``adjust`` lowers the radius to what every leaf bears."""
+    """A checker whose balls are wider; ``adjust`` lowers the radius until every leaf passes."""
 
     radius: float = LARGEST
     adjust: bool = False

@@ -1,6 +1,6 @@
 """The checker of root sets: whether a proof shows that its list of roots is complete.
 
-It imports nothing of the search; what both rest on is said in ``enumsol.checker``. It recomputes S, g and F (or
+It imports nothing of the search; ``enumsol.checker`` lists what both rest on. It recomputes S, g and F (or
 their enclosures) from the problem, proves S positive definite, walks the tree from its root, so that the leaves cover
 all selections by construction, and checks every leaf.
 """
@@ -66,7 +66,7 @@ def verify(
     problem : ContactProblem
     proof : Proof
     progress : callable, optional
-        Called now and then with the number of leaves checked.
+        Called regularly with the number of leaves checked.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def verify(
     ------
     ProofFormatError
         The file is damaged (its checksum does not agree), of another version, or holds no sequence of records. Records
-        that make no sense, or prove nothing, are a reason to refuse the proof: the report says so.
+        that make no sense, or prove nothing, make the report refuse the proof.
     InvalidArgumentError
         An argument is of another type.
 
@@ -107,7 +107,7 @@ def verify(
 class Checker:
     """Checks one proof: its header, then the tree alone, then every leaf.
 
-    Whatever does not fit together is found before anything is computed, which may take long.
+    Inconsistencies are found before any long computation starts.
     """
 
     problem: ContactProblem
@@ -193,7 +193,7 @@ class Checker:
 
     @cached_property
     def rational(self) -> RationalSystem:
-        """The condensed problem in rationals; only leaves that need it ask for it."""
+        """The condensed problem in rationals; computed only if a leaf needs it."""
         if self.data == "condensed":
             raise RefusedError("a rational leaf in a proof about S and g as computed")
         from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
@@ -214,7 +214,7 @@ class Checker:
                 yield codes, record
 
     def _survey(self, records: Iterator[Any]) -> Any:
-        """Walk the tree without a look at its leaves; gives the counts at the end."""
+        """Walk the tree without examining its leaves; returns the counts at the end."""
         leaves = sum(1 for _ in self._leaves(records))
         footer = next(records, _END)
         if not isinstance(footer, dict) or footer.get("leaves") != leaves:
@@ -264,12 +264,12 @@ class Checker:
         raise RefusedError(f"a branching {shown(record)} does not cover the assignment that it splits")
 
     def fail(self, message: str) -> None:
-        """Take note of a failure.
+        """Record a failure.
 
         Raises
         ------
         RefusedError
-            There have been MAX_FAILURES: whoever wrote this may have written any number of such leaves.
+            There have been MAX_FAILURES.
         """
         self.failures.append(message)
         if len(self.failures) == MAX_FAILURES:
@@ -337,7 +337,7 @@ class Checker:
         _, points, dimension = record
         _check_points(points, 2 * self.problem.p)
         hull = hull_of_selections(self.rational, codes)
-        # in lowest terms a number has one text: there is no need to make numbers of the texts in a file
+        # in lowest terms a number has one text: the texts in a file need no conversion
         found = [[fraction_text(x.numerator, x.denominator) for x in point] for point in hull.points]
         if not found or sorted(points) != sorted(found) or type(dimension) is not int or dimension != hull.dimension:
             return "its roots are not those that are claimed"
@@ -349,7 +349,7 @@ class Checker:
     def _count(self) -> tuple[int, int]:
         """Isolated degenerate roots and families: rational solutions joined where they have a point in common.
 
-        A strict root solves no second selection, so it is none of these, and strict roots of two leaves are two.
+        A strict root solves no second selection: it is not among these, and strict roots of two leaves are different.
         """
         groups = list(range(len(self.polytopes)))
 
@@ -362,7 +362,7 @@ class Checker:
         for k, (_, points, _) in enumerate(self.polytopes):
             for point in points:
                 groups[group_of(k)] = group_of(owner.setdefault(point, k))
-        # two points are one or have nothing in common; larger polytopes may meet elsewhere than in their vertices
+        # points are equal or disjoint; larger polytopes may meet away from their vertices
         for k in [k for k, polytope in enumerate(self.polytopes) if polytope[2] > 0]:
             for m in range(len(self.polytopes)):
                 if group_of(k) != group_of(m) and self._meet(k, m):

@@ -12,6 +12,7 @@ from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, count, csv,
 from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -186,7 +187,7 @@ def _basin_text(table: pd.DataFrame, roots: int, completeness: str) -> str:
     lines = []
     for root in range(roots):
         rows = table[table["root"] == root]
-        most = f", up to {rows['iterations'].max()} iterations" if len(rows) else ""
+        most = f", up to {counted(rows['iterations'].max(), 'iteration')}" if len(rows) else ""
         lines.append(f"root {root}: reached from {len(rows)} of {len(table)} starts{most}")
     lost = table[table["root"].isna()]
     lines += [f"no root ({outcome}): {len(rows)} starts" for outcome, rows in lost.groupby("outcome")]

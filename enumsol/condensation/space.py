@@ -10,13 +10,13 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT
 from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.condensed import cholesky_factor, load_unit, node_units
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
-    from enumsol.problem3d import ContactProblem3D
 
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]
@@ -51,17 +51,12 @@ class SpaceSystem:
     def scaled(cls, S: Matrix, g: Vector, F: Matrix) -> SpaceSystem:
         """From S (3p, 3p) and g (3p,), all normals first, then both tangents, and coefficients F (p, 2)."""
         p = len(F)
-        factor = np.exp2(-np.round(0.5 * np.mean(np.log2(np.diagonal(S).reshape(3, p)), axis=0)))
+        factor = node_units(S, p)
         tau, rows, node, axis = places(F > 0)
         weight = np.concatenate([factor, factor[node] * F[node, axis]])
         S = weight[:, None] * S[np.ix_(rows, rows)] * weight
         g = weight * g[rows]
-        size = 1.0
-        largest = float(np.max(np.abs(g)))
-        if largest > 0:
-            first = np.exp2(np.floor(np.log2(largest)))
-            energy = float(np.sqrt(np.linalg.solve(S, g / first) @ (g / first)))
-            size = float(first * np.exp2(np.floor(np.log2(energy))))
+        size = load_unit(g, cholesky_factor(S))
         return cls(S, g / size, F, tau, factor * size, size / factor)
 
     @property
@@ -102,9 +97,7 @@ class EnclosedSpace(EnclosedSystem):
         return cls(system.S, zero(system.S), system.g, zero(system.g), system.F, zero(system.F), system.tau)
 
     @classmethod
-    def of_problem(
-        cls, enclosure: CondensedEnclosure, problem: ContactProblem3D, alpha: Fraction, force: Vector, length: Vector
-    ) -> EnclosedSpace:
+    def of_problem(cls, enclosure: CondensedEnclosure, alpha: Fraction, force: Vector, length: Vector) -> EnclosedSpace:
         """Balls for the exact data at alpha, in units of the nodes given by powers of two (see SpaceSystem).
 
         Raises
@@ -112,6 +105,7 @@ class EnclosedSpace(EnclosedSystem):
         NotEnclosedError
             Something over- or underflows.
         """
+        problem = enclosure.problem
         p = problem.p
         exact = [exactly_at(alpha, *pair) for pair in zip(problem.friction, problem.friction_slope, strict=True)]
         F = np.array([[float(x) for x in column] for column in exact]).T

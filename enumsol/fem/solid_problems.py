@@ -50,7 +50,8 @@ def solid_contact_problem(
 ) -> ContactProblem3D:
     """Contact problem of a body of P1 tetrahedra or Q1 hexahedra; the held degrees of freedom are eliminated.
 
-    Contact rows come in the order of node numbers or of the labels of patches; what is held entirely has none.
+    Contact rows come in the order of node numbers or of the labels of patches; nodes and patches that are held
+    entirely have none.
 
     Parameters
     ----------
@@ -186,5 +187,5 @@ def _slips(
     moving = (patch >= 0)[:, None]
     T1, T2 = (_displacements(values, np.where(moving, axis[patch], 0.0), free) for axis in axes)
     if offset.shape != (len(axes[0]), 2):
-        offset = np.zeros((len(axes[0]), 2))  # a wrong shape is for ContactProblem3D to refuse
+        offset = np.zeros((len(axes[0]), 2))  # ContactProblem3D refuses a wrong shape
     return T1, T2, np.where(moving, offset[patch], 0.0)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
     Field = ArrayLike | Callable[[Floats], ArrayLike]
 
-#: How far axes may be from right angles and length one: rounding of whatever computed them.
+#: How far axes may be from right angles and length one, for rounding.
 AXES_TOLERANCE = 1e-10
 #: Normals nearer to the x axis than this cosine take the y axis for the default of t1.
 _NEAR_X = 0.9
@@ -95,7 +95,7 @@ class ContactSurface:
 
 @dataclass(frozen=True)
 class Multipliers:
-    """The p contact rows: what displacement each stands for, and where it is.
+    """The p contact rows: the displacement that each stands for, and its position.
 
     Attributes
     ----------

@@ -44,7 +44,7 @@ def fixed_point_residual(problem: Problem, root: Any) -> float:
     Raises
     ------
     InvalidArgumentError
-        The root is none, or is one of another problem (its arrays have other shapes).
+        The root has no forces, or belongs to another problem (its arrays have other shapes).
     """
     body = contact_problem(problem)
     if not hasattr(root, "alpha"):
@@ -75,7 +75,7 @@ def is_fixed_point(problem: Problem, root: Any, tolerance: float = 1e-8) -> bool
     Raises
     ------
     InvalidArgumentError
-        The root is none, or is one of another problem; the tolerance is not positive.
+        The root has no forces, or belongs to another problem; the tolerance is not positive.
 
     Examples
     --------
@@ -125,7 +125,7 @@ def basin_table(
     Raises
     ------
     InvalidArgumentError
-        There are no roots, they belong to several alpha, or starts have the wrong shape.
+        There are no roots, they belong to different alpha, or starts have the wrong shape.
     Interrupted
         Ctrl-C; ``partial`` is the table so far.
 

@@ -10,12 +10,12 @@ import scipy.sparse as sp
 if TYPE_CHECKING:
     from enumsol.fixed_points.newton import TrescaData, Vector
 
-#: What Clarabel is asked for; Newton's method takes over from there.
+#: Tolerance of Clarabel; Newton's method improves the result.
 TOLERANCE = 1e-11
 
 
 def interior_point(data: TrescaData) -> Vector | None:
-    """Scaled forces that solve a Tresca problem to about 1e-9, from scratch; None where Clarabel gives none.
+    """Scaled forces that solve a Tresca problem to about 1e-9, from scratch; None if Clarabel fails.
 
     Components of lambda_t that do not occur are left out, so that every cone has an interior.
     """

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]
 
-#: Slips per node at which a friction function is looked at for its largest values and slopes.
+#: Slips per node at which a friction function is sampled for its largest values and slopes.
 _SAMPLES = 257
 #: Smallest ratio of two areas.
 _LEAST_SHARE = 1e-100
@@ -45,12 +45,12 @@ class LipschitzEstimate:
     uniqueness : float
         The left-hand side of (theory, (11.9)) [-].
     factor : float
-        With all coefficients multiplied by less than this the solution still is unique, where they do not depend on
+        The solution is still unique with all coefficients multiplied by less than this, if they do not depend on
         the solution; inf without friction [-].
     lipschitz, anisotropy : float
         L [1 / length] and kappa [-] as used.
     sampled : bool
-        L, kappa and the largest coefficients of a friction function are from samples, and so are no bounds.
+        L, kappa and the largest coefficients of a friction function come from samples, and are no bounds.
     """
 
     C1: float
@@ -228,7 +228,7 @@ def _weights(inverse_nn: Matrix, blocks: Matrix, F: Matrix, m: Vector) -> list[V
 
 
 def _coefficients(system: ContactSystem, reach: Vector, lipschitz: float | None) -> _Coefficients:
-    """What (theory, section 11.5) asks of the coefficients, for slips up to ``reach`` of shape (p,) [length]."""
+    """What (theory, section 11.5) needs of the coefficients, for slips up to ``reach`` of shape (p,) [length]."""
     body = system.problem
     if not isinstance(body, ContactProblem3D):
         return _Coefficients(body.friction_at(system.alpha)[:, None])

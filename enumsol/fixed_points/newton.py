@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]
 
-#: Steps after which the method is given up; from a near start it needs two to five.
+#: Steps after which the method stops; from a near start it needs two to five.
 MOST_STEPS = 30
 #: The residual below which a point counts as the solution [unit of the scaled system, in which solutions have size 1],
-#: and the one below which no smaller one is looked for.
+#: and the one below which the method stops.
 ACCEPTED, ROUNDING = 1e-11, 1e-15
 #: Steps of the proximal point method, and its weights in a system whose S has a diagonal near 1.
 MOST_PROXIMAL, _FIRST_RHO, _LEAST_RHO = 60, 1e-3, 1e-14

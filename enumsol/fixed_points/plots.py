@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.figures import new_figure
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +35,7 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     Raises
     ------
     InvalidArgumentError
-        The table is none of `basin_table`, or ``ax`` no Axes.
+        The table was not made by `basin_table`, or ``ax`` is no Axes.
     MissingDependencyError
         matplotlib is not installed.
     """
@@ -50,10 +51,12 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     for root in sorted(table["root"].dropna().astype(int).unique().tolist()):
         rows = table[table["root"] == root]
         style = {"marker": _MARKERS[root % len(_MARKERS)], "color": f"C{root}"}  # the same in every picture
-        ax.plot(rows["size"], rows["iterations"], ls="", alpha=0.7, label=f"root {root}: {len(rows)} starts", **style)
+        label = f"root {root}: {counted(len(rows), 'start')}"
+        ax.plot(rows["size"], rows["iterations"], ls="", alpha=0.7, label=label, **style)
     lost = table[table["root"].isna()]
     for outcome, rows in lost.groupby("outcome"):
-        ax.plot(rows["size"], rows["iterations"], "x", color="black", label=f"no root ({outcome}): {len(rows)} starts")
+        label = f"no root ({outcome}): {counted(len(rows), 'start')}"
+        ax.plot(rows["size"], rows["iterations"], "x", color="black", label=label)
     positive = table["size"][table["size"] > 0]
     # a power of ten, so that no tick comes to lie between 0 and the first one
     ax.set_xscale("symlog", linthresh=10.0 ** math.floor(math.log10(positive.min())) if len(positive) else 1.0)
@@ -65,6 +68,6 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     ax.set_ylabel("iterations")
     never = table.attrs.get("never", [])
     names = ", ".join(map(str, never))
-    ax.set_title(f"never reached: root{'s' if len(never) > 1 else ''} {names}" if names else "never reached: none")
+    ax.set_title(f"never reached: {'roots' if len(never) > 1 else 'root'} {names}" if names else "never reached: none")
     ax.legend()
     return ax

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import enum
-import json
 import textwrap
-import zipfile
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +12,10 @@ import numpy as np
 from enumsol.array_checks import real_array
 from enumsol.checks import alpha_value, file_path, optional_count, positive_integer, positive_number
 from enumsol.errors import InvalidArgumentError
-from enumsol.files import writing
+from enumsol.files import read_arrays, reading, write_arrays
 from enumsol.fixed_points.state import ContactState
 from enumsol.fixed_points.system import contact_problem
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     import os
@@ -77,7 +76,7 @@ class FixedPoint(ContactState):
         Distance of every iterate from its image under Psi in the norms of (theory, (11.4)): slips
         [length * sqrt(area)], and normal forces [sqrt(work)].
     tolerance : float
-        Increments at most this fraction of the load's norm count as none.
+        Increments of at most this fraction of the load's norm count as zero.
     period : int or None
         Of a cycle.
 
@@ -130,7 +129,7 @@ class FixedPoint(ContactState):
         slips, forces = self.increments[-1] if len(self.increments) else (np.nan, np.nan)
         depends = getattr(self.problem, "depends_on_solution", False)
         last = f"last increment {forces:.2e} in forces" + (f", {slips:.2e} in slips" if depends else "")
-        solved = f"{self.iterations} iteration{'s' if self.iterations != 1 else ''}"
+        solved = counted(self.iterations, "iteration")
         match self.outcome:
             case Outcome.CONVERGED:
                 return f"converged after {solved} ({last})"
@@ -154,8 +153,7 @@ class FixedPoint(ContactState):
         InvalidArgumentError
             The file cannot be written.
         """
-        meta = {
-            "format": _FORMAT,
+        report = {
             "alpha": str(self.alpha),
             "outcome": self.outcome.value,
             "iterations": self.iterations,
@@ -164,10 +162,8 @@ class FixedPoint(ContactState):
             "node_ids": [str(label) for label in self.problem.node_ids],
             "statuses": [status.value for status in self.statuses],
         }
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
-        place = file_path(path, "path")
-        with writing(place, "path"), place.open("wb") as stream:
-            np.savez_compressed(stream, allow_pickle=False, meta=np.array(json.dumps(meta)), u=self.u, **arrays)
+        arrays = {name: getattr(self, name) for name in (*_ARRAYS, "u")}
+        write_arrays(file_path(path, "path"), _FORMAT, report, arrays)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], problem: Problem) -> FixedPoint:
@@ -180,32 +176,17 @@ class FixedPoint(ContactState):
         """
         body = contact_problem(problem)
         place = file_path(path, "path")
-        try:
-            with np.load(place, allow_pickle=False) as data:
-                meta: dict[str, Any] = json.loads(str(data["meta"]))
-                arrays = {
-                    name: real_array(data[name], f"{name} in {path}", error=InvalidArgumentError) for name in _ARRAYS
-                }
-            if meta["format"] != _FORMAT:
-                raise InvalidArgumentError(f"{path} has format {meta['format']!r}; this version reads format {_FORMAT}")
-            report: dict[str, Any] = {
-                "iterations": positive_integer(meta["iterations"], f"iterations in {path}", least=0),
-                "tolerance": positive_number(meta["tolerance"], f"tolerance in {path}"),
-                "period": optional_count(meta["period"], f"period in {path}"),
+        with reading(place, "a fixed point", "FixedPoint.save"):
+            found, kept = read_arrays(place, _FORMAT, _ARRAYS)
+            arrays = {
+                name: real_array(value, f"{name} in {path}", error=InvalidArgumentError) for name, value in kept.items()
             }
-            alpha, outcome = alpha_value(meta["alpha"]), Outcome(meta["outcome"])
-            labels = meta["node_ids"]
-        except OSError as error:
-            reason = error.strerror or error
-            raise InvalidArgumentError(
-                f"{path} cannot be read ({reason}); expected a file of FixedPoint.save"
-            ) from error
-        except (LookupError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
-            if isinstance(error, InvalidArgumentError):
-                raise
-            raise InvalidArgumentError(
-                f"{path} does not hold a fixed point ({error}); expected a file of FixedPoint.save"
-            ) from error
+            report: dict[str, Any] = {
+                "iterations": positive_integer(found["iterations"], f"iterations in {path}", least=0),
+                "tolerance": positive_number(found["tolerance"], f"tolerance in {path}"),
+                "period": optional_count(found["period"], f"period in {path}"),
+            }
+            alpha, outcome, labels = alpha_value(found["alpha"]), Outcome(found["outcome"]), found["node_ids"]
         if labels != [str(label) for label in body.node_ids]:
             raise InvalidArgumentError(f"{path} is about other contact nodes; expected those of the problem")
         _check_shapes(arrays, body, str(path))

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     Vector = NDArray[np.float64]
 
-#: A force below this fraction of the largest is none, and |tau| within it of the bound has reached it, for statuses.
+#: For statuses: a force below this fraction of the largest is zero, and |tau| this close to its bound has reached it.
 STATUS_TOLERANCE = 1e-9
 
 

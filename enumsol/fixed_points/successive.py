@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     Vector = NDArray[np.float64]
 
-#: Cycles up to this length are looked for; two iterates are the same if they are this much closer than neighbours.
+#: Longest cycle that is detected; two iterates are the same if they are this much closer than neighbours.
 LONGEST_CYCLE, _SAME = 12, 1e-9
 #: Most iterates that Anderson's mixing keeps.
 MOST_DEPTH = 1000
@@ -69,7 +69,7 @@ def successive_approximations(
 
     Every iterate solves the Tresca problem whose slip bounds are the normal forces of the one before, and whose
     coefficients, where they depend on the solution, are those at its slips. Convergence is certain only where Psi
-    contracts (`lipschitz_estimate`); a limit is a solution wherever it is, but others may exist.
+    contracts (`lipschitz_estimate`); every limit is a solution, but others may exist.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ class _Iteration:
                 data = TrescaData(self.system, bound, self.system.coefficients(slip))
                 forces, _, _ = solve(data, forces)
                 image, image_slip = self._image(data, forces)
-                increment = self._record(data, slip, image, image_slip)
+                increment = self._increment(data, slip, image, image_slip)
                 if increment <= 1.0:
                     outcome = Outcome.CONVERGED
                     break
@@ -198,8 +198,8 @@ class _Iteration:
         normal = np.maximum(self.system.split(forces)[0], 0.0)
         return normal, self.system.slip(forces, w)
 
-    def _record(self, data: TrescaData, slip: Vector, image: Vector, image_slip: Vector) -> float:
-        """Note the increment; returned relative to what counts as none."""
+    def _increment(self, data: TrescaData, slip: Vector, image: Vector, image_slip: Vector) -> float:
+        """How far Psi moved the iterate, relative to the tolerance: at most 1 has converged."""
         system = self.system
         force = system.force_norm(image - data.bound)
         change = float(np.linalg.norm(self.slip_weights * (image_slip - slip)))

@@ -13,6 +13,7 @@ from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.fixed_points.newton import ACCEPTED, TrescaData
 from enumsol.fixed_points.state import ContactState, scaled_forces
 from enumsol.fixed_points.system import ContactSystem, contact_problem
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -55,9 +56,8 @@ class TrescaSolution(ContactState):
     solver: str
 
     def __repr__(self) -> str:
-        p = len(self.lambda_n)
         return (
-            f"TrescaSolution at alpha = {float(self.alpha):g} on {p} contact node{'s' if p != 1 else ''}: "
+            f"TrescaSolution at alpha = {float(self.alpha):g} on {counted(len(self.lambda_n), 'contact node')}: "
             f"sum of lambda_n {np.sum(self.lambda_n):.6g}, residual {self.residual:.1e}, by {self.solver}"
         )
 

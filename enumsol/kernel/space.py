@@ -444,11 +444,13 @@ class _Leaf:
             if point is None:
                 return None
         span = Ball(np.zeros((q, 1)), radius[:, None])
+        pushed = z = span
         for _ in range(1 if point is None else 2):
             pushed = self._pushed(x[self.column] * turned, m)
-            z = _solution(PS @ E, PS @ pushed)
-            if z is None:
+            solved = _solution(PS @ E, PS @ pushed)
+            if solved is None:
                 return None
+            z = solved
             if point is not None:
                 # the mean value form: what the box adds to the values in its middle, dx = -z dpsi
                 x = _smaller(x, point[0][self.rows][:, None] - z @ span)

@@ -1,6 +1,6 @@
 """The parts of a proof's records, read strictly: for both checkers, which trust nothing that stands in a file.
 
-Every function gives what it says it gives, of the stated size, bounded and finite, or raises ValueError. Numbers of a
+Every function returns a value of the stated kind and size, bounded and finite, or raises ValueError. Numbers of a
 record are finite and whole numbers have at most 18 digits before they come here (``Proof.records``).
 """
 
@@ -44,7 +44,7 @@ class RefusedError(Exception):
 
 
 def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
-    """What a header says that is certified, "problem" or "condensed", once it fits the problem and the kind of proof.
+    """What a header claims to certify, "problem" or "condensed", once it fits the problem and the kind of proof.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def friction_at(problem: ContactProblem, alpha: Fraction) -> list[Fraction]:
 
 
 def shown(value: Any) -> str:
-    """Something out of a proof as a short text, whatever it is."""
+    """Any value from a proof as a short text."""
     return _SHORT.repr(value)
 
 
