@@ -182,7 +182,9 @@ def lipschitz_estimate(
     slips = _Slips.of(body, S_tt)
     reach = slips.reach(body, system.alpha, load, c_inf) if isinstance(body, ContactProblem3D) else c_inf * load
     used = _coefficients(system, reach, given)
-    C1 = min(_force_part(inverse_nn, S_tt, used.F, theta) for theta in _weights(inverse_nn, blocks, used.F, m))
+    most_F = float(np.max(used.F)) or 1.0  # taken out, so that squares of tiny coefficients do not underflow
+    F = used.F / most_F
+    C1 = most_F * min(_force_part(inverse_nn, S_tt, F, theta) for theta in _weights(inverse_nn, blocks, F, m))
     C2 = second = 0.0
     if used.lipschitz > 0:
         c_0 = np.sqrt(_largest(inverse_nn / np.sqrt(np.outer(m, m))))
