@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from enumsol.checks import AlphaLike
     from enumsol.condensation.condensed import CondensedProblem3D
+    from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.friction import FrictionTable
 
 
@@ -235,6 +236,19 @@ class ContactProblem3D(ContactBody):
         from enumsol.condensation.condensed import CondensedProblem3D  # scipy's solvers come with the first use
 
         return CondensedProblem3D.from_problem(self)
+
+    @cached_property
+    def enclosure(self) -> CondensedEnclosure:
+        """Rigorous enclosure of the condensed problem.
+
+        Raises
+        ------
+        NotEnclosedError
+            A is positive definite only within rounding.
+        """
+        from enumsol.condensation.enclosure import CondensedEnclosure  # as above
+
+        return CondensedEnclosure.from_problem(self)
 
     def coefficients(self, alpha: AlphaLike, slip: NDArray[np.float64]) -> NDArray[np.float64]:
         """Coefficients F1, F2 at alpha for slips of shape (p,) [length], shape (p, 2).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -184,8 +184,11 @@ class Condensation(Sealed):
         return problem.factorization.solve(np.asarray(rhs))
 
 
+@dataclass(frozen=True)
 class CondensedProblem3D(Condensation):
     """A 3D problem condensed: rows all normals, then all first, then all second tangents."""
+
+    problem: Any = field(repr=False)  # a ContactProblem3D
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,16 @@ class CondensableData(Protocol):
     slip_offset: Vector
 
     @property
+    def A(self) -> sp.csc_array:  # noqa: N802 (the field's letter)
+        """Stiffness, symmetric positive definite [force / length]."""
+
+    @property
     def contact_rows(self) -> sp.csr_array:
         """Bn and the tangents one above the other."""
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
 
     @property
     def factorization(self) -> Factorization:
@@ -61,20 +69,12 @@ class ProblemData(CondensableData, Protocol):
     node_ids: tuple[Any, ...]
 
     @property
-    def A(self) -> sp.csc_array:  # noqa: N802 (the field's letter)
-        """Stiffness, symmetric positive definite [force / length]."""
-
-    @property
-    def Bn(self) -> sp.csr_array:  # noqa: N802 (as above)
+    def Bn(self) -> sp.csr_array:  # noqa: N802 (the field's letter)
         """Normal displacement of the contact nodes."""
 
     @property
     def Bt(self) -> sp.csr_array:  # noqa: N802 (as above)
         """Tangential displacement of the contact nodes."""
-
-    @property
-    def n(self) -> int:
-        """Number of degrees of freedom."""
 
     @property
     def p(self) -> int:

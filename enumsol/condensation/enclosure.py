@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from enumsol.arithmetic.balls import Array
     from enumsol.checks import AlphaLike
-    from enumsol.condensation.data import ProblemData
+    from enumsol.condensation.data import CondensableData
 
 #: Columns that are made dense together.
 _COLUMNS = 32
@@ -66,10 +66,10 @@ class CondensedEnclosure(Sealed):
     g1: Array
     g1_rad: Array
     stiffness_bound: float
-    problem: ProblemData = field(repr=False)
+    problem: Any = field(repr=False)  # in 2D or 3D
 
     @classmethod
-    def from_problem(cls, problem: ProblemData) -> CondensedEnclosure:
+    def from_problem(cls, problem: CondensableData) -> CondensedEnclosure:
         """Enclose S and g from the problem's own matrices.
 
         Raises
@@ -85,7 +85,7 @@ class CondensedEnclosure(Sealed):
         return enclosed
 
     @classmethod
-    def _from_problem(cls, problem: ProblemData) -> CondensedEnclosure:
+    def _from_problem(cls, problem: CondensableData) -> CondensedEnclosure:
         n = problem.n
         # np.ldexp, and not a power function, gives powers of two by definition
         scale = np.ldexp(1.0, -np.round(0.5 * np.log2(problem.A.diagonal())).astype(int))
@@ -125,7 +125,7 @@ class CondensedEnclosure(Sealed):
         return cls(sym, S_rad, g0, g0_rad, free[:, 1], free_rad[:, 1], bound, problem)
 
     def at(self, alpha: AlphaLike, force: Array, length: Array) -> EnclosedSystem:
-        """The enclosed system at one alpha, in units given by powers of two (see ScaledSystem)."""
+        """The enclosed system of a 2D problem at one alpha, in units given by powers of two (see ScaledSystem)."""
         a = alpha if isinstance(alpha, Fraction) else Fraction(alpha_value(alpha))
         exact = exactly_at(a, *self.problem.friction)
         try:
@@ -185,7 +185,7 @@ def _scaled(matrix: sp.csr_array, left: Array, right: Array) -> sp.csr_array:
     return sp.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
-def _smallest_eigenvalue(problem: ProblemData, scale: Array) -> float:
+def _smallest_eigenvalue(problem: CondensableData, scale: Array) -> float:
     """Estimate of the smallest eigenvalue of the scaled A by inverse iteration."""
     vector = np.random.default_rng(1).normal(size=problem.n)
     value = 1.0

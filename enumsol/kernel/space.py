@@ -7,13 +7,13 @@ of slip directions. What is concluded here holds for all data in the balls.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_norm, upper_sum
 from enumsol.kernel.point import energy_bounds, verified_solve
-from enumsol.sectors import SECTORS, contains, direction, end_number, level_of
+from enumsol.sectors import SECTORS, contains, direction, end_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -177,8 +177,8 @@ class Ball:
         rad = np.abs(self.mid) * other.rad + self.rad * (np.abs(other.mid) + other.rad) + 2 * UNIT * np.abs(mid)
         return Ball(mid, rad * SAFE + TINY)
 
-    def __getitem__(self, item: object) -> Ball:
-        return Ball(self.mid[item], self.rad[item])  # type: ignore[index]
+    def __getitem__(self, item: Any) -> Ball:
+        return Ball(self.mid[item], self.rad[item])
 
     @property
     def size(self) -> Array:
@@ -194,7 +194,7 @@ def _solution(M: Ball, B: Ball) -> Ball | None:
     scale = np.ldexp(1.0, -np.frexp(np.max(np.abs(M.mid), axis=0) + TINY)[1])
     M = Ball(M.mid * scale, M.rad * scale + TINY)
     try:
-        R = Ball.exact(np.linalg.inv(M.mid))
+        R = Ball.exact(np.asarray(np.linalg.inv(M.mid), dtype=np.float64))
     except np.linalg.LinAlgError:
         return None
     defect = (R @ M - Ball.exact(np.eye(n))).size
@@ -322,7 +322,7 @@ class _Leaf:
             if not q:
                 return self._root(y, w, angle, radius, reach, None, open_leaf)
             try:
-                Y = Ball.exact(np.linalg.inv(J.mid))
+                Y = Ball.exact(np.asarray(np.linalg.inv(J.mid), dtype=np.float64))
             except np.linalg.LinAlgError:
                 return open_leaf
             point = self._state(angle, np.zeros(q))
@@ -353,7 +353,7 @@ class _Leaf:
             if state is None or point is None:
                 return open_leaf
             try:
-                Y = Ball.exact(np.linalg.inv(state[3].mid))
+                Y = Ball.exact(np.asarray(np.linalg.inv(state[3].mid), dtype=np.float64))
             except np.linalg.LinAlgError:
                 break
             shrink = (Ball.exact(np.eye(len(angle))) - Y @ state[3]) @ Ball(np.zeros(len(angle)), radius)
@@ -463,13 +463,13 @@ class _Leaf:
                     (y.rad[i] + float(upper_norm(y.rad[t])) + 16 * UNIT * (abs(y.mid[i]) + length)) * SAFE + TINY
                 )
         for i, sign in self.sliding:
-            t = int(np.max(tau[i]))
-            mid.append(sign * w.mid[t])
-            rad.append(w.rad[t])
+            along = int(np.max(tau[i]))
+            mid.append(sign * w.mid[along])
+            rad.append(w.rad[along])
         if self.turning:
             _, d, _ = self._directions(angle, radius)
-            along = w[self.t[:, 0]] * d[:, 0] + w[self.t[:, 1]] * d[:, 1]
-            mid, rad = [*mid, *along.mid], [*rad, *along.rad]
+            forward = w[self.t[:, 0]] * d[:, 0] + w[self.t[:, 1]] * d[:, 1]
+            mid, rad = [*mid, *forward.mid], [*rad, *forward.rad]
         return np.array(mid), np.array(rad)
 
     def _broken(self, y: Ball, w: Ball, angle: Array, radius: Array) -> bool:
@@ -498,6 +498,19 @@ def same_root(one: SpaceRoot, other: SpaceRoot) -> bool | None:
     return True if np.all(away < other.reach) else None
 
 
-def width_of(code: int) -> float:
-    """A bound of the angle between the ends of a sector."""
-    return 2.0 * np.pi / (1 << level_of(code - SECTORS)) * 1.3
+def distinct_roots(
+    found: Sequence[tuple[tuple[int, ...], SpaceRoot]],
+) -> tuple[list[tuple[tuple[int, ...], SpaceRoot]], list[tuple[int, ...]]]:
+    """Roots of leaves without those that two leaves share, and the leaves whose roots could not be told apart."""
+    distinct: list[tuple[tuple[int, ...], SpaceRoot]] = []
+    doubtful = []
+    for codes, root in found:
+        pattern = [min(code, SECTORS) for code in codes]
+        alike = [other for known, other in distinct if [min(code, SECTORS) for code in known] == pattern]
+        answers = [same_root(root, other) for other in alike]
+        if True in answers:
+            continue
+        if None in answers:
+            doubtful.append(codes)
+        distinct.append((codes, root))
+    return distinct, doubtful

@@ -155,7 +155,7 @@ class SpaceRelaxation:
         outside = np.flatnonzero(np.all(system.tau >= 0, axis=1) & (size > y[:p] * (1.0 + _OUTSIDE) + 1e-9))
         rows = []
         for node in outside:
-            slot = self._engine.slot((TANGENT, int(node), nearest(*tau[node], _FINE)))
+            slot = self._engine.slot((TANGENT, int(node), nearest(float(tau[node, 0]), float(tau[node, 1]), _FINE)))
             if slot is not None and not self._state.mode_of(slot * p + int(node)):
                 rows.append(slot * p + int(node))
         return rows

@@ -17,6 +17,7 @@ from enumsol.checks import (
     optional_seconds,
     share,
 )
+from enumsol.contact_body import ContactBody
 from enumsol.errors import Interrupted, InvalidArgumentError, OutputError, WorkerError
 from enumsol.executors import WorkerLost
 from enumsol.problem import ContactProblem
@@ -40,7 +41,10 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from pathlib import Path
 
+    from typing_extensions import TypeIs
+
     from enumsol.checks import AlphaLike
+    from enumsol.problem3d import ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
     from enumsol.selections.solution import ActiveSets, PointValues, SelectionSolver
 
@@ -50,7 +54,7 @@ _REPORT_SECONDS = 0.1
 
 
 def enumerate_roots(
-    problem: ContactProblem,
+    problem: ContactProblem | ContactProblem3D,
     alpha: AlphaLike,
     arithmetic: Arithmetic = "verified",
     method: Method = "tree",
@@ -68,7 +72,8 @@ def enumerate_roots(
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
+        In 3D: arithmetic "verified" or "fast", method "tree", and coefficients that do not depend on the solution.
     alpha : float, Fraction, any other real number, or str
         The parameter, read as the exact number that it is; a text is a fraction such as "8/3" or a decimal number,
         which is read as float64.
@@ -125,7 +130,8 @@ def enumerate_roots(
     index sum: +1
     complete: yes (proven)
     """
-    instance_of(problem, ContactProblem, "problem")
+    if not _is_in_space(problem):
+        instance_of(problem, ContactProblem, "problem")
     value = alpha_value(alpha)
     one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     one_of(method, "method", ("tree", "exhaustive"))
@@ -134,9 +140,29 @@ def enumerate_roots(
     optional_callable(progress, "progress")
     counts = optional_count(stop_after, "stop_after"), optional_count(max_nodes, "max_nodes")
     seconds, tolerance = optional_seconds(time_limit), share(tolerance)
+    if _is_in_space(problem):
+        from enumsol.roots.space import check_supported, enumerate_in_space  # not for problems in 2D
+
+        check_supported(arithmetic, method, executor, engine)
+        _check_proof(arithmetic, method, proof_path)
+        return enumerate_in_space(
+            problem,
+            value,
+            arithmetic,
+            stop_after=counts[0],
+            max_nodes=counts[1],
+            time_limit=seconds,
+            progress=progress,
+            proof_path=proof_path,
+        )
     _check_proof(arithmetic, method, proof_path)
     solvers = Solvers(problem, value, arithmetic, tolerance)
     return _Enumeration(solvers, method, progress, engine, proof_path).run(executor, *counts, seconds)
+
+
+def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
+    """Whether it is a problem in 3D, whose class is not loaded for others."""
+    return isinstance(problem, ContactBody) and not isinstance(problem, ContactProblem)
 
 
 class _Enumeration:

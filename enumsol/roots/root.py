@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -180,17 +180,8 @@ class Root(ContactState):
     def __repr__(self) -> str:
         index = "?" if self.index is None else f"{self.index:+d}"
         regular = "regular" if self.regular else "not regular"
-        labels = self._condensed.problem.node_ids
-        shown = min(len(labels), _PRINTED_NODES)
-        width = max(4, *(len(str(label)) for label in labels[:shown]))
-        lines = [
-            f"Root at alpha = {float(self.alpha):g}: index {index}, {regular}, margin {self.margin:.2e}",
-            node_heading(width),
-            *(node_line(self, i, labels[i], width) for i in range(shown)),
-        ]
-        if shown < len(labels):
-            lines.append(f"... {len(labels) - shown} more nodes; all of them: {summary(self.statuses)}")
-        return "\n".join(lines)
+        heading = f"Root at alpha = {float(self.alpha):g}: index {index}, {regular}, margin {self.margin:.2e}"
+        return "\n".join([heading, *node_table(self, self._condensed.problem.node_ids)])
 
 
 @dataclass(frozen=True)
@@ -256,14 +247,29 @@ class RootFamily:
         return sealed(np.unique(np.concatenate([part.vertices for part in self.polytopes]), axis=0))
 
 
-def node_heading(width: int) -> str:
+def node_table(state: ContactState, labels: tuple[Any, ...]) -> list[str]:
+    """Lines of a table over the contact nodes; of many the first."""
+    shown = min(len(labels), _PRINTED_NODES)
+    width = max(4, *(len(str(label)) for label in labels[:shown]))
+    lines = [
+        node_heading(width, 1 if state.lambda_t.ndim == 1 else 2),
+        *(node_line(state, i, labels[i], width) for i in range(shown)),
+    ]
+    if shown < len(labels):
+        lines.append(f"... {len(labels) - shown} more nodes; all of them: {summary(state.statuses)}")
+    return lines
+
+
+def node_heading(width: int, tangents: int = 1) -> str:
     """The heading of lines over contact nodes, whose labels take that width."""
-    return f"{'node':>{width}} {'status':<7} {'lambda_n':>12} {'lambda_t':>12} {'u_n':>12} {'u_t':>12}"
+    across = [[name] if tangents == 1 else [f"{name}1", f"{name}2"] for name in ("lambda_t", "u_t")]
+    names = ["lambda_n", *across[0], "u_n", *across[1]]
+    return f"{'node':>{width}} {'status':<7} " + " ".join(f"{name:>12}" for name in names)
 
 
 def node_line(state: ContactState, i: int, label: object, width: int) -> str:
     """Status, forces and displacements of a contact node, below `node_heading`."""
-    numbers = (state.lambda_n[i], state.lambda_t[i], state.u_n[i], state.u_t[i])
+    numbers = [state.lambda_n[i], *np.ravel(state.lambda_t[i]), state.u_n[i], *np.ravel(state.u_t[i])]
     # + 0.0 turns a negative zero, which means nothing to a reader, into zero
     text = " ".join(f"{number + 0.0:>12.6g}" for number in numbers)
     return f"{label!s:>{width}} {state.statuses[i].value:<7} {text}"

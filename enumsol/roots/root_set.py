@@ -14,6 +14,7 @@ from enumsol.sealed import Immutable
 
 if TYPE_CHECKING:
     import pandas as pd
+    from numpy.typing import NDArray
 
     from enumsol.checks import Alpha
     from enumsol.proof.proof_file import Proof
@@ -123,7 +124,7 @@ class RootSet(Sequence[Root], Immutable):
         self,
         *,
         alpha: Alpha,
-        roots: Sequence[Root],
+        roots: Sequence[Any],
         families: Sequence[RootFamily],
         undecided: Sequence[Undecided],
         arithmetic: str,
@@ -192,8 +193,9 @@ class RootSet(Sequence[Root], Immutable):
                 "node": list(self.node_ids) * count,
                 "status": [status.value for root in self for status in root.statuses],
                 **{
-                    name: np.concatenate([getattr(root, name) for root in self]) if count else np.zeros(0)
+                    column: values
                     for name in ("lambda_n", "lambda_t", "u_n", "u_t")
+                    for column, values in _columns(name, [getattr(root, name) for root in self])
                 },
                 "index": np.repeat(np.array([root.index for root in self], dtype=object), p),
                 "regular": np.repeat(np.array([root.regular for root in self], dtype=bool), p),
@@ -244,6 +246,12 @@ class RootSet(Sequence[Root], Immutable):
         lines.append(f"index sum: {note}")
         lines.append(self.completeness())
         return "\n".join(lines)
+
+
+def _columns(name: str, arrays: list[NDArray[np.float64]]) -> list[tuple[str, NDArray[np.float64]]]:
+    """A quantity of all roots as columns of a frame: one, or in 3D one an axis."""
+    values = np.concatenate(arrays) if arrays else np.zeros(0)
+    return [(name, values)] if values.ndim == 1 else [(f"{name}{k + 1}", values[:, k]) for k in range(values.shape[1])]
 
 
 def _count(number: int, singular: str, plural: str | None = None) -> str:

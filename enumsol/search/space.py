@@ -71,7 +71,7 @@ class SpaceCertifier:
     """
 
     def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, recorder: Recorder) -> None:
-        self._engine, self._enclosed, self.recorder = engine, enclosed, recorder
+        self._engine, self.enclosed, self.recorder = engine, enclosed, recorder
         self.roots: list[tuple[Codes, SpaceRoot]] = []
         self._leaves = 0
 
@@ -86,7 +86,7 @@ class SpaceCertifier:
             return False
         numbers, values = relaxation.multipliers()
         rows = [self._engine.rows[number] for number in numbers.tolist()]
-        if not exclusion_margin(self._enclosed, codes, rows, values, errors=2.0) > 0:
+        if not exclusion_margin(self.enclosed, codes, rows, values, errors=2.0) > 0:
             return False
         self._leaf("x", [list(row) for row in rows], base64.b64encode(values.astype("<f8").tobytes()).decode())
         return True
@@ -102,7 +102,7 @@ class SpaceCertifier:
 
     def selection(self, codes: Codes) -> SpaceRoot | UndecidedPart | Refine | None:
         """The root of a leaf, a sector to halve, or why the leaf stays open."""
-        answer = settle(self._enclosed, codes)
+        answer = settle(self.enclosed, codes)
         if answer is None:
             self._leaf("n")
         elif isinstance(answer, Open):

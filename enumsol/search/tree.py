@@ -14,8 +14,9 @@ from __future__ import annotations
 import time
 import warnings
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from enumsol.condensation.condensed import ScaledSystem
 from enumsol.errors import MissingDependencyError
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
@@ -29,7 +30,7 @@ from enumsol.statuses import CONTACT, UNDECIDED
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.condensation.space import SpaceSystem
     from enumsol.search.certifiers.protocol import Certifier
 
 #: Progress is reported and limits on time are looked at after this many nodes.
@@ -163,7 +164,7 @@ class TreeSearch:
 
     def __init__(
         self,
-        system: ScaledSystem,
+        system: ScaledSystem | SpaceSystem,
         certifier: Certifier,
         *,
         engine: str | Engine | None = None,
@@ -173,12 +174,14 @@ class TreeSearch:
     ) -> None:
         self.system = system
         self.certifier = certifier
-        self.engine = make_engine(system, engine) if engine is None or isinstance(engine, str) else engine
+        if isinstance(system, ScaledSystem) and (engine is None or isinstance(engine, str)):
+            engine = make_engine(system, engine)
+        self.engine: Any = engine
         self.limits = limits or SearchLimits()
         self.progress = progress
         self.outcome = SearchOutcome()
         self._fallback: InteriorPointEngine | None = None
-        self.splitting = splitting or PlaneSplitting(system.F)
+        self.splitting: Splitting = splitting or PlaneSplitting(system.F)
         self._known_rows: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
         self._covered = 0.0
         self._start = time.perf_counter()
@@ -292,6 +295,8 @@ class TreeSearch:
     def _fall_back(self, codes: Codes) -> Relaxation | None:
         """The relaxation by the slower engine; None when that gives no answer either."""
         self.outcome.fallback_qps += 1
+        if not isinstance(self.system, ScaledSystem):
+            return None  # the node is branched on
         if self._fallback is None:
             self._fallback = InteriorPointEngine(self.system)
         relaxation = self._fallback.root(*self._all_rows(codes))

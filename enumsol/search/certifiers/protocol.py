@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from enumsol.kernel.point import VerifiedSelection
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.selections.solution import Codes, SelectionSolution
+    from enumsol.selections.solution import Codes
 
 
 @dataclass(frozen=True)
@@ -93,8 +93,8 @@ class Certifier(Protocol):
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         """Whether the relaxation's multipliers prove that the partial assignment holds no solution."""
 
-    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
-        """All roots in a complete selection, None when it holds none, or why that is open."""
+    def selection(self, codes: Codes) -> Any:
+        """All roots in a complete selection, None when it holds none, why that is open, or what to split further."""
 
     def branching(self, node: int, children: Sequence[int]) -> None:
         """Take note that a partial assignment is split at ``node`` (called in preorder, for the proof)."""

@@ -1,0 +1,411 @@
+"""All solutions of a problem in 3D at one alpha (theory, section 12)."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.space import EnclosedSpace, SpaceSystem
+from enumsol.errors import Interrupted, InvalidArgumentError, OutputError
+from enumsol.kernel.space import Ball, distinct_roots
+from enumsol.proof.proof_file import ProofWriter
+from enumsol.proof.reading import rational_text
+from enumsol.relaxation.space import SpaceEngine
+from enumsol.roots.root import ContactState, Enclosure, node_table
+from enumsol.roots.root_set import RootSet, SearchStats, Undecided
+from enumsol.sealed import sealed
+from enumsol.search.certifiers.protocol import UndecidedPart, Unrecorded
+from enumsol.search.space import SpaceCertifier, SpaceSplitting
+from enumsol.search.stopping import Stop, StopReason
+from enumsol.search.tree import SearchLimits, SearchOutcome, TreeSearch
+from enumsol.sectors import SECTORS, direction, end_number
+from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from enumsol.checks import Alpha
+    from enumsol.condensation.condensed import CondensedProblem3D
+    from enumsol.kernel.space import SpaceRoot
+    from enumsol.problem3d import ContactProblem3D
+    from enumsol.proof.proof_file import Proof
+    from enumsol.search.tree import SearchProgress
+    from enumsol.selections.solution import Codes
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Root3D(ContactState):
+    """An isolated solution in 3D at one alpha.
+
+    Attributes
+    ----------
+    statuses : tuple of p ContactStatus
+        OPEN, STICK or SLIP. A node in contact whose coefficients are both 0 slips wherever u_t is not 0.
+    lambda_n, u_n : (p,) arrays
+        Normal contact forces [force], and Bn u - gap [length].
+    lambda_t, u_t : (p, 2) arrays
+        Along the local axes [force, length].
+    slip_angle : (p, 2) array
+        Bounds of the angle of F u_t in the local axes, the lower one in [-pi, pi); nan where the node does not slip
+        against friction [radians].
+    index : int or None
+        Local degree: the sign of the Jacobian determinant of the normal map (theory, section 12.4).
+    regular : bool
+        Every condition holds strictly.
+    margin : float
+        The least slack of the conditions, in scaled units [-].
+    enclosure : Enclosure or None
+        Proven bounds, with shapes (p, 2) and, of tangential components, (p, 2, 2): lower and upper ones last.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> root = enumsol.enumerate_roots(enumsol.gallery.one_node_3d(), alpha=0)[0]
+    >>> root.statuses, root.lambda_t.shape
+    ((ContactStatus.SLIP,), (1, 2))
+    """
+
+    slip_angle: Array
+    index: int | None
+    regular: bool
+    margin: float
+    enclosure: Enclosure | None = field(repr=False, compare=False)
+    _condensed: CondensedProblem3D = field(repr=False, compare=False)
+
+    @property
+    def u(self) -> Array:
+        """Displacement of all degrees of freedom, shape (n,) [length]; computed at every access."""
+        forces = np.concatenate([self.lambda_n, self.lambda_t.ravel(order="F")])
+        return self._condensed.displacement(self.alpha, forces)
+
+    def __repr__(self) -> str:
+        index = "?" if self.index is None else f"{self.index:+d}"
+        regular = "regular" if self.regular else "not regular"
+        heading = f"Root at alpha = {float(self.alpha):g}: index {index}, {regular}, margin {self.margin:.2e}"
+        return "\n".join([heading, *node_table(self, self._condensed.problem.node_ids)])
+
+
+def enumerate_in_space(
+    problem: ContactProblem3D,
+    alpha: Alpha,
+    arithmetic: str,
+    *,
+    stop_after: int | None,
+    max_nodes: int | None,
+    time_limit: float | None,
+    progress: Callable[[SearchProgress], object] | None,
+    proof_path: str | Path | None,
+) -> RootSet:
+    """All solutions of a problem in 3D; arguments as of enumerate_roots, which has checked them.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The coefficients depend on the solution, or are negative at alpha.
+    Interrupted, OutputError
+        As enumerate_roots.
+    """
+    problem.friction_at(alpha)  # refuses what cannot be enumerated before anything is computed
+    return _Enumeration(problem, alpha, arithmetic, progress, proof_path).run(stop_after, max_nodes, time_limit)
+
+
+class _Enumeration:
+    """One call of enumerate_in_space."""
+
+    def __init__(
+        self,
+        problem: ContactProblem3D,
+        alpha: Alpha,
+        arithmetic: str,
+        progress: Callable[[SearchProgress], object] | None,
+        proof_path: str | Path | None,
+    ) -> None:
+        self.problem, self.alpha, self.arithmetic, self.progress = problem, alpha, arithmetic, progress
+        self.started = time.perf_counter()
+        condensed = problem.condensed
+        self.system = SpaceSystem.scaled(condensed.S, condensed.free_displacements(alpha), problem.friction_at(alpha))
+        self.outcome = SearchOutcome()
+        self.certifier: SpaceCertifier | None = None
+        self.at_rest = problem.is_unloaded(alpha)
+        self.proof_path = proof_path
+        self.writer: ProofWriter | None = None
+
+    def run(self, stop_after: int | None, max_nodes: int | None, time_limit: float | None) -> RootSet:
+        """Search, then build the result; an interruption keeps what was found."""
+        limits = SearchLimits(self._enough(stop_after), max_nodes, SearchLimits.deadline_in(time_limit))
+        try:
+            self._search(limits)
+        except KeyboardInterrupt as interruption:
+            self.outcome.stopped = Stop(StopReason.INTERRUPTED, self.outcome.nodes)
+            partial = self._result()
+            message = f"enumerate_roots was interrupted; {len(partial)} roots so far"
+            raise Interrupted(message, partial) from interruption
+        result = self._result()
+        if self.writer is not None and self.writer.failure is not None:
+            raise OutputError(self.writer.failure, result)
+        return result
+
+    def _search(self, limits: SearchLimits) -> None:
+        enclosed = EnclosedSpace.of_floats(self.system)
+        if self.arithmetic == "verified":
+            self.writer = ProofWriter(self.proof_path)
+            self.writer.write(self._header())
+        engine = SpaceEngine(self.system)
+        recorder = Unrecorded() if self.writer is None else self.writer
+        self.certifier = SpaceCertifier(engine, enclosed, recorder)
+        if self.at_rest:
+            self.certifier.unloaded()
+            return
+        search = TreeSearch(
+            self.system,
+            self.certifier,
+            engine=engine,
+            splitting=SpaceSplitting(engine),
+            limits=limits,
+            progress=self.progress,
+        )
+        self.outcome = search.outcome
+        if self.arithmetic == "verified":
+            try:
+                enclosed = EnclosedSpace.of_problem(
+                    self.problem.enclosure, self.problem, Fraction(self.alpha), self.system.force, self.system.length
+                )
+                _ = enclosed.smallest_eigenvalue  # proven positive, or refused
+                self.certifier.enclosed = enclosed
+            except NotEnclosedError as error:
+                codes = search.first().codes
+                self.certifier.skipped(codes, str(error))
+                self.outcome.undecided.append(
+                    UndecidedPart(codes, str(error), "hold the body better, or scale the data")
+                )
+                return
+        search.run()
+
+    def _header(self) -> dict[str, Any]:
+        return {
+            "format": "enumsol-proof",
+            "version": 1,
+            "kind": "space",
+            "problem": self.problem.fingerprint,
+            "alpha": rational_text(Fraction(self.alpha), "alpha"),
+            "p": self.problem.p,
+            "data": "problem",
+            "force": (np.frexp(self.system.force)[1] - 1).tolist(),
+            "length": (np.frexp(self.system.length)[1] - 1).tolist(),
+        }
+
+    def _found(self) -> list[tuple[Codes, SpaceRoot]]:
+        return [] if self.certifier is None else self.certifier.roots
+
+    def _enough(self, stop_after: int | None) -> Callable[[list[Any]], bool] | None:
+        if stop_after is None:
+            return None
+        return lambda solutions: len(solutions) >= stop_after and len(distinct_roots(self._found())[0]) >= stop_after
+
+    def _result(self) -> RootSet:
+        outcome = self.outcome
+        distinct, doubtful = distinct_roots(self._found())
+        roots = [self._root(codes, root) for codes, root in distinct]
+        if self.at_rest:
+            roots = [self._rest()]
+        roots.sort(key=lambda root: (-float(np.sum(root.lambda_n)), root.lambda_n.tolist(), root.lambda_t.tolist()))
+        undecided = [self._named(part) for part in outcome.undecided]
+        undecided += [Undecided(self._names(codes), _DOUBTFUL, "perturb the load") for codes in doubtful]
+        whole = outcome.stopped is None and not undecided
+        return RootSet(
+            alpha=self.alpha,
+            roots=roots,
+            families=(),
+            undecided=undecided,
+            arithmetic=self.arithmetic,
+            method="tree",
+            stopped=None if outcome.stopped is None else str(outcome.stopped),
+            stats=SearchStats(
+                nodes=outcome.nodes,
+                pruned=outcome.pruned,
+                selections=outcome.selections,
+                qps=outcome.qps,
+                fallback_qps=outcome.fallback_qps,
+                seconds=time.perf_counter() - self.started,
+            ),
+            node_ids=self.problem.node_ids,
+            at_least=None if whole else max(len(roots) - len(doubtful), min(len(roots), 1)),
+            proof=self._proof(len(roots)),
+        )
+
+    def _proof(self, roots: int) -> Proof | None:
+        if self.writer is None or self.certifier is None:
+            return None
+        whole = self.outcome.stopped is None or not self.outcome.stopped.interrupted
+        if whole:
+            leaves = self.certifier.certified.leaves
+            self.writer.write({"roots": roots, "undecided": len(self.outcome.undecided), "leaves": leaves})
+        proof = self.writer.close()
+        return proof if whole and self.writer.failure is None else None
+
+    # -- in the user's terms ---------------------------------------------------------------------------------------
+
+    def _root(self, codes: Codes, found: SpaceRoot) -> Root3D:
+        system, p = self.system, self.system.p
+        forces, F = found.y.mid, system.F
+        lambda_n = forces[:p] * system.force
+        lambda_t = system.tangential(forces) * F * system.force[:, None]
+        u_n, u_t = self._displacements(lambda_n, lambda_t)
+        closed = np.array([code != OPEN for code in codes])
+        u_n = np.where(closed, 0.0, np.minimum(u_n, 0.0))
+        u_t = np.where((np.array(codes) == STICK)[:, None] & (F > 0), 0.0, u_t)
+        enclosure = None
+        if self.arithmetic == "verified":
+            enclosure = self._enclosure(codes, found)
+        return Root3D(
+            alpha=self.alpha,
+            statuses=tuple(_status(code, u_t[i]) for i, code in enumerate(codes)),
+            active=tuple(frozenset((_status(code, u_t[i]),)) for i, code in enumerate(codes)),
+            lambda_n=lambda_n,
+            lambda_t=lambda_t,
+            u_n=u_n,
+            u_t=u_t,
+            slip_angle=self._angles(codes, found),
+            index=found.index,
+            regular=True,
+            margin=found.slack,
+            enclosure=enclosure,
+            _condensed=self.problem.condensed,
+        )
+
+    def _displacements(self, lambda_n: Array, lambda_t: Array) -> tuple[Array, Array]:
+        condensed, p = self.problem.condensed, self.problem.p
+        w = condensed.free_displacements(self.alpha)
+        w = w - condensed.S @ np.concatenate([lambda_n, lambda_t.ravel(order="F")])
+        return w[:p], w[p:].reshape(2, p).T
+
+    def _angles(self, codes: Codes, found: SpaceRoot) -> Array:
+        """Bounds of the directions of v."""
+        angles = np.full((len(codes), 2), np.nan)
+        turning = [i for i, code in enumerate(codes) if code > SECTORS]
+        for k, i in enumerate(turning):
+            middle = float(np.arctan2(found.centre[k, 1], found.centre[k, 0])) + found.angle[k]
+            angles[i] = _around(middle, float(found.angle_rad[k]) * SAFE + 1e-14)
+        for i, code in enumerate(codes):
+            if code in (2, 3):
+                axis = int(np.argmax(self.system.tau[i]))
+                angles[i] = _around((0.0 if code == 2 else np.pi) + (0.0 if axis == 0 else 0.5 * np.pi), 1e-15)
+        return angles
+
+    def _enclosure(self, codes: Codes, found: SpaceRoot) -> Enclosure:
+        """Bounds of forces and displacements in the problem's units."""
+        problem, system, p = self.problem, self.system, self.problem.p
+        exact = self.certifier.enclosed if self.certifier is not None else None
+        assert exact is not None
+        one = np.tile(1.0, 3 * p)
+        S, S_rad, g, g_rad = problem.enclosure.in_units(Fraction(self.alpha), one, one)
+        forces = Ball(np.zeros(3 * p), np.zeros(3 * p))
+        forces.mid[:p], forces.rad[:p] = found.y.mid[:p] * system.force, found.y.rad[:p] * system.force
+        for k in range(2):
+            occurs = system.tau[:, k] >= 0
+            t = system.tau[occurs, k]
+            part = Ball(found.y.mid[t], found.y.rad[t]) * Ball(exact.F[occurs, k], exact.F_rad[occurs, k])
+            place = (1 + k) * p + np.flatnonzero(occurs)
+            forces.mid[place], forces.rad[place] = part.mid * system.force[occurs], part.rad * system.force[occurs]
+        w = Ball(g, g_rad) - (Ball(S, S_rad) @ Ball(forces.mid[:, None], forces.rad[:, None]))[:, 0]
+        for i, code in enumerate(codes):
+            if code != OPEN:
+                w.mid[i] = w.rad[i] = 0.0
+            for k in range(2):
+                if code == STICK and system.tau[i, k] >= 0:
+                    w.mid[(1 + k) * p + i] = w.rad[(1 + k) * p + i] = 0.0
+        bounds = [np.stack([b.mid - b.rad * SAFE, b.mid + b.rad * SAFE], axis=-1) for b in (forces, w)]
+        low_high = [(b[:p], np.stack([b[p : 2 * p], b[2 * p :]], axis=1)) for b in bounds]
+        return Enclosure(*low_high[0], *low_high[1])
+
+    def _rest(self) -> Root3D:
+        """The unloaded body: nothing moves, and every status holds."""
+        p = self.problem.p
+        zero, plane = np.zeros(p), np.zeros((p, 2))
+        every = frozenset((ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP))
+        enclosure = None
+        if self.arithmetic == "verified":
+            enclosure = Enclosure(*(np.zeros(shape) for shape in ((p, 2), (p, 2, 2)) * 2))
+        return Root3D(
+            alpha=self.alpha,
+            statuses=(ContactStatus.OPEN,) * p,
+            active=(every,) * p,
+            lambda_n=zero,
+            lambda_t=plane,
+            u_n=zero,
+            u_t=plane,
+            slip_angle=np.full((p, 2), np.nan),
+            index=1,
+            regular=False,
+            margin=0.0,
+            enclosure=enclosure,
+            _condensed=self.problem.condensed,
+        )
+
+    def _names(self, codes: Codes) -> tuple[ContactStatus | str | None, ...]:
+        special: dict[int, ContactStatus | str | None] = {UNDECIDED: None, CONTACT: "contact", FRICTIONLESS: "contact"}
+        special |= {OPEN: ContactStatus.OPEN, STICK: ContactStatus.STICK}
+        return tuple(special.get(code, ContactStatus.SLIP) for code in codes)
+
+    def _named(self, part: UndecidedPart) -> Undecided:
+        """An undecided leaf, with the directions that it leaves open."""
+        boxes: list[str] = []
+        for label, code in zip(self.problem.node_ids, part.codes, strict=True):
+            if code > SECTORS and len(boxes) < _SHOWN_BOXES:
+                ends = (direction(n) for n in (code - SECTORS, end_number(code - SECTORS)))
+                low, high = (np.degrees(np.arctan2(y, x)) for x, y in ends)
+                boxes.append(f"{low:.6g} to {high:.6g} degrees at node {label}")
+        where = f" (slip directions {', '.join(boxes)})" if boxes else ""
+        return Undecided(self._names(part.codes), part.reason + where, part.hint)
+
+
+_DOUBTFUL = "two leaves hold roots that could not be told apart"
+#: Boxes of directions that the reason of an undecided leaf names.
+_SHOWN_BOXES = 3
+
+
+def _status(code: int, u_t: Array) -> ContactStatus:
+    if code == OPEN:
+        return ContactStatus.OPEN
+    if code == STICK or (code == FRICTIONLESS and not np.any(u_t)):
+        return ContactStatus.STICK
+    return ContactStatus.SLIP
+
+
+def _around(middle: float, radius: float) -> Array:
+    """Bounds of an angle, the lower one in [-pi, pi)."""
+    low = middle - radius
+    turns = np.floor((low + np.pi) / (2.0 * np.pi))
+    return sealed(np.array([low, middle + radius]) - 2.0 * np.pi * turns)
+
+
+def check_supported(arithmetic: str, method: str, executor: object, engine: str | None) -> None:
+    """Refuse what is not offered in 3D.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The first such argument is named.
+    """
+    for wrong, sentence in (
+        (
+            arithmetic == "exact",
+            'arithmetic is "exact", which problems in 3D do not have; expected "verified" or "fast"',
+        ),
+        (method != "tree", 'method is "exhaustive", which problems in 3D do not have; expected "tree"'),
+        (executor is not None, "executor is given, which problems in 3D do not take yet; expected None"),
+        (engine == "clarabel", 'engine is "clarabel", which problems in 3D do not take; expected None'),
+    ):
+        if wrong:
+            raise InvalidArgumentError(sentence)
