@@ -189,6 +189,12 @@ class Ball:
         return np.asarray((np.abs(self.mid) + self.rad) * SAFE)
 
 
+def _smaller(one: Ball, other: Ball) -> Ball:
+    """Entry by entry the ball with the smaller radius, of two that hold the same values."""
+    first = one.rad <= other.rad
+    return Ball(np.where(first, one.mid, other.mid), np.where(first, one.rad, other.rad))
+
+
 def _solution(M: Ball, B: Ball) -> Ball | None:
     """All X with M X = B, columns of unknowns; None where M is not proven regular."""
     n = len(M.mid)
@@ -445,15 +451,26 @@ class _Leaf:
         w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
         if not q:
             return y, w, Ball.exact(np.zeros(0)), Ball.exact(np.zeros((0, 0)))
-        force = x[self.column]
-        push = force * turned
-        dE = Ball(np.zeros((m, q)), np.zeros((m, q)))
-        for k in range(q):
-            dE.mid[self.t[k], k], dE.rad[self.t[k], k] = push.mid[k], push.rad[k]
-        z = _solution(PS @ E, PS @ dE)
-        if z is None:
-            return None
-        dv = self.S @ (E @ z - dE)
+        point = None
+        if np.any(radius):
+            point = self._state(angle, np.zeros(q))
+            if point is None:
+                return None
+        span = Ball(np.zeros((q, 1)), radius[:, None])
+        for _ in range(1 if point is None else 2):
+            pushed = self._pushed(x[self.column] * turned, m)
+            z = _solution(PS @ E, PS @ pushed)
+            if z is None:
+                return None
+            if point is not None:
+                # the mean value form: what the box adds to the values in its middle, dx = -z dpsi
+                x = _smaller(x, point[0][self.rows][:, None] - z @ span)
+        dy = pushed - E @ z
+        change = self.S @ dy
+        dv = Ball(-change.mid, change.rad)
+        if point is not None:
+            y = _smaller(_smaller(y, (E @ x)[:, 0]), point[0] + (dy @ span)[:, 0])
+            w = _smaller(w, point[1] + (dv @ span)[:, 0])
         t1, t2 = self.t[:, 0], self.t[:, 1]
         d1, d2 = d[:, 0], d[:, 1]
         G = w[t1] * d2 - w[t2] * d1
@@ -463,6 +480,14 @@ class _Leaf:
         corrected = J[diagonal, diagonal] + along
         J.mid[diagonal, diagonal], J.rad[diagonal, diagonal] = corrected.mid, corrected.rad
         return y, w, G, J
+
+    def _pushed(self, push: Ball, size: int) -> Ball:
+        """dE/dpsi x: what turning the directions alone does to y."""
+        q = len(self.turning)
+        pushed = Ball(np.zeros((size, q)), np.zeros((size, q)))
+        for k in range(q):
+            pushed.mid[self.t[k], k], pushed.rad[self.t[k], k] = push.mid[k], push.rad[k]
+        return pushed
 
     def _conditions(self, y: Ball, w: Ball, angle: Array, radius: Array) -> tuple[Array, Array]:
         """Conditions that a root has to satisfy, as midpoints and radii; stick by |tau| in both."""
