@@ -92,7 +92,9 @@ class ContactProblem3D(ContactBody):
       gap                 0
     """
 
-    taken_by: ClassVar[str] = " (problems in 3D are taken by enumerate_roots, successive_approximations and solve_tresca so far)"
+    taken_by: ClassVar[str] = (
+        " (problems in 3D are taken by enumerate_roots, successive_approximations and solve_tresca so far)"
+    )
 
     def __init__(
         self,

@@ -14,15 +14,16 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.verify import Checker, verify
+from enumsol.checks import instance_of
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.kernel.point import exclusion_margins, solve_selection
+from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
 
 #: Largest radius that is tried; below 1 a positive friction coefficient stays positive.
@@ -65,7 +66,10 @@ def stability_radius(problem: ContactProblem, proof: Proof) -> float:
     ------
     ProofFormatError
         The file is damaged or of another version.
+    InvalidArgumentError
+        The problem is no ContactProblem.
     """
+    instance_of(problem, ContactProblem, "problem")
     if not verify(problem, proof).complete:
         return 0.0
     search = _WidenedChecker(problem, None, radius=LARGEST, adjust=True)

@@ -78,6 +78,9 @@ def places(occurs: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp
     return tau, np.concatenate([np.arange(p), (1 + axis) * p + node]), node, axis
 
 
+_OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"
+
+
 @dataclass(frozen=True)
 class EnclosedSpace(EnclosedSystem):
     """A SpaceSystem as balls: S, g and F for the data as given.
@@ -108,7 +111,10 @@ class EnclosedSpace(EnclosedSystem):
         problem = enclosure.problem
         p = problem.p
         exact = [exactly_at(alpha, *pair) for pair in zip(problem.friction, problem.friction_slope, strict=True)]
-        F = np.array([[float(x) for x in column] for column in exact]).T
+        try:
+            F = np.array([[float(x) for x in column] for column in exact]).T
+        except OverflowError:
+            raise NotEnclosedError(_OVERFLOW) from None
         inexact = np.array(
             [[Fraction(y) != x for x, y in zip(*both, strict=True)] for both in zip(exact, F.T, strict=True)]
         )
@@ -121,7 +127,7 @@ class EnclosedSpace(EnclosedSystem):
         rad = np.concatenate([np.zeros(p), F_rad[node, axis]])
         with np.errstate(over="ignore", invalid="ignore"):
             pair = np.outer(weight, weight)
-            pair_rad = np.outer(weight + rad, weight + rad) * SAFE - pair + 4 * UNIT * pair
+            pair_rad = (np.outer(weight + rad, rad) + np.outer(rad, weight)) * SAFE + 4 * UNIT * pair
             S, S_rad = S[np.ix_(rows, rows)], S_rad[np.ix_(rows, rows)]
             scaled, scaled_rad = S * pair, np.abs(S) * pair_rad + S_rad * (pair + pair_rad)
             scaled_rad = (scaled_rad + 4 * UNIT * np.abs(scaled)) * SAFE + TINY
@@ -129,5 +135,5 @@ class EnclosedSpace(EnclosedSystem):
             load_rad = weight * g_rad[rows] + rad * (np.abs(g[rows]) + g_rad[rows]) + 4 * UNIT * np.abs(load)
             load_rad = load_rad * SAFE + TINY
         if not all(np.all(np.isfinite(array)) for array in (scaled, scaled_rad, load, load_rad)):
-            raise NotEnclosedError("the condensed problem over- or underflows float64; expected data in other units")
+            raise NotEnclosedError(_OVERFLOW)
         return cls(scaled, scaled_rad, load, load_rad, F, F_rad, tau)

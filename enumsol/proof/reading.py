@@ -101,13 +101,14 @@ def rational_from(text: Any) -> Fraction:
 
 def units_from(header: dict[str, Any], p: int) -> tuple[Array, Array]:
     """Units of forces and displacements, (2p,) powers of two, whose binary exponents a record gives."""
-    force, length = (_exponents(header.get(key), 2 * p) for key in ("force", "length"))
+    force, length = (exponents_from(header.get(key), 2 * p) for key in ("force", "length"))
     if len({a + b for a, b in zip(force, length, strict=True)}) != 1 or force[:p] != force[p:]:
         raise ValueError("the units are no common scaling of energy and of the two directions of a node")
     return np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))
 
 
-def _exponents(value: Any, size: int) -> list[int]:
+def exponents_from(value: Any, size: int) -> list[int]:
+    """``size`` binary exponents of units."""
     if not (
         isinstance(value, list)
         and len(value) == size
