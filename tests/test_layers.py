@@ -16,7 +16,7 @@ import enumsol
 LAYERS = (
     ("errors", "sealed", "compiled", "executors", "_version", "arithmetic"),
     ("checks", "figures", "files"),
-    ("array_checks", "statuses"),
+    ("array_checks", "statuses", "sectors"),
     ("condensation",),
     ("contact_body",),
     ("friction",),

@@ -34,6 +34,8 @@ Row = tuple[int, int, int]
 _WIDENED = 0.125
 #: Contractions of a box before the leaf is given up.
 _CONTRACTIONS = 10
+#: Contractions of a box that holds exactly one zero, down to rounding.
+_REFINEMENTS = 60
 _LARGEST_CONTRACTION = 0.95
 _POWER_STEPS = 6
 
@@ -346,7 +348,7 @@ class _Leaf:
 
     def _refined(self, angle: Array, radius: Array, reach: Array, J: Ball, open_leaf: Open) -> SpaceRoot | Open | None:
         """The one zero of a box, enclosed as closely as floats can."""
-        for _ in range(_CONTRACTIONS):
+        for _ in range(_REFINEMENTS):
             if np.all(self._outside(angle, radius)):
                 return None
             state, point = self._state(angle, radius), self._state(angle, np.zeros(len(angle)))
@@ -363,7 +365,7 @@ class _Leaf:
                 return None
             new = 0.5 * (low + high)
             new_radius = np.maximum(high - new, new - low) * SAFE + 4 * UNIT * reach
-            done = np.all(new_radius > 0.5 * radius)
+            done = np.all(new_radius > 0.9 * radius)
             angle, radius = new, np.minimum(new_radius, radius + np.abs(new - angle))
             if done:
                 break

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 _FINE, _COARSE = 10, 3
 #: Rounds of tangents, and how far outside the disc the minimiser must lie.
 _ROUNDS, _OUTSIDE = 4, 1e-3
+#: Violations of maximum dissipation below this do not tell which sector to halve.
+_DISSIPATION = 1e-7
 #: Rows of a program, and entries of a row.
 _ROWS, _ENTRIES = 24576, 3
 
@@ -185,6 +187,15 @@ class SpaceRelaxation:
         score = np.where((array == CONTACT) | (array == UNDECIDED), score, -np.inf)
         best = int(np.argmax(score))
         return best if score[best] > -np.inf else -1
+
+    def sector_to_halve(self, codes: Codes) -> int:
+        """The node in a sector at which maximum dissipation is violated most; -1 where it is nowhere."""
+        system, y = self._engine.system, self.forces
+        tau, v = system.tangential(y), system.tangential(self.displacements)
+        slip = y[: system.p] * np.linalg.norm(v, axis=1) - np.sum(tau * v, axis=1)
+        slip[np.array(codes) <= SECTORS] = 0.0
+        best = int(np.argmax(slip))
+        return best if slip[best] > _DISSIPATION else -1
 
     def forced(self, codes: Codes) -> tuple[int, ...]:
         """No node is forced here."""
