@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from enumsol import search as search
     from enumsol import selections as selections
     from enumsol import statuses as statuses
+    from enumsol.body3d import BodyMesh, SlipMean
     from enumsol.branches import BranchGraph, branch_graph, link_samples, multiplicity_table
     from enumsol.checker.reports import VerificationReport
     from enumsol.checker.verify import verify
@@ -66,7 +67,7 @@ if TYPE_CHECKING:
     from enumsol.io import read_problem, write_problem
     from enumsol.io.vtu import write_vtu
     from enumsol.problem import ContactProblem
-    from enumsol.problem3d import BodyMesh, ContactProblem3D, SlipMean
+    from enumsol.problem3d import ContactProblem3D
     from enumsol.proof.proof_file import Proof, ProofFormatError
     from enumsol.roots.enumerate import enumerate_roots
     from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
@@ -79,6 +80,7 @@ if TYPE_CHECKING:
 #: Where the public names are at home. A module is loaded when a name of it is first used, so that a program loads what
 #: it works with and no more: sparse matrices come with a problem, networkx and rational arithmetic with a branch graph.
 _HOMES = {
+    "enumsol.body3d": ("BodyMesh", "SlipMean"),
     "enumsol.branches": ("BranchGraph", "branch_graph", "link_samples", "multiplicity_table"),
     "enumsol.checker.verify": ("verify",),
     "enumsol.proof.proof_file": ("Proof", "ProofFormatError"),
@@ -121,7 +123,7 @@ _HOMES = {
     ),
     "enumsol.friction": ("FrictionTable",),
     "enumsol.problem": ("ContactProblem",),
-    "enumsol.problem3d": ("BodyMesh", "ContactProblem3D", "SlipMean"),
+    "enumsol.problem3d": ("ContactProblem3D",),
     "enumsol.roots.root": ("Enclosure", "Polytope", "Root", "RootFamily"),
     "enumsol.roots.root_set": ("RootSet", "SearchStats", "Undecided"),
     "enumsol.equation": ("PiecewiseSmoothEquation",),
@@ -213,7 +215,7 @@ __all__ = [
 ]
 
 
-if not TYPE_CHECKING:  # or a type checker would take any name for one of ours
+if not TYPE_CHECKING:  # with it a type checker would accept any name
 
     def __getattr__(name: str) -> object:
         if name in _MODULES:

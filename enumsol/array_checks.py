@@ -55,7 +55,8 @@ def real_array(
         It is no array of real numbers, float64 cannot hold one of them, or one is not finite.
     """
     raw = plain_array(value, name, error=error)
-    if not hasattr(value, "dtype") and raw.dtype.kind == "f" and np.any(np.abs(raw) >= _EXACT_INTEGERS):
+    # the float64 keeps NumPy from casting the integer to float16
+    if not hasattr(value, "dtype") and raw.dtype.kind == "f" and np.any(np.abs(raw) >= np.float64(_EXACT_INTEGERS)):
         # numpy has rounded the integers of lists and frames that hold floats as well
         raw = np.asarray(value.astype(object) if hasattr(value, "astype") else value, dtype=object)
     if raw.dtype.kind not in "fiubO":
@@ -69,17 +70,18 @@ def real_array(
         raise _inexact(name, raw[where], where, error)
     if finite and not np.all(np.isfinite(array)):
         where = _index(~np.isfinite(array))
-        raise error(f"{name} has the value {array[where]} at index {where}; expected finite numbers only")
+        at = f" at index {where}" if where else ""
+        raise error(f"{name} has the value {array[where]}{at}; expected finite numbers only")
     return array
 
 
 def plain_array(value: Any, name: str, *, error: type[EnumsolError]) -> NDArray[Any]:
-    """The value as an array of whatever it holds.
+    """The value as an array of its own type.
 
     Raises
     ------
     ``error``
-        It is no array: something else, sparse, with masked values, or of rows that differ in length.
+        It is not an array, or sparse, with masked values, or of rows that differ in length.
     """
     try:
         if sp.issparse(value):
@@ -236,17 +238,6 @@ def _check_sums(
     if np.any(large):
         where = _place(sizes, int(np.argmax(large)))
         raise error(f"{name} has integers at index {where} that add up to 2^53 or more; expected float64 values")
-
-
-def vector_2d(value: Any, name: str) -> NDArray[np.float64]:
-    """Value as a finite array of shape (2,).
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is not two finite real numbers.
-    """
-    return short_vector(value, name, 2)
 
 
 def short_vector(value: Any, name: str, size: int) -> NDArray[np.float64]:

@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 
 #: What a value of alpha is kept as.
 Alpha = float | Fraction
-#: What is taken for alpha.
+#: What is accepted as alpha.
 AlphaLike = float | Fraction | Decimal | str | np.number[Any] | np.ndarray[Any, Any]
-#: Most binary digits of a numerator or denominator: four times those of any float64, so that nothing takes for ever.
+#: Most binary digits of a numerator or denominator: four times those of any float64, which bounds the cost.
 MAX_BITS = 4096
 #: Most characters of a text: enough for every fraction within MAX_BITS.
 MAX_TEXT = 2600
@@ -137,7 +137,7 @@ def _in_range(number: Fraction) -> bool:
 
 
 def exact_number(value: Any) -> float | Fraction | None:
-    """The exact value of a real number of any type; None for what is none.
+    """The exact value of a real number of any type; None for anything else.
 
     A float is given for floats, which may be nan or infinite, and a Fraction for everything else. A Decimal whose
     exact value would take for ever is replaced by a number that is refused for the same reason.
@@ -157,7 +157,7 @@ def exact_number(value: Any) -> float | Fraction | None:
 
 
 def _without_array(value: Any) -> Any:
-    """What an array without dimensions holds; anything else as it is (a masked value too)."""
+    """The content of an array without dimensions; anything else unchanged (a masked value too)."""
     if isinstance(value, np.ndarray) and value.ndim == 0 and not np.ma.is_masked(value):
         return np.asarray(value)[()]
     return value
@@ -340,7 +340,7 @@ def _integer(value: Any) -> int | None:
 
 
 def real_or_nan(value: Any) -> float:
-    """A real number of any type as a float, rounded if need be; nan for what is none."""
+    """A real number of any type as a float, rounded if necessary; nan for anything else."""
     number = exact_number(value)
     try:
         return math.nan if number is None else float(number)
@@ -352,7 +352,7 @@ def real_or_nan(value: Any) -> float:
 
 
 def one_of(value: Any, name: str, known: Collection[str | None]) -> Any:
-    """Value, which is one of the known texts (or None, where that is one of them)."""
+    """Value, if it is one of the known texts (or None, if that is among them)."""
     if not (value is None or isinstance(value, str)) or value not in known:
         raise _refusal(value, name, f"one of {', '.join(map(repr, known))}")
     return value

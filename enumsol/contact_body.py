@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from enumsol.array_checks import real_array, real_matrix
 from enumsol.checks import alpha_value, shown
 from enumsol.condensation.affine import exactly_at
-from enumsol.errors import InvalidProblemError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.sealed import Immutable, SealedMatrix, sealed
 
 if TYPE_CHECKING:
@@ -147,6 +147,22 @@ class ContactBody(Immutable):
         return {key: value for key, value in self.__dict__.items() if key != "factorization"}
 
 
+def friction_values(alpha: Fraction, first: NDArray[np.float64], slope: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coefficients first + alpha slope, rounded once from the exact values: zero and the sign are decided exactly.
+
+    Raises
+    ------
+    InvalidArgumentError
+        One is too large for float64.
+    """
+    try:
+        return np.array([float(x) for x in exactly_at(alpha, first, slope)])
+    except OverflowError:
+        raise InvalidArgumentError(
+            f"friction at alpha = {float(alpha):g} is too large for float64; expected a finite value"
+        ) from None
+
+
 def span(values: NDArray[np.float64]) -> str:
     """The range of some numbers, in words."""
     low, high = float(np.min(values)), float(np.max(values))
@@ -196,9 +212,7 @@ def _check_row_rank(contact: Mapping[str, sp.csr_array]) -> None:
     if np.any(norms == 0):
         row = int(np.argmin(norms))
         raise InvalidProblemError(f"{names[row]} is zero; expected linearly independent rows of {stack}")
-    from scipy.sparse.csgraph import (
-        connected_components,
-    )  # comes with scipy's solvers: not for an import of this module
+    from scipy.sparse.csgraph import connected_components  # with it come scipy's solvers
 
     unit = sp.csr_array(sp.diags_array(1.0 / norms) @ rows)
     gram = sp.csr_array(unit @ unit.T)

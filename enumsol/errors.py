@@ -1,4 +1,4 @@
-"""Errors of enumsol: every one a subclass of EnumsolError with one sentence that says what to fix."""
+"""Errors of enumsol: every one a subclass of EnumsolError with one sentence about what to fix."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class TooLargeError(EnumsolError, ValueError):
 
 
 class IncompleteGraphError(EnumsolError, ValueError):
-    """A branch graph with gaps was asked for what only a graph without gaps can tell.
+    """A branch graph with gaps was asked a question that only a graph without gaps can answer.
 
     Examples
     --------
@@ -67,7 +67,7 @@ class _PartialResultError(EnumsolError):
         self.partial = partial
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (str(self), self.partial)  # a worker process may have to send it back
+        return type(self), (str(self), self.partial)  # a worker process may send it back
 
 
 class Interrupted(_PartialResultError, KeyboardInterrupt):  # noqa: N818 (the name is part of the public interface)

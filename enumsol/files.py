@@ -1,16 +1,18 @@
-"""Files that are written: what the operating system says against it, as errors of ours."""
+"""Files: errors of the operating system as errors of this package, and files of arrays with a report."""
 
 from __future__ import annotations
 
 import errno
+import json
 import os
+import zipfile
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError, OutputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
 #: What the operating system says when a file can be opened and not be written to.
@@ -32,8 +34,55 @@ def writing(place: Path, name: str) -> Iterator[None]:
         yield
     except OSError as error:
         if error.errno in _NO_ROOM:
-            reason = os.strerror(error.errno)  # some libraries put a long story in its place
+            reason = os.strerror(error.errno)  # some libraries replace it by a longer text
             raise OutputError(f"{name} {place} cannot be written ({reason}); expected a place with room") from error
         raise InvalidArgumentError(
             f"{name} {place} cannot be written ({error.strerror or error}); expected a path for a new file"
         ) from error
+
+
+@contextmanager
+def reading(place: Path, content: str, writer: str) -> Iterator[None]:
+    """A block that reads a file of ``content`` that ``writer`` wrote.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file cannot be read, or holds something else.
+    """
+    try:
+        yield
+    except InvalidArgumentError:
+        raise
+    except OSError as error:
+        reason = error.strerror or error
+        raise InvalidArgumentError(f"{place} cannot be read ({reason}); expected a file of {writer}") from error
+    except (LookupError, ValueError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
+        raise InvalidArgumentError(f"{place} does not hold {content} ({error}); expected a file of {writer}") from error
+
+
+def write_arrays(place: Path, version: int, report: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
+    """Write arrays, and a report that JSON can hold, to a .npz file (errors as of ``writing``)."""
+    import numpy as np  # what writes other files does without
+
+    meta = np.array(json.dumps({"format": version, **report}))
+    with writing(place, "path"), place.open("wb") as stream:
+        np.savez_compressed(stream, allow_pickle=False, meta=meta, **arrays)
+
+
+def read_arrays(place: Path, version: int, names: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Report and arrays of a file of ``write_arrays``, within ``reading``.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file has another version.
+    """
+    import numpy as np  # as above
+
+    with np.load(place, allow_pickle=False) as data:
+        report = json.loads(str(data["meta"]))
+        arrays = {name: data[name] for name in names}
+    if report["format"] != version:
+        raise InvalidArgumentError(f"{place} has format {report['format']!r}; this version reads format {version}")
+    return report, arrays

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.array_checks import real_array
+from enumsol.array_checks import plain_array, real_array
 from enumsol.checks import exact_number, shown
 from enumsol.contact_body import span, vector
 from enumsol.errors import FrictionJumpWarning, InvalidProblemError
-from enumsol.sealed import Sealed, sealed
+from enumsol.sealed import Immutable, Sealed, sealed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     Vector = NDArray[np.float64]
 
 _EXPECTED = "expected a number, a pair (F1, F2) of numbers or (p,) arrays, a FrictionTable, or a callable F(node, slip)"
-#: Slips per node at which a function is looked at for jumps; bisections of the largest step; the share of the step
+#: Slips per node at which a function is sampled for jumps; bisections of the largest step; the share of the step
 #: that must be left for it to count as a jump.
 _JUMP_SAMPLES, _JUMP_BISECTIONS, _JUMP_SHARE = 33, 40, 0.5
 
@@ -53,7 +54,7 @@ class ConstantFriction(Sealed):
         return f"F1 in {span(self.values[:, 0])}, F2 in {span(self.values[:, 1])}"
 
 
-class FrictionTable(Sealed):
+class FrictionTable(Immutable):
     """Coefficients as piecewise linear functions of the slip |u_t|, constant beyond the last one.
 
     Parameters
@@ -88,6 +89,7 @@ class FrictionTable(Sealed):
         self.slip = sealed(knots)
         self.F1 = _column(F1, "F1", len(knots))
         self.F2 = self.F1 if F2 is None else _column(F2, "F2", len(knots))
+        self._freeze()
 
     def at(self, slip: Vector) -> NDArray[np.float64]:
         """Coefficients F1, F2 at slips (p,) [length], shape (p, 2) [-]."""
@@ -142,10 +144,11 @@ class FrictionFunction:
 
     def _pair(self, node: int, slip: float) -> tuple[float, float]:
         found = self.function(node, slip)
-        try:
-            values = np.broadcast_to(np.asarray(found, dtype=np.float64), (2,))
-        except (TypeError, ValueError):
-            values = np.full(2, np.nan)
+        values = np.full(2, np.nan)
+        with np.errstate(over="ignore"), suppress(InvalidProblemError, TypeError, ValueError, OverflowError):
+            numbers = plain_array(found, "friction", error=InvalidProblemError)
+            if numbers.dtype.kind in "fiuO":
+                values = np.broadcast_to(numbers.astype(np.float64), (2,))
         if not np.all(np.isfinite(values) & (values >= 0)):
             raise InvalidProblemError(
                 f"friction returns {shown(found)} at contact node {self.labels[node]} for slip {slip:g}; "
@@ -158,12 +161,12 @@ class FrictionFunction:
 
 
 def friction_law(value: Any, p: int, labels: tuple[Any, ...]) -> FrictionLaw:
-    """The coefficients of p contact nodes that a user's argument stands for.
+    """The coefficients of p contact nodes from a number, pair, FrictionTable or callable.
 
     Raises
     ------
     InvalidProblemError
-        It is nothing of what is expected, or has the wrong shape.
+        It is none of these, or has the wrong shape.
     """
     if isinstance(value, FrictionTable):
         value.check_nodes(p)
@@ -216,7 +219,7 @@ def warn_of_jumps(law: FrictionLaw, reach: Vector, labels: tuple[Any, ...]) -> N
             f"friction jumps by {_size(at_high - at_low)[node]:.3g} near slip {high[node]:.6g} at contact node "
             f"{labels[node]}; expected a Lipschitz function of the slip, without which there may be no fixed point",
             FrictionJumpWarning,
-            stacklevel=6,  # from here up to who called successive_approximations
+            stacklevel=6,  # the caller of successive_approximations
         )
 
 

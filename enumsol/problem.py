@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.checks import alpha_value, exact_number, shown
-from enumsol.condensation.affine import exactly_at
-from enumsol.contact_body import ContactBody, span, vector
+from enumsol.contact_body import ContactBody, friction_values, span, vector
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -135,22 +135,12 @@ class ContactProblem(ContactBody):
             alpha is not finite, or a coefficient is negative there (the node and its value are named).
         """
         a = Fraction(alpha_value(alpha))
-        value = float(a)
-        # rounded once from the exact value, so that zero and its sign are decided exactly
-        try:
-            F = np.array([float(x) for x in exactly_at(a, *self.friction)])
-        except OverflowError:
-            F = np.array([np.inf])
+        F = friction_values(a, *self.friction)
         if np.any(F < 0):
             node = int(np.argmin(F))
-            raise InvalidArgumentError(
-                f"friction at alpha = {value:g} is {F[node]:g} at contact node {self.node_ids[node]}; expected F >= 0"
-            )
-        if not np.all(np.isfinite(F)):
-            raise InvalidArgumentError(
-                f"friction at alpha = {value:g} is too large for float64; expected a finite value"
-            )
-        return np.asarray(F)
+            where = f"at alpha = {float(a):g} is {F[node]:g} at contact node {self.node_ids[node]}"
+            raise InvalidArgumentError(f"friction {where}; expected F >= 0")
+        return F
 
     @cached_property
     def fingerprint(self) -> str:
@@ -163,7 +153,7 @@ class ContactProblem(ContactBody):
         path = f"F0 in {span(F0)}, F1 in {span(F1)}"
         load = "constant" if self.load_slope is None else "f + alpha load_slope"
         return (
-            f"ContactProblem with {self.p} contact node{'s' if self.p != 1 else ''}\n"
+            f"ContactProblem with {counted(self.p, 'contact node')}\n"
             f"  degrees of freedom  {self.n}  (A: {self.A.nnz} nonzeros)\n"
             f"  friction            F0 + alpha F1,  {path}\n"
             f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -10,12 +9,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from enumsol.array_checks import real_array
+from enumsol.body3d import BodyMesh, SlipMean
 from enumsol.checks import alpha_value, instance_of
-from enumsol.condensation.affine import exactly_at
-from enumsol.contact_body import ContactBody, span, vector
+from enumsol.contact_body import ContactBody, friction_values, span, vector
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.friction import ConstantFriction, friction_law, friction_pair
-from enumsol.sealed import Sealed, sealed
+from enumsol.sealed import sealed
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,76 +27,6 @@ if TYPE_CHECKING:
     from enumsol.condensation.condensed import CondensedProblem3D
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.friction import FrictionTable
-
-
-@dataclass(frozen=True)
-class BodyMesh(Sealed):
-    """The mesh a problem was made of, for pictures, files and norms.
-
-    Attributes
-    ----------
-    points : (N, 3) array [length]
-    cells : (M, 4) or (M, 8) array of int
-        Tetrahedra, or hexahedra in the order of VTK.
-    dofs : (n,) array of int
-        The degree of freedom ``3 node + component`` that each entry of u is; the others are held at 0.
-    facets : (k, 3) or (k, 4) array of int or None
-        Contact surface, counterclockwise as seen from outside.
-    rows : (k,) array of int or None
-        Where contact rows stand for patches, the row of each facet (-1: held); None where they stand for nodes.
-
-    Examples
-    --------
-    >>> import enumsol
-    >>> mesh = enumsol.gallery.block3d(1, 1, 1).mesh
-    >>> mesh.points.shape, mesh.cells.shape, mesh.dofs.shape
-    ((8, 3), (1, 8), (12,))
-    """
-
-    points: NDArray[np.float64]
-    cells: NDArray[np.int64]
-    dofs: NDArray[np.int64]
-    facets: NDArray[np.int64] | None = None
-    rows: NDArray[np.int64] | None = None
-
-    def displacements(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Displacement of every point, shape (N, 3), for u of shape (n,)."""
-        full = np.zeros(self.points.size)
-        full[self.dofs] = u
-        return full.reshape(-1, 3)
-
-
-@dataclass(frozen=True)
-class SlipMean(Sealed):
-    """The slip that coefficients depend on, as weighted means of |u_t|: the return operator r_h (paper, Section 3).
-
-    The slips are ``weights @ |(T1 u, T2 u) - offset|``.
-
-    Attributes
-    ----------
-    T1, T2 : (q, n) csr_arrays
-        Tangential displacements at q places of the contact surface.
-    offset : (q, 2) array
-        Tangential positions from which slip is counted there [length].
-    weights : (p, q) csr_array
-        Of nonnegative rows that add up to one.
-
-    Examples
-    --------
-    >>> import enumsol
-    >>> problem = enumsol.gallery.block3d(4, 4, 1, multipliers="elements", ratio=2)
-    >>> problem.slip_mean.weights.sum(axis=1)
-    array([1., 1., 1., 1.])
-    """
-
-    T1: sp.csr_array
-    T2: sp.csr_array
-    offset: NDArray[np.float64]
-    weights: sp.csr_array
-
-    def __call__(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Slip of the p contact rows, shape (p,) [length]."""
-        return np.asarray(self.weights @ np.hypot(self.T1 @ u - self.offset[:, 0], self.T2 @ u - self.offset[:, 1]))
 
 
 class ContactProblem3D(ContactBody):
@@ -162,7 +92,9 @@ class ContactProblem3D(ContactBody):
       gap                 0
     """
 
-    taken_by: ClassVar[str] = " (problems in 3D are taken by successive_approximations and solve_tresca so far)"
+    taken_by: ClassVar[str] = (
+        " (problems in 3D are taken by enumerate_roots, successive_approximations and solve_tresca so far)"
+    )
 
     def __init__(
         self,
@@ -191,8 +123,8 @@ class ContactProblem3D(ContactBody):
         self._slope = sealed(friction_pair(friction_slope, "friction_slope", p))
         self.slip_offset = _slip_offset(slip_offset, p)
         self.areas = None if areas is None else _areas(areas, p)
-        self.mesh = None if mesh is None else _mesh(instance_of(mesh, BodyMesh, "mesh"), self.n)
-        self.slip_mean = None if slip_mean is None else _mean(instance_of(slip_mean, SlipMean, "slip_mean"), p, self.n)
+        self.mesh = None if mesh is None else instance_of(mesh, BodyMesh, "mesh").check(self.n, p)
+        self.slip_mean = None if slip_mean is None else instance_of(slip_mean, SlipMean, "slip_mean").check(self.n, p)
         if isinstance(self.law, ConstantFriction) and not np.any(self._slope):
             _check_signs(self.law.values, self.node_ids, "")
         self._freeze()
@@ -250,29 +182,23 @@ class ContactProblem3D(ContactBody):
 
         return CondensedEnclosure.from_problem(self)
 
-    def coefficients(self, alpha: AlphaLike, slip: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coefficients(self, alpha: AlphaLike, slip: ArrayLike) -> NDArray[np.float64]:
         """Coefficients F1, F2 at alpha for slips of shape (p,) [length], shape (p, 2).
 
         Raises
         ------
         InvalidArgumentError
-            alpha is not finite, or a coefficient is negative there (the node and its value are named).
+            alpha is not finite, slip has another shape, or a coefficient is negative there (the node and its value
+            are named).
         InvalidProblemError
             A callable returns something else than finite numbers >= 0.
         """
         exact = Fraction(alpha_value(alpha))
-        value = float(exact)
-        try:
-            # rounded once from the exact values, so that zero and its sign are decided exactly
-            F = np.array([float(x) for x in exactly_at(exact, self.law.at(slip).ravel(), self._slope.ravel())])
-        except OverflowError:
-            F = np.full(2 * self.p, np.inf)
-        F = F.reshape(self.p, 2)
-        if not np.all(np.isfinite(F)):
-            raise InvalidArgumentError(
-                f"friction at alpha = {value:g} is too large for float64; expected a finite value"
-            )
-        _check_signs(F, self.node_ids, f" at alpha = {value:g}", error=InvalidArgumentError)
+        slip = real_array(slip, "slip", error=InvalidArgumentError)
+        if slip.shape != (self.p,):
+            raise InvalidArgumentError(f"slip has shape {slip.shape}; expected (p,) = ({self.p},)")
+        F = friction_values(exact, self.law.at(slip).ravel(), self._slope.ravel()).reshape(self.p, 2)
+        _check_signs(F, self.node_ids, f" at alpha = {float(exact):g}", error=InvalidArgumentError)
         return F
 
     def friction_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
@@ -312,7 +238,7 @@ class ContactProblem3D(ContactBody):
         slope = "" if not np.any(self._slope) else f" + alpha [{span(self._slope[:, 0])}, {span(self._slope[:, 1])}]"
         load = "constant" if self.load_slope is None else "f + alpha load_slope"
         return (
-            f"ContactProblem3D with {self.p} contact node{'s' if self.p != 1 else ''}\n"
+            f"ContactProblem3D with {counted(self.p, 'contact node')}\n"
             f"  degrees of freedom  {self.n}  (A: {self.A.nnz} nonzeros)\n"
             f"  friction            {self.law}{slope}\n"
             f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"
@@ -345,19 +271,3 @@ def _areas(value: ArrayLike, p: int) -> NDArray[np.float64]:
     if np.min(array) <= 0:
         raise InvalidProblemError(f"areas has the value {np.min(array):g}; expected areas > 0")
     return array
-
-
-def _mesh(mesh: BodyMesh, n: int) -> BodyMesh:
-    if len(mesh.dofs) != n:
-        raise InvalidProblemError(f"mesh names {len(mesh.dofs)} degrees of freedom; expected n = {n}")
-    return mesh
-
-
-def _mean(mean: SlipMean, p: int, n: int) -> SlipMean:
-    q = mean.T1.shape[0]
-    found = (mean.T1.shape, mean.T2.shape, mean.offset.shape, mean.weights.shape)
-    if found != (expected := ((q, n), (q, n), (q, 2), (p, q))):
-        raise InvalidProblemError(f"slip_mean has T1, T2, offset, weights of shapes {found}; expected {expected}")
-    if np.any(mean.weights.data < 0):
-        raise InvalidProblemError("slip_mean has a negative weight; expected weights >= 0")
-    return mean

@@ -32,6 +32,8 @@ def sealed(array: NDArray[Any]) -> NDArray[Any]:
 def _is_sealed(array: NDArray[Any]) -> bool:
     base: Any = array
     while isinstance(base, np.ndarray):
+        if base.flags.writeable:  # as large arrays out of a pickle are, although they are held in a bytes object
+            return False
         base = base.base
     return isinstance(base, bytes)
 

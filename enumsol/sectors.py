@@ -15,7 +15,7 @@ from functools import cache
 #: The status code of sector i is SECTORS + i.
 SECTORS = 8
 #: Deepest level of a sector; s has that many binary digits, and all integers below are exact in float64.
-DEEPEST = 22
+DEEPEST = 28
 
 
 def level_of(number: int) -> int:

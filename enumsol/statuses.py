@@ -99,8 +99,9 @@ SIGNS = {
 
 
 _EQUATIONS = np.array([[kind in CONDITIONS[code].equations for kind in RowKind] for code in SIGNS])
-#: lambda_n >= 0 in every status, which F = 0 does not imply in a sticking one.
-_INEQUALITIES = np.array(
+#: Rows that are not negative, by final code and RowKind: lambda_n in every status, as the cone of a sticking node does
+#: not imply it where F = 0.
+INEQUALITIES = np.array(
     [[kind in (_R.NORMAL_FORCE, *CONDITIONS[code].inequalities) for kind in RowKind] for code in SIGNS]
 )
 
@@ -110,7 +111,7 @@ def active_within(
 ) -> tuple[frozenset[int], ...]:
     """Per node the final codes whose conditions hold within the tolerance, for values of all rows, shape (7, p)."""
     # products of booleans: whether any row that shall vanish, or hold, does not
-    broken = _EQUATIONS @ (np.abs(rows) > tolerance) | _INEQUALITIES @ (rows < -tolerance)
+    broken = _EQUATIONS @ (np.abs(rows) > tolerance) | INEQUALITIES @ (rows < -tolerance)
     return tuple(
         frozenset(code for code in FINAL[bool(friction[i])] if not column[code])
         for i, column in enumerate(broken.T.tolist())

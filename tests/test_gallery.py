@@ -307,7 +307,6 @@ def test_functions_for_2d_say_what_takes_problems_in_3d():
 
     problem = gallery.block3d(1, 1, 1)
     calls = [
-        lambda: enumsol.enumerate_roots(problem, 1.0),
         lambda: enumsol.branch_graph(problem, (0.0, 1.0)),
         lambda: enumsol.multiplicity_table(problem, [1.0]),
         lambda: enumsol.link_samples(problem, [0.0, 1.0]),
@@ -319,5 +318,5 @@ def test_functions_for_2d_say_what_takes_problems_in_3d():
         lambda: enumsol.verify(problem, None),
     ]
     for call in calls:
-        with pytest.raises(InvalidArgumentError, match=r"is a ContactProblem3D; .* \(problems in 3D are taken by succ"):
+        with pytest.raises(InvalidArgumentError, match=r"is a ContactProblem3D; .* \(problems in 3D are taken by enum"):
             call()

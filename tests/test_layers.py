@@ -14,12 +14,12 @@ import enumsol
 
 #: Rooms from the ground up ("." is the package's own ``__init__``). A room imports rooms of lower layers only.
 LAYERS = (
-    ("errors", "sealed", "compiled", "executors", "_version", "arithmetic"),
+    ("errors", "sealed", "compiled", "executors", "texts", "_version", "arithmetic"),
     ("checks", "figures", "files"),
     ("array_checks", "statuses", "sectors"),
     ("condensation",),
     ("contact_body",),
-    ("friction",),
+    ("friction", "body3d"),
     ("problem", "problem3d"),
     ("equation", "kernel", "selections"),
     ("relaxation", "proof"),

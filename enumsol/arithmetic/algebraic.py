@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Width to which an isolating interval is narrowed before the greatest common divisor decides about a common root.
 _NARROW = fmpq(1, 2**64)
-#: Steps of bisection between two attempts to tell numbers apart.
+#: Steps of bisection between two attempts to separate numbers.
 _STEPS = 16
 
 

@@ -137,7 +137,7 @@ def sparse_eigenvalue_bound(A: sp.csc_array, estimate: float) -> float:
 
 
 def _factor_error(A: sp.csc_array) -> float | None:
-    """Bound on ||A - L D L'|| with D > 0, or None when no such factors came out."""
+    """Bound on ||A - L D L'|| with D > 0, or None when the factorization fails."""
     options = {"SymmetricMode": True, "Equil": False}
     try:
         lu = spla.splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)

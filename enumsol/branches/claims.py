@@ -1,8 +1,8 @@
 """What a branch graph may claim: the one place that knows how far its statements reach (theory, section 7.13).
 
 Arcs and settled vertices of any graph are solutions, whatever cut the search short: each arc is one of regular roots,
-and no two of them meet between their ends. So a graph that is not complete gives lower bounds. A number of solutions,
-uniqueness and a critical alpha need a graph without gaps. Texts, JSON, plots and Python all ask here.
+and no two of them meet between their ends. So a graph that is not complete gives lower bounds. The number
+of solutions, uniqueness and a critical alpha need a graph without gaps. Texts, JSON, plots and Python all ask here.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.branches.elements import VertexKind
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +40,7 @@ class Multiplicity:
     ----------
     count : int
     exact : bool
-        ``count`` is the number; otherwise there are at least so many.
+        ``count`` is the number itself; otherwise it is a lower bound.
     """
 
     count: int
@@ -78,14 +79,14 @@ class Uniqueness:
     Attributes
     ----------
     known : bool
-        False for a graph with gaps: then only ``several_by`` is a statement.
+        False for a graph with gaps: then only ``several_by`` is known.
     throughout : bool or None
         One solution at every alpha of the interval; None when that is not known.
     limit : float or None
         The alpha up to which the solution is unique, from the interval's first alpha on; None when it is unique
         throughout, and when that is not known.
     several_by : float or None
-        An alpha at which, or right behind which, there are several solutions: the limit is not beyond it. None when no
+        There are several solutions at this alpha or right above it, so that the limit is not larger. None when no
         second solution was found.
     """
 
@@ -112,15 +113,20 @@ class Claims:
         self._vertices, self._arcs, self._interval = vertices, arcs, interval
         self.standing = standing
 
+    def __repr__(self) -> str:
+        low, high = self._interval
+        arcs, vertices = counted(len(self._arcs), "arc"), counted(len(self._vertices), "vertex", "vertices")
+        return f"Claims of {arcs} and {vertices} for alpha in [{low:g}, {high:g}]: {self.standing.value}"
+
     @property
     def whole(self) -> bool:
-        """Whether nothing is known to be missing, so that numbers are numbers and not lower bounds."""
+        """Whether nothing is known to be missing: counts are then exact and not lower bounds."""
         return self.standing is not Standing.INCOMPLETE
 
     def multiplicity(self, arcs: Sequence[Arc], vertices: Sequence[Vertex]) -> Multiplicity:
         """Number of solutions at one alpha, given the arcs over it and the vertices at it.
 
-        In a graph with gaps, solutions that a continuum not found may join are counted as one.
+        In a graph with gaps, solutions that an undiscovered continuum may connect are counted as one.
         """
         if self.whole:
             return Multiplicity(len(arcs) + len(vertices), exact=True)
@@ -191,7 +197,7 @@ class Claims:
 
 
 def uniqueness_bound(condensed: CondensedProblem, interval: tuple[float, float]) -> float | None:
-    """An alpha up to which uniqueness follows without any search (theory, section 5.6); None when for no alpha."""
+    """An alpha up to which uniqueness follows without any search (theory, section 5.6), if there is one."""
     a, b = interval
     p = len(condensed.F0)
     try:

@@ -21,7 +21,7 @@ from enumsol.checks import (
     optional_seconds,
 )
 from enumsol.condensation.affine import exactly_at
-from enumsol.condensation.exact import FAST_EXACT_DOF, ExactPath
+from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
@@ -60,19 +60,19 @@ def branch_graph(
     ----------
     problem : ContactProblem
     interval : pair of alphas
-        First and last alpha, the first less than the last: float, Fraction or whatever enumerate_roots takes for alpha.
+        First and last alpha, in increasing order: float, Fraction or whatever enumerate_roots accepts as alpha.
     arithmetic : {"verified", "fast", "exact"}
         "verified": every leaf of the search is proven empty over its whole piece of the interval by rigorous error
-        bounds, and what follows is exact. Up to 24 degrees of freedom this is about the problem's own matrices, beyond
-        about S and g as computed in floats (``graph.certified_data`` says which). "fast": the same, but the search
-        believes floats; never claimed to be complete. "exact": everything in rationals, about the problem's own
-        matrices up to 250 degrees of freedom, and slow beyond some ten contact nodes.
+        bounds, and what follows is exact. Up to 24 degrees of freedom this concerns the problem's own matrices, above
+        that S and g as computed in floats (``graph.certified_data`` says which). "fast": the same, but the search
+        trusts floats; never claimed to be complete. "exact": everything in rationals, for the problem's own
+        matrices of up to 250 degrees of freedom, and slow beyond some ten contact nodes.
     progress : callable, optional
         Called with the name of the stage ("search", "arcs") and the share of it that is done.
     max_nodes : int, optional
-        Stop the search after so many nodes; the graph then is not complete and says so.
+        Stop the search after this many nodes; the graph is then reported as incomplete.
     time_limit : float, optional
-        Stop the search after so many seconds.
+        Stop the search after this many seconds.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def branch_graph(
     _check_friction(problem, a, b)
     started = time.perf_counter()
     exactly = arithmetic == "exact" or problem.n <= FAST_EXACT_DOF
-    exact = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
+    exact = ExactCondensed.from_problem(problem) if exactly else ExactCondensed.from_condensed(problem)
     certifier = _certifier(problem, exact, arithmetic)
     search = IntervalSearch(
         problem.condensed,
@@ -145,20 +145,20 @@ def branch_graph(
     )
     graph = BranchGraph(data)
     if any(stop.interrupted for stop in stops):
-        raise Interrupted("branch_graph was interrupted; its arcs so far are kept", graph)
+        raise Interrupted("branch_graph was interrupted; the arcs found so far are kept", graph)
     return graph
 
 
-def _certifier(problem: ContactProblem, exact: ExactPath, arithmetic: Arithmetic) -> IntervalCertifier:
+def _certifier(problem: ContactProblem, exact: ExactCondensed, arithmetic: Arithmetic) -> IntervalCertifier:
     if arithmetic == "exact":
         return ExactIntervalCertifier(exact)
     return VerifiedIntervalCertifier(problem, exact) if arithmetic == "verified" else FastIntervalCertifier()
 
 
-def _candidates(search: IntervalSearch, exact: ExactPath) -> set[Codes]:
+def _candidates(search: IntervalSearch, exact: ExactCondensed) -> set[Codes]:
     """The selections that may hold somewhere; Ctrl-C keeps those that were found."""
     if exact.unloaded:
-        # nothing but lambda = 0 solves at any alpha; every selection holds there, so that one is enough
+        # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
         return {(OPEN,) * exact.p}
     try:
         search.run()
@@ -168,7 +168,7 @@ def _candidates(search: IntervalSearch, exact: ExactPath) -> set[Codes]:
 
 
 def _proof(
-    search: IntervalSearch, certifier: IntervalCertifier, problem: ContactProblem, exact: ExactPath
+    search: IntervalSearch, certifier: IntervalCertifier, problem: ContactProblem, exact: ExactCondensed
 ) -> Proof | None:
     if not certifier.checkable or not search.pieces or search.stopped is not None:
         return None
@@ -181,7 +181,7 @@ def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callab
 
 
 def _check_friction(problem: ContactProblem, a: Fraction, b: Fraction) -> None:
-    """Refuse negative and huge friction inside the interval; F is affine, so that both ends tell."""
+    """Refuse negative and huge friction inside the interval; F is affine, so the two ends suffice."""
     values = [exactly_at(end, *problem.friction) for end in (a, b)]
     for node, *pair, F0, F1 in zip(problem.node_ids, *values, *problem.friction, strict=True):
         for end, value in zip((a, b), pair, strict=True):

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from enumsol.arithmetic.algebraic import CriticalAlpha
     from enumsol.checks import AlphaLike
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.roots.root import RootFamily
     from enumsol.selections.solution import Codes
     from enumsol.statuses import ContactStatus
@@ -46,8 +46,8 @@ class VertexKind(enum.StrEnum):
     TOUCH = "touch"
     #: No arc at all.
     POINT = "point"
-    #: Selections hold here that were not examined, because the search was cut short or a limit was reached: arcs that
-    #: were not found may end here, so that nothing is said about its kind.
+    #: Selections hold here that were not examined, because the search was cut short or a limit was reached. Unknown
+    #: arcs may end here, so the kind is not known.
     UNSETTLED = "unsettled"
     #: An arc ends for no reason: something is missing, and the graph is not complete.
     BROKEN = "broken"
@@ -77,7 +77,7 @@ class Vertex(ContactState):
     border : bool
         It lies at the first or last alpha.
     statuses, active, lambda_n, lambda_t, u_n, u_t
-        As in Root. Of a family, ``active`` is what holds somewhere on it, and the arrays are those at one point of it.
+        As in Root. For a family, ``active`` holds every status that occurs on it, and the arrays belong to one point.
     family : RootFamily or None
     index_left, index_right : int or None
         Sums of the indices of the arcs that end and begin here; equal inside the interval (balance of degrees). None
@@ -104,14 +104,14 @@ class Vertex(ContactState):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Arc:
-    """All solutions of one selection between two neighbouring critical alphas, one for every alpha (of a sheet: many).
+    """All solutions of one selection between two neighbouring critical alphas, one for every alpha (many on a sheet).
 
     Attributes
     ----------
     number : int
         Its place in ``graph.arcs``.
     statuses : tuple of p ContactStatus
-        Of several selections that coincide (grazing) those of the first. At a node in contact with F = 0 throughout the
+        Those of the first selection where several coincide (grazing). At a node in contact with F = 0 throughout the
         sign of u_t at the middle of the arc names the slip.
     lo, hi : float
         Its ends.
@@ -120,7 +120,7 @@ class Arc:
     index : int or None
         Local degree of its roots.
     dimension : int
-        0; of a sheet the dimension of its families.
+        0 for an arc, for a sheet the dimension of its families.
     grazing : bool
         Several selections coincide on it, or it is a sheet: no root on it is regular.
     selections : tuple of status codes
@@ -137,7 +137,7 @@ class Arc:
     grazing: bool
     selections: tuple[Codes, ...] = field(repr=False)
     sample: Fraction = field(repr=False)
-    _exact: ExactPath = field(repr=False)
+    _exact: ExactCondensed = field(repr=False)
 
     @property
     def interval(self) -> tuple[float, float]:

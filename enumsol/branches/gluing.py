@@ -1,8 +1,8 @@
 """Ends of arcs glued into vertices by the statuses that hold there, never by distance (theory, section 7.6).
 
-Two selections share a point at a critical alpha when both hold there, which the signs at one of them decide exactly.
-Isolated points need only their selection's own functions; where a selection is singular its polytope of solutions is
-computed in exact arithmetic at that alpha.
+Two selections share a point at a critical alpha when both hold there; the signs at one of them decide this exactly.
+An isolated point needs only the functions of its own selection; where a selection is singular its polytope of
+solutions is computed in exact arithmetic at that alpha.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from enumsol.branches.selection_arcs import Event, SelectionArcs
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.roots.components import RootComponent
     from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
 
@@ -85,18 +85,18 @@ class Gluing:
 
     Attributes
     ----------
-    exact : ExactPath
+    exact : ExactCondensed
     a, b : fmpq
     arcs : dict of SelectionArcs by codes, those that hold somewhere
     vertices : list of GluedVertex in the order of alpha
     edges : list of GluedArc
     interrupted : Stop or None
-        How far it came, when Ctrl-C was pressed while the arcs of the selections were worked out.
+        How far it got, if Ctrl-C was pressed while arcs were computed.
     reasons : list of str
         What stayed undecided or contradicts completeness; empty when nothing does.
     """
 
-    exact: ExactPath
+    exact: ExactCondensed
     a: Any
     b: Any
     arcs: dict[Codes, SelectionArcs]
@@ -107,7 +107,7 @@ class Gluing:
 
 
 def glue(
-    exact: ExactPath,
+    exact: ExactCondensed,
     candidates: Iterable[Codes],
     a: Any,
     b: Any,
@@ -119,11 +119,11 @@ def glue(
 
     Parameters
     ----------
-    exact : ExactPath
+    exact : ExactCondensed
     candidates : codes of the selections that may hold somewhere in [a, b]
     a, b : fmpq
     tick : called with the share of the candidates done
-    cut_short : the search was stopped: selections that it did not give are left out, and arcs end without neighbours
+    cut_short : the search was stopped: selections it did not find are left out, and arcs may end without neighbours
     """
     known = KnownSelections(exact, a, b, cut_short=cut_short)
     interrupted = _work_out(known, sorted(set(candidates)), tick)
@@ -145,7 +145,7 @@ def glue(
 def _work_out(
     known: KnownSelections, candidates: Sequence[Codes], tick: Callable[[float], object] | None
 ) -> Stop | None:
-    """Where the candidates hold; Ctrl-C leaves the rest out, as a search does that was cut short."""
+    """Where the candidates hold; after Ctrl-C the rest is left out, as if the search had been cut short."""
     for k, codes in enumerate(candidates):
         try:
             known.add(codes)
@@ -267,12 +267,12 @@ def _edges(known: KnownSelections, vertices: list[GluedVertex]) -> list[GluedArc
                 index = 1
             elif arcs.grazing:
                 component = _component(known, codes, cell.sample)
-                # the critical points of selections that coincide here and were not found may cut the arc further
+                # unknown selections that coincide here may have critical points that cut the arc further
                 if component is None or (known.cut_short and not _all_known(known, component)):
                     vertices[tail].settled = vertices[head].settled = False
                     continue
                 selections = tuple(sorted(s.codes for s in component.solutions))
-                # a search that was cut short may not have given the others
+                # a search that was cut short may not have found the others
                 first = next(s.codes for s in component.solutions if s.codes in known.arcs)
                 index, dimension = component.index, component.dimension
             arc = GluedArc(first, selections, cell.sample, tail, head, index, dimension)

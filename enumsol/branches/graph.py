@@ -39,7 +39,7 @@ class BranchGraph(Immutable):
     A graph with ``reasons`` is not complete. It shows what was found, and every part of it is true: arcs are solutions,
     and a vertex has a kind only where everything that meets there is known (it is "unsettled" otherwise). What needs
     the whole graph (``multiplicity_at``, ``steps``, ``uniqueness_limit``) raises IncompleteGraphError then;
-    ``at_least`` and ``claims`` tell what is known.
+    ``at_least`` and ``claims`` give what is known.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class BranchGraph(Immutable):
 
     @property
     def claims(self) -> Claims:
-        """What may be said about the number of solutions: numbers of a graph without gaps, lower bounds otherwise."""
+        """What is known about the number of solutions: exact counts, or lower bounds for a graph with gaps."""
         return self.data.claims
 
     def _whole(self, name: str, instead: str) -> None:
@@ -264,7 +264,7 @@ class BranchGraph(Immutable):
 
     @property
     def uniqueness_bound(self) -> float | None:
-        """An alpha up to which uniqueness follows without any search (theory, section 5.6); None when for no alpha.
+        """An alpha up to which uniqueness follows without any search (theory, section 5.6), if there is one.
 
         F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node; evaluated in floats.
         """
@@ -282,7 +282,7 @@ class BranchGraph(Immutable):
         return None
 
     def starting_points(self) -> tuple[Root, ...]:
-        """One regular root on every branch that was found and has any, as starting points of continuation, in order."""
+        """One regular root on every branch that has any, as starting points of continuation, in order."""
         found = (self.starting_point(branch) for branch in self.branches)
         return tuple(root for root in found if root is not None)
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.branches.elements import Arc, Vertex
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
     from enumsol.search.interval import SearchedPiece
@@ -32,7 +32,7 @@ class GraphStats:
     selections : int
         Complete selections whose arcs were computed.
     search_seconds, seconds : float
-        Wall time of the search, and of all.
+        Wall time of the search, and of everything.
     """
 
     pieces: int = 0
@@ -49,7 +49,7 @@ class GraphData:
     Attributes
     ----------
     problem : ContactProblem
-    exact : ExactPath
+    exact : ExactCondensed
         The condensed problem in rationals, on which the arcs rest.
     interval : (Fraction, Fraction)
     arithmetic : str
@@ -66,7 +66,7 @@ class GraphData:
     """
 
     problem: ContactProblem
-    exact: ExactPath
+    exact: ExactCondensed
     interval: tuple[Fraction, Fraction]
     arithmetic: str
     vertices: tuple[Vertex, ...]
@@ -93,7 +93,7 @@ class GraphData:
 
     @cached_property
     def claims(self) -> Claims:
-        """What may be said about the number of solutions: numbers of a graph without gaps, lower bounds otherwise."""
+        """What is known about the number of solutions: exact counts, or lower bounds for a graph with gaps."""
         whole = Standing.PROVEN if self.complete else Standing.NOT_PROVEN
         ends = (float(self.interval[0]), float(self.interval[1]))
         return Claims(self.vertices, self.arcs, ends, Standing.INCOMPLETE if self.all_reasons else whole)

@@ -6,6 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from enumsol.branches.elements import VertexKind
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,9 +51,9 @@ def _branch_line(branch: Branch) -> str:
     lo, hi = branch.interval
     folds = ", ".join(f"{v.alpha:.6g}" for v in branch.folds)
     width = f", length {hi - lo:.3g}" if f"{lo:.6g}" == f"{hi:.6g}" else ""
-    return (
-        f"  branch {branch.number}: {_shape(branch)}, {len(branch.arcs)} arcs, alpha in [{lo:.6g}, {hi:.6g}]{width}"
-        + (f", folds at {folds}" if folds else "")
+    arcs = counted(len(branch.arcs), "arc")
+    return f"  branch {branch.number}: {_shape(branch)}, {arcs}, alpha in [{lo:.6g}, {hi:.6g}]{width}" + (
+        f", folds at {folds}" if folds else ""
     )
 
 

@@ -1,4 +1,4 @@
-"""The selections of a graph with the alpha at which they hold, as far as the search gave them (theory, section 7.6)."""
+"""Selections of a graph that the search found, with the alpha at which they hold (theory, section 7.6)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from enumsol.selections.solution import VertexLimitError
 
 if TYPE_CHECKING:
     from enumsol.arithmetic.algebraic import CriticalAlpha
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.solution import ActiveSets, Codes
 
 
@@ -23,21 +23,21 @@ class KnownSelections:
 
     Parameters
     ----------
-    exact : ExactPath
+    exact : ExactCondensed
     a, b : fmpq
 
     Attributes
     ----------
     arcs : dict of SelectionArcs by codes
     cut_short : bool
-        The search was stopped: selections that it did not give are left out, and arcs end without neighbours.
+        The search was stopped: selections it did not find are left out, and arcs may end without neighbours.
     waiting : list of Event
-        Events at which it is still to be asked what else holds.
+        Events at which other selections have not been looked for yet.
     reasons : list of str
         What stayed undecided or contradicts completeness.
     """
 
-    def __init__(self, exact: ExactPath, a: Any, b: Any, *, cut_short: bool) -> None:
+    def __init__(self, exact: ExactCondensed, a: Any, b: Any, *, cut_short: bool) -> None:
         self.exact, self.a, self.b, self.cut_short = exact, a, b, cut_short
         self.arcs: dict[Codes, SelectionArcs] = {}
         self.waiting: list[Event] = []
@@ -84,7 +84,7 @@ class KnownSelections:
             del self.arcs[codes]
 
     def solve(self, event: Event) -> bool:
-        """Find the polytope of a selection at a singular event; False when it holds nothing there."""
+        """Find the polytope of a selection at a singular event; False when it has no solution there."""
         solver = self._fiber(event.alpha)
         try:
             solution = solver.solve(event.codes)
@@ -116,7 +116,7 @@ class KnownSelections:
             sets = []
         else:
             functions = self.arcs[event.codes].functions
-            sets = [active_sets(functions, event.alpha, int(event.alpha.sign_of(functions.det)), self.exact)]
+            sets = [active_sets(functions, event.alpha, self.exact)]
         event.active = tuple(
             frozenset({code}.union(*(active[i] for active in sets))) for i, code in enumerate(event.codes)
         )
@@ -125,7 +125,7 @@ class KnownSelections:
     def members(self, active: ActiveSets) -> tuple[list[Codes], bool]:
         """Known selections among those that hold, and whether these are all of them.
 
-        If the search was not cut short, one that it left out is a contradiction, and is taken in.
+        If the search was not cut short, a selection it left out is a contradiction, and is added.
         """
         count = prod(len(a) for a in active)
         if count > 2 * len(self.arcs) + 64:
@@ -139,7 +139,7 @@ class KnownSelections:
         return known, len(known) == count
 
     def _add_left_out(self, codes: Codes) -> bool:
-        """Take in a selection that a search without gaps should have given; whether it holds anywhere."""
+        """Add a selection that a complete search should have found; whether it holds anywhere."""
         if codes not in self._refused:
             self.add(codes)
         if codes in self._refused:

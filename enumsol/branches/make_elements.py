@@ -15,13 +15,13 @@ from enumsol.roots.root import RootFamily
 from enumsol.roots.slip_signs import shown_status, sign_over, slip_names
 from enumsol.selections.ordered_field import FiberSelections, as_float
 from enumsol.selections.polytopes import dot
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, RowKind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.branches.gluing import GluedArc, GluedVertex, Gluing
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.roots.root import Polytope
 
 
@@ -52,7 +52,7 @@ def make_arcs(gluing: Gluing) -> list[Arc]:
     ]
 
 
-def _slips(exact: ExactPath, edge: GluedArc) -> tuple[int, ...]:
+def _slips(exact: ExactCondensed, edge: GluedArc) -> tuple[int, ...]:
     """Signs of u_t in the middle of an arc, which name the slip of nodes without friction; zeros if there are none."""
     if not any(exact.frictionless):
         return (0,) * exact.p
@@ -76,7 +76,7 @@ def _vertex(gluing: Gluing, number: int, glued: GluedVertex, left: Sequence[Arc]
     border = glued.alpha.is_rational and glued.alpha.lo in (gluing.a, gluing.b)
     p = gluing.exact.p
     degrees = (_sum(left), _sum(right)) if glued.settled else (None, None)
-    # at the last alpha only the arcs from the left tell the degree
+    # at the last alpha there are arcs from the left only
     degree = degrees[0] if border and glued.alpha.lo == gluing.b else degrees[1]
     forces, w = _values(gluing, glued)
     active = tuple(
@@ -139,7 +139,7 @@ def _slip_sign(gluing: Gluing, glued: GluedVertex, node: int) -> int:
     for codes in glued.members:
         functions = gluing.arcs[codes].functions
         if not functions.singular and (det := glued.alpha.sign_of(functions.det)) != 0:
-            slip = functions.slip(node)
+            slip = functions.row(RowKind.SLIP_FORWARD, node)
             return 0 if slip.is_zero() else int(det * glued.alpha.sign_of(slip))
     return 0  # the unloaded body at rest
 
@@ -150,7 +150,7 @@ def _values(gluing: Gluing, glued: GluedVertex) -> tuple[Any, Any]:
     if glued.solutions and glued.solver is not None:
         point = glued.solutions[0].vertices[0]
         return glued.solver.forces(point) + 0.0, glued.solver.displacements(point) + 0.0
-    # an irrational alpha is replaced by a rational one that agrees with it to many more digits than a float has
+    # an irrational alpha is replaced by a rational one that agrees with it far beyond float precision
     glued.alpha.narrow(fmpq(1, 2**256))
     alpha = (glued.alpha.lo + glued.alpha.hi) / 2
     point = next(

@@ -43,7 +43,7 @@ class DrawnGraph(Protocol):
 
     @property
     def claims(self) -> Claims:
-        """What may be said about the number of solutions."""
+        """What is known about the number of solutions."""
 
     def completeness(self) -> str:
         """One sentence about it."""
@@ -64,7 +64,7 @@ _STYLES: dict[ContactStatus, Any] = {
     ContactStatus.SLIP_PLUS: (0, (6, 1.6, 1.2, 1.6)),
     ContactStatus.SLIP_MINUS: (0, (6, 1.6, 1.2, 1.6)),
 }
-#: Blue, orange, green, violet, red, brown, teal, olive: told apart in print and by most readers.
+#: Blue, orange, green, violet, red, brown, teal, olive: distinct in print and to most readers.
 _COLOURS = ("#1f5fa8", "#d9730d", "#2a8a4a", "#7a4fa3", "#c23b4b", "#7d5a3c", "#2a9aa0", "#8a8a2a")
 _FAMILY = "#333333"
 #: Panels drawn when no nodes are named.

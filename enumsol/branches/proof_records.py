@@ -30,7 +30,7 @@ class GraphLeaf(enum.StrEnum):
 def write_graph_proof(
     problem: ContactProblem, interval: tuple[Fraction, Fraction], data: str, pieces: Sequence[SearchedPiece]
 ) -> Proof | None:
-    """The leaves of all pieces with their multipliers; None where an end of a piece is too long a fraction for it."""
+    """The leaves of all pieces with their multipliers; None if the end of a piece has too many digits for it."""
     if not all(fits(end) for found in pieces for end in (found.piece.a, found.piece.b)):
         return None
     writer = ProofWriter()

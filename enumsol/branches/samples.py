@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.statuses import ContactStatus
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -24,9 +26,18 @@ if TYPE_CHECKING:
     from enumsol.roots.root_set import RootSet
 
 
+class LinkRule(enum.StrEnum):
+    """Why two roots are linked; members compare with their texts."""
+
+    #: The same selection holds at both samples.
+    SELECTION = "selection"
+    #: Neighbouring selections hold, which share a vanishing test function.
+    FLIP = "flip"
+
+
 @dataclass(frozen=True)
 class Missed:
-    """What a sampled graph lacks, measured against the exact graph.
+    """What a sampled graph lacks, compared with the exact graph.
 
     Attributes
     ----------
@@ -56,8 +67,7 @@ class SampledGraph:
     Attributes
     ----------
     graph : networkx.Graph
-        Nodes (sample, root) with alpha, statuses, lambda_n, lambda_t, index and root; edges with ``rule`` "selection"
-        (the same selection at both samples) or "flip" (neighbouring selections that share a vanishing test function),
+        Nodes (sample, root) with alpha, statuses, lambda_n, lambda_t, index and root; edges with ``rule``, a LinkRule,
         and ``heuristic`` True: only the exact graph proves a link.
     root_sets : tuple of RootSet
     ambiguous : tuple of pairs of nodes
@@ -96,8 +106,10 @@ class SampledGraph:
 
     def __repr__(self) -> str:
         return (
-            f"SampledGraph of {len(self.root_sets)} samples: {self.graph.number_of_nodes()} roots, "
-            f"{self.graph.number_of_edges()} links (heuristic), {len(self.ambiguous)} ambiguous pairs left open"
+            f"SampledGraph of {counted(len(self.root_sets), 'sample')}: "
+            f"{counted(self.graph.number_of_nodes(), 'root')}, "
+            f"{counted(self.graph.number_of_edges(), 'link')} (heuristic), "
+            f"{counted(len(self.ambiguous), 'ambiguous pair')} left open"
         )
 
 
@@ -119,7 +131,7 @@ def link_samples(
     Parameters
     ----------
     problem : ContactProblem
-    alphas : iterable of float, Fraction or whatever enumerate_roots takes for alpha
+    alphas : iterable of float, Fraction or whatever enumerate_roots accepts as alpha
         Sorted by the function; at least one.
     arithmetic : str
         Of ``enumerate_roots``.
@@ -177,7 +189,7 @@ def _link(
     for i, root in enumerate(left):
         partners = [j for j in free_right if right[j].statuses == root.statuses]
         if len(partners) == 1:
-            graph.add_edge((sample, i), (sample + 1, partners[0]), rule="selection", heuristic=True)
+            graph.add_edge((sample, i), (sample + 1, partners[0]), rule=LinkRule.SELECTION, heuristic=True)
             free_left.discard(i)
             free_right.discard(partners[0])
     pairs = [(i, j) for i in sorted(free_left) for j in sorted(free_right) if _may_flip(condensed, left[i], right[j])]
@@ -186,7 +198,7 @@ def _link(
     for i, j in pairs:
         alone = sum(a == i for a, _ in pairs) == 1 and sum(b == j for _, b in pairs) == 1
         if alone and left[i].index == right[j].index:
-            graph.add_edge((sample, i), (sample + 1, j), rule="flip", heuristic=True)
+            graph.add_edge((sample, i), (sample + 1, j), rule=LinkRule.FLIP, heuristic=True)
         else:
             open_pairs.append(((sample, i), (sample + 1, j)))
     return open_pairs

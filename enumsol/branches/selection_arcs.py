@@ -8,44 +8,23 @@ point the signs follow from those beside it and from what vanishes there. Nothin
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import cache
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge, rational_between, real_roots, sign
 from enumsol.selections.functions import SelectionFunctions
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import CONDITIONS, FINAL, STICK, RowKind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.ordered_field import FiberSelections
     from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
 
-
-class Condition(NamedTuple):
-    """A condition ``sign * poly / det >= 0`` of a selection."""
-
-    sign: int
-    poly: Any
-
-
-def conditions(functions: SelectionFunctions) -> list[Condition]:
-    """The inequalities of a selection, those that vanish identically included.
-
-    A sticking node has lambda_n >= 0 too: its cone does not imply it where F = 0, at an end of the interval.
-    """
-    found = []
-    for i, code in enumerate(functions.codes):
-        if code == OPEN:
-            found.append(Condition(-1, functions.gap(i)))
-            continue
-        found.append(Condition(1, functions.normal_force(i)))
-        if code == STICK:
-            found.append(Condition(1, functions.cone(i, 1)))
-            found.append(Condition(1, functions.cone(i, -1)))
-        elif code in (SLIP_PLUS, SLIP_MINUS):
-            found.append(Condition(1 if code == SLIP_PLUS else -1, functions.slip(i)))
-    return found
+#: What makes a critical point, apart from the numbers of rows: the determinant vanishes; an end of the interval.
+_DET, _END = -1, -2
 
 
 @dataclass(eq=False)
@@ -144,107 +123,89 @@ class SelectionArcs:
         return event, True
 
 
-def selection_arcs(exact: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionArcs | None:
+def selection_arcs(exact: ExactCondensed, codes: Codes, a: Any, b: Any) -> SelectionArcs | None:
     """Cells and events of a selection in [a, b]; None when its determinant vanishes identically.
 
     Parameters
     ----------
-    exact : ExactPath
+    exact : ExactCondensed
     codes : status codes
     a, b : fmpq, a <= b
     """
     functions = SelectionFunctions(exact, codes)
     if functions.singular:
         return None
-    arcs = SelectionArcs(codes, functions)
-    required = conditions(functions)
-    arcs.grazing = any(c.poly.is_zero() for c in required)
-    required = [c for c in required if not c.poly.is_zero()]
-    events = _critical_points(functions.det, required, a, b)
-    if events is None:
+    rows = [functions.row(kind, i) for i, code in enumerate(codes) for kind in _required(code)]
+    arcs = SelectionArcs(codes, functions, grazing=any(row.is_zero() for row in rows))
+    rows = [row for row in rows if not row.is_zero()]
+    points = _critical_points(functions.det, rows, a, b)
+    if points is None:
         return arcs
-    owners = dict(events)
-    groups = merge(owners)
-    vanishing = [{owners[number] for number in group} for group in groups]
-    arcs.events = [Event(codes, group[0], singular=-1 in owner) for group, owner in zip(groups, vanishing, strict=True)]
+    groups = merge(points)
+    vanishing = [{points[number] for number in group} for group in groups]
+    arcs.events = [Event(codes, group[0], singular=_DET in zero) for group, zero in zip(groups, vanishing, strict=True)]
     signs = []
-    for left, right in zip(arcs.events, arcs.events[1:], strict=False):
+    for left, right in pairwise(arcs.events):
         at = rational_between(left.alpha, right.alpha)
         det = sign(functions.det(at))
-        signs.append([c.sign * det * sign(c.poly(at)) for c in required])
+        signs.append([det * sign(row(at)) for row in rows])
         arcs.cells.append(Cell(at, min(signs[-1], default=1) > 0, det))
     for k, (event, zero) in enumerate(zip(arcs.events, vanishing, strict=True)):
-        beside = [arcs.cells[j].holds for j in (k - 1, k) if 0 <= j < len(arcs.cells)]
-        if any(beside):
+        if any(cell.holds for cell in arcs.cells[max(k - 1, 0) : k + 1]):
             event.holds = True
         elif event.singular:
             # consistent only where every numerator vanishes too; whether the polytope is empty is decided elsewhere
             event.holds = all(event.alpha.sign_of(poly) == 0 for poly in functions.numerators)
         elif arcs.cells:
-            near = signs[k - 1] if k else signs[0]
+            near = signs[max(k - 1, 0)]
             event.holds = all(j in zero or s > 0 for j, s in enumerate(near))
         else:
             det = event.alpha.sign_of(functions.det)
-            event.holds = all(c.sign * det * event.alpha.sign_of(c.poly) >= 0 for c in required)
+            event.holds = all(det * event.alpha.sign_of(row) >= 0 for row in rows)
     return arcs
 
 
-def _critical_points(det: Any, required: Sequence[Condition], a: Any, b: Any) -> list[tuple[CriticalAlpha, int]] | None:
-    """Roots of the determinant (owner -1) and of the conditions (their numbers), and both ends of the interval (-2).
+def _required(code: int) -> tuple[RowKind, ...]:
+    """Rows that are not negative in a status: at a sticking node lambda_n too, which its cone does not imply at F = 0.
 
-    None when a condition is broken on the whole interval: the selection then holds nowhere in it.
+    A friction coefficient that is positive inside the interval may vanish at one of its ends.
     """
-    points = [(number, -1) for number in real_roots(det, a, b)]
+    inequalities = CONDITIONS[code].inequalities
+    return (RowKind.NORMAL_FORCE, *inequalities) if code == STICK else inequalities
+
+
+def _critical_points(det: Any, rows: Sequence[Any], a: Any, b: Any) -> dict[CriticalAlpha, int] | None:
+    """Roots of the determinant and of the rows, and both ends of the interval, with what vanishes there.
+
+    That is the number of a row, _DET or, at an end, _END. None when a row is negative on the whole interval: the
+    selection then holds nowhere in it.
+    """
+    points = dict.fromkeys(real_roots(det, a, b), _DET)
     det_sign = 0 if points else sign(det(a))
-    for k, condition in enumerate(required):
-        roots = real_roots(condition.poly, a, b)
-        if not roots and condition.sign * det_sign * sign(condition.poly(a)) < 0:
+    for k, row in enumerate(rows):
+        roots = real_roots(row, a, b)
+        if not roots and det_sign * sign(row(a)) < 0:
             return None
-        points += [(number, k) for number in roots]
-    return points + [(CriticalAlpha.rational(end), -2) for end in ((a, b) if a != b else (a,))]
+        points |= dict.fromkeys(roots, k)
+    return points | dict.fromkeys((CriticalAlpha.rational(end) for end in ((a, b) if a != b else (a,))), _END)
 
 
-def active_sets(functions: SelectionFunctions, alpha: Any, det_sign: int, exact: ExactPath) -> ActiveSets:
-    """Per node the codes that hold at the selection's solution at ``alpha``, where its determinant does not vanish.
+def active_sets(functions: SelectionFunctions, alpha: CriticalAlpha, exact: ExactCondensed) -> ActiveSets:
+    """Per node the codes that hold at the selection's solution at ``alpha``, where its determinant does not vanish."""
+    det_sign = alpha.sign_of(functions.det)
 
-    Parameters
-    ----------
-    functions : the selection's functions
-    alpha : CriticalAlpha
-    det_sign : sign of the determinant there
-    exact : ExactPath
-    """
+    @cache
+    def row_sign(kind: RowKind, i: int) -> int:
+        if kind in CONDITIONS[functions.codes[i]].equations or (row := functions.row(kind, i)).is_zero():
+            return 0
+        return det_sign * alpha.sign_of(row)
 
-    def at(poly: Any) -> int:
-        return 0 if poly.is_zero() else det_sign * alpha.sign_of(poly)
+    def holds(code: int, i: int) -> bool:
+        return all(row_sign(kind, i) == 0 for kind in CONDITIONS[code].equations) and all(
+            row_sign(kind, i) >= 0 for kind in _required(code)
+        )
 
-    found = []
-    for i, code in enumerate(functions.codes):
-        holds = {code}
-        if exact.frictionless[i]:
-            value = at(functions.gap(i)) if code == OPEN else at(functions.normal_force(i))
-            holds |= {OPEN, FRICTIONLESS} if value == 0 else set()
-        elif code == OPEN:
-            if at(functions.gap(i)) == 0:
-                holds |= _tangential(at(functions.slip(i)))
-        elif code == STICK:
-            plus, minus = at(functions.cone(i, 1)), at(functions.cone(i, -1))
-            holds |= {c for c, slack in ((SLIP_PLUS, plus), (SLIP_MINUS, minus)) if slack == 0}
-            # at F = 0 both slacks vanish under a positive force
-            if plus == minus == 0 and at(functions.normal_force(i)) == 0:
-                holds.add(OPEN)
-        else:
-            moves = at(functions.slip(i))
-            if at(functions.normal_force(i)) == 0:
-                holds |= {OPEN} | _tangential(moves)
-            elif alpha.is_rational and exact.F0[i] + exact.F1[i] * alpha.lo == 0:
-                holds |= _tangential(moves)
-            elif moves == 0:
-                holds.add(STICK)
-        found.append(frozenset(holds))
-    return tuple(found)
-
-
-def _tangential(slip_sign: int) -> set[int]:
-    """Contact statuses that hold at a node whose slip bound is zero, by the sign of w_t."""
-    return {STICK, SLIP_PLUS, SLIP_MINUS} if slip_sign == 0 else {SLIP_PLUS if slip_sign > 0 else SLIP_MINUS}
+    return tuple(
+        frozenset(code for code in FINAL[not exact.frictionless[i]] if code == own or holds(code, i))
+        for i, own in enumerate(functions.codes)
+    )

@@ -16,19 +16,19 @@ from enumsol.selections.ordered_field import FiberSelections, row_reduce
 from enumsol.selections.solution import MAX_BASES, VertexLimitError
 
 if TYPE_CHECKING:
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.solution import Codes
 
 #: Bases whose vertex functions are followed over alpha; a sheet that needs more is refused.
 MAX_SHEET_BASES = min(2000, MAX_BASES)
 
 
-def sheet_arcs(exact: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionArcs:
+def sheet_arcs(exact: ExactCondensed, codes: Codes, a: Any, b: Any) -> SelectionArcs:
     """Cells and events of a selection that is singular for every alpha, in [a, b].
 
     A vertex of its polytope solves the equations and as many of the inequalities as its kernel has dimensions. All
     alpha at which the determinant of such a basis, another condition or an equation's residual vanishes are
-    candidates for events; those at which nothing changes are taken out again. Cost: exponential in the dimension of
+    candidates for events; those at which nothing changes are removed. Cost: exponential in the dimension of
     the kernel.
 
     Raises
@@ -59,7 +59,7 @@ def sheet_arcs(exact: ExactPath, codes: Codes, a: Any, b: Any) -> SelectionArcs:
     return arcs
 
 
-def _pattern(exact: ExactPath, codes: Codes, alpha: Any) -> Any:
+def _pattern(exact: ExactCondensed, codes: Codes, alpha: Any) -> Any:
     """What a polytope looks like: the active sets of its vertices; None when it is empty."""
     solver = FiberSelections(exact, alpha)
     solution = solver.solve(codes)
@@ -68,7 +68,7 @@ def _pattern(exact: ExactPath, codes: Codes, alpha: Any) -> Any:
     return frozenset(solver.active(vertex) for vertex in solution.vertices)
 
 
-def _critical_polynomials(exact: ExactPath, codes: Codes) -> list[Any]:
+def _critical_polynomials(exact: ExactCondensed, codes: Codes) -> list[Any]:
     """Nonzero integer polynomials whose roots include every alpha at which the polytope changes its shape."""
     p, size = exact.p, 2 * exact.p
 

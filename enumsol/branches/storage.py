@@ -17,7 +17,7 @@ from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.branches.elements import Arc, Vertex, VertexKind
 from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.checks import file_path
-from enumsol.condensation.exact import ExactPath
+from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import InvalidArgumentError
 from enumsol.files import writing
 from enumsol.problem import ContactProblem
@@ -75,8 +75,8 @@ def load_graph(file: str | Path) -> GraphData:
     try:
         if record["version"] == 1 and record["reasons"]:
             raise InvalidArgumentError(
-                f"graph {file} is not complete and was saved by an earlier version, which said more about such graphs "
-                "than is known; expected a complete one, or one saved by this version"
+                f"graph {file} is not complete and was saved by an earlier version, which claimed more about such "
+                "graphs than is known; expected a complete one, or one saved by this version"
             )
         return _from_record(record)
     except (LookupError, TypeError, ValueError, AttributeError) as error:
@@ -86,7 +86,7 @@ def load_graph(file: str | Path) -> GraphData:
 def _from_record(record: dict[str, Any]) -> GraphData:
     problem = _problem(record["problem"])
     exactly = record["condensed_exactly"]
-    exact = ExactPath.from_problem(problem) if exactly else ExactPath.from_condensed(problem)
+    exact = ExactCondensed.from_problem(problem) if exactly else ExactCondensed.from_condensed(problem)
     first, last = (_fraction(end) for end in record["interval"])
     vertices = tuple(_vertex(k, item) for k, item in enumerate(record["vertices"]))
     arcs = tuple(_arc(k, item, vertices, exact) for k, item in enumerate(record["arcs"]))
@@ -171,7 +171,7 @@ def _vertex_record(v: Vertex) -> dict[str, Any]:
 
 
 def _fraction(text: str) -> Fraction:
-    """The fraction that a text like "-8/3" stands for; others are refused, such as one with an exponent of millions."""
+    """The fraction written like "-8/3"; other texts are refused, such as numbers with an exponent."""
     if _FRACTION.fullmatch(text) is None:
         raise ValueError(f"{text[:20]!r}, which is no fraction")
     return Fraction(text)
@@ -217,7 +217,7 @@ def _arc_record(arc: Arc) -> dict[str, Any]:
     }
 
 
-def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], exact: ExactPath) -> Arc:
+def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], exact: ExactCondensed) -> Arc:
     return Arc(
         number=number,
         statuses=_statuses(item["statuses"]),

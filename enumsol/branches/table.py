@@ -71,7 +71,7 @@ def multiplicity_table(
     Parameters
     ----------
     problem : ContactProblem
-    alphas : iterable of float, Fraction or whatever enumerate_roots takes for alpha
+    alphas : iterable of float, Fraction or whatever enumerate_roots accepts as alpha
     arithmetic : str
         Of ``enumerate_roots``.
     executor : concurrent.futures.Executor, optional
@@ -87,8 +87,8 @@ def multiplicity_table(
         One row an alpha, in the order given: alpha, roots, families, with_open, with_stick, with_slip_plus and
         with_slip_minus (isolated roots at which at least one node has the status), index_sum (missing where a degree is
         not known), complete, undecided, stopped (why the search ended early, or missing), nodes of the search, and
-        seconds. Where a search was cut short or left something undecided, the counts are those of what was found, and
-        so lower bounds.
+        seconds. Where a search was cut short or left something undecided, the counts are
+        lower bounds.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def _spread(
 
 
 def table_row(problem: ContactProblem, alpha: Alpha, options: dict[str, Any]) -> dict[str, Any]:
-    """One row of the table (a function of the module, so that other processes can be asked for it)."""
+    """One row of the table (a module-level function, so that other processes can import it)."""
     roots = enumerate_roots(problem, alpha, **options)
     counts = kinds(roots)
     return {

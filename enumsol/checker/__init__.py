@@ -25,8 +25,8 @@ What checker and search share
       definite matrix, and floats as rationals;
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file;
     - ``problem``, ``contact_body``, ``condensation.data``, ``condensation.condensed``, ``condensation.factorization``,
-      ``sealed``, ``checks``, ``array_checks``, ``files`` and ``errors``: the data, their checks and their fingerprint,
-      the factorization of A (no bound assumes that it is accurate), S and g as computed;
+      ``sealed``, ``checks``, ``array_checks``, ``files``, ``texts`` and ``errors``: the data, their checks and their
+      fingerprint, the factorization of A (no bound assumes that it is accurate), S and g as computed;
     - numpy, scipy and python-flint.
 
     They are shared because the two must agree. A leaf is written when its inequality is proven positive, and a second
@@ -45,9 +45,9 @@ Cross-checks
     They use nothing of the proof and are printed with the result. The indices of all roots and families add up to +1,
     the degree of the problem without friction: ``RootSet.index_sum``. Where all roots are regular, their number is odd.
 
-    - Complete and +1: what has to be.
+    - Complete and +1: as it must be.
     - None and not whole: the sum is not known. What was left undecided, or was not reached, holds roots whose indices
-      make up what those found lack of +1; a lack of nothing says nothing, since roots may be missing in pairs.
+      bring the sum to +1; a sum of +1 so far proves nothing, since roots may be missing in pairs.
     - None otherwise: the index of a degenerate root or family could not be found within the limits of the local
       analysis (very many selections hold there). The count of roots does not depend on it.
     - Complete, and another sum or an even number of regular roots: a contradiction. Either the program or the machine

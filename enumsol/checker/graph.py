@@ -9,7 +9,7 @@ fractions ``"a/b"`` in decimal digits.
 
 What is checked: pieces partition the interval (it is cut first where g vanishes, see ``condensation.unloaded``), with
 the subtrees left by a piece searched in both its halves; the leaves of every piece cover all selections of its roots;
-every exclusion is proven at both ends of the piece. What is not: that the arcs of the selections handed on are all
+every exclusion is proven at both ends of the piece. Not checked: that the arcs of the selections handed on are all
 there. They follow from these selections by exact algebra, and the balance of degrees checks them (theory, section 7.7).
 """
 
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 
 #: Leaves read and checked together.
 _BATCH = 256
-#: Leaves of a piece after which they are first looked at for repetitions; then whenever they have doubled.
+#: Leaves of a piece after which repetitions are first looked for; then whenever their number has doubled.
 _LOOK = 1024
 #: Entries of a leaf's record, by its kind.
 _ENTRIES = {"x": 4, "s": 2, "c": 2}
@@ -147,7 +147,7 @@ class GraphChecker:
 
     @cached_property
     def enclosure(self) -> CondensedEnclosure:
-        """Balls for what is certified; only exclusions ask for it."""
+        """Balls for what is certified; only exclusions need them."""
         return as_computed(self.problem) if self.data == "condensed" else CondensedEnclosure.from_problem(self.problem)
 
     def _read_header(self) -> tuple[Fraction, Fraction]:
@@ -176,7 +176,7 @@ class GraphChecker:
         except ValueError as error:
             raise RefusedError(f"piece {number} is missing or cannot be read: {error}") from None
         if (piece.a, piece.b) != due[:2] or not np.array_equal(_sorted(piece.roots), _sorted(due[2])):
-            raise RefusedError(f"piece {number} is not the one that is due: the interval is not covered")
+            raise RefusedError(f"piece {number} is not the next one: the interval is not covered")
         self.pieces = number
         record = next(records, _END)
         while isinstance(record, list):
@@ -207,7 +207,7 @@ class GraphChecker:
         return _Piece(a, b, *units, codes_from(record.get("roots"), self.problem.p))
 
     def _read_leaves(self, piece: _Piece, batch: list[list[Any]]) -> None:
-        """Take note of some leaves, and check the dual inequalities of those that are said to be empty."""
+        """Record some leaves, and check the dual inequalities of those claimed to be empty."""
         for record in batch:
             kind = record[0] if record else None
             if not isinstance(kind, str) or kind not in _ENTRIES:
@@ -233,7 +233,7 @@ class GraphChecker:
         leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
         margins = interval_exclusion_margins(enclosed, codes, leaf, np.concatenate(rows), np.concatenate(values))
         for number in np.flatnonzero(~(margins > 0)):
-            # alone it is added up in another order, that of the search: for a nearly singular S that may decide
+            # alone it is summed in the order of the search, which may matter for a nearly singular S
             alone = codes[number : number + 1], np.zeros(len(rows[number]), dtype=np.intp)
             if not interval_exclusion_margins(enclosed, *alone, rows[number], values[number])[0] > 0:
                 self._fail(f"leaf {self.leaves + number + 1}: its multipliers do not exclude it")
@@ -275,8 +275,8 @@ def covers(roots: Codes, leaves: Codes, friction: Sequence[bool]) -> bool:
     """Whether the leaves that refine one of the roots together cover every selection in the roots.
 
     Both are sets of partial assignments, (k, p) arrays of codes. They come from trees, so that in every cell that holds
-    some of them there is a node at which all of them refine it; splitting there gives smaller cells. A list that is no
-    tree is refused even if it covers.
+    some of them there is a node at which all of them refine it; splitting there gives smaller cells. A list that is not
+    a tree is refused even if it covers.
     """
     cell = np.full(len(friction), UNDECIDED, dtype=np.uint8)
     # a cell, the roots in it (None: the whole cell is to be covered), and the leaves in it

@@ -1,4 +1,4 @@
-"""The condensed problem in rationals, as the checker computes it; the search condenses by code of its own."""
+"""The condensed problem in rationals, as the checker computes it; the search has its own code for this."""
 
 from __future__ import annotations
 

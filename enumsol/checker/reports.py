@@ -1,4 +1,4 @@
-"""What the checkers report: what a proof was found to show, or why it was refused."""
+"""Reports of the checkers: what a proof shows, or why it was refused."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from enumsol.proof.reading import shown_alpha
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -23,10 +24,10 @@ class VerificationReport:
     ok : bool
         Every leaf was checked and the counts agree; with ``undecided`` 0 the list of roots is proven complete.
     failures : tuple of str
-        Why the proof was refused. The check ends where the records cease to make sense, and after MAX_FAILURES.
+        Why the proof was refused. The check ends where the records stop making sense, and after MAX_FAILURES.
     roots, families, undecided, leaves : int
-        Counts that were checked: isolated roots, families, undecided leaves, all leaves. Of a refused proof they only
-        tell how far the check went.
+        Counts that were checked: isolated roots, families, undecided leaves, all leaves. For a refused proof they only
+        show how far the check got.
     data : str
         "problem": the theorem holds for the problem's own matrices; "condensed": for S, g and F as computed.
     alpha : Fraction or None
@@ -58,13 +59,13 @@ class VerificationReport:
     def __repr__(self) -> str:
         where = "" if self.alpha is None else f" at alpha = {shown_alpha(self.alpha)}"
         if not self.ok:
-            return _refusal(where, self.failures, _count(self.leaves, "leaf", "leaves"))
+            return _refusal(where, self.failures, counted(self.leaves, "leaf", "leaves"))
         return "\n".join(
             (
                 f"proof: verified{where}",
-                f"  {_count(self.leaves, 'leaf covers', 'leaves cover')} all selections, {self.undecided} of them "
+                f"  {counted(self.leaves, 'leaf covers', 'leaves cover')} all selections, {self.undecided} of them "
                 "undecided",
-                f"  {_count(self.roots, 'isolated root')}, {_count(self.families, 'family', 'families')}",
+                f"  {counted(self.roots, 'isolated root')}, {counted(self.families, 'family', 'families')}",
                 f"  certified data: {_DATA[self.data]}",
                 f"  complete: {'yes' if self.complete else 'no'}",
             )
@@ -80,10 +81,10 @@ class GraphVerificationReport:
     ok : bool
         Every solution for every alpha in the interval lies in one of ``selections``.
     failures : tuple of str
-        Why the proof was refused. The check ends where the records cease to make sense, and after MAX_FAILURES.
+        Why the proof was refused. The check ends where the records stop making sense, and after MAX_FAILURES.
     interval : (Fraction, Fraction) or None
     pieces, leaves : int
-        Of a refused proof they only tell how far the check went; so do the selections.
+        For a refused proof they, and the selections, only show how far the check got.
     selections : frozenset of tuples of status codes
     data : str
         "problem": about the problem's own matrices; "condensed": about S and g as computed.
@@ -105,13 +106,13 @@ class GraphVerificationReport:
     def __repr__(self) -> str:
         ends = () if self.interval is None else tuple(float(end) for end in self.interval)
         where = f" for alpha in [{ends[0]:g}, {ends[1]:g}]" if ends else ""
-        found = f"{_count(self.leaves, 'leaf', 'leaves')} in {_count(self.pieces, 'piece')}"
+        found = f"{counted(self.leaves, 'leaf', 'leaves')} in {counted(self.pieces, 'piece')}"
         if not self.ok:
             return _refusal(where, self.failures, found)
         return "\n".join(
             (
                 f"proof: verified{where}",
-                f"  {found}; every solution lies in one of {_count(len(self.selections), 'selection')}",
+                f"  {found}; every solution lies in one of {counted(len(self.selections), 'selection')}",
                 f"  certified data: {_DATA[self.data]}",
             )
         )
@@ -123,7 +124,3 @@ _DATA = {"problem": "A, Bn, Bt, f as given", "condensed": "S and g as computed"}
 def _refusal(where: str, failures: tuple[str, ...], read: str) -> str:
     lines = [f"proof: REFUSED{where}", *(f"  failure: {failure}" for failure in failures)]
     return "\n".join([*lines, f"  checked until then: {read}, which show nothing", "  complete: no"])
-
-
-def _count(number: int, singular: str, plural: str | None = None) -> str:
-    return f"{number} {singular if number == 1 else plural or singular + 's'}"

@@ -14,20 +14,21 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.verify import Checker, verify
+from enumsol.checks import instance_of
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.kernel.point import exclusion_margins, solve_selection
+from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
 
 #: Largest radius that is tried; below 1 a positive friction coefficient stays positive.
 LARGEST = 0.5
-#: Below this a radius is no better than rounding, and 0 is returned.
+#: A smaller radius is within rounding, and 0 is returned.
 SMALLEST = 2.0**-50
 #: Multipliers are stretched or shrunk by at most this.
 _STRETCH = 1e9
@@ -47,7 +48,8 @@ def stability_radius(problem: ContactProblem, proof: Proof) -> float:
     the problem has as many roots as the proof lists, all of them regular, in the same selections and with the same
     indices, and no families. (For the units: sqrt(S_ii S_jj) bounds |S_ij|, and a displacement is measured by the root
     of its own compliance.) A change of load, gap, slip offset, friction or alpha is such a change of g and F. The
-    largest radius is larger: only the multipliers of this proof are tried. It costs some checks of the proof.
+    largest radius is larger: only the multipliers of this proof are tried. The cost is that of several
+    checks of the proof.
 
     Parameters
     ----------
@@ -64,7 +66,10 @@ def stability_radius(problem: ContactProblem, proof: Proof) -> float:
     ------
     ProofFormatError
         The file is damaged or of another version.
+    InvalidArgumentError
+        The problem is no ContactProblem.
     """
+    instance_of(problem, ContactProblem, "problem")
     if not verify(problem, proof).complete:
         return 0.0
     search = _WidenedChecker(problem, None, radius=LARGEST, adjust=True)
@@ -81,7 +86,7 @@ def stability_radius(problem: ContactProblem, proof: Proof) -> float:
 
 @dataclass
 class _WidenedChecker(Checker):
-    """A checker whose balls are wider; ``adjust`` lowers the radius to what every leaf bears."""
+    """A checker whose balls are wider; ``adjust`` lowers the radius until every leaf passes."""
 
     radius: float = LARGEST
     adjust: bool = False

@@ -1,6 +1,6 @@
 """The checker of root sets: whether a proof shows that its list of roots is complete.
 
-It imports nothing of the search; what both rest on is said in ``enumsol.checker``. It recomputes S, g and F (or
+It imports nothing of the search; ``enumsol.checker`` lists what both rest on. It recomputes S, g and F (or
 their enclosures) from the problem, proves S positive definite, walks the tree from its root, so that the leaves cover
 all selections by construction, and checks every leaf.
 """
@@ -10,16 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.graph import GraphChecker
-from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport, VerificationReport
+from enumsol.checker.reports import GraphVerificationReport, VerificationReport
+from enumsol.checker.tree import TreeChecker
 from enumsol.checks import instance_of, optional_callable
-from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
 from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
 from enumsol.kernel.rows import FRICTIONLESS, ROW_KINDS, UNDECIDED, children_of, row_signs
 from enumsol.problem import ContactProblem
@@ -36,37 +36,35 @@ from enumsol.proof.reading import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
     from enumsol.checker.rational import RationalSystem
-    from enumsol.condensation.data import Data
+    from enumsol.problem3d import ContactProblem3D
 
     #: codes of a selection, the vertices of its root set, and its dimension
     Polytope = tuple[tuple[int, ...], list[Any], int]
 
-_REPORT_EVERY = 256
 #: Exclusion leaves checked together.
 _BATCH = 256
 #: Entries of a leaf's record, by its kind.
 _ENTRIES = {"x": 3, "X": 3, "n": 1, "r": 4, "N": 1, "D": 3, "z": 1, "u": 2}
 #: Covers underflow of one product.
 _SUBNORMAL = 2.0**-1070
-_END = object()
 
 
 def verify(
-    problem: ContactProblem, proof: Proof, progress: Callable[[int], object] | None = None
+    problem: ContactProblem | ContactProblem3D, proof: Proof, progress: Callable[[int], object] | None = None
 ) -> VerificationReport | GraphVerificationReport:
     """Check a proof, of a root set or of a branch graph's search, against a problem.
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     proof : Proof
     progress : callable, optional
-        Called now and then with the number of leaves checked.
+        Called regularly with the number of leaves checked.
 
     Returns
     -------
@@ -76,7 +74,7 @@ def verify(
     ------
     ProofFormatError
         The file is damaged (its checksum does not agree), of another version, or holds no sequence of records. Records
-        that make no sense, or prove nothing, are a reason to refuse the proof: the report says so.
+        that make no sense, or prove nothing, make the report refuse the proof.
     InvalidArgumentError
         An argument is of another type.
 
@@ -92,74 +90,37 @@ def verify(
       certified data: A, Bn, Bt, f as given
       complete: yes
     """
-    instance_of(problem, ContactProblem, "problem")
+    in_space = _is_in_space(problem)
+    if not in_space:
+        instance_of(problem, ContactProblem, "problem")
     instance_of(proof, Proof, "proof")
     optional_callable(progress, "progress")
     proof.check_integrity()
+    if in_space:
+        from enumsol.checker.space import SpaceChecker  # with its kernel, for problems in 3D only
+
+        return SpaceChecker(problem, progress).run(proof)
     records = proof.records()
     header = next(records, None)
     if isinstance(header, dict) and header.get("kind") == "graph":
-        return GraphChecker(problem, header, progress).run(records)
+        return GraphChecker(cast("ContactProblem", problem), header, progress).run(records)
     return Checker(problem, progress).run(proof)
 
 
+def _is_in_space(problem: object) -> bool:
+    if isinstance(problem, ContactProblem):
+        return False
+    from enumsol.problem3d import ContactProblem3D
+
+    return isinstance(problem, ContactProblem3D)
+
+
 @dataclass
-class Checker:
-    """Checks one proof: its header, then the tree alone, then every leaf.
+class Checker(TreeChecker):
+    """Checks one proof of a problem in 2D."""
 
-    Whatever does not fit together is found before anything is computed, which may take long.
-    """
-
-    problem: ContactProblem
-    progress: Callable[[int], object] | None
-    alpha: Fraction = field(init=False)
-    failures: list[str] = field(default_factory=list)
-    regular: int = 0
-    undecided: int = 0
-    leaves: int = 0
     polytopes: list[Polytope] = field(default_factory=list)
-    data: Data = "problem"
     _waiting: list[tuple[int, tuple[int, ...], Any, Any]] = field(default_factory=list)
-
-    def run(self, proof: Proof) -> VerificationReport:
-        """Check all records.
-
-        Raises
-        ------
-        ProofFormatError
-            The content is not a sequence of records.
-        """
-        families = isolated = 0
-        try:
-            records = proof.records()
-            self._read_header(next(records, None))
-            footer = self._survey(records)
-            records = proof.records()
-            next(records, None)
-            self._walk(records)
-            isolated, families = self._count()
-            claim = {
-                "roots": self.regular + isolated,
-                "families": families,
-                "undecided": self.undecided,
-                "leaves": self.leaves,
-            }
-            if footer != claim:
-                self.fail(f"the counts at the end are {shown(footer)}; the leaves give {claim}")
-        except RefusedError as refusal:
-            self.failures.append(str(refusal))
-        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
-            self.failures.append(f"the problem's data cannot be enclosed: {error}")
-        return VerificationReport(
-            not self.failures,
-            tuple(self.failures),
-            self.regular + isolated,
-            families,
-            self.undecided,
-            self.leaves,
-            self.data,
-            getattr(self, "alpha", None),
-        )
 
     # -- header and tree -------------------------------------------------------------------------------------------
 
@@ -193,55 +154,16 @@ class Checker:
 
     @cached_property
     def rational(self) -> RationalSystem:
-        """The condensed problem in rationals; only leaves that need it ask for it."""
+        """The condensed problem in rationals; computed only if a leaf needs it."""
         if self.data == "condensed":
             raise RefusedError("a rational leaf in a proof about S and g as computed")
         from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
 
         return RationalSystem(self.problem, self.alpha)
 
-    def _leaves(self, records: Iterator[Any]) -> Iterator[tuple[tuple[int, ...], list[Any]]]:
-        """The tree's leaves with the assignments that they stand for, which together cover all selections."""
-        stack: list[tuple[int, ...]] = [(UNDECIDED,) * self.problem.p]
-        while stack:
-            codes = stack.pop()
-            record = next(records, _END)
-            if not isinstance(record, list) or not record:
-                raise RefusedError(f"{len(stack) + 1} subtrees are not accounted for: the tree breaks off")
-            if record[0] == "b":
-                stack.extend(reversed(self._children(codes, record)))
-            else:
-                yield codes, record
-
-    def _survey(self, records: Iterator[Any]) -> Any:
-        """Walk the tree without a look at its leaves; gives the counts at the end."""
-        leaves = sum(1 for _ in self._leaves(records))
-        footer = next(records, _END)
-        if not isinstance(footer, dict) or footer.get("leaves") != leaves:
-            found = "missing" if footer is _END else shown(footer)
-            raise RefusedError(f"the counts at the end are {found}; the tree has {leaves} leaves")
-        if next(records, _END) is not _END:
-            raise RefusedError("records follow after the end of the proof")
-        return footer
-
-    def _walk(self, records: Iterator[Any]) -> None:
-        for codes, record in self._leaves(records):
-            self.leaves += 1
-            try:
-                problem = self._leaf(codes, record)
-            except ValueError as error:
-                problem = f"its record cannot be followed ({error})"
-            if problem is not None:
-                self.fail(f"leaf {self.leaves}: {problem}")
-            if len(self._waiting) >= _BATCH:
-                self._exclusions()
-            if self.progress is not None and self.leaves % _REPORT_EVERY == 0:
-                self.progress(self.leaves)
-        self._exclusions()
-
-    def _exclusions(self) -> None:
+    def _flush(self, *, last: bool) -> None:
         """Check the dual inequalities of the waiting leaves together."""
-        if not self._waiting:
+        if not self._waiting or (not last and len(self._waiting) < _BATCH):
             return
         numbers, codes, rows, values = zip(*self._waiting, strict=True)
         self._waiting.clear()
@@ -255,25 +177,12 @@ class Checker:
         for number in numbers[~(margins > 0)]:
             self.fail(f"leaf {number}: its multipliers do not exclude it")
 
-    def _children(self, codes: tuple[int, ...], record: list[Any]) -> list[tuple[int, ...]]:
-        _, node, children = record if len(record) == 3 else (None, None, None)
-        if type(node) is int and 0 <= node < self.problem.p and isinstance(children, list):
-            expected = children_of(codes[node], friction=self.friction[node])
-            if expected and all(type(code) is int for code in children) and sorted(children) == sorted(expected):
-                return [(*codes[:node], code, *codes[node + 1 :]) for code in children]
-        raise RefusedError(f"a branching {shown(record)} does not cover the assignment that it splits")
+    def _covering(self, code: int, node: int) -> tuple[int, ...]:
+        return children_of(code, friction=self.friction[node])
 
-    def fail(self, message: str) -> None:
-        """Take note of a failure.
-
-        Raises
-        ------
-        RefusedError
-            There have been MAX_FAILURES: whoever wrote this may have written any number of such leaves.
-        """
-        self.failures.append(message)
-        if len(self.failures) == MAX_FAILURES:
-            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
+    def _claim(self, isolated: int, families: int) -> dict[str, int]:
+        roots = self.regular + isolated
+        return {"roots": roots, "families": families, "undecided": self.undecided, "leaves": self.leaves}
 
     # -- leaves ----------------------------------------------------------------------------------------------------
 
@@ -337,7 +246,7 @@ class Checker:
         _, points, dimension = record
         _check_points(points, 2 * self.problem.p)
         hull = hull_of_selections(self.rational, codes)
-        # in lowest terms a number has one text: there is no need to make numbers of the texts in a file
+        # in lowest terms a number has one text: the texts in a file need no conversion
         found = [[fraction_text(x.numerator, x.denominator) for x in point] for point in hull.points]
         if not found or sorted(points) != sorted(found) or type(dimension) is not int or dimension != hull.dimension:
             return "its roots are not those that are claimed"
@@ -349,7 +258,7 @@ class Checker:
     def _count(self) -> tuple[int, int]:
         """Isolated degenerate roots and families: rational solutions joined where they have a point in common.
 
-        A strict root solves no second selection, so it is none of these, and strict roots of two leaves are two.
+        A strict root solves no second selection: it is not among these, and strict roots of two leaves are different.
         """
         groups = list(range(len(self.polytopes)))
 
@@ -362,7 +271,7 @@ class Checker:
         for k, (_, points, _) in enumerate(self.polytopes):
             for point in points:
                 groups[group_of(k)] = group_of(owner.setdefault(point, k))
-        # two points are one or have nothing in common; larger polytopes may meet elsewhere than in their vertices
+        # points are equal or disjoint; larger polytopes may meet away from their vertices
         for k in [k for k, polytope in enumerate(self.polytopes) if polytope[2] > 0]:
             for m in range(len(self.polytopes)):
                 if group_of(k) != group_of(m) and self._meet(k, m):

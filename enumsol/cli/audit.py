@@ -12,6 +12,7 @@ from enumsol.cli.graph import build, read_graph
 from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, csv, file, number
 from enumsol.cli.output import as_json, check_outputs, deliver
 from enumsol.errors import InvalidArgumentError
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -114,7 +115,7 @@ def _read_runs(points: str, problem: ContactProblem, columns: Columns) -> Sequen
 
 def _as_text(report: AuditReport, found: BranchGraph) -> str:
     low, high = found.interval
-    about = f"graph for alpha in [{low:g}, {high:g}], {len(found.arcs)} arcs; {found.completeness()}"
+    about = f"graph for alpha in [{low:g}, {high:g}], {counted(len(found.arcs), 'arc')}; {found.completeness()}"
     return f"{report!r}\n{about}"
 
 

@@ -50,21 +50,10 @@ def load_problem(name: str) -> ContactProblem:
         It cannot be read, the gallery has none of that name (the message gives names that are close), or it is one
         in 3D.
     """
-    return plane_problem(load_any_problem(name), name)
-
-
-def plane_problem(problem: ContactProblem | ContactProblem3D, name: str) -> ContactProblem:
-    """The problem, which is one in 2D.
-
-    Raises
-    ------
-    InvalidArgumentError
-        It is one in 3D.
-    """
     from enumsol.checks import instance_of  # numpy: not for --help
     from enumsol.problem import ContactProblem
 
-    return instance_of(problem, ContactProblem, name)
+    return instance_of(load_any_problem(name), ContactProblem, name)
 
 
 def load_any_problem(name: str) -> ContactProblem | ContactProblem3D:

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, plane_problem, so_far
+from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, so_far
 from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, count, csv, file, number
 from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -60,8 +61,8 @@ def fixed_point(
     value = _alpha(alpha, problem, body)
     options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations, "anderson": anderson}
     if starts is not None:
-        _basins(plane_problem(body, problem), problem, value, starts, options, json_file, csv_file, plot_file)
-    write_vtu = None if vtu_file is None else _vtu_writer(body, problem)
+        _basins(_in_2d(body, problem), problem, value, starts, options, json_file, csv_file, plot_file)
+    write_vtu = None if vtu_file is None else _vtu_writer(body, problem, vtu_file)
     found, ended = so_far(lambda: _approximate(body, value, start, options))
     deliver(
         (npz_file, found.save),
@@ -96,6 +97,14 @@ def _alpha(text: str | None, name: str, body: ContactProblem | ContactProblem3D)
     return 0.0
 
 
+def _in_2d(body: ContactProblem | ContactProblem3D, name: str) -> ContactProblem:
+    from enumsol.problem import ContactProblem  # as below
+
+    if not isinstance(body, ContactProblem):
+        raise InvalidArgumentError(f"--starts is given, but {name} is a problem in 3D; expected one in 2D")
+    return body
+
+
 def _approximate(
     body: ContactProblem | ContactProblem3D, alpha: Alpha, start: float, options: dict[str, Any]
 ) -> FixedPoint:
@@ -109,13 +118,15 @@ def _approximate(
         return successive_approximations(body, alpha, start, progress=show, **options)
 
 
-def _vtu_writer(body: ContactProblem | ContactProblem3D, name: str) -> Callable[[FixedPoint, str], None]:
+def _vtu_writer(body: ContactProblem | ContactProblem3D, name: str, file: str) -> Callable[[FixedPoint, str], None]:
     """What writes a result, if there can be such a file at all."""
     from enumsol.io.vtu import write_vtu  # as above
     from enumsol.problem3d import ContactProblem3D
 
     if not isinstance(body, ContactProblem3D):
         raise InvalidArgumentError(f"--vtu is given, but {name} is a problem in 2D; expected one in 3D")
+    if not file.endswith(".vtu"):
+        raise InvalidArgumentError(f"--vtu is {file!r}; expected a name that ends in .vtu")
     if find_spec("meshio") is None:
         raise MissingDependencyError(
             '--vtu needs meshio, which is not installed; install it with: pip install "enumsol[solids]"'
@@ -176,7 +187,7 @@ def _basin_text(table: pd.DataFrame, roots: int, completeness: str) -> str:
     lines = []
     for root in range(roots):
         rows = table[table["root"] == root]
-        most = f", up to {rows['iterations'].max()} iterations" if len(rows) else ""
+        most = f", up to {counted(rows['iterations'].max(), 'iteration')}" if len(rows) else ""
         lines.append(f"root {root}: reached from {len(rows)} of {len(table)} starts{most}")
     lost = table[table["root"].isna()]
     lines += [f"no root ({outcome}): {len(rows)} starts" for outcome, rows in lost.groupby("outcome")]

@@ -29,6 +29,7 @@ from enumsol.cli.options import (
 from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display, SearchDisplay
 from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -191,7 +192,7 @@ class _Followed:
                     if self._follow(number, root, sign, alone=alone):
                         break
                 points = sum(len(path) for path in self.paths)
-                display.show((done + 1) / len(starts), f"{len(self.paths)} paths, {points:,} points")
+                display.show((done + 1) / len(starts), f"{counted(len(self.paths), 'path')}, {points:,} points")
 
     def _follow(self, number: int, root: Root, sign: int, *, alone: bool) -> bool:
         """One path; whether it closed."""
@@ -229,9 +230,7 @@ class _Followed:
         lines += [f"root {number} lies on path {k}" for number, k in self.passed.items()]
         lines += [f"root {number} in direction {sign:+d}: {reason}" for number, sign, reason in self.failures]
         ended = sum(path.status in _ARRIVED for path in self.paths)
-        lines.append(
-            f"{len(self.paths)} path{'s' * (len(self.paths) != 1)}, {ended} of them left the interval or closed"
-        )
+        lines.append(f"{counted(len(self.paths), 'path')}, {ended} of them left the interval or closed")
         return "\n".join(lines)
 
     def frame(self) -> pd.DataFrame:

@@ -22,6 +22,7 @@ from enumsol.cli.options import (
 from enumsol.cli.output import check_outputs, check_writable, deliver
 from enumsol.cli.progress import SearchDisplay
 from enumsol.errors import InvalidArgumentError
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from enumsol.checks import Alpha
@@ -84,7 +85,8 @@ def roots(
         frame=found.to_frame,
     )
     if csv_file is not None and found.families:
-        note(f"the CSV holds the isolated roots only, --json the {len(found.families)} families too")
+        families = counted(len(found.families), "family", "families")
+        note(f"the CSV holds the isolated roots only, --json the {families} too")
     finish(ended, _status(found))
 
 

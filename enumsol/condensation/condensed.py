@@ -79,20 +79,12 @@ class ScaledSystem:
     @classmethod
     def from_system(cls, system: CondensedSystem) -> ScaledSystem:
         """Scale a condensed system."""
-        p = system.p
-        diagonal = np.log2(np.diagonal(system.S))
-        node = np.exp2(-np.round(0.25 * (diagonal[:p] + diagonal[p:])))
+        node = node_units(system.S, system.p)
         factor = np.concatenate([node, node])
         S = system.S * factor[:, None] * factor[None, :]
         g = system.g * factor
-        cholesky = _cholesky(S)
-        largest = float(np.max(np.abs(g)))
-        size = 1.0
-        if largest > 0:
-            # two steps, so that squaring neither overflows nor underflows
-            first = np.exp2(np.floor(np.log2(largest)))
-            energy = float(np.linalg.norm(np.linalg.solve(cholesky, g / first)))
-            size = float(first * np.exp2(np.floor(np.log2(energy))))
+        cholesky = cholesky_factor(S)
+        size = load_unit(g, cholesky)
         with np.errstate(over="ignore", divide="ignore"):
             units = np.concatenate([factor * size, size / factor])
         if not np.all((units >= 2.0**-UNIT_EXPONENT) & (units <= 2.0**UNIT_EXPONENT)):
@@ -113,7 +105,30 @@ class ScaledSystem:
         return len(self.F)
 
 
-def _cholesky(S: NDArray[np.float64]) -> NDArray[np.float64]:
+def node_units(S: NDArray[np.float64], p: int) -> NDArray[np.float64]:
+    """Powers of two, shape (p,), that scale the compliance of every node near one, alike in all its directions."""
+    return np.asarray(np.exp2(-np.round(0.5 * np.mean(np.log2(np.diagonal(S).reshape(-1, p)), axis=0))))
+
+
+def load_unit(g: NDArray[np.float64], cholesky: NDArray[np.float64]) -> float:
+    """The power of two that scales g' S^{-1} g into [1, 4); 1 where g = 0."""
+    largest = float(np.max(np.abs(g)))
+    if largest == 0:
+        return 1.0
+    # two steps, so that squaring neither overflows nor underflows
+    first = np.exp2(np.floor(np.log2(largest)))
+    energy = float(np.linalg.norm(np.linalg.solve(cholesky, g / first)))
+    return float(first * np.exp2(np.floor(np.log2(energy))))
+
+
+def cholesky_factor(S: NDArray[np.float64]) -> NDArray[np.float64]:
+    """L with S = L L'.
+
+    Raises
+    ------
+    InvalidProblemError
+        S is not positive definite to working precision.
+    """
     try:
         # a pivot of the size of rounding may be positive by accident: the relaxations factorize 2 S, and would fail
         np.linalg.cholesky(2.0 * S)

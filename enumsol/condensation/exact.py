@@ -57,11 +57,11 @@ class ExactSystem:
             The problem has more than EXACT_DOF_LIMIT degrees of freedom.
         """
         problem.friction_at(alpha)
-        return ExactPath(*_condensed(problem), condensed_exactly=True, zero=None).system(rational(alpha))
+        return ExactCondensed(*_condensed(problem), condensed_exactly=True, zero=None).system(rational(alpha))
 
 
 @dataclass(frozen=True)
-class ExactPath:
+class ExactCondensed:
     """The condensed problem in rationals: w = g0 + alpha g1 - S lambda, F = F0 + alpha F1.
 
     Attributes
@@ -86,7 +86,7 @@ class ExactPath:
     zero: Fraction | None
 
     @classmethod
-    def from_problem(cls, problem: CondensedData) -> ExactPath:
+    def from_problem(cls, problem: CondensedData) -> ExactCondensed:
         """Condense A, Bn, Bt, f, load_slope, gap, slip_offset and friction without any rounding.
 
         Raises
@@ -102,7 +102,7 @@ class ExactPath:
         return fmpq_mat([list(row) for row in self.rows])
 
     @classmethod
-    def from_condensed(cls, problem: CondensedData) -> ExactPath:
+    def from_condensed(cls, problem: CondensedData) -> ExactCondensed:
         """The exact values of S, g and F as computed in floats."""
         condensed = problem.condensed
         vectors = (condensed.g0, condensed.g1, condensed.F0, condensed.F1)

@@ -1,6 +1,6 @@
 """The problem's matrices in rationals, and g solved from them: for the checker, and for the alpha at which g vanishes.
 
-The search condenses by code of its own (``condensation.exact``).
+The search has its own code for this (``condensation.exact``).
 """
 
 from __future__ import annotations

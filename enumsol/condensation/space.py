@@ -10,13 +10,13 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT
 from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.condensed import cholesky_factor, load_unit, node_units
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
-    from enumsol.problem3d import ContactProblem3D
 
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]
@@ -51,17 +51,12 @@ class SpaceSystem:
     def scaled(cls, S: Matrix, g: Vector, F: Matrix) -> SpaceSystem:
         """From S (3p, 3p) and g (3p,), all normals first, then both tangents, and coefficients F (p, 2)."""
         p = len(F)
-        factor = np.exp2(-np.round(0.5 * np.mean(np.log2(np.diagonal(S).reshape(3, p)), axis=0)))
+        factor = node_units(S, p)
         tau, rows, node, axis = places(F > 0)
         weight = np.concatenate([factor, factor[node] * F[node, axis]])
         S = weight[:, None] * S[np.ix_(rows, rows)] * weight
         g = weight * g[rows]
-        size = 1.0
-        largest = float(np.max(np.abs(g)))
-        if largest > 0:
-            first = np.exp2(np.floor(np.log2(largest)))
-            energy = float(np.sqrt(np.linalg.solve(S, g / first) @ (g / first)))
-            size = float(first * np.exp2(np.floor(np.log2(energy))))
+        size = load_unit(g, cholesky_factor(S))
         return cls(S, g / size, F, tau, factor * size, size / factor)
 
     @property
@@ -83,6 +78,9 @@ def places(occurs: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp
     return tau, np.concatenate([np.arange(p), (1 + axis) * p + node]), node, axis
 
 
+_OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"
+
+
 @dataclass(frozen=True)
 class EnclosedSpace(EnclosedSystem):
     """A SpaceSystem as balls: S, g and F for the data as given.
@@ -102,9 +100,7 @@ class EnclosedSpace(EnclosedSystem):
         return cls(system.S, zero(system.S), system.g, zero(system.g), system.F, zero(system.F), system.tau)
 
     @classmethod
-    def of_problem(
-        cls, enclosure: CondensedEnclosure, problem: ContactProblem3D, alpha: Fraction, force: Vector, length: Vector
-    ) -> EnclosedSpace:
+    def of_problem(cls, enclosure: CondensedEnclosure, alpha: Fraction, force: Vector, length: Vector) -> EnclosedSpace:
         """Balls for the exact data at alpha, in units of the nodes given by powers of two (see SpaceSystem).
 
         Raises
@@ -112,9 +108,13 @@ class EnclosedSpace(EnclosedSystem):
         NotEnclosedError
             Something over- or underflows.
         """
+        problem = enclosure.problem
         p = problem.p
         exact = [exactly_at(alpha, *pair) for pair in zip(problem.friction, problem.friction_slope, strict=True)]
-        F = np.array([[float(x) for x in column] for column in exact]).T
+        try:
+            F = np.array([[float(x) for x in column] for column in exact]).T
+        except OverflowError:
+            raise NotEnclosedError(_OVERFLOW) from None
         inexact = np.array(
             [[Fraction(y) != x for x, y in zip(*both, strict=True)] for both in zip(exact, F.T, strict=True)]
         )
@@ -127,7 +127,7 @@ class EnclosedSpace(EnclosedSystem):
         rad = np.concatenate([np.zeros(p), F_rad[node, axis]])
         with np.errstate(over="ignore", invalid="ignore"):
             pair = np.outer(weight, weight)
-            pair_rad = np.outer(weight + rad, weight + rad) * SAFE - pair + 4 * UNIT * pair
+            pair_rad = (np.outer(weight + rad, rad) + np.outer(rad, weight)) * SAFE + 4 * UNIT * pair
             S, S_rad = S[np.ix_(rows, rows)], S_rad[np.ix_(rows, rows)]
             scaled, scaled_rad = S * pair, np.abs(S) * pair_rad + S_rad * (pair + pair_rad)
             scaled_rad = (scaled_rad + 4 * UNIT * np.abs(scaled)) * SAFE + TINY
@@ -135,5 +135,5 @@ class EnclosedSpace(EnclosedSystem):
             load_rad = weight * g_rad[rows] + rad * (np.abs(g[rows]) + g_rad[rows]) + 4 * UNIT * np.abs(load)
             load_rad = load_rad * SAFE + TINY
         if not all(np.all(np.isfinite(array)) for array in (scaled, scaled_rad, load, load_rad)):
-            raise NotEnclosedError("the condensed problem over- or underflows float64; expected data in other units")
+            raise NotEnclosedError(_OVERFLOW)
         return cls(scaled, scaled_rad, load, load_rad, F, F_rad, tau)

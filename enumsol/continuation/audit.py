@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from enumsol.checks import real_or_nan, shown
-from enumsol.continuation.audit_report import AuditedPoint, AuditReport, Jump, MissedArc
+from enumsol.continuation.audit_report import AuditedPoint, AuditReport, Jump, MissedArc, Verdict
 from enumsol.continuation.graph_map import GraphLike, GraphMap, Place, PlaceKind
 from enumsol.continuation.path import Path
 from enumsol.continuation.points import Columns, PointRun, read_points
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 POINT_TOLERANCE = 1e-5
 #: Two points follow each other on the graph when the way along it is at most this many times their distance.
 DETOUR = 10.0
-#: Why a point on none of its arcs is not said to be off a graph from which something is known to be missing.
+#: Why a point that lies on no arc of an incomplete graph is not reported as off.
 _UNPLACED = "on no arc that the graph holds, and the graph is not complete"
 
 
@@ -50,7 +50,7 @@ def audit(
     tolerance : float
         Distance from the nearest arc or vertex at which a point lies off the graph, above 0 and below 1. For points of
         another code, about ten times the relative error of its contact forces. Solutions closer to each other than
-        this are not told apart.
+        this are not distinguished.
     detour : float
         Neighbouring points of a path with a longer way between them along the graph, in multiples of their distance,
         are a jump.
@@ -134,14 +134,14 @@ class _Tally:
         if chart.outside(alpha):
             place = Place(PlaceKind.OUTSIDE, -1, math.nan)
             low, high = (float(end) for end in chart.graph.interval)
-            verdict, reason = "not compared", f"outside the graph's interval [{low:.10g}, {high:.10g}]"
+            verdict, reason = Verdict.NOT_COMPARED, f"outside the graph's interval [{low:.10g}, {high:.10g}]"
         else:
             place = chart.place(x, near)
-            verdict, reason = "on", ""
+            verdict, reason = Verdict.ON, ""
             if place.distance > chart.tolerance:
-                verdict, reason = ("not compared", _UNPLACED) if chart.graph.reasons else ("off", "")
+                verdict, reason = (Verdict.NOT_COMPARED, _UNPLACED) if chart.graph.reasons else (Verdict.OFF, "")
         self.points.append(AuditedPoint(run.path, int(run.rows[k]), alpha, place, self._branch(place), verdict, reason))
-        if verdict != "on":
+        if verdict is not Verdict.ON:
             return None
         self.on.append(place)
         if place.kind is PlaceKind.ARC:

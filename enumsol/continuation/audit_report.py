@@ -1,7 +1,8 @@
-"""What an audit found, and the one place that decides what it may claim."""
+"""What an audit found, and what it may claim."""
 
 from __future__ import annotations
 
+import enum
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from enumsol.continuation.graph_map import PlaceKind
 from enumsol.roots.root import summary
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -20,9 +22,23 @@ if TYPE_CHECKING:
     from enumsol.continuation.graph_map import Place
     from enumsol.statuses import ContactStatus
 
-#: How the rows of points are counted, for whoever reads a report.
+#: How rows are counted, printed with a report.
 ROWS = "rows are counted from 0: in a file from the first row below the names of the columns, in a frame as by iloc"
 _PRINTED = 8
+
+
+class Verdict(enum.StrEnum):
+    """Where a point is; members compare with their texts: ``point.verdict == "on"``."""
+
+    #: Within the tolerance of its place.
+    ON = "on"
+    #: Further from it, and nothing is known to be missing from the graph.
+    OFF = "off"
+    #: Whether it is on the graph is not known, for the reason given.
+    NOT_COMPARED = "not compared"
+
+    def __repr__(self) -> str:
+        return repr(self.value)
 
 
 @dataclass(frozen=True)
@@ -41,9 +57,7 @@ class AuditedPoint:
         The nearest arc or vertex and the distance from it.
     branch : int
         Branch of that arc; -1 for a vertex.
-    verdict : {"on", "off", "not compared"}
-        "on": within the tolerance of the place. "off": not so, and nothing is known to be missing from the graph.
-        "not compared": neither is known, for the reason given.
+    verdict : Verdict
     reason : str
         Why it was not compared; empty for other points.
     """
@@ -53,7 +67,7 @@ class AuditedPoint:
     alpha: float
     place: Place
     branch: int
-    verdict: str
+    verdict: Verdict
     reason: str = ""
 
     @property
@@ -128,9 +142,8 @@ class MissedArc:
 class AuditReport:
     """Result of an audit.
 
-    Against a graph from which something is known to be missing (``graph_reasons``), a point on none of its arcs may lie
-    on one that it lacks, and two points that it does not join may be joined by one: then ``off`` and ``jumps`` are
-    empty, such points are ``not_compared``, and such pairs ``unjoined``.
+    An incomplete graph (one with ``graph_reasons``) may lack the arc on which a point lies, or the arc that joins two
+    points. Then ``off`` and ``jumps`` are empty; such points are ``not_compared`` and such pairs ``unjoined``.
 
     Attributes
     ----------
@@ -149,8 +162,8 @@ class AuditReport:
     graph_complete : bool
         Whether it is proven that the graph holds every solution.
     graph_reasons : tuple of str
-        Why solutions may be missing from it. Empty and not ``graph_complete``: nothing is known to be missing, and that
-        nothing is was not proven (fast arithmetic).
+        Why solutions may be missing from it. Empty without ``graph_complete``: nothing is known to be missing, but
+        completeness is not proven (fast arithmetic).
     """
 
     points: tuple[AuditedPoint, ...]
@@ -183,12 +196,12 @@ class AuditReport:
     @property
     def off(self) -> tuple[int, ...]:
         """Numbers, among ``points``, of those that are off the graph."""
-        return tuple(k for k, point in enumerate(self.points) if point.verdict == "off")
+        return tuple(k for k, point in enumerate(self.points) if point.verdict is Verdict.OFF)
 
     @property
     def not_compared(self) -> tuple[int, ...]:
         """Numbers, among ``points``, of those that could not be compared."""
-        return tuple(k for k, point in enumerate(self.points) if point.verdict == "not compared")
+        return tuple(k for k, point in enumerate(self.points) if point.verdict is Verdict.NOT_COMPARED)
 
     def graph_state(self) -> str:
         """What is known about the graph, as a clause."""
@@ -219,7 +232,9 @@ class AuditReport:
     @property
     def max_distance(self) -> float:
         """Largest distance of a compared point from the graph [-]; nan when none was compared."""
-        return max((point.distance for point in self.points if point.verdict != "not compared"), default=np.nan)
+        return max(
+            (point.distance for point in self.points if point.verdict is not Verdict.NOT_COMPARED), default=np.nan
+        )
 
     # -- output ------------------------------------------------------------------------------------------------------
 
@@ -244,8 +259,8 @@ class AuditReport:
                 "number": np.array([point.place.number for point in self.points], dtype=np.int64),
                 "branch": np.array([point.branch for point in self.points], dtype=np.int64),
                 "distance": self.distances,
-                "off": [point.verdict == "off" for point in self.points],
-                "compared": [point.verdict != "not compared" for point in self.points],
+                "off": [point.verdict is Verdict.OFF for point in self.points],
+                "compared": [point.verdict is not Verdict.NOT_COMPARED for point in self.points],
                 "reason": [point.reason for point in self.points],
                 "jump": before(self.jumps),
                 "unjoined": before(self.unjoined),
@@ -277,17 +292,17 @@ class AuditReport:
         count, paths = len(self.points), len({point.path for point in self.points})
         largest = "none" if np.isnan(self.max_distance) else f"{self.max_distance:.2e}"
         lines = [
-            f"Audit of {_count(count, 'point')} of {_count(paths, 'path')}: {self._headline()}",
-            f"  largest distance  {largest} (tolerance {self.tolerance:.1e}), {len(self.off)} points off",
+            f"Audit of {counted(count, 'point')} of {counted(paths, 'path')}: {self._headline()}",
+            f"  largest distance  {largest} (tolerance {self.tolerance:.1e}), {counted(len(self.off), 'point')} off",
             *self._listed(self.points[k] for k in self.off),
         ]
         if self.not_compared:
-            lines.append(f"  not compared      {_count(len(self.not_compared), 'point')}")
+            lines.append(f"  not compared      {counted(len(self.not_compared), 'point')}")
             lines += self._listed(_stretches([self.points[k] for k in self.not_compared]))
         lines += [f"  jumps             {len(self.jumps)}", *self._listed(self.jumps)]
         if self.unjoined:
             lines.append(
-                f"  not joined        {_count(len(self.unjoined), 'pair')} of points, by the arcs of this graph"
+                f"  not joined        {counted(len(self.unjoined), 'pair')} of points, by the arcs of this graph"
             )
             lines += self._listed(self.unjoined)
         lines.append(f"  arcs              {len(self.visited)} visited, {len(self.missed)} missed")
@@ -381,7 +396,3 @@ def _place_record(place: Place, branch: int) -> dict[str, Any]:
 
 def _jump_record(jump: Jump) -> dict[str, Any]:
     return {**asdict(jump), "arcs": jump.arcs}
-
-
-def _count(number: int, name: str) -> str:
-    return f"{number} {name}{'s' * (number != 1)}"

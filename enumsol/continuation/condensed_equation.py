@@ -170,7 +170,7 @@ class CondensedEquation:
     # -- H and its selections ----------------------------------------------------------------------------------------
 
     def test_functions(self, x: Vector) -> Vector:
-        """theta1, theta2, theta3 as columns, shape (p, 3): their signs are what the r of H decides."""
+        """theta1, theta2, theta3 as columns, shape (p, 3): their signs depend on the r of H."""
         return self._test_functions(x, self.r)
 
     def _test_functions(self, x: Vector, r: Vector) -> Vector:
@@ -182,8 +182,8 @@ class CondensedEquation:
     def residual(self, x: Vector) -> Vector:
         """H(x) for each node's own r, shape (2p,).
 
-        Solutions do not depend on r, and no more may the decision whether x is one: a tiny r would make any
-        displacement small, a huge one any rounding large.
+        Solutions do not depend on r, and neither may the decision whether x is one: a tiny r would make any
+        displacement small, and a huge one any rounding error large.
         """
         return self._projected(x, np.ones(2 * self.p))
 
@@ -192,7 +192,7 @@ class CondensedEquation:
         return float(np.linalg.norm(self._projected(x, self.r)))
 
     def _projected(self, x: Vector, r: Vector) -> Vector:
-        """H(x), piece by piece: the projections lose nothing of w where r is small, nor of lambda where it is large."""
+        """H(x), piece by piece: no digits of w are lost where r is small, nor of lambda where it is large."""
         p, w = self.p, self.w(x)
         closed, slips, count = pieces(self._test_functions(x, r) > 0)
         bound = self.at(x).F * x[:p]

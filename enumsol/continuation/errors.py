@@ -1,4 +1,4 @@
-"""Errors of continuation, each with what a user needs to go on."""
+"""Errors of continuation, with what a user needs to proceed."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import EnumsolError, InvalidArgumentError
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,7 +57,7 @@ class NotConverged(EnumsolError, ArithmeticError):  # noqa: N818 (the name is pa
         last = f"residual {self.history[-1].residual:.2e}" if self.history else "no iteration"
         super().__init__(
             f"Newton's method did not converge at alpha = {alpha:g} "
-            f"({reason}; {len(self.history)} iterations, {last}); "
+            f"({reason}; {counted(len(self.history), 'iteration')}, {last}); "
             "try another start, for example a root at a nearby alpha, or enumerate_roots, which needs no start"
         )
 

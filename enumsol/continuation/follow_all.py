@@ -40,7 +40,7 @@ class FollowAllResult:
     report : AuditReport
         Of all paths together.
     failures : tuple of (alpha, str)
-        Starts from which no path could be followed, with the reason, and paths that stalled.
+        Starts from which no path could be followed, and paths that stalled, with the reason.
     reseeded : int
         Paths that were started on arcs which those from the starting points had missed.
     graph : BranchGraph
@@ -84,8 +84,8 @@ def follow_all(
     """Every branch in the interval followed in both directions, and the audit of all paths.
 
     Paths start from ``graph.starting_points()``; starts on arcs that were already passed are left out. Arcs missed by
-    these, which may happen beyond bifurcations, are started anew. Points outside the graph's interval, as those of an
-    ``overshoot``, are not compared, and the result is then not complete.
+    these, which may happen beyond bifurcations, are started anew. Points outside the graph's interval, such as
+    those of an ``overshoot``, are not compared, and the result is then not complete.
 
     Parameters
     ----------

@@ -24,6 +24,7 @@ from enumsol.continuation.transitions import (
     same_curve,
 )
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 ROUNDING = 1e-12
 #: Two points closer than this are the same point of the solution set: located points agree to about 1e-10.
 SAME_POINT = 1e-7
-#: Without checks a transition point may lie behind: by this times h_min or eps, for steps are refused beyond it.
+#: Without checks a transition point may lie behind by this times h_min or eps; steps are refused beyond it.
 UNCHECKED_REACH = 100.0
 #: Selection changes in a row without moving after which the path is stuck at a point where many selections meet.
 MAX_CHANGES_IN_PLACE = 32
@@ -134,7 +135,7 @@ class Follower:
         if self.record.stats.accepted >= self.options.max_steps:
             return _Stop(
                 PathStatus.STEP_LIMIT,
-                f"the limit of {self.options.max_steps} steps was reached at alpha = {self._alpha():g}; "
+                f"the limit of {counted(self.options.max_steps, 'step')} was reached at alpha = {self._alpha():g}; "
                 "path.resume() goes on",
             )
         step = self._step()
@@ -185,7 +186,7 @@ class Follower:
     def _end_point(self, correction: Correction) -> CurvePoint | None:
         """The solution beside a corrected point, converged to rounding; None when it is not admissible.
 
-        H is small near the tip of a fold, where no solution is: only the conditions of a converged point tell.
+        H is small near the tip of a fold even without a solution: only the conditions of a converged point decide.
         """
         equation = self.equation
         codes = equation.codes(correction.x, self.current.codes, max(STATUS_TOLERANCE, 10 * correction.residual))
@@ -234,7 +235,7 @@ class Follower:
         moved = equation.norm(arrival.x - self.current.x) > SAME_POINT
         self._in_place = 0 if moved else self._in_place + 1
         if self._in_place > MAX_CHANGES_IN_PLACE:
-            return self._stalled("the selection changes again and again at one point")
+            return self._stalled("the selection changes repeatedly at one point")
         try:
             keep, others = continuations(equation, arrival, self.sign)
         except TooLargeError as error:
@@ -370,8 +371,9 @@ class Follower:
         self._end(arrival)
         return _Stop(
             PathStatus.DEAD_END,
-            f"no continuation keeps the orientation at alpha = {self._alpha():g}, where {others} other directions "
-            "leave; start anew there with follow(tangent=k)",
+            f"no continuation keeps the orientation at alpha = {self._alpha():g}, where "
+            f"{counted(others, 'other direction leaves', 'other directions leave')}; start anew there with "
+            "follow(tangent=k)",
         )
 
 

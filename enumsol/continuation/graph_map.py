@@ -36,7 +36,7 @@ _DIFFERENCE = 1e-6
 _EXACT = 1e-4
 #: A vertex is nearer than the arcs that end there only when it is so by more than rounding.
 _NEARER = 1 - 1e-9
-#: What is asked of a graph.
+#: What a graph must have.
 _ASKED = ("problem", "interval", "arcs", "vertices", "branches", "complete", "reasons")
 
 
@@ -72,8 +72,8 @@ class VertexLike(Protocol):
 class GraphLike(Protocol):
     """What an audit asks of a BranchGraph: ``arcs`` are ArcLike and ``vertices`` VertexLike.
 
-    ``reasons`` tell why solutions may be missing from the graph; where there are none, ``complete`` still tells whether
-    that none is missing is proven.
+    ``reasons`` say why solutions may be missing from the graph; without any, ``complete`` says whether completeness is
+    proven.
     """
 
     problem: ContactProblem
@@ -95,7 +95,7 @@ class GraphLike(Protocol):
 
 
 def checked_graph(graph: Any) -> GraphLike:
-    """The argument ``graph``, which is a branch graph.
+    """The argument ``graph`` as a branch graph.
 
     Raises
     ------
@@ -148,7 +148,7 @@ class Place:
 
 
 def checked_tolerance(tolerance: float) -> float:
-    """The argument ``tolerance``, which is one: the forces of every solution have at most length one.
+    """The argument ``tolerance``, below 1 because the forces of every solution have at most length 1.
 
     Raises
     ------

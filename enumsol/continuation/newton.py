@@ -15,6 +15,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.roots.root import Root
 from enumsol.statuses import FRICTIONLESS, STATUSES, STICK
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -43,13 +44,13 @@ def newton(
     """One root at alpha, by the piecewise smooth Newton method from any start.
 
     Every iteration solves the selection of H that is active at the iterate. Full steps are taken until a selection
-    comes back; from then on a line search on the norm of H. Which root is found depends on the start; a start near a
+    recurs; from then on a line search lowers the norm of H. Which root is found depends on the start; a start near a
     regular root leads to it in one step. Each iteration costs one dense solve of size 2p.
 
     Parameters
     ----------
     problem : ContactProblem
-    alpha : float, Fraction or whatever enumerate_roots takes for alpha
+    alpha : float, Fraction or whatever enumerate_roots accepts as alpha
     start : Root, (2p,) or (p, 2) array_like, or None
         Contact forces: those of a root, lambda_n followed by lambda_t, or a row (lambda_n, lambda_t) per node [force].
         None: zero.
@@ -131,7 +132,7 @@ def _iterate(equation: CondensedEquation, x: Vector, alpha: float, max_iteration
             raise NotConverged(alpha, history, "no step along Newton's direction lowers the residual")
         x = x.copy()
         x[:-1] -= fraction * step
-    raise NotConverged(alpha, history, f"the limit of {max_iterations} iterations was reached")
+    raise NotConverged(alpha, history, f"the limit of {counted(max_iterations, 'iteration')} was reached")
 
 
 def _newton_step(equation: CondensedEquation, rows: NDArray[np.bool_], x: Vector) -> Vector:

@@ -34,20 +34,20 @@ class ContinuationOptions:
     k_max, k_thr : int
         Most corrections in a step; a step with fewer than ``k_thr`` may be followed by a longer one.
     r : float or None
-        The parameter of H [force / length]. None: per node 1 / sqrt(S_nn S_tt), the node's own stiffness. Solutions do
+        The parameter of H [force / length]. None: for each node its own stiffness, 1 / sqrt(S_nn S_tt). Solutions do
         not depend on it.
     max_steps : int
         Accepted steps after which to stop.
     alpha_scale : float or None
-        Change of alpha that counts as one. None: a twentieth of the interval, so that on the paper's 0 .. 20 it is one
-        as there; 1 for an interval that is not finite.
+        Change of alpha that counts as one. None: a twentieth of the interval, which is 1 on the paper's 0 .. 20; 1 for
+        an interval that is not finite.
     transition_tolerance : float
         Accuracy to which transition points are located, at most 1e-8: the checks of steps rely on it.
     check_steps : bool
         Accept a step only when its end is the continuation of its start: in the same selection, or behind one located
         change of status. False is the paper's Algorithm 5.1 as printed; with long steps it may jump between branches.
     overshoot : float
-        How far outside the interval the path is followed in the hope that it returns, in the units of alpha.
+        How far outside the interval the path is followed, in case it returns, in the units of alpha.
     choose : callable or None
         Called with the admissible tangents where several continue the path (theory, section 8.8); returns an index.
         None: the one that turns least.

@@ -33,7 +33,7 @@ PathFunction = Callable[[float], Any]
 class SmoothPath:
     """Friction and load as callables of alpha, in place of the affine paths of a problem.
 
-    Give friction, load or both, each with its derivative; what is not given stays as the problem has it.
+    Give friction, load or both, each with its derivative; what is not given is taken from the problem.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ class CallablePath:
         self._check_derivatives(alpha)
 
     def _check_start(self, alpha: float) -> None:
-        """Refuse friction and load that are no such thing where the path starts."""
+        """Refuse values that are not admissible friction or load at the start of the path."""
         values = self.at(alpha)
         if not (np.all(np.isfinite(values.F)) and np.all(values.F >= 0)):
             node = int(np.argmin(np.isfinite(values.F) & (values.F >= 0)))
@@ -182,7 +182,7 @@ class CallablePath:
 
     @cached_property
     def frictionless(self) -> NDArray[np.bool_]:
-        """Nodes with F = 0 and dF = 0 at the start; taken to stay so."""
+        """Nodes with F = 0 and dF = 0 at the start, assumed to stay without friction."""
         if self._smooth.F is None:
             return self._affine.frictionless
         values = self.at(self._start)

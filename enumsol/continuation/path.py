@@ -1,4 +1,4 @@
-"""Path: what following a branch gives, and what a user does with it."""
+"""Path: a followed branch, with its plots, files and continuation."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Path(PathData):
         Why the path ended: "interval left", "closed", "visited", "step limit", "friction", "dead end", "stalled" or
         "interrupted".
     message : str
-        The same as a sentence, with what may be done.
+        The same as a sentence, with advice.
     orientation : int
         +1 when it was followed in the positive orientation of theory, (8.2), else -1.
     interval : (float, float)

@@ -12,6 +12,7 @@ import numpy as np
 
 from enumsol.roots.root import summary
 from enumsol.sealed import Sealed
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -282,10 +283,11 @@ class PathData(Sequence[PathPoint], Sealed):
         stats = self.stats
         low, high = float(np.min(self.alpha)), float(np.max(self.alpha))
         lines = [
-            f"Path with {len(self)} points, alpha from {low:.6g} to {high:.6g}",
+            f"Path with {counted(len(self), 'point')}, alpha from {low:.6g} to {high:.6g}",
             f"  steps        {stats.accepted} accepted, {stats.rejected} rejected "
-            f"({stats.not_converged} not converged, {stats.refused} refused), {stats.corrections} corrections",
-            f"  transitions  {len(self.transitions)}, of them {len(self.folds)} folds",
+            f"({stats.not_converged} not converged, {stats.refused} refused), "
+            f"{counted(stats.corrections, 'correction')}",
+            f"  transitions  {len(self.transitions)}, of them {counted(len(self.folds), 'fold')}",
         ]
         for item in self.transitions[:_PRINTED_TRANSITIONS]:
             test = "" if item.local_test is None or item.local_test.exists else ", no local branch"

@@ -55,7 +55,7 @@ def read_points(
 
     Parameters
     ----------
-    source : Path, sequence of Path, pandas.DataFrame, file name or open text file of a CSV, or what this returned
+    source : Path, sequence of Path, pandas.DataFrame, file name or open text file of a CSV, or list of PointRun
         Frames and files have the columns alpha, lambda_n_X and lambda_t_X, one X a contact node, and may name several
         paths in a column ``path``. Other columns are ignored.
     problem : ContactProblem
@@ -109,7 +109,7 @@ def _check_nodes(found: int, p: int) -> None:
 
 
 def _read_csv(source: str | os.PathLike[str] | IO[str], name: str) -> pd.DataFrame:
-    """The file's texts as they stand: what they mean is decided in one place for files and frames."""
+    """The texts of the file, unconverted: files and frames are converted in one place."""
     import pandas as pd  # slow to import, used here only
 
     try:
@@ -235,7 +235,7 @@ def _rows_by_path(frame: pd.DataFrame, name: str) -> dict[Any, NDArray[np.intp]]
     cells = frame["path"].tolist()
     unnamed = [row for row, cell in enumerate(cells) if _empty(cell)]
     if unnamed:
-        # whether it belongs to the path above or to none is not for us to guess
+        # whether it belongs to the path above or to none is not guessed
         more = f" and {len(unnamed) - 1} more" if len(unnamed) > 1 else ""
         raise InvalidArgumentError(
             f"{name}: path is empty in row {unnamed[0]}{more}; expected the name of its path in every row, or no "

@@ -1,4 +1,4 @@
-"""Collects what a continuation does and turns it into a Path."""
+"""Collects the points of a continuation and makes a Path of them."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class Start:
         self.x = self._on_solution(alpha, forces)
 
     def _check_resolution(self, alpha: float, width: float) -> None:
-        """Refuse an interval over which the problem changes by little more than what counts as equal."""
+        """Refuse an interval over which the problem hardly changes."""
         equation = self.equation
         values = equation.at(equation.point(alpha, np.zeros(2 * equation.p)))
         change = max(np.max(np.abs(values.dg)), np.max(np.abs(values.dF) / (1.0 + values.F))) * width

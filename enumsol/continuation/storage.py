@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import zipfile
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from enumsol.checks import file_path
 from enumsol.continuation.options import ContinuationOptions
 from enumsol.continuation.path_data import ARRAYS, PathData, PathStats, PathStatus, PointKind, Transition
-from enumsol.errors import InvalidArgumentError
-from enumsol.files import writing
+from enumsol.files import read_arrays, reading, write_arrays
 from enumsol.roots.local_branch import LocalBranchTest
 from enumsol.statuses import ContactStatus
 
@@ -24,8 +19,7 @@ _FORMAT = 1
 
 def save_path(path: PathData, file: str | os.PathLike[str]) -> None:
     """Write a path; see Path.save."""
-    meta = {
-        "format": _FORMAT,
+    report = {
         "kinds": path.kinds,
         "transitions": [_pack(item) for item in path.transitions],
         "status": path.status,
@@ -38,46 +32,31 @@ def save_path(path: PathData, file: str | os.PathLike[str]) -> None:
         "node_ids": path.node_ids,
         "names": [[status.value for status in point.statuses] for point in path],
     }
-    arrays = {name: getattr(path, name) for name in ARRAYS}
-    place = file_path(file, "path")
-    with writing(place, "path"), place.open("wb") as stream:
-        np.savez_compressed(stream, allow_pickle=False, meta=np.array(json.dumps(meta)), **arrays)
+    write_arrays(file_path(file, "path"), _FORMAT, report, {name: getattr(path, name) for name in ARRAYS})
 
 
 def load_path(file: str | os.PathLike[str]) -> PathData:
     """Read a path; see Path.load."""
     place = file_path(file, "path")
-    try:
-        with np.load(place, allow_pickle=False) as data:
-            meta = json.loads(str(data["meta"]))
-            arrays = {name: data[name] for name in ARRAYS}
-        if meta["format"] != _FORMAT:
-            raise InvalidArgumentError(f"{file} has format {meta['format']!r}; this version reads format {_FORMAT}")
-        return _unpacked(meta, arrays)
-    except OSError as error:
-        reason = error.strerror or error
-        raise InvalidArgumentError(f"{file} cannot be read ({reason}); expected a file of Path.save") from error
-    except (LookupError, ValueError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
-        if isinstance(error, InvalidArgumentError):
-            raise
-        raise InvalidArgumentError(f"{file} does not hold a path ({error}); expected a file of Path.save") from error
+    with reading(place, "a path", "Path.save"):
+        return _unpacked(*read_arrays(place, _FORMAT, ARRAYS))
 
 
-def _unpacked(meta: dict[str, Any], arrays: dict[str, Any]) -> PathData:
-    low, high = meta["interval"]
+def _unpacked(report: dict[str, Any], arrays: dict[str, Any]) -> PathData:
+    low, high = report["interval"]
     return PathData(
         **arrays,
-        kinds=tuple(PointKind(kind) for kind in meta["kinds"]),
-        transitions=tuple(_unpack(item) for item in meta["transitions"]),
-        status=PathStatus(meta["status"]),
-        message=meta["message"],
-        orientation=meta["orientation"],
+        kinds=tuple(PointKind(kind) for kind in report["kinds"]),
+        transitions=tuple(_unpack(item) for item in report["transitions"]),
+        status=PathStatus(report["status"]),
+        message=report["message"],
+        orientation=report["orientation"],
         interval=(float(low), float(high)),
-        options=ContinuationOptions.from_dict(meta["options"]),
-        next_step=meta["next_step"],
-        stats=PathStats(**meta["stats"]),
-        node_ids=tuple(meta["node_ids"]),
-        _names=tuple(tuple(ContactStatus(value) for value in names) for names in meta["names"]),
+        options=ContinuationOptions.from_dict(report["options"]),
+        next_step=report["next_step"],
+        stats=PathStats(**report["stats"]),
+        node_ids=tuple(report["node_ids"]),
+        _names=tuple(tuple(ContactStatus(value) for value in names) for names in report["names"]),
     )
 
 

@@ -66,7 +66,7 @@ def same_curve(equation: CondensedEquation, start: CurvePoint, end: CurvePoint, 
     """Whether ``end`` lies ahead of ``start`` on one smooth piece of a selection's curve, all of it admissible.
 
     The piece is judged by both tangents and by the cubic Hermite interpolants of all conditions: one that dips below
-    zero in between tells that the curve was left and entered again. ``sharp`` allows turns up to a right angle.
+    zero in between shows that the curve was left and entered again. ``sharp`` allows turns up to a right angle.
     """
     chord = end.x - start.x
     length = equation.norm(chord)
@@ -108,7 +108,7 @@ def locate(
         return None
     tangent = curve_tangent(equation, start.codes, x, sign)
     if tangent is None:
-        # a vertical segment may end where its own tangent is not unique: it came in a straight line
+        # a vertical segment may end where its own tangent is not unique: it is straight
         chord = x - start.x
         length = equation.norm(chord)
         tangent = start.tangent if length <= FORWARD_TOLERANCE else chord / length

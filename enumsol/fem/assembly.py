@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.array_checks import vector_2d
-from enumsol.checks import shown
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.mesh_checks import (
     check_every_node_is_used,
     elements,
     held_mask,
+    lame_coefficients,
     nodal_vectors,
     node_numbers,
     positions,
@@ -29,7 +28,7 @@ from enumsol.fem.mesh_checks import (
     unit_vectors,
     vectors_of_all,
 )
-from enumsol.fem.numbering import by_nodes
+from enumsol.fem.numbering import by_nodes, gathered
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
@@ -71,7 +70,7 @@ def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]
     from skfem import Basis, ElementTriP1, ElementVector, MeshTri
     from skfem.models.elasticity import linear_elasticity
 
-    lam, mu = lame_coefficients(lame)
+    lam, mu = lame_coefficients(lame, 2)
     nodes = positions(points, 2)
     cells = elements(triangles, "triangles", 3, len(nodes))
     _check_areas(nodes, cells)
@@ -103,7 +102,7 @@ def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> NDArray
     >>> fem.triangle_stiffness([[0, 0], [1, 0], [0, 1]], lame=(1, 1))[0].tolist()
     [2.0, 1.0, -1.5, -0.5, -0.5, -0.5]
     """
-    lam, mu = lame_coefficients(lame)
+    lam, mu = lame_coefficients(lame, 2)
     nodes, cells = positions(corners, 2), np.array([[0, 1, 2]])
     if nodes.shape != (3, 2):
         raise InvalidArgumentError(f"corners has shape {nodes.shape}; expected (3, 2)")
@@ -143,10 +142,7 @@ def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> NDA
     ends = elements(edges, "edges", 2, len(nodes))
     density = vectors_of_all(traction, "traction", (len(ends), 2))
     lengths = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
-    forces = np.zeros_like(nodes)
-    for end in range(2):
-        np.add.at(forces, ends[:, end], 0.5 * lengths[:, None] * density)
-    return forces
+    return gathered(ends, np.tile(0.5 * lengths[:, None], 2), density, len(nodes))
 
 
 def body_forces(points: ArrayLike, triangles: ArrayLike, density: ArrayLike) -> NDArray[np.float64]:
@@ -176,10 +172,7 @@ def body_forces(points: ArrayLike, triangles: ArrayLike, density: ArrayLike) -> 
     cells = elements(triangles, "triangles", 3, len(nodes))
     values = vectors_of_all(density, "density", (len(cells), 2))
     third = np.abs(_double_areas(nodes, cells)) / 6.0
-    forces = np.zeros_like(nodes)
-    for corner in range(3):
-        np.add.at(forces, cells[:, corner], third[:, None] * values)
-    return forces
+    return gathered(cells, np.tile(third[:, None], 3), values, len(nodes))
 
 
 def contact_problem(
@@ -291,22 +284,6 @@ def _tangents(tangents: ArrayLike | None, normal: NDArray[np.float64]) -> NDArra
         k = int(np.argmax(skew))
         raise InvalidArgumentError(f"tangents row {k} is not perpendicular to normals row {k}; expected right angles")
     return tangent
-
-
-def lame_coefficients(value: Any) -> tuple[float, float]:
-    """Value as the Lame coefficients (l, m) with m > 0 and l + m > 0, which make plane-strain energy positive.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is not two such numbers.
-    """
-    lam, mu = (float(entry) for entry in vector_2d(value, "lame"))
-    if not (mu > 0 and lam + mu > 0):
-        raise InvalidArgumentError(
-            f"lame is {shown(value)}; expected Lame coefficients (l, m) with m > 0 and l + m > 0"
-        )
-    return lam, mu
 
 
 def _double_areas(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -5,17 +5,18 @@ Each function gives the value in a plain type and raises InvalidArgumentError fo
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.array_checks import plain_array, real_array, short_vector
+from enumsol.checks import shown
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-#: Areas and volumes are computed of coordinates up to this, in two and in three dimensions.
+#: Largest coordinates of which areas and volumes are computed, by dimension.
 LARGEST_COORDINATE = {2: 1e150, 3: 1e100}
 
 
@@ -34,7 +35,7 @@ def positions(points: ArrayLike, dimension: int) -> NDArray[np.float64]:
 
 
 def elements(value: ArrayLike, name: str, corners: int | tuple[int, ...], count: int) -> NDArray[np.int64]:
-    """Nodes of each of some elements, (k, corners) with k >= 1, all below ``count``."""
+    """Nodes of each element, (k, corners) with k >= 1, all below ``count``."""
     array = plain_array(value, name, error=InvalidArgumentError)
     numbers = (corners,) if isinstance(corners, int) else corners
     if array.ndim != 2 or array.shape[1] not in numbers or len(array) == 0:
@@ -60,11 +61,22 @@ def node_numbers(value: ArrayLike, name: str, count: int, *, distinct: bool = Tr
 
 
 def check_every_node_is_used(cells: NDArray[np.int64], count: int, name: str, kind: str) -> None:
-    """Raise InvalidArgumentError where a node belongs to no cell: nothing would hold it."""
+    """Raise InvalidArgumentError if a node belongs to no cell: it would have no stiffness."""
     used = np.unique(cells)
     if len(used) != count:
         lone = int(np.setdiff1d(np.arange(count), used)[0])
         raise InvalidArgumentError(f"{name} leave node {lone} out; expected every node in some {kind}")
+
+
+def lame_coefficients(value: Any, dimension: int) -> tuple[float, float]:
+    """Value as the Lame coefficients (l, m) of a body, in plane strain or in 3D, that make its energy positive."""
+    lam, mu = (float(entry) for entry in short_vector(value, "lame", 2))
+    if not (mu > 0 and dimension * lam + 2 * mu > 0):
+        bulk = {2: "l + m", 3: "3 l + 2 m"}[dimension]
+        raise InvalidArgumentError(
+            f"lame is {shown(value)}; expected Lame coefficients (l, m) with m > 0 and {bulk} > 0"
+        )
+    return lam, mu
 
 
 def held_mask(held: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:

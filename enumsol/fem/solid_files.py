@@ -29,7 +29,7 @@ _IGNORED = ("vertex", "line")
 _PHYSICAL = "gmsh:physical"
 #: The name of all facets where nothing names groups of them.
 _ALL = "boundary"
-#: What meshio raises on files that are damaged or of another kind; at its end it exits.
+#: What meshio raises on damaged files or files of another kind; it may also exit.
 _DAMAGE = (
     ArithmeticError,
     AssertionError,
@@ -51,13 +51,13 @@ def read_solid(source: str | os.PathLike[str] | Any, groups: str | None = None) 
     """Mesh of tetrahedra or hexahedra with its named facets, from a file that meshio reads or from a meshio.Mesh.
 
     Facets are the triangles or quadrilaterals that the file holds, by the names of their cell sets or physical groups
-    (a group without a name has its number); without any groups all of them are named "boundary". Lines and single
-    points are passed over, and nodes that belong to no cell are left out.
+    (a group without a name gets its number); without any groups all of them are named "boundary". Lines and single
+    points are ignored, and nodes that belong to no cell are left out.
 
     Parameters
     ----------
     source : str, path-like or meshio.Mesh
-        Of gmsh (.msh), .vtu and what else meshio knows by its suffix.
+        A gmsh (.msh) or .vtu file, or any other that meshio knows by its suffix.
     groups : str or None
         Name of cell data (integers) by which facets are grouped instead, for formats without named groups.
 

@@ -41,7 +41,7 @@ def solid_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[Floats, Integers]:
     Raises
     ------
     InvalidArgumentError
-        The arguments are no mesh: shapes, node numbers, a node in no cell, a cell that is flat or turned inside out.
+        The mesh is not valid: shapes, node numbers, a node in no cell, a cell that is flat or inside out.
     """
     nodes = positions(points, 3)
     bodies = elements(cells, "cells", (4, 8), len(nodes))

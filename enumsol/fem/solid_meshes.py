@@ -183,7 +183,7 @@ def blocks(points: ArrayLike, facets: ArrayLike, ratio: int) -> NDArray[np.int64
     filled = np.bincount(starts[:, 1] * counts[0] + starts[:, 0], minlength=int(np.prod(counts)))
     if np.any(starts != ends) or np.any(filled != (1 if surface.shape[1] == 4 else 2)):
         raise _no_grid("they do not fill a rectangular grid")
-    block = starts // width
+    block = starts // min(width, int(counts.max()))
     return np.asarray(block[:, 1] * (block[:, 0].max() + 1) + block[:, 0])
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.array_checks import real_array
+from enumsol.array_checks import plain_array, real_array
+from enumsol.body3d import BodyMesh, SlipMean
 from enumsol.checks import one_of, positive_integer
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.mesh_checks import elements, held_mask, nodal_vectors, spring_stiffnesses
@@ -15,7 +16,7 @@ from enumsol.fem.solid_geometry import outward, solid_mesh
 from enumsol.fem.solid_meshes import blocks
 from enumsol.fem.solids import solid_stiffness
 from enumsol.fem.surfaces import ContactSurface, Multipliers, local_axes, on_nodes, on_patches
-from enumsol.problem3d import BodyMesh, ContactProblem3D, SlipMean
+from enumsol.problem3d import ContactProblem3D
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,7 +50,8 @@ def solid_contact_problem(
 ) -> ContactProblem3D:
     """Contact problem of a body of P1 tetrahedra or Q1 hexahedra; the held degrees of freedom are eliminated.
 
-    Contact rows come in the order of node numbers or of the labels of patches; what is held entirely has none.
+    Contact rows come in the order of node numbers or of the labels of patches; nodes and patches that are held
+    entirely have none.
 
     Parameters
     ----------
@@ -147,7 +149,7 @@ def solid_contact_problem(
 
 
 def _contact_facets(contact: ArrayLike, count: int) -> Integers:
-    if np.size(contact) == 0:
+    if plain_array(contact, "contact", error=InvalidArgumentError).size == 0:
         raise InvalidArgumentError("contact has no facets; expected (k, 3) or (k, 4) node numbers of the surface")
     return elements(contact, "contact", (3, 4), count)
 
@@ -185,5 +187,5 @@ def _slips(
     moving = (patch >= 0)[:, None]
     T1, T2 = (_displacements(values, np.where(moving, axis[patch], 0.0), free) for axis in axes)
     if offset.shape != (len(axes[0]), 2):
-        offset = np.zeros((len(axes[0]), 2))  # a wrong shape is for ContactProblem3D to refuse
+        offset = np.zeros((len(axes[0]), 2))  # ContactProblem3D refuses a wrong shape
     return T1, T2, np.where(moving, offset[patch], 0.0)

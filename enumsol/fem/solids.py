@@ -10,11 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.array_checks import short_vector
-from enumsol.checks import shown
-from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_checks import elements, positions, vectors_of_all
-from enumsol.fem.numbering import by_nodes
+from enumsol.fem.mesh_checks import elements, lame_coefficients, positions, vectors_of_all
+from enumsol.fem.numbering import by_nodes, gathered
 from enumsol.fem.solid_geometry import HEXAHEDRON, facet_quadrature, shape_volumes, solid_mesh
 
 if TYPE_CHECKING:
@@ -41,7 +38,7 @@ def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, floa
     Raises
     ------
     InvalidArgumentError
-        The mesh is not one (shapes, node numbers, a cell without volume or inside out, a node in no cell) or the
+        The mesh is not valid (shapes, node numbers, a cell without volume or inside out, a node in no cell) or the
         coefficients are not admissible.
 
     Examples
@@ -54,7 +51,7 @@ def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, floa
     from skfem import BilinearForm  # as below
     from skfem.helpers import ddot, div, sym_grad
 
-    lam, mu = solid_lame(lame)
+    lam, mu = lame_coefficients(lame, 3)
 
     def energy(u: Any, v: Any, _: Any) -> Any:
         # as skfem.models.elasticity has it, which makes an identity of every quadrature point and is slow
@@ -74,7 +71,7 @@ def vector_basis(nodes: NDArray[np.float64], cells: NDArray[np.int64], degree: i
 
     points = np.ascontiguousarray(nodes.T)
     if cells.shape[1] == 4:
-        # sorted by us, so that scikit-fem has no reason to renumber or to log
+        # sorted here, so that scikit-fem neither renumbers nor logs
         mesh = MeshTet(points, np.ascontiguousarray(np.sort(cells, axis=1).T))
         return Basis(mesh, ElementVector(ElementTetP1()), intorder=degree)
     # scikit-fem has an order of its own
@@ -96,7 +93,7 @@ def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -
     Raises
     ------
     InvalidArgumentError
-        The mesh is not one, or density has the wrong shape.
+        The mesh is not valid, or density has the wrong shape.
 
     Examples
     --------
@@ -107,7 +104,7 @@ def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -
     """
     nodes, bodies = solid_mesh(points, cells)
     values = vectors_of_all(density, "density", (len(bodies), 3))
-    return _gathered(bodies, shape_volumes(nodes, bodies), values, len(nodes))
+    return gathered(bodies, shape_volumes(nodes, bodies), values, len(nodes))
 
 
 def facet_forces(points: ArrayLike, facets: ArrayLike, traction: ArrayLike) -> NDArray[np.float64]:
@@ -138,29 +135,4 @@ def facet_forces(points: ArrayLike, facets: ArrayLike, traction: ArrayLike) -> N
     surface = elements(facets, "facets", (3, 4), len(nodes))
     density = vectors_of_all(traction, "traction", (len(surface), 3))
     values, weights = facet_quadrature(nodes, surface)
-    return _gathered(surface, weights @ values, density, len(nodes))
-
-
-def _gathered(
-    elements_: NDArray[np.int64], shares: NDArray[np.float64], density: NDArray[np.float64], count: int
-) -> NDArray[np.float64]:
-    forces = np.zeros((count, 3))
-    for corner in range(elements_.shape[1]):
-        np.add.at(forces, elements_[:, corner], shares[:, corner, None] * density)
-    return forces
-
-
-def solid_lame(value: Any) -> tuple[float, float]:
-    """Value as the Lame coefficients (l, m) with m > 0 and 3 l + 2 m > 0, which make the energy positive.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The value is not two such numbers.
-    """
-    lam, mu = (float(entry) for entry in short_vector(value, "lame", 2))
-    if not (mu > 0 and 3 * lam + 2 * mu > 0):
-        raise InvalidArgumentError(
-            f"lame is {shown(value)}; expected Lame coefficients (l, m) with m > 0 and 3 l + 2 m > 0"
-        )
-    return lam, mu
+    return gathered(surface, weights @ values, density, len(nodes))

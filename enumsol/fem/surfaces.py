@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
     Field = ArrayLike | Callable[[Floats], ArrayLike]
 
-#: How far axes may be from right angles and length one: rounding of whatever computed them.
+#: How far axes may be from right angles and length one, for rounding.
 AXES_TOLERANCE = 1e-10
 #: Normals nearer to the x axis than this cosine take the y axis for the default of t1.
 _NEAR_X = 0.9
@@ -95,7 +95,7 @@ class ContactSurface:
 
 @dataclass(frozen=True)
 class Multipliers:
-    """The p contact rows: what displacement each stands for, and where it is.
+    """The p contact rows: the displacement that each stands for, and its position.
 
     Attributes
     ----------
@@ -235,8 +235,9 @@ def local_axes(multipliers: Multipliers, normals: ArrayLike | None, axes: Any) -
     triples = [normal, *given]
     for i, one in enumerate(triples):
         for j, two in enumerate(triples[: i + 1]):
-            off = np.abs(np.sum(one * two, axis=1) - (i == j))
-            if np.any(off > AXES_TOLERANCE):
+            with np.errstate(over="ignore", invalid="ignore"):
+                off = np.abs(np.sum(one * two, axis=1) - (i == j))
+            if not np.all(off <= AXES_TOLERANCE):
                 raise _not_orthonormal(i, j, int(np.argmax(off)), one, two)
     return normal, given[0], given[1] if len(given) == 2 else np.cross(normal, given[0])
 
@@ -249,6 +250,7 @@ def _field(value: Any, places: Floats) -> Floats:
 
 def _not_orthonormal(i: int, j: int, row: int, one: Floats, two: Floats) -> InvalidArgumentError:
     names = ("the normal", "t1", "t2")
+    one, two = np.clip(one, -1e150, 1e150), np.clip(two, -1e150, 1e150)  # squares do not overflow
     found = (
         f"{names[i]} has length {np.linalg.norm(one[row]):.6g}"
         if i == j

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 #: Differences of residuals that depend on each other to this degree are dropped.
 _RANK_TOLERANCE = 1e-10
-#: A residual this many times the smallest so far drops the history: the mixing led astray.
+#: A residual this many times the smallest so far drops the history.
 _WORSE = 10.0
 
 

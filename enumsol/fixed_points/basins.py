@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checks import positive_integer, positive_number
+from enumsol.array_checks import plain_array, real_array
+from enumsol.checks import alpha_value, positive_integer, positive_number, shown
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.fixed_points.state import scaled_forces
+from enumsol.fixed_points.state import scaled_forces, slips_of
 from enumsol.fixed_points.successive import successive_approximations
 from enumsol.fixed_points.system import ContactSystem, contact_problem
 from enumsol.fixed_points.tresca import solve_tresca
@@ -19,9 +20,13 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike, NDArray
 
+    from enumsol.checks import Alpha
     from enumsol.fixed_points.system import Problem
 
     Vector = NDArray[np.float64]
+
+#: Most random starts of a table.
+MOST_STARTS = 1_000_000
 
 
 def fixed_point_residual(problem: Problem, root: Any) -> float:
@@ -39,25 +44,18 @@ def fixed_point_residual(problem: Problem, root: Any) -> float:
     Raises
     ------
     InvalidArgumentError
-        The root is none, or is one of another problem (its arrays have other shapes).
+        The root has no forces, or belongs to another problem (its arrays have other shapes).
     """
     body = contact_problem(problem)
-    for name in ("alpha", "lambda_n", "lambda_t", "u_t"):
-        if not hasattr(root, name):
-            raise InvalidArgumentError(
-                f"root is a {type(root).__name__} without {name}; expected a root of enumerate_roots or a fixed point"
-            )
-    if np.shape(root.lambda_n) != (body.p,) or np.size(root.lambda_t) != len(body.condensed.S) - body.p:
+    if not hasattr(root, "alpha"):
         raise InvalidArgumentError(
-            f"root has lambda_n of shape {np.shape(root.lambda_n)} and lambda_t of shape {np.shape(root.lambda_t)}; "
-            f"expected a root of the problem, which has p = {body.p} contact nodes"
+            f"root is a {type(root).__name__} without alpha; expected a root of enumerate_roots or a fixed point"
         )
-    slip = getattr(root, "slip", None)
-    if slip is None:
-        slip = np.linalg.norm(np.reshape(root.u_t, (body.p, -1)), axis=1)
-    image = solve_tresca(body, np.maximum(root.lambda_n, 0.0), root.alpha, slip=slip, start=root)
     system = ContactSystem.at(body, root.alpha)
-    return float(np.max(np.abs(scaled_forces(system, image) - scaled_forces(system, root))))
+    forces = scaled_forces(system, root, "root")
+    slip = slips_of(root, body.p, "root")
+    image = solve_tresca(body, np.maximum(root.lambda_n, 0.0), root.alpha, slip=slip, start=root)
+    return float(np.max(np.abs(scaled_forces(system, image) - forces)))
 
 
 def is_fixed_point(problem: Problem, root: Any, tolerance: float = 1e-8) -> bool:
@@ -77,7 +75,7 @@ def is_fixed_point(problem: Problem, root: Any, tolerance: float = 1e-8) -> bool
     Raises
     ------
     InvalidArgumentError
-        The root is none, or is one of another problem; the tolerance is not positive.
+        The root has no forces, or belongs to another problem; the tolerance is not positive.
 
     Examples
     --------
@@ -127,7 +125,7 @@ def basin_table(
     Raises
     ------
     InvalidArgumentError
-        There are no roots, they belong to several alpha, or starts have the wrong shape.
+        There are no roots, they belong to different alpha, or starts have the wrong shape.
     Interrupted
         Ctrl-C; ``partial`` is the table so far.
 
@@ -143,11 +141,10 @@ def basin_table(
     import pandas as pd  # for frames only
 
     body = contact_problem(problem)
-    if len(roots) == 0 or len({float(root.alpha) for root in roots}) > 1:
-        raise InvalidArgumentError(f"roots has {len(roots)} roots; expected at least one, all at the same alpha")
-    alpha = roots[0].alpha
+    alpha = _common_alpha(roots)
+    distance = positive_number(distance, "distance")
     system = ContactSystem.at(body, alpha)
-    known = np.array([scaled_forces(system, root) for root in roots])
+    known = np.array([scaled_forces(system, root, f"root {k}") for k, root in enumerate(roots)])
     bounds = _starts(starts, seed, roots, body.p)
     rows: list[dict[str, Any]] = []
     stopped: KeyboardInterrupt | None = None
@@ -179,18 +176,32 @@ def basin_table(
     return table
 
 
+def _common_alpha(roots: Sequence[Any]) -> Alpha:
+    try:
+        alphas = [alpha_value(root.alpha, "alpha of a root") for root in roots]
+    except (TypeError, AttributeError):
+        raise InvalidArgumentError(
+            f"roots is {shown(roots)}; expected a RootSet or a sequence of roots, all at the same alpha"
+        ) from None
+    if len(set(alphas)) != 1:
+        raise InvalidArgumentError(
+            f"roots has {len(alphas)} roots at {len(set(alphas))} alphas; expected at least one, all at the same alpha"
+        )
+    return alphas[0]
+
+
 def _starts(starts: int | ArrayLike, seed: int, roots: Sequence[Any], p: int) -> NDArray[np.float64]:
-    if np.ndim(starts) == 0:
-        count = positive_integer(starts, "starts")
+    if plain_array(starts, "starts", error=InvalidArgumentError).ndim == 0:
+        count = positive_integer(starts, "starts", most=MOST_STARTS)
         size = max(float(np.max(root.lambda_n)) for root in roots) or 1.0
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(positive_integer(seed, "seed", least=0))
         scale = size * 10.0 ** rng.uniform(-3.0, 1.0, (count, 1))
         bounds = scale * rng.uniform(0.0, 1.0, (count, p))
         bounds[0] = 0.0
         return bounds
-    bounds = np.asarray(starts, dtype=np.float64)
-    if bounds.ndim != 2 or bounds.shape[1] != p:
+    bounds = real_array(starts, "starts", error=InvalidArgumentError)
+    if bounds.ndim != 2 or len(bounds) == 0 or bounds.shape[1] != p:
         raise InvalidArgumentError(
-            f"starts has shape {bounds.shape}; expected (k, p) = (k, {p}), or a number of starts"
+            f"starts has shape {bounds.shape}; expected (k, p) = (k, {p}) with k >= 1, or a number of starts"
         )
     return bounds

@@ -10,12 +10,12 @@ import scipy.sparse as sp
 if TYPE_CHECKING:
     from enumsol.fixed_points.newton import TrescaData, Vector
 
-#: What Clarabel is asked for; Newton's method takes over from there.
+#: Tolerance of Clarabel; Newton's method improves the result.
 TOLERANCE = 1e-11
 
 
 def interior_point(data: TrescaData) -> Vector | None:
-    """Scaled forces that solve a Tresca problem to about 1e-9, from scratch; None where Clarabel gives none.
+    """Scaled forces that solve a Tresca problem to about 1e-9, from scratch; None if Clarabel fails.
 
     Components of lambda_t that do not occur are left out, so that every cone has an interior.
     """
@@ -23,13 +23,15 @@ def interior_point(data: TrescaData) -> Vector | None:
 
     system, occurs = data.system, data.occurs
     p = system.p
+    bound = np.minimum(data.bound, _reach(data))
     node_one = np.flatnonzero(np.sum(occurs, axis=1) == 1)
     node_two = np.flatnonzero(np.sum(occurs, axis=1) == 2)
     free = np.concatenate([np.ones(p, dtype=bool), occurs.T.ravel()])
     column = np.cumsum(free) - 1
     axis = np.argmax(occurs[node_one], axis=1)
     F = data.F[node_one, axis]
-    # 0 <= lambda_n;  |lambda_t| <= s F for one axis;  (s, lambda_t / F) in the second-order cone for two
+    # 0 <= lambda_n;  |lambda_t| <= s F for one axis;  (s, lambda_t / F), scaled, in the second-order cone for two
+    least = np.min(data.F[node_two], axis=1)
     parts = [(np.arange(p), np.arange(p), -np.ones(p))]
     first = p
     interval = column[(1 + axis) * p + node_one]
@@ -38,11 +40,11 @@ def interior_point(data: TrescaData) -> Vector | None:
         first += len(node_one)
     for k in range(2 if len(node_two) else 0):
         rows = first + 3 * np.arange(len(node_two)) + 1 + k
-        parts.append((rows, column[(1 + k) * p + node_two], -1.0 / data.F[node_two, k]))
+        parts.append((rows, column[(1 + k) * p + node_two], -least / data.F[node_two, k]))
     size = first + 3 * len(node_two)
     offset = np.zeros(size)
-    offset[p:first] = np.tile(data.bound[node_one] * F, 2)
-    offset[first::3] = data.bound[node_two]
+    offset[p:first] = np.tile(bound[node_one] * F, 2)
+    offset[first::3] = bound[node_two] * least
     rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
     settings = clarabel.DefaultSettings()
     settings.verbose = False
@@ -62,3 +64,14 @@ def interior_point(data: TrescaData) -> Vector | None:
     forces = np.zeros(len(system.g))
     forces[free] = found
     return forces
+
+
+def _reach(data: TrescaData) -> Vector:
+    """Sizes that |tau| cannot exceed, by the energy bound (theory, section 11.3), shape (p,): larger bounds are none.
+
+    With them the solver meets no numbers that are large for no reason.
+    """
+    most = data.system.split(data.system.largest_forces)[1]
+    with np.errstate(over="ignore"):
+        tau = np.divide(most, data.F, out=np.zeros_like(most), where=data.occurs)
+        return np.asarray(2.0 * np.sum(tau, axis=1))

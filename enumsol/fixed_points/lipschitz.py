@@ -11,6 +11,7 @@ from scipy.linalg import eigh
 
 from enumsol.checks import nonnegative_number
 from enumsol.condensation.condensed import RHS_BLOCK
+from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.system import ContactSystem, contact_problem
 from enumsol.fixed_points.tresca import node_values
 from enumsol.friction import FrictionTable
@@ -19,15 +20,17 @@ from enumsol.problem3d import ContactProblem3D
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.checks import AlphaLike
+    from enumsol.body3d import SlipMean
+    from enumsol.checks import Alpha, AlphaLike
     from enumsol.fixed_points.system import Problem
-    from enumsol.problem3d import SlipMean
 
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]
 
-#: Slips per node at which a friction function is looked at for its largest values and slopes.
+#: Slips per node at which a friction function is sampled for its largest values and slopes.
 _SAMPLES = 257
+#: Smallest ratio of two areas.
+_LEAST_SHARE = 1e-100
 
 
 @dataclass(frozen=True)
@@ -42,12 +45,12 @@ class LipschitzEstimate:
     uniqueness : float
         The left-hand side of (theory, (11.9)) [-].
     factor : float
-        With all coefficients multiplied by less than this the solution still is unique, where they do not depend on
+        The solution is still unique with all coefficients multiplied by less than this, if they do not depend on
         the solution; inf without friction [-].
     lipschitz, anisotropy : float
         L [1 / length] and kappa [-] as used.
     sampled : bool
-        L, kappa and the largest coefficients of a friction function are from samples, and so are no bounds.
+        L, kappa and the largest coefficients of a friction function come from samples, and are no bounds.
     """
 
     C1: float
@@ -101,7 +104,7 @@ class _Slips:
     @classmethod
     def of(cls, body: Problem, S_tt: Matrix) -> _Slips:
         """Of a problem; compliances are condensed to the degrees of freedom that occur in the means."""
-        mean = body.slip_mean if isinstance(body, ContactProblem3D) else None
+        mean = body.slip_mean if isinstance(body, ContactProblem3D) and body.depends_on_solution else None
         if mean is None:
             return cls(S_tt, None)
         rows = sp.csr_array(sp.vstack([mean.T1, mean.T2]))
@@ -111,6 +114,16 @@ class _Slips:
         solve = body.factorization.solve
         compliance = np.hstack([solve(unit[:, k : k + RHS_BLOCK].toarray())[used] for k in starts])
         return cls(S_tt, mean, sp.csr_array(rows[:, used]), np.linalg.cholesky(0.5 * (compliance + compliance.T)))
+
+    def reach(self, body: ContactProblem3D, alpha: Alpha, load: float, c_inf: Vector) -> Vector:
+        """What no slip of a solution exceeds, by the energy bound, shape (p,) [length]."""
+        if self.mean is None or self.rows is None or self.root is None:
+            return c_inf * load
+        q = len(self.mean.offset)
+        moved = np.sqrt(np.sum((self.rows @ self.root).reshape(2, q, -1) ** 2, axis=(0, 2)))
+        u = body.condensed.displacement(alpha, np.zeros(len(self.S_tt) // 2 * 3))
+        free = np.hypot(self.mean.T1 @ u - self.mean.offset[:, 0], self.mean.T2 @ u - self.mean.offset[:, 1])
+        return np.asarray(self.mean.weights @ (free + moved * load))
 
     def largest(self, weights: Vector) -> float:
         """Largest sum of weights * slip^2 over displacements of unit energy, weights of shape (p,)."""
@@ -152,7 +165,8 @@ def lipschitz_estimate(
     body = contact_problem(problem)
     p = body.p
     known = body.areas if areas is None and isinstance(body, ContactProblem3D) else areas
-    m = np.ones(p) if known is None else node_values(known, "areas", p)
+    m = np.ones(p) if known is None else _relative(node_values(known, "areas", p))
+    given = None if lipschitz is None else nonnegative_number(lipschitz, "lipschitz")
     system = ContactSystem.at(body, alpha)
     S = body.condensed.S
     g = body.condensed.free_displacements(system.alpha)
@@ -165,11 +179,14 @@ def lipschitz_estimate(
     blocks = S_tt.reshape(d, p, d, p)[:, np.arange(p), :, np.arange(p)]
     c_inf = np.sqrt(np.linalg.eigvalsh(blocks)[:, -1])
 
-    used = _coefficients(system, c_inf * load, lipschitz)
-    C1 = min(_force_part(inverse_nn, S_tt, used.F, theta) for theta in _weights(inverse_nn, blocks, used.F, m))
+    slips = _Slips.of(body, S_tt)
+    reach = slips.reach(body, system.alpha, load, c_inf) if isinstance(body, ContactProblem3D) else c_inf * load
+    used = _coefficients(system, reach, given)
+    most_F = float(np.max(used.F)) or 1.0  # taken out, so that squares of tiny coefficients do not underflow
+    F = used.F / most_F
+    C1 = most_F * min(_force_part(inverse_nn, S_tt, F, theta) for theta in _weights(inverse_nn, blocks, F, m))
     C2 = second = 0.0
     if used.lipschitz > 0:
-        slips = _Slips.of(body, S_tt)
         c_0 = np.sqrt(_largest(inverse_nn / np.sqrt(np.outer(m, m))))
         c_phi = np.sqrt(slips.largest(m))
         C2 = float(used.per_change * c_0 * np.max(c_inf) * c_phi * load)
@@ -187,6 +204,17 @@ def lipschitz_estimate(
     )
 
 
+def _relative(areas: Vector) -> Vector:
+    """Areas as shares of the largest: a factor of all of them has no effect."""
+    shares = areas / np.max(areas) if np.all(areas > 0) else np.zeros(1)
+    if np.min(shares) < _LEAST_SHARE:
+        raise InvalidArgumentError(
+            f"areas has the values {np.min(areas):g} to {np.max(areas):g}; expected areas > 0, the smallest at least "
+            f"{_LEAST_SHARE:g} of the largest"
+        )
+    return np.asarray(shares)
+
+
 def _force_part(inverse_nn: Matrix, S_tt: Matrix, F: Matrix, theta: Vector) -> float:
     """c_n c_t of (theory, (11.6)) for weights theta of shape (p,)."""
     c_n = _largest(_weighted(inverse_nn, theta))
@@ -202,7 +230,7 @@ def _weights(inverse_nn: Matrix, blocks: Matrix, F: Matrix, m: Vector) -> list[V
 
 
 def _coefficients(system: ContactSystem, reach: Vector, lipschitz: float | None) -> _Coefficients:
-    """What (theory, section 11.5) asks of the coefficients, for slips up to ``reach`` of shape (p,) [length]."""
+    """What (theory, section 11.5) needs of the coefficients, for slips up to ``reach`` of shape (p,) [length]."""
     body = system.problem
     if not isinstance(body, ContactProblem3D):
         return _Coefficients(body.friction_at(system.alpha)[:, None])
@@ -219,7 +247,7 @@ def _coefficients(system: ContactSystem, reach: Vector, lipschitz: float | None)
     if isinstance(body.law, FrictionTable) or lipschitz is None:
         slope = float(np.max(np.abs(np.diff(F, axis=0)) / np.where(step > 0, step, np.inf), initial=0.0))
         return _Coefficients(most, slope, ratio, sampled=not isinstance(body.law, FrictionTable))
-    slope = nonnegative_number(lipschitz, "lipschitz")
+    slope = lipschitz
     between = 0.5 * slope * np.max(step, axis=0)
     most, least = most + between, np.maximum(least - between, 1e-300)
     return _Coefficients(most, slope, float(np.max(np.max(most, axis=1) / np.min(least, axis=1))))

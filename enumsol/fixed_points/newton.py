@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,11 +17,15 @@ if TYPE_CHECKING:
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]
 
-#: Steps after which the method is given up; from a near start it needs two to five.
+#: Steps after which the method stops; from a near start it needs two to five.
 MOST_STEPS = 30
 #: The residual below which a point counts as the solution [unit of the scaled system, in which solutions have size 1],
-#: and the one below which no smaller one is looked for.
+#: and the one below which the method stops.
 ACCEPTED, ROUNDING = 1e-11, 1e-15
+#: Steps of the proximal point method, and its weights in a system whose S has a diagonal near 1.
+MOST_PROXIMAL, _FIRST_RHO, _LEAST_RHO = 60, 1e-3, 1e-14
+#: Tangential forces that cannot get larger than this [as above] are none: far below rounding, far above underflow.
+_NEGLIGIBLE = 1e-100
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,7 @@ class TrescaData:
     bound : (p,) array
         Scaled slip bounds s >= 0.
     F : (p, d) array
-        Friction coefficients; where one is 0, or the bound is, tau does not occur (theory, section 11.1).
+        Friction coefficients; where F s is 0 or negligible, tau does not occur (theory, section 11.1).
     """
 
     system: ContactSystem
@@ -44,7 +48,8 @@ class TrescaData:
     @property
     def occurs(self) -> NDArray[np.bool_]:
         """Which tau occur, shape (p, d)."""
-        return (self.F > 0) & (self.bound > 0)[:, None]
+        with np.errstate(over="ignore"):
+            return np.asarray(self.F * self.bound[:, None] > _NEGLIGIBLE)
 
     def displacements(self, forces: Vector) -> Vector:
         """Scaled w = g - S lambda of all rows."""
@@ -90,6 +95,29 @@ class TrescaData:
                 best, least = forces, residual
         return best, least
 
+    def proximal(self, start: Vector) -> tuple[Vector, float]:
+        """The best point of a proximal point method from scaled forces, and its residual: slower than Newton's alone.
+
+        The solutions for (S + rho, g + rho lambda) converge to that of the problem from everywhere, and Newton's
+        method finds them where it does not find the solution itself: rho grows until it does, and shrinks after that.
+        """
+        best, least = start, self.residual(start, self.displacements(start))
+        forces, rho = best, _FIRST_RHO
+        for _ in range(MOST_PROXIMAL):
+            if least <= ACCEPTED:
+                break
+            S = self.system.S + rho * np.eye(len(forces))
+            near = replace(self, system=replace(self.system, S=S, g=self.system.g + rho * forces))
+            found, inner = near.newton(forces)
+            if inner > ACCEPTED:
+                rho *= 8.0
+                continue
+            forces, rho = found, max(0.125 * rho, _LEAST_RHO)
+            residual = self.residual(forces, self.displacements(forces))
+            if residual < least:
+                best, least = forces, residual
+        return best, least
+
     def _in_tau(self, forces: Vector, w: Vector) -> tuple[Vector, Matrix, Matrix]:
         """w_n, v = F w_t and tau at a point; zero where tau does not occur."""
         (_, lambda_t), (w_n, w_t) = self.system.split(forces), self.system.split(w)
@@ -102,7 +130,7 @@ class TrescaData:
         Some directions of lambda move by known steps: normals that open, and sliding pairs along z = tau + r v. In the
         others, the columns of Q, the equation is Q' S dlambda + shift = Q' w weight, symmetric positive definite: for
         normals in contact and for sticking tau w vanishes after the step; across z the derivative of the projection
-        is delta = s / |z|, which gives the shift (1 - delta) / (delta r) and the weight 1 / delta.
+        is delta = s / |z|, which gives the shift (1 - delta) / r and the weight 1 / delta for columns times delta^1/2.
         """
         p, d = self.system.p, self.system.tangents
         normal, _ = self.system.split(forces)
@@ -122,8 +150,11 @@ class TrescaData:
         node_s, axis_s = np.nonzero(self.occurs & ~sliding[:, None])
         node_a = np.flatnonzero(sliding & np.all(self.occurs, axis=1)) if d == 2 else np.empty(0, dtype=np.intp)
         delta = self.bound[node_a] / size[node_a]
+        root = np.sqrt(delta)
         across = (
-            self.F[node_a] * np.stack([-along[node_a, -1], along[node_a, 0]], axis=1) if d == 2 else np.empty((0, 2))
+            root[:, None] * self.F[node_a] * np.stack([-along[node_a, -1], along[node_a, 0]], axis=1)
+            if d == 2
+            else np.empty((0, 2))
         )
         counts = np.cumsum([0, len(node_n), len(node_s), len(node_a)])
         columns = [np.arange(counts[k], counts[k + 1]) for k in range(3)]
@@ -139,7 +170,7 @@ class TrescaData:
         )
         ones = np.ones(counts[2])
         weight = np.concatenate([ones, 1.0 / delta])
-        shift = np.concatenate([0.0 * ones, (1.0 - delta) / (delta * r_t[node_a])])
+        shift = np.concatenate([0.0 * ones, (1.0 - delta) / r_t[node_a]])
         rows = Q.T @ self.system.S
         rhs = weight * (Q.T @ w) - rows @ known.ravel()
         matrix = rows @ Q

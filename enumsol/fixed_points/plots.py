@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.figures import new_figure
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _MARKERS = "osD^v<>P*h"
+#: Up to as many iterations the axis of iterations is linear.
+_LINEAR = 20
 
 
 def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
@@ -31,29 +35,39 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     Raises
     ------
     InvalidArgumentError
-        The table is none of `basin_table`.
+        The table was not made by `basin_table`, or ``ax`` is no Axes.
     MissingDependencyError
         matplotlib is not installed.
     """
     missing = {"size", "iterations", "root", "outcome"} - set(getattr(table, "columns", ()))
     if missing:
         raise InvalidArgumentError(f"table lacks {', '.join(sorted(missing))}; expected what basin_table returns")
+    if ax is not None and not hasattr(ax, "set_xscale"):
+        raise InvalidArgumentError(f"ax is a {type(ax).__name__}; expected the Axes of a figure, or None")
     if ax is None:
         ax = new_figure(figsize=(6.4, 4.2)).subplots()
+    from matplotlib.ticker import MaxNLocator  # there, where there are axes
+
     for root in sorted(table["root"].dropna().astype(int).unique().tolist()):
         rows = table[table["root"] == root]
         style = {"marker": _MARKERS[root % len(_MARKERS)], "color": f"C{root}"}  # the same in every picture
-        ax.plot(rows["size"], rows["iterations"], ls="", alpha=0.7, label=f"root {root}: {len(rows)} starts", **style)
+        label = f"root {root}: {counted(len(rows), 'start')}"
+        ax.plot(rows["size"], rows["iterations"], ls="", alpha=0.7, label=label, **style)
     lost = table[table["root"].isna()]
     for outcome, rows in lost.groupby("outcome"):
-        ax.plot(rows["size"], rows["iterations"], "x", color="black", label=f"no root ({outcome}): {len(rows)} starts")
+        label = f"no root ({outcome}): {counted(len(rows), 'start')}"
+        ax.plot(rows["size"], rows["iterations"], "x", color="black", label=label)
     positive = table["size"][table["size"] > 0]
-    ax.set_xscale("symlog", linthresh=float(positive.min()) if len(positive) else 1.0)
-    ax.set_yscale("log")
+    # a power of ten, so that no tick comes to lie between 0 and the first one
+    ax.set_xscale("symlog", linthresh=10.0 ** math.floor(math.log10(positive.min())) if len(positive) else 1.0)
+    if table["iterations"].max() > _LINEAR:
+        ax.set_yscale("log")
+    else:
+        ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_xlabel("mean slip bound of the start [force]")
     ax.set_ylabel("iterations")
     never = table.attrs.get("never", [])
     names = ", ".join(map(str, never))
-    ax.set_title(f"never reached: root{'s' if len(never) > 1 else ''} {names}" if names else "never reached: none")
+    ax.set_title(f"never reached: {'roots' if len(never) > 1 else 'root'} {names}" if names else "never reached: none")
     ax.legend()
     return ax

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import MissingDependencyError
+from enumsol.fixed_points.system import contact_problem
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 class TrescaReference:
     """Minimise u' A u / 2 - f' u + sum_i s_i |F_i u_t,i| subject to Bn u <= gap.
 
-    Slip bounds, coefficients and load are parameters, so that CVXPY brings the problem into the form of its solver
-    once, however many are solved. The multipliers of the constraints are the contact forces.
+    Slip bounds, coefficients and load are parameters, so that CVXPY canonicalizes the problem only once
+    for many solutions. The multipliers of the constraints are the contact forces.
 
     Parameters
     ----------
@@ -38,6 +39,7 @@ class TrescaReference:
     """
 
     def __init__(self, problem: Problem) -> None:
+        problem = contact_problem(problem)
         try:
             import cvxpy
         except ImportError as error:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import enum
-import json
-import zipfile
+import textwrap
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checks import alpha_value, file_path
+from enumsol.array_checks import real_array
+from enumsol.checks import alpha_value, file_path, optional_count, positive_integer, positive_number
 from enumsol.errors import InvalidArgumentError
-from enumsol.files import writing
+from enumsol.files import read_arrays, reading, write_arrays
 from enumsol.fixed_points.state import ContactState
+from enumsol.fixed_points.system import contact_problem
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     import os
@@ -26,8 +28,21 @@ if TYPE_CHECKING:
 
 _FORMAT = 1
 _ARRAYS = ("slip_bound", "coefficients", "lambda_n", "lambda_t", "u_n", "u_t", "slip", "increments")
-#: Nodes and iterations that a printed result shows.
-_PRINTED = 12
+#: Nodes that a printed result shows, columns of its text, and what is noise beside the largest number of a kind.
+_PRINTED, _WIDTH, _NOISE = 12, 80, 1e-12
+
+
+def _check_shapes(arrays: dict[str, Vector], body: Problem, path: str) -> None:
+    p = body.p
+    tangential = body.slip_offset.shape  # (p,) in 2D, (p, 2) in 3D
+    shapes = {"coefficients": (p, len(tangential)), "lambda_t": tangential, "u_t": tangential}
+    shapes["increments"] = (len(arrays["increments"]), 2) if arrays["increments"].ndim else (0, 2)
+    for name, array in arrays.items():
+        expected = shapes.get(name, (p,))
+        if array.shape != expected:
+            raise InvalidArgumentError(
+                f"{path} has {name} of shape {array.shape}; expected {expected}, as the problem has it"
+            )
 
 
 class Outcome(enum.Enum):
@@ -61,7 +76,7 @@ class FixedPoint(ContactState):
         Distance of every iterate from its image under Psi in the norms of (theory, (11.4)): slips
         [length * sqrt(area)], and normal forces [sqrt(work)].
     tolerance : float
-        Increments at most this fraction of the load's norm count as none.
+        Increments of at most this fraction of the load's norm count as zero.
     period : int or None
         Of a cycle.
 
@@ -112,21 +127,23 @@ class FixedPoint(ContactState):
     def why(self) -> str:
         """How the iteration ended, in a sentence."""
         slips, forces = self.increments[-1] if len(self.increments) else (np.nan, np.nan)
-        last = f"last increment {forces:.2e} in forces, {slips:.2e} in slips"
+        depends = getattr(self.problem, "depends_on_solution", False)
+        last = f"last increment {forces:.2e} in forces" + (f", {slips:.2e} in slips" if depends else "")
+        solved = counted(self.iterations, "iteration")
         match self.outcome:
             case Outcome.CONVERGED:
-                return f"converged after {self.iterations} iterations ({last})"
+                return f"converged after {solved} ({last})"
             case Outcome.CYCLE:
                 return (
                     f"not converged: from iteration {self.iterations} on it repeats {self.period} iterates ({last}); "
                     "another start or anderson=5 may reach a solution, enumerate_roots reaches all in 2D"
                 )
             case Outcome.ITERATION_LIMIT:
-                return f"not converged within {self.iterations} iterations ({last})"
+                return f"not converged within {solved} ({last})"
             case Outcome.NOT_SOLVED:
-                return f"stopped after {self.iterations} iterations: a Tresca problem was not solved ({last})"
+                return f"stopped after {solved}: a Tresca problem was not solved ({last})"
             case _:
-                return f"interrupted after {self.iterations} iterations ({last})"
+                return f"interrupted after {solved} ({last})"
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write all arrays and the report to a .npz file; the problem itself is not in it.
@@ -136,8 +153,7 @@ class FixedPoint(ContactState):
         InvalidArgumentError
             The file cannot be written.
         """
-        meta = {
-            "format": _FORMAT,
+        report = {
             "alpha": str(self.alpha),
             "outcome": self.outcome.value,
             "iterations": self.iterations,
@@ -146,10 +162,8 @@ class FixedPoint(ContactState):
             "node_ids": [str(label) for label in self.problem.node_ids],
             "statuses": [status.value for status in self.statuses],
         }
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
-        place = file_path(path, "path")
-        with writing(place, "path"), place.open("wb") as stream:
-            np.savez_compressed(stream, allow_pickle=False, meta=np.array(json.dumps(meta)), u=self.u, **arrays)
+        arrays = {name: getattr(self, name) for name in (*_ARRAYS, "u")}
+        write_arrays(file_path(path, "path"), _FORMAT, report, arrays)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], problem: Problem) -> FixedPoint:
@@ -160,38 +174,54 @@ class FixedPoint(ContactState):
         InvalidArgumentError
             The file cannot be read, or is about another problem (another number of contact nodes, other labels).
         """
+        body = contact_problem(problem)
         place = file_path(path, "path")
-        try:
-            with np.load(place, allow_pickle=False) as data:
-                meta: dict[str, Any] = json.loads(str(data["meta"]))
-                arrays = {name: data[name] for name in _ARRAYS}
-            if meta["format"] != _FORMAT:
-                raise InvalidArgumentError(f"{path} has format {meta['format']!r}; this version reads format {_FORMAT}")
-            report = {name: meta[name] for name in ("iterations", "tolerance", "period")}
-            alpha, outcome = alpha_value(meta["alpha"]), Outcome(meta["outcome"])
-            labels = meta["node_ids"]
-        except OSError as error:
-            reason = error.strerror or error
-            raise InvalidArgumentError(
-                f"{path} cannot be read ({reason}); expected a file of FixedPoint.save"
-            ) from error
-        except (LookupError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
-            if isinstance(error, InvalidArgumentError):
-                raise
-            raise InvalidArgumentError(
-                f"{path} does not hold a fixed point ({error}); expected a file of FixedPoint.save"
-            ) from error
-        if labels != [str(label) for label in problem.node_ids]:
+        with reading(place, "a fixed point", "FixedPoint.save"):
+            found, kept = read_arrays(place, _FORMAT, _ARRAYS)
+            arrays = {
+                name: real_array(value, f"{name} in {path}", error=InvalidArgumentError) for name, value in kept.items()
+            }
+            report: dict[str, Any] = {
+                "iterations": positive_integer(found["iterations"], f"iterations in {path}", least=0),
+                "tolerance": positive_number(found["tolerance"], f"tolerance in {path}"),
+                "period": optional_count(found["period"], f"period in {path}"),
+            }
+            alpha, outcome, labels = alpha_value(found["alpha"]), Outcome(found["outcome"]), found["node_ids"]
+        if labels != [str(label) for label in body.node_ids]:
             raise InvalidArgumentError(f"{path} is about other contact nodes; expected those of the problem")
-        return cls(problem=problem, alpha=alpha, outcome=outcome, **arrays, **report)
+        _check_shapes(arrays, body, str(path))
+        return cls(problem=body, alpha=alpha, outcome=outcome, **(report | arrays))
 
     def __repr__(self) -> str:
-        lines = [f"FixedPoint at alpha = {float(self.alpha):g}: {self.why}"]
         factor = self.contraction_factor
-        if np.isfinite(factor):
-            lines.append(f"  contraction factor seen {factor:.3g}")
-        lines.append("  residuals " + ", ".join(f"{name} {value:.1e}" for name, value in self.residuals.items()))
-        lines += ["  " + line for line in self.to_frame().head(_PRINTED).to_string(index=False).splitlines()]
-        if len(self.lambda_n) > _PRINTED:
-            lines.append(f"  ... {len(self.lambda_n) - _PRINTED} more nodes")
-        return "\n".join(lines)
+        seen = f"; contraction factor seen {factor:.3g}" if np.isfinite(factor) else ""
+        found = ", ".join(f"{name} {value:.1e}" for name, value in self.residuals.items())
+        texts = [f"FixedPoint at alpha = {float(self.alpha):g}: {self.why}{seen}", f"residuals {found}"]
+        lines = [line for k, text in enumerate(texts) for line in _wrapped(text, "  " * k)]
+        return "\n".join([*lines, *self._table()])
+
+    def _table(self) -> list[str]:
+        """Lines of the first nodes: with coefficients where they differ, and with bounds that are not lambda_n."""
+        frame = self.to_frame()
+        names = [str(name) for name in frame]
+        coefficients = [name for name in names if name in ("F", "F1", "F2")]
+        varying = [name for name in coefficients if frame[name].nunique() > 1]
+        constant = ", ".join(f"{name} {frame[name][0]:g}" for name in coefficients if name not in varying)
+        shown = ["node", "status", *varying]
+        size = float(np.max(self.lambda_n, initial=0.0))
+        if not np.allclose(self.slip_bound, self.lambda_n, rtol=1e-6, atol=1e-6 * size):
+            shown.append("slip_bound")
+        for prefix in ("lambda", "u_"):  # rounding beside what is there is printed as the zero that it stands for
+            group = [name for name in names if name.startswith(prefix)]
+            noise = _NOISE * float(np.max(np.abs(frame[group].to_numpy()), initial=0.0))
+            frame[group] = frame[group].where(frame[group].abs() > noise, 0.0)
+            shown += group
+        text = frame[shown].head(_PRINTED).to_string(index=False, float_format=lambda value: f"{value:.5g}")
+        lines = ["  " + line for line in text.splitlines()]
+        if len(frame) > _PRINTED:
+            lines.append(f"  ... {len(frame) - _PRINTED} more nodes; to_frame() has all of them, and where they are")
+        return [f"  {constant} at all nodes", *lines] if constant else lines
+
+
+def _wrapped(text: str, indent: str) -> list[str]:
+    return textwrap.wrap(text, _WIDTH, initial_indent=indent, subsequent_indent="    ", break_long_words=False)

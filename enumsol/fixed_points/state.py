@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from enumsol.array_checks import real_array
+from enumsol.errors import InvalidArgumentError
 from enumsol.sealed import Sealed, sealed
 from enumsol.statuses import ContactStatus
 
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
 
     Vector = NDArray[np.float64]
 
-#: A force below this fraction of the largest is none, and |tau| within it of the bound has reached it, for statuses.
+#: For statuses: a force below this fraction of the largest is zero, and |tau| this close to its bound has reached it.
 STATUS_TOLERANCE = 1e-9
 
 
@@ -122,7 +124,8 @@ class ContactState(Sealed):
 
         ``equilibrium`` is |A u + B' lambda - f| / |f|; ``penetration`` the largest u_n and ``tension`` the largest
         -lambda_n, as forces and displacements of the contact nodes; ``complementarity`` the sum of |lambda_n u_n|;
-        ``cone`` the largest |tau| - lambda_n; ``dissipation`` the sum of |lambda_n |F u_t| - lambda_t . u_t|. Forces
+        ``cone`` the largest |tau| - lambda_n; ``dissipation`` the sum of |lambda_n |F u_t| - lambda_t . u_t|; where
+        friction depends on the slip ``coefficients``, the largest |F(slip) - F| [-], F those it was solved with. Forces
         are divided by the largest contact force, displacements by the largest displacement of a contact node without
         contact forces, work by g' S^-1 g.
         """
@@ -145,7 +148,18 @@ class ContactState(Sealed):
             "cone": max(np.max(tau - self.lambda_n), 0.0) / force,
             "dissipation": np.sum(np.abs(slip_work - np.sum(lambda_t * u_t, axis=1))) / work,
         }
-        return MappingProxyType({name: float(value) for name, value in values.items()})
+        if getattr(self.problem, "depends_on_solution", False):
+            values["coefficients"] = np.max(np.abs(self._coefficients_at_slips() - F))
+        return MappingProxyType({name: float(value) + 0.0 for name, value in values.items()})
+
+    def _coefficients_at_slips(self) -> Vector:
+        problem: Any = self.problem
+        slip = np.linalg.norm(self.u_t, axis=1) if problem.slip_mean is None else problem.slip_mean(self.u)
+        return np.asarray(problem.coefficients(self.alpha, slip))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # a mappingproxy cannot be pickled; copies compute it again
+        return {name: value for name, value in self.__dict__.items() if name != "residuals"}
 
     def to_frame(self) -> pd.DataFrame:
         """One row a contact node: label, coordinates, status, coefficients, forces and displacements."""
@@ -168,7 +182,45 @@ class ContactState(Sealed):
         return pd.DataFrame(columns)
 
 
-def scaled_forces(system: ContactSystem, state: Any) -> Vector:
-    """Scaled forces of a state or root, as a start."""
-    forces = np.concatenate([state.lambda_n, np.asarray(state.lambda_t).ravel(order="F")])
-    return np.asarray(forces / np.tile(system.force, 1 + system.tangents))
+def scaled_forces(system: ContactSystem, state: Any, name: str = "start") -> Vector:
+    """Scaled forces of a state or root.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It has no lambda_n or lambda_t, or none of these shapes, or they are huge; ``name`` is what it is called in
+        the message.
+    """
+    p, d = system.p, system.tangents
+    parts = []
+    for attribute, shape in (("lambda_n", (p,)), ("lambda_t", (p,) if d == 1 else (p, 2))):
+        if not hasattr(state, attribute):
+            raise InvalidArgumentError(
+                f"{name} is a {type(state).__name__} without {attribute}; expected a root of enumerate_roots or a "
+                "fixed point"
+            )
+        values = real_array(getattr(state, attribute), f"{attribute} of {name}", error=InvalidArgumentError)
+        if values.shape != shape:
+            raise InvalidArgumentError(
+                f"{name} has {attribute} of shape {values.shape}; expected {shape}, as the problem has p = {p} contact "
+                "nodes"
+            )
+        parts.append(values.ravel(order="F"))
+    return system.scaled(np.concatenate(parts), system.force, name)
+
+
+def slips_of(state: Any, p: int, name: str) -> Vector:
+    """The slips that a state or root has: its ``slip``, or |u_t|, shape (p,) [length].
+
+    Raises
+    ------
+    InvalidArgumentError
+        It has neither, or u_t is not p numbers or pairs.
+    """
+    slip = getattr(state, "slip", None)
+    if slip is not None:
+        return np.asarray(slip)
+    u_t = real_array(getattr(state, "u_t", None), f"u_t of {name}", error=InvalidArgumentError)
+    if u_t.shape not in ((p,), (p, 2)):
+        raise InvalidArgumentError(f"{name} has u_t of shape {u_t.shape}; expected ({p},) or ({p}, 2)")
+    return np.asarray(np.linalg.norm(u_t.reshape(p, -1), axis=1))

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.array_checks import real_array
 from enumsol.checks import optional_callable, positive_integer, positive_number
-from enumsol.errors import Interrupted
+from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.fixed_points.anderson import AndersonMixing
 from enumsol.fixed_points.newton import TrescaData
 from enumsol.fixed_points.result import FixedPoint, Outcome
-from enumsol.fixed_points.state import scaled_forces
+from enumsol.fixed_points.state import scaled_forces, slips_of
 from enumsol.fixed_points.system import ContactSystem, contact_problem
 from enumsol.fixed_points.tresca import TrescaNotSolved, node_values, solve
 from enumsol.friction import warn_of_jumps
@@ -30,8 +31,10 @@ if TYPE_CHECKING:
 
     Vector = NDArray[np.float64]
 
-#: Cycles up to this length are looked for; two iterates are the same if they are this much closer than neighbours.
+#: Longest cycle that is detected; two iterates are the same if they are this much closer than neighbours.
 LONGEST_CYCLE, _SAME = 12, 1e-9
+#: Most iterates that Anderson's mixing keeps.
+MOST_DEPTH = 1000
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ def successive_approximations(
 
     Every iterate solves the Tresca problem whose slip bounds are the normal forces of the one before, and whose
     coefficients, where they depend on the solution, are those at its slips. Convergence is certain only where Psi
-    contracts (`lipschitz_estimate`); a limit is a solution wherever it is, but others may exist.
+    contracts (`lipschitz_estimate`); every limit is a solution, but others may exist.
 
     Parameters
     ----------
@@ -78,7 +81,8 @@ def successive_approximations(
         slips [length]; a root, a FixedPoint or a TrescaSolution gives its own.
     tolerance : float
         Converged when the increment of normal forces in the norm of (theory, (11.4)) is at most this fraction of the
-        load's, and that of the slips at most this fraction of the largest slips, where coefficients depend on them.
+        load's, and, where coefficients depend on the slips, that of the slips at most this fraction of the largest
+        slips, and the change of the coefficients at most this fraction of the largest one.
     max_iterations : int
     anderson : int
         Depth of Anderson's mixing; 0 is plain iteration. With mixing, limits may be fixed points that repel Psi.
@@ -117,7 +121,7 @@ def successive_approximations(
     body = contact_problem(problem)
     tolerance = positive_number(tolerance, "tolerance")
     limit = positive_integer(max_iterations, "max_iterations")
-    depth = positive_integer(anderson, "anderson", least=0)
+    depth = positive_integer(anderson, "anderson", least=0, most=MOST_DEPTH)
     optional_callable(progress, "progress")
     system = ContactSystem.at(body, alpha)
     return _Iteration(system, tolerance, depth, progress).run(start, limit)
@@ -154,7 +158,7 @@ class _Iteration:
                 data = TrescaData(self.system, bound, self.system.coefficients(slip))
                 forces, _, _ = solve(data, forces)
                 image, image_slip = self._image(data, forces)
-                increment = self._record(bound, slip, image, image_slip)
+                increment = self._increment(data, slip, image, image_slip)
                 if increment <= 1.0:
                     outcome = Outcome.CONVERGED
                     break
@@ -177,15 +181,16 @@ class _Iteration:
         if start is None:
             bound: Any = 0.0
         elif hasattr(start, "lambda_n") and hasattr(start, "u_t"):
-            bound = np.maximum(np.asarray(start.lambda_n, dtype=np.float64), 0.0)
-            slip = getattr(start, "slip", None)
-            if slip is None:
-                slip = np.linalg.norm(np.reshape(start.u_t, (len(bound), -1)), axis=1)
+            bound = np.maximum(real_array(start.lambda_n, "lambda_n of start", error=InvalidArgumentError), 0.0)
+            slip = slips_of(start, p, "start")
         elif isinstance(start, tuple) and len(start) == 2 and any(np.ndim(part) == 1 for part in start):
             bound, slip = start
         else:
             bound = start
-        return node_values(bound, "start", p) / system.force, node_values(slip, "slips of start", p) / system.length
+        return (
+            system.scaled(node_values(bound, "start", p), system.force, "start"),
+            system.scaled(node_values(slip, "slips of start", p), system.length, "slips of start"),
+        )
 
     def _image(self, data: TrescaData, forces: Vector) -> tuple[Vector, Vector]:
         """Psi of the iterate that gave these forces: scaled normal forces and slips."""
@@ -193,18 +198,21 @@ class _Iteration:
         normal = np.maximum(self.system.split(forces)[0], 0.0)
         return normal, self.system.slip(forces, w)
 
-    def _record(self, bound: Vector, slip: Vector, image: Vector, image_slip: Vector) -> float:
-        """Note the increment; returned relative to what counts as none."""
+    def _increment(self, data: TrescaData, slip: Vector, image: Vector, image_slip: Vector) -> float:
+        """How far Psi moved the iterate, relative to the tolerance: at most 1 has converged."""
         system = self.system
-        force = system.force_norm(image - bound)
+        force = system.force_norm(image - data.bound)
         change = float(np.linalg.norm(self.slip_weights * (image_slip - slip)))
         if not self.increments and self.depends:
             self._look_for_jumps(image_slip)
         self.increments.append((change, force * self.work))
         self.largest_slip = max(self.largest_slip, float(np.linalg.norm(self.slip_weights * image_slip)))
         relative = [force / system.load_energy] if system.load_energy > 0 else [0.0]
-        if self.depends and self.largest_slip > 0:
-            relative.append(change / self.largest_slip)
+        if self.depends:
+            relative.append(change / (self.largest_slip or 1.0))
+            # where coefficients are steep, slips that hardly change are not enough
+            F = system.coefficients(image_slip)
+            relative.append(float(np.max(np.abs(F - data.F)) / (np.max(F) or 1.0)))
         increment = max(relative) / self.tolerance
         if self.progress is not None:
             self.progress(FixedPointProgress(len(self.increments), increment, time.perf_counter() - self.started))

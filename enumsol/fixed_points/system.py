@@ -7,10 +7,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg import solve_triangular
 
 from enumsol.checks import Alpha, alpha_value
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.condensation.condensed import cholesky_factor, load_unit, node_units
+from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.problem3d import ContactProblem3D
 
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]
     Problem = ContactProblem | ContactProblem3D
+
+#: Most that coefficients may be, and given forces and slips, in units in which those of the load have size 1.
+_LARGEST = 1e100
 
 
 def contact_problem(value: Any) -> Problem:
@@ -52,6 +56,8 @@ class ContactSystem:
     g : ((1 + d) p,) array
     force, length : (p,) arrays
         Factors: a force is ``force`` times its scaled one, a displacement ``length`` times.
+    cholesky : array of the shape of S
+        L with S = L L'.
     """
 
     problem: Problem
@@ -60,6 +66,7 @@ class ContactSystem:
     g: Vector = field(repr=False)
     force: Vector = field(repr=False)
     length: Vector = field(repr=False)
+    cholesky: Matrix = field(repr=False)
 
     @classmethod
     def at(cls, problem: Problem, alpha: Any) -> ContactSystem:
@@ -75,17 +82,13 @@ class ContactSystem:
         value = alpha_value(alpha)
         condensed = problem.condensed
         p = problem.p
-        factor = np.exp2(-np.round(0.5 * np.mean(np.log2(np.diagonal(condensed.S).reshape(-1, p)), axis=0)))
+        factor = node_units(condensed.S, p)
         everywhere = np.tile(factor, len(condensed.S) // p)
         S = condensed.S * everywhere[:, None] * everywhere[None, :]
         g = condensed.free_displacements(value) * everywhere
-        largest = float(np.max(np.abs(g)))
-        size = 1.0
-        if largest > 0:
-            first = np.exp2(np.floor(np.log2(largest)))  # two steps, so that squares do not overflow
-            energy = float(np.sqrt(_solve(S, g / first) @ (g / first)))
-            size = float(first * np.exp2(np.floor(np.log2(energy))))
-        return cls(problem, value, S, g / size, factor * size, size / factor)
+        cholesky = cholesky_factor(S)
+        size = load_unit(g, cholesky)
+        return cls(problem, value, S, g / size, factor * size, size / factor, cholesky)
 
     @property
     def p(self) -> int:
@@ -100,14 +103,20 @@ class ContactSystem:
     @cached_property
     def load_energy(self) -> float:
         """||g||_(S^-1): no solution has a larger energy norm (theory, section 11.3)."""
-        return float(np.sqrt(np.maximum(_solve(self.S, self.g) @ self.g, 0.0)))
+        return float(np.linalg.norm(solve_triangular(self.cholesky, self.g, lower=True, check_finite=False)))
+
+    @cached_property
+    def largest_forces(self) -> Vector:
+        """What no force of a solution exceeds, by the energy bound (theory, section 11.3), over all rows."""
+        inverse = solve_triangular(self.cholesky, np.eye(len(self.S)), lower=True, check_finite=False)
+        return np.asarray(self.load_energy * np.linalg.norm(inverse, axis=0))
 
     @cached_property
     def normal_stiffness(self) -> Matrix:
         """((S^-1)_nn)^-1, the matrix of the norm of normal forces (theory, (11.4)), shape (p, p)."""
         p = self.p
         coupling = self.S[:p, p:]
-        return np.asarray(self.S[:p, :p] - coupling @ _solve(self.S[p:, p:], coupling.T))
+        return np.asarray(self.S[:p, :p] - coupling @ np.linalg.solve(self.S[p:, p:], coupling.T))
 
     def force_norm(self, normal: Vector) -> float:
         """||normal||_D of scaled normal forces (theory, (11.4)): at most ``load_energy`` at solutions."""
@@ -116,8 +125,12 @@ class ContactSystem:
     def coefficients(self, slip: Vector) -> Matrix:
         """Friction coefficients for scaled slips of shape (p,), shape (p, d)."""
         if isinstance(self.problem, ContactProblem3D):
-            return self.problem.coefficients(self.alpha, slip * self.length)
-        return self.problem.friction_at(self.alpha)[:, None]
+            F = self.problem.coefficients(self.alpha, slip * self.length)
+        else:
+            F = self.problem.friction_at(self.alpha)[:, None]
+        if np.max(F) > _LARGEST:
+            raise InvalidArgumentError(f"friction is {np.max(F):g}; expected at most {_LARGEST:g} here")
+        return F
 
     def slip(self, forces: Vector, w: Vector) -> Vector:
         """The scaled slip that coefficients depend on, shape (p,), for scaled forces and displacements of all rows."""
@@ -131,6 +144,22 @@ class ContactSystem:
         scaled = forces * np.tile(self.force, 1 + self.tangents)
         return self.problem.condensed.displacement(self.alpha, scaled)
 
+    def scaled(self, values: Vector, unit: Vector, name: str) -> Vector:
+        """Forces or displacements of nodes or rows by the factors ``unit``, which are those of one tangent or of all.
+
+        Raises
+        ------
+        InvalidArgumentError
+            One is so large beside the load that squares would overflow.
+        """
+        with np.errstate(over="ignore"):
+            scaled = values / np.tile(unit, len(values) // self.p)
+        if np.any(np.abs(scaled) > _LARGEST):
+            raise InvalidArgumentError(
+                f"{name} has the value {np.max(np.abs(values)):g}; expected at most {_LARGEST:g} times the load's"
+            )
+        return np.asarray(scaled)
+
     def split(self, values: Vector) -> tuple[Vector, Matrix]:
         """Normal part (p,) and tangential part (p, d) of a vector over all rows."""
         p = self.p
@@ -139,14 +168,3 @@ class ContactSystem:
     def joined(self, normal: Vector, tangential: Matrix) -> Vector:
         """The vector over all rows with these parts."""
         return np.concatenate([normal, tangential.T.ravel()])
-
-
-def _solve(S: Matrix, rhs: Matrix) -> Matrix:
-    """S^-1 rhs by Cholesky's method."""
-    try:
-        return np.asarray(cho_solve(cho_factor(S, lower=True, check_finite=False), rhs, check_finite=False))
-    except LinAlgError as error:
-        raise InvalidProblemError(
-            "the condensed compliance S = B A^-1 B' is not positive definite to working precision; expected contact "
-            "rows that are independent beyond rounding (are two contact nodes almost the same point?)"
-        ) from error

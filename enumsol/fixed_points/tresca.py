@@ -13,6 +13,7 @@ from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.fixed_points.newton import ACCEPTED, TrescaData
 from enumsol.fixed_points.state import ContactState, scaled_forces
 from enumsol.fixed_points.system import ContactSystem, contact_problem
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -55,9 +56,8 @@ class TrescaSolution(ContactState):
     solver: str
 
     def __repr__(self) -> str:
-        p = len(self.lambda_n)
         return (
-            f"TrescaSolution at alpha = {float(self.alpha):g} on {p} contact node{'s' if p != 1 else ''}: "
+            f"TrescaSolution at alpha = {float(self.alpha):g} on {counted(len(self.lambda_n), 'contact node')}: "
             f"sum of lambda_n {np.sum(self.lambda_n):.6g}, residual {self.residual:.1e}, by {self.solver}"
         )
 
@@ -114,9 +114,9 @@ def solve_tresca(
     body = contact_problem(problem)
     one_of(solver, "solver", SOLVERS)
     system = ContactSystem.at(body, alpha)
-    bound = node_values(slip_bound, "slip_bound", body.p) / system.force
-    slips = node_values(0.0 if slip is None else slip, "slip", body.p) / system.length
-    data = TrescaData(system, bound, system.coefficients(slips))
+    bound = system.scaled(node_values(slip_bound, "slip_bound", body.p), system.force, "slip_bound")
+    slips = node_values(0.0 if slip is None else slip, "slip", body.p)
+    data = TrescaData(system, bound, system.coefficients(system.scaled(slips, system.length, "slip")))
     if solver == "cvxpy":
         return _by_cvxpy(data)
     guess = np.zeros(len(system.g)) if start is None else scaled_forces(system, start)
@@ -154,6 +154,8 @@ def solve(data: TrescaData, start: Vector, first: str = "newton") -> tuple[Vecto
     """
     from enumsol.fixed_points.clarabel_solver import interior_point  # a fallback
 
+    if not np.any(data.system.g):
+        return np.zeros(len(start)), 0.0, first
     found: list[tuple[float, str, Vector]] = []
     if first == "newton":
         forces, residual = data.newton(start)
@@ -163,6 +165,8 @@ def solve(data: TrescaData, start: Vector, first: str = "newton") -> tuple[Vecto
     rough = interior_point(data)
     if rough is not None:
         forces, residual = data.newton(rough)
+        if residual > ACCEPTED:
+            forces, residual = data.proximal(forces)
         found.append((residual, "clarabel", forces))
     residual, used, forces = min(found, key=lambda item: item[0], default=(np.inf, "", start))
     if residual > _INTERIOR_POINT_ACCEPTED:

@@ -9,10 +9,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol import fem
-from enumsol.array_checks import vector_2d
+from enumsol.array_checks import short_vector
 from enumsol.checks import finite_number, nonnegative_number, positive_integer, positive_number, shown
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.assembly import lame_coefficients
+from enumsol.fem.mesh_checks import lame_coefficients
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def one_node_triangle(f: Pair = (1.5, -4.0), lame: Pair = (1.0, 1.0)) -> Contact
     [1, 3]
     """
     return ContactProblem(
-        _one_node_stiffness(lame), [[1.0, 0.0]], [[0.0, 1.0]], vector_2d(f, "f"), coordinates=[[0.0, 0.0]]
+        _one_node_stiffness(lame), [[1.0, 0.0]], [[0.0, 1.0]], short_vector(f, "f", 2), coordinates=[[0.0, 0.0]]
     )
 
 
@@ -71,8 +71,8 @@ def two_node_square(
 ) -> ContactProblem:
     """Two contact nodes on one square: up to five roots, several branches, and loading paths (n = 4, p = 2).
 
-    The geometry is our own, not that of the paper's Examples 6.4-6.7, whose coordinates were never published; their
-    loads can be applied to it, their printed figures are not to be expected. The unit square is clamped along its top
+    The geometry is not that of the paper's Examples 6.4-6.7, whose coordinates were never published; their loads can
+    be applied to it, but their printed figures do not follow. The unit square is clamped along its top
     and stands in a corner: node 0 at (0, 0) touches the floor (normal (0, -1), tangent (1, 0)), node 1 at (1, 0) the
     wall on the right (normal (1, 0), tangent (0, 1)). Two P1 triangles share the diagonal from (1, 0) to (0, 1). The
     degrees of freedom are (u_n, u_t) of node 0, then of node 1; for l = m = 1 the entries of A are exact in binary.
@@ -120,12 +120,12 @@ def two_node_square(
             raise InvalidArgumentError(
                 f"load_slope is {shown(load_slope)}; expected two pairs, the slopes of f1 and f2"
             )
-        slope = np.concatenate([vector_2d(pair, f"load_slope[{k}]") for k, pair in enumerate(load_slope)])
+        slope = np.concatenate([short_vector(pair, f"load_slope[{k}]", 2) for k, pair in enumerate(load_slope)])
     return ContactProblem(
         turn @ K[:4, :4] @ turn.T,
         np.eye(4)[[0, 2]],
         np.eye(4)[[1, 3]],
-        np.concatenate([vector_2d(f1, "f1"), vector_2d(f2, "f2")]),
+        np.concatenate([short_vector(f1, "f1", 2), short_vector(f2, "f2", 2)]),
         friction=friction,
         load_slope=slope,
         coordinates=corners[:2],
@@ -193,7 +193,7 @@ def clamped_block(
         contact=mesh.bottom[cells // count :: cells // count],
         normals=(0.0, -1.0),
         held=mesh.left,
-        forces=fem.edge_forces(mesh.points, fem.edges_along(mesh.top), vector_2d(traction, "traction")),
+        forces=fem.edge_forces(mesh.points, fem.edges_along(mesh.top), short_vector(traction, "traction", 2)),
         gap=finite_number(gap, "gap"),
         friction=friction,
     )
@@ -276,7 +276,7 @@ def wedge(
         normals=np.repeat([[-c, -s], [c, -s]], len(left), axis=0),
         tangents=np.repeat([[-s, c], [s, c]], len(left), axis=0),
         springs=_top_springs(mesh, springs),
-        forces=fem.edge_forces(mesh.points, fem.edges_along(mesh.top), vector_2d(pull, "pull")),
+        forces=fem.edge_forces(mesh.points, fem.edges_along(mesh.top), short_vector(pull, "pull", 2)),
         gap=-finite_number(press, "press"),
         friction=friction,
     )
@@ -325,17 +325,17 @@ def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.
     dofs = sp.csr_array(sp.eye_array(2 * count))
     # triangles with legs of length one, half a leg apart
     coordinates = np.stack([1.5 * np.arange(count), np.zeros(count)], axis=1)
-    load = np.tile(vector_2d(f, "f"), count)
+    load = np.tile(short_vector(f, "f", 2), count)
     return ContactProblem(sp.csc_array(A), dofs[0::2], dofs[1::2], load, coordinates=coordinates)
 
 
 def _one_node_stiffness(lame: Pair) -> NDArray[np.float64]:
-    lam, mu = lame_coefficients(lame)
+    lam, mu = lame_coefficients(lame, 2)
     return 0.5 * np.array([[lam + 3 * mu, -(lam + mu)], [-(lam + mu), lam + 3 * mu]])
 
 
 def _top_springs(mesh: fem.Mesh, springs: Pair) -> NDArray[np.float64]:
-    total = vector_2d(springs, "springs")
+    total = short_vector(springs, "springs", 2)
     if np.min(total) <= 0:
         raise InvalidArgumentError(
             f"springs is {shown(springs)}; expected two stiffnesses > 0, otherwise nothing holds the wedge"

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from enumsol.errors import InvalidProblemError
-from enumsol.io.layouts import LAYOUT_2D, LAYOUT_3D, Layout
+from enumsol.io.layouts import LAYOUT_2D, LAYOUT_3D, Layout, constant_friction
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from enumsol.problem3d import ContactProblem3D
@@ -28,13 +26,7 @@ def problem_from_arrays(arrays: Mapping[str, Any], layout: Layout) -> ContactPro
         name: arrays[name] for name in ("gap", "load_slope", "slip_offset", "coordinates") if name in arrays
     }
     if "friction" in arrays:
-        constant = np.asarray(arrays["friction"])
-        if constant.ndim:
-            raise InvalidProblemError(
-                f"friction is an array of shape {constant.shape}, which is ambiguous; expected one number, "
-                "or friction0 and friction1, each a number or an array of shape (p,)"
-            )
-        options["friction"] = (constant, 0.0)
+        options["friction"] = (constant_friction(arrays["friction"], layout), 0.0)
     elif "friction0" in arrays or "friction1" in arrays:
         options["friction"] = (arrays.get("friction0", 0.0), arrays.get("friction1", 0.0))
     if "node_ids" in arrays:

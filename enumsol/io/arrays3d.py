@@ -5,28 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.sparse as sp
 
-from enumsol.array_checks import real_array, real_matrix
+from enumsol.body3d import BodyMesh, SlipMean
 from enumsol.errors import InvalidProblemError
 from enumsol.friction import ConstantFriction, FrictionTable
-from enumsol.io.layouts import LAYOUT_3D
-from enumsol.problem3d import BodyMesh, ContactProblem3D, SlipMean
+from enumsol.io.layouts import LAYOUT_3D, MEAN, MESH, SURFACE, TABLE, constant_friction
+from enumsol.problem3d import ContactProblem3D
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
-_MESH = ("mesh_points", "mesh_cells", "mesh_dofs")
-_SURFACE = ("mesh_facets", "mesh_rows")
-_MEAN = ("slip_mean_T1", "slip_mean_T2", "slip_mean_offset", "slip_mean_weights")
-_TABLE = ("friction_table_slip", "friction_table_1", "friction_table_2")
-
 
 def problem_from_arrays_3d(arrays: Mapping[str, Any]) -> ContactProblem3D:
     """The problem made of arrays whose names have been checked."""
-    for parts in (_MESH, _MEAN, _TABLE):
+    for parts in (MESH, MEAN, TABLE):
         missing = [name for name in parts if name not in arrays]
         if 0 < len(missing) < len(parts):
             raise InvalidProblemError(f"{', '.join(missing)} is missing; expected {', '.join(parts)}, all or none")
@@ -37,65 +29,28 @@ def problem_from_arrays_3d(arrays: Mapping[str, Any]) -> ContactProblem3D:
         options["friction"] = friction
     options["friction_slope"] = tuple(arrays.get(f"friction_slope_{axis}", 0.0) for axis in (1, 2))
     if "mesh_points" in arrays:
-        options["mesh"] = _mesh(arrays)
-    elif extra := [name for name in _SURFACE if name in arrays]:
-        raise InvalidProblemError(f"{extra[0]} has no mesh; expected {', '.join(_MESH)} as well")
+        points, cells, dofs = (arrays[name] for name in MESH)
+        options["mesh"] = BodyMesh(points, cells, dofs, *(arrays.get(name) for name in SURFACE))
+    elif extra := [name for name in SURFACE if name in arrays]:
+        raise InvalidProblemError(f"{extra[0]} has no mesh; expected {', '.join(MESH)} as well")
     if "slip_mean_T1" in arrays:
-        T1, T2, weights = (sp.csr_array(real_matrix(arrays[name], name)) for name in (_MEAN[0], _MEAN[1], _MEAN[3]))
-        options["slip_mean"] = SlipMean(T1, T2, real_array(arrays[_MEAN[2]], _MEAN[2]), weights)
+        options["slip_mean"] = SlipMean(*(arrays[name] for name in MEAN))
     return ContactProblem3D(*(arrays[name] for name in LAYOUT_3D.required), **options)
 
 
 def _friction(arrays: Mapping[str, Any]) -> Any:
     if "friction" in arrays:
-        constant = np.asarray(arrays["friction"])
-        if constant.ndim:
-            raise InvalidProblemError(
-                f"friction is an array of shape {constant.shape}, which is ambiguous; expected one number, "
-                "or friction_1 and friction_2, each a number or an array of shape (p,)"
-            )
-        return constant
+        return constant_friction(arrays["friction"], LAYOUT_3D)
     given = [name for name in ("friction_1", "friction_2") if name in arrays]
     if len(given) == 1:
         raise InvalidProblemError(f"{given[0]} stands alone; expected friction_1 and friction_2, or friction")
     if given:
         return arrays["friction_1"], arrays["friction_2"]
     if "friction_table_slip" in arrays:
-        slip, *columns = (np.asarray(arrays[name]) for name in _TABLE)
+        slip, *columns = (np.asarray(arrays[name]) for name in TABLE)
         # one column of a MatrixMarket file is the table of all nodes
         return FrictionTable(slip, *(F.ravel() if F.ndim == 2 and F.shape[1] == 1 else F for F in columns))
     return None
-
-
-def _mesh(arrays: Mapping[str, Any]) -> BodyMesh:
-    nodes = real_array(arrays["mesh_points"], "mesh_points")
-    if nodes.ndim != 2 or nodes.shape[1] != 3:
-        raise InvalidProblemError(f"mesh_points has shape {nodes.shape}; expected (N, 3)")
-    bodies = _numbers(arrays["mesh_cells"], "mesh_cells", len(nodes))
-    if bodies.ndim != 2 or bodies.shape[1] not in (4, 8):
-        raise InvalidProblemError(f"mesh_cells has shape {bodies.shape}; expected (M, 4) or (M, 8)")
-    free = _numbers(arrays["mesh_dofs"], "mesh_dofs", nodes.size)
-    if free.ndim != 1 or len(np.unique(free)) != len(free):
-        raise InvalidProblemError(f"mesh_dofs has shape {free.shape} or repeats a number; expected (n,) distinct ones")
-    facets = rows = None
-    if "mesh_facets" in arrays:
-        facets = _numbers(arrays["mesh_facets"], "mesh_facets", len(nodes))
-        if facets.ndim != 2 or facets.shape[1] not in (3, 4):
-            raise InvalidProblemError(f"mesh_facets has shape {facets.shape}; expected (k, 3) or (k, 4)")
-    if "mesh_rows" in arrays:
-        rows = _numbers(arrays["mesh_rows"], "mesh_rows", np.shape(arrays["Bn"])[0], least=-1)
-        if facets is None or rows.shape != facets.shape[:1]:
-            raise InvalidProblemError(f"mesh_rows has shape {rows.shape}; expected (k,), one for each of mesh_facets")
-    return BodyMesh(nodes, bodies, free, facets, rows)
-
-
-def _numbers(value: Any, name: str, count: int, least: int = 0) -> NDArray[np.int64]:
-    array = real_array(value, name)
-    if np.any(array != np.round(array)) or np.any(array < least) or np.any(array >= count):
-        raise InvalidProblemError(
-            f"{name} holds other numbers than {least} .. {count - 1}; expected whole ones in that range"
-        )
-    return array.astype(np.int64)
 
 
 def arrays_of_3d(problem: ContactProblem3D) -> dict[str, Any]:
@@ -106,7 +61,7 @@ def arrays_of_3d(problem: ContactProblem3D) -> dict[str, Any]:
     if isinstance(law, ConstantFriction):
         arrays |= {"friction_1": law.values[:, 0], "friction_2": law.values[:, 1]}
     elif isinstance(law, FrictionTable):
-        arrays |= dict(zip(_TABLE, (law.slip, law.F1, law.F2), strict=True))
+        arrays |= dict(zip(TABLE, (law.slip, law.F1, law.F2), strict=True))
     else:
         raise InvalidProblemError(f"friction is {law}, which no file can hold; expected constants or a FrictionTable")
     arrays |= {f"friction_slope_{axis}": slope for axis, slope in zip((1, 2), problem.friction_slope, strict=True)}
@@ -116,10 +71,8 @@ def arrays_of_3d(problem: ContactProblem3D) -> dict[str, Any]:
         if getattr(problem, name) is not None
     }
     if (mesh := problem.mesh) is not None:
-        arrays |= dict(zip(_MESH, (mesh.points, mesh.cells, mesh.dofs), strict=True))
-        arrays |= {
-            name: part for name, part in zip(_SURFACE, (mesh.facets, mesh.rows), strict=True) if part is not None
-        }
+        arrays |= dict(zip(MESH, (mesh.points, mesh.cells, mesh.dofs), strict=True))
+        arrays |= {name: part for name, part in zip(SURFACE, (mesh.facets, mesh.rows), strict=True) if part is not None}
     if (mean := problem.slip_mean) is not None:
-        arrays |= dict(zip(_MEAN, (mean.T1, mean.T2, mean.offset, mean.weights), strict=True))
+        arrays |= dict(zip(MEAN, (mean.T1, mean.T2, mean.offset, mean.weights), strict=True))
     return arrays

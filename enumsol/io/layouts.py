@@ -5,12 +5,16 @@ from __future__ import annotations
 import difflib
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping
+
+    from numpy.typing import NDArray
 
 #: Version of the layout that is written, and the newest that can be read.
 FORMAT_VERSION = 1
@@ -85,20 +89,21 @@ LAYOUT_2D = Layout(
     | {"f0": "friction0", "mu0": "friction0", "f1": "friction1", "mu1": "friction1"},
 )
 _TANGENTS = {"bt1": "Bt1", "t1": "Bt1", "tangential1": "Bt1", "bt2": "Bt2", "t2": "Bt2", "tangential2": "Bt2"}
-_MEANS = ("slip_mean_T1", "slip_mean_T2", "slip_mean_weights")
-_TABLE = ("friction_table_slip", "friction_table_1", "friction_table_2")
+#: Names of the arrays of a BodyMesh, required and optional, of a SlipMean and of a FrictionTable.
+MESH, SURFACE = ("mesh_points", "mesh_cells", "mesh_dofs"), ("mesh_facets", "mesh_rows")
+MEAN = ("slip_mean_T1", "slip_mean_T2", "slip_mean_offset", "slip_mean_weights")
+TABLE = ("friction_table_slip", "friction_table_1", "friction_table_2")
 _SLOPES = ("friction_slope_1", "friction_slope_2")
 LAYOUT_3D = Layout(
     contact=("A", "Bn", "Bt1", "Bt2"),
-    matrices=("A", "Bn", "Bt1", "Bt2", *_MEANS),
-    tables=("coordinates", "slip_offset", "mesh_points", "mesh_cells", "mesh_facets", "slip_mean_offset", *_TABLE[1:]),
+    matrices=("A", "Bn", "Bt1", "Bt2", *MEAN[:2], MEAN[3]),
+    tables=("coordinates", "slip_offset", "mesh_points", "mesh_cells", "mesh_facets", "slip_mean_offset", *TABLE[1:]),
     broadcast=("gap", "friction", "friction_1", "friction_2", *_SLOPES),
     optional=(
         *_COMMON,
-        *("friction_1", "friction_2", *_SLOPES, *_TABLE, "areas"),
-        *("mesh_points", "mesh_cells", "mesh_dofs", "mesh_facets", "mesh_rows", *_MEANS, "slip_mean_offset"),
+        *("friction_1", "friction_2", *_SLOPES, *TABLE, "areas", *MESH, *SURFACE, *MEAN),
     ),
-    frictions=(("friction",), ("friction_1", "friction_2"), _TABLE),
+    frictions=(("friction",), ("friction_1", "friction_2"), TABLE),
     synonyms=_SYNONYMS
     | _TANGENTS
     | {"f1": "friction_1", "mu1": "friction_1", "f2": "friction_2", "mu2": "friction_2"}
@@ -106,15 +111,33 @@ LAYOUT_3D = Layout(
 )
 
 
+def constant_friction(value: Any, layout: Layout) -> NDArray[np.float64]:
+    """The array ``friction``, one number.
+
+    Raises
+    ------
+    InvalidProblemError
+        It is several.
+    """
+    array = np.asarray(value)
+    if array.ndim:
+        choice = " and ".join(layout.frictions[1])
+        raise InvalidProblemError(
+            f"friction is an array of shape {array.shape}, which is ambiguous; expected one number, "
+            f"or {choice}, each a number or an array of shape (p,)"
+        )
+    return array
+
+
 def layout_of(names: Iterable[str]) -> Layout:
-    """The layout that the names of some arrays, or of their sparse parts, belong to: a second tangent tells."""
+    """The layout of arrays, or sparse parts, with these names: a second tangent means 3D."""
     second = any(_plain(name) in _TANGENTS or name.partition("_")[0] in ("Bt1", "Bt2") for name in names)
     return LAYOUT_3D if second else LAYOUT_2D
 
 
 @contextmanager
 def refusing(errors: tuple[type[Exception], ...], found: str, expected: str) -> Iterator[None]:
-    """Turn what other packages raise on unusable files into one sentence: ``found (reason); expected ...``."""
+    """Turn errors of other packages on unusable files into one sentence: ``found (reason); expected ...``."""
     try:
         yield
     except InvalidProblemError:
@@ -146,7 +169,7 @@ def check_names(found: Collection[str], layout: Layout, suffix: str = "") -> Non
         hint = f" (is {close}{suffix} meant?)" if close else ""
         raise InvalidProblemError(
             f"{strangers[0]}{suffix} is not known{hint}; expected {_listing(layout.known)}, "
-            "or a name that begins with an underscore for what enumsol is to ignore"
+            "or a name that begins with an underscore for what enumsol should ignore"
         )
     kinds = [kind for kind in layout.frictions if any(name in found for name in kind)]
     if len(kinds) > 1:

@@ -55,14 +55,14 @@ def write(problem: ContactProblem | ContactProblem3D, path: Path) -> None:
     if stale:
         _remove(stale)
     for name, matrix in columns.items():
-        text = BytesIO()  # the writer of scipy passes over what the disk refuses
+        text = BytesIO()  # scipy's writer ignores errors of the disk
         mmwrite(text, matrix, field="real", precision=_DIGITS)
         (path / f"{name}.mtx").write_bytes(text.getvalue())
     (path / _LABELS).write_text(labels + "\n", encoding="utf-8")
 
 
 def _remove(files: list[Path]) -> None:
-    """Delete what an earlier problem left and this one lacks, provided that there are no files of others."""
+    """Delete files of an earlier problem that this one lacks, unless there are foreign files."""
     names = [file.stem for file in files if not file.name.startswith("_")]
     layout = LAYOUT_2D if all(name in LAYOUT_2D.known for name in names) else LAYOUT_3D
     check_names([*layout.required, *names], layout, ".mtx")

@@ -80,7 +80,7 @@ def _load(path: Path) -> dict[str, NDArray[Any]]:
     damaged = refusing(_DAMAGE, "it is not a readable .npz archive", "a complete one, by numpy.savez or write_problem")
     with path.open("rb") as file, damaged:
         if file.read(2) != b"PK":
-            raise InvalidProblemError("it is no .npz archive in spite of its name; expected what numpy.savez writes")
+            raise InvalidProblemError("it is not a .npz archive despite its name; expected what numpy.savez writes")
         file.seek(0)
         archive = np.load(file, allow_pickle=False)
         with archive:

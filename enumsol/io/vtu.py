@@ -10,12 +10,14 @@ from enumsol.array_checks import real_array
 from enumsol.checks import file_path, instance_of
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.files import writing
-from enumsol.problem3d import BodyMesh, ContactProblem3D
+from enumsol.problem3d import ContactProblem3D
 
 if TYPE_CHECKING:
     import os
 
     from numpy.typing import NDArray
+
+    from enumsol.body3d import BodyMesh
 
     Floats = NDArray[np.float64]
 

@@ -68,7 +68,7 @@ class EnclosedPiece:
         """
         systems = [enclosure.at(alpha, force, length) for alpha in (a, b)]
         constant = np.array(enclosure.problem.friction[1]) == 0
-        # a coefficient near the largest float has no upper bound, and what it multiplies gives none
+        # a coefficient near the largest float has no upper bound, nor has any product with it
         with np.errstate(over="ignore"):
             low = np.min([s.F - s.F_rad * SAFE for s in systems], axis=0)
             high = np.max([s.F + s.F_rad * SAFE for s in systems], axis=0)

@@ -133,8 +133,8 @@ def margins(
 def energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array, errors: float = 1.0) -> Array:
     """Lower bounds on the energy for multipliers y (m, 2p) on S lambda - g and c, a ball, on lambda.
 
-    ``errors`` is how often the error bound is subtracted: once proves the bound. Who writes a proof subtracts it twice,
-    so that a checker, which adds up in another order, finds a positive bound too.
+    ``errors`` is how often the error bound is subtracted: once proves the bound. A writer of proofs subtracts it twice,
+    so that a checker, which sums in another order, finds a positive bound too.
     """
     S, g = system.S, system.g
     # every inner product of up to 2p terms below is off by at most k times that of the absolute values
@@ -232,7 +232,7 @@ def contradicts(system: EnclosedSystem, codes: Sequence[int]) -> bool:
             return False
         sizes = np.maximum(sizes / np.max(np.abs(system.S)), UNIT)
         y = U @ ((b @ U) / sizes**2)
-        # its length is of no account
+        # its length does not matter
         y /= np.max(np.abs(y))
         y_abs, k = np.abs(y), gamma(len(b) + 2)
         least = abs(float(y @ b)) - float(y_abs @ (b_rad + k * np.abs(b))) * (1 + 2 * k) * SAFE - TINY
@@ -296,7 +296,7 @@ def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSe
     if not len(rows):
         zero = np.zeros(2 * p)
         return _conditions(system, status, zero, zero, system.g, system.g_rad, 1)
-    # scale the columns by powers of two, so that the contraction is asked of comparable unknowns
+    # scale the columns by powers of two, so that the unknowns are comparable in the contraction
     scale = np.ldexp(1.0, -np.frexp(np.max(np.abs(M), axis=0) + TINY)[1])
     # what underflows in the scaling is less than TINY
     solved = verified_solve(M * scale, M_rad * scale + TINY, system.g[rows], system.g_rad[rows])

@@ -1,7 +1,7 @@
 """The proof's vocabulary: status codes, rows, which multipliers are allowed, and how branchings split an assignment.
 
-This module states the mathematics that a reader of a proof has to agree with (theory, sections 5.2, 5.4); it holds no
-algorithm. It is the checkers' own copy of the table in ``enumsol.statuses``, which the search reads.
+This module states the mathematics on which a proof rests (theory, sections 5.2, 5.4); it holds no algorithm. It
+is the checkers' own copy of the table in ``enumsol.statuses``, which the search reads.
 
 Status codes: 0 open, 1 stick, 2 slip+, 3 slip-, 4 in contact at a node with F = 0, 5 in contact, 6 undecided.
 

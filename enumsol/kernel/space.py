@@ -133,6 +133,7 @@ def exclusion_margin(
                 y[i - size] -= term
                 y_size[i - size] += abs(term)
     k = gamma(len(rows) + 24)
+    k *= 1.0 + 2.0 * k  # the sizes are sums as long
     with np.errstate(over="ignore", invalid="ignore"):
         c_rad, y_rad = k * c_size * SAFE + TINY, k * y_size * SAFE + TINY
         bound = float(energy_bounds(system, y[None], c[None], c_rad[None], errors)[0])
@@ -188,12 +189,18 @@ class Ball:
         return np.asarray((np.abs(self.mid) + self.rad) * SAFE)
 
 
+def _smaller(one: Ball, other: Ball) -> Ball:
+    """Entry by entry the ball with the smaller radius, of two that hold the same values."""
+    first = one.rad <= other.rad
+    return Ball(np.where(first, one.mid, other.mid), np.where(first, one.rad, other.rad))
+
+
 def _solution(M: Ball, B: Ball) -> Ball | None:
     """All X with M X = B, columns of unknowns; None where M is not proven regular."""
     n = len(M.mid)
     if not n:
         return Ball.exact(np.zeros_like(B.mid))
-    scale = np.ldexp(1.0, -np.frexp(np.max(np.abs(M.mid), axis=0) + TINY)[1])
+    scale = _column_scale(M)
     M = Ball(M.mid * scale, M.rad * scale + TINY)
     try:
         R = Ball.exact(np.asarray(np.linalg.inv(M.mid), dtype=np.float64))
@@ -214,6 +221,29 @@ def _solution(M: Ball, B: Ball) -> Ball | None:
     largest = np.max(step / u[:, None], axis=0) / (1.0 - contraction) * SAFE
     rad = (step + upper_sum(defect * u, axis=1)[:, None] * largest) * SAFE
     return Ball(X.mid * scale[:, None], rad * scale[:, None] + TINY)
+
+
+def _determinant_sign(M: Ball) -> int:
+    """The sign of all determinants in a ball, 0 where it is not proven."""
+    n = len(M.mid)
+    if not n:
+        return 1
+    scale = _column_scale(M)
+    solved = verified_solve(M.mid * scale, M.rad * scale + TINY, np.zeros(n), np.zeros(n))
+    return 0 if solved is None else solved[2]
+
+
+def _column_scale(M: Ball) -> Array:
+    """Powers of two by which columns get a size near one."""
+    return np.asarray(np.ldexp(1.0, -np.frexp(np.max(np.abs(M.mid), axis=0) + TINY)[1]))
+
+
+def _cut(angle: Array, radius: Array, reach: Array, move: Ball) -> tuple[Array, Array]:
+    """The part of a box of angles that lies within ``move`` of its centre."""
+    low, high = np.maximum(move.mid - move.rad, -radius), np.minimum(move.mid + move.rad, radius)
+    middle = 0.5 * (low + high)
+    # low, high, their middle and the new centre are rounded by less than a unit each
+    return angle + middle, np.maximum(high - middle, middle - low) * SAFE + 4 * UNIT * reach
 
 
 # -- leaves ------------------------------------------------------------------------------------------------------------
@@ -323,50 +353,46 @@ class _Leaf:
                 return None
             if not q:
                 return self._root(y, w, angle, radius, reach, None, open_leaf)
-            try:
-                Y = Ball.exact(np.asarray(np.linalg.inv(J.mid), dtype=np.float64))
-            except np.linalg.LinAlgError:
+            move = self._move(angle, radius, J)
+            if move is None:
                 return open_leaf
-            point = self._state(angle, np.zeros(q))
-            if point is None:
-                return open_leaf
-            shrink = (Ball.exact(np.eye(q)) - Y @ J) @ Ball(np.zeros(q), radius)
-            K = Ball.exact(angle) - Y @ point[2] + shrink
-            low, high = K.mid - K.rad, K.mid + K.rad
-            if np.any((high < angle - radius) | (low > angle + radius)):
+            if np.any(np.abs(move.mid) > (move.rad + radius) * SAFE):
                 return None
-            inside = np.all((low > angle - radius) & (high < angle + radius))
-            new_low, new_high = np.maximum(low, angle - radius), np.minimum(high, angle + radius)
-            new_angle = 0.5 * (new_low + new_high)
-            new_radius = np.maximum(new_high - new_angle, new_angle - new_low) * SAFE + 4 * UNIT * reach
+            # the box holds exactly one zero
+            inside = np.all(move.size < radius)
+            new_angle, new_radius = _cut(angle, radius, reach, move)
             if inside:
-                return self._refined(new_angle, new_radius, reach, J, open_leaf)
+                return self._refined(new_angle, new_radius, reach, open_leaf)
             if np.all(new_radius > 0.9 * radius):
                 return open_leaf
             angle, radius = new_angle, new_radius
         return open_leaf
 
-    def _refined(self, angle: Array, radius: Array, reach: Array, J: Ball, open_leaf: Open) -> SpaceRoot | Open | None:
+    def _move(self, angle: Array, radius: Array, J: Ball) -> Ball | None:
+        """Krawczyk's operator: a ball of psi - angle for all zeros psi in a box over which J holds dG/dpsi."""
+        point = self._state(angle, np.zeros(len(angle)))
+        if point is None:
+            return None
+        try:
+            Y = Ball.exact(np.asarray(np.linalg.inv(J.mid), dtype=np.float64))
+        except np.linalg.LinAlgError:
+            return None
+        return (Ball.exact(np.eye(len(angle))) - Y @ J) @ Ball(np.zeros(len(angle)), radius) - Y @ point[2]
+
+    def _refined(self, angle: Array, radius: Array, reach: Array, open_leaf: Open) -> SpaceRoot | Open | None:
         """The one zero of a box, enclosed as closely as floats can."""
         for _ in range(_REFINEMENTS):
-            if np.all(self._outside(angle, radius)):
+            if np.any(self._outside(angle, radius)):
                 return None
-            state, point = self._state(angle, radius), self._state(angle, np.zeros(len(angle)))
-            if state is None or point is None:
+            state = self._state(angle, radius)
+            move = None if state is None else self._move(angle, radius, state[3])
+            if move is None:
                 return open_leaf
-            try:
-                Y = Ball.exact(np.asarray(np.linalg.inv(state[3].mid), dtype=np.float64))
-            except np.linalg.LinAlgError:
-                break
-            shrink = (Ball.exact(np.eye(len(angle))) - Y @ state[3]) @ Ball(np.zeros(len(angle)), radius)
-            K = Ball.exact(angle) - Y @ point[2] + shrink
-            low, high = np.maximum(K.mid - K.rad, angle - radius), np.minimum(K.mid + K.rad, angle + radius)
-            if np.any(low > high):
-                return None
-            new = 0.5 * (low + high)
-            new_radius = np.maximum(high - new, new - low) * SAFE + 4 * UNIT * reach
+            new_angle, new_radius = _cut(angle, radius, reach, move)
+            if not np.all(new_radius <= radius + 8 * UNIT * reach):
+                return open_leaf
             done = np.all(new_radius > 0.9 * radius)
-            angle, radius = new, np.minimum(new_radius, radius + np.abs(new - angle))
+            angle, radius = new_angle, new_radius
             if done:
                 break
         state = self._state(angle, radius)
@@ -388,18 +414,11 @@ class _Leaf:
         if not np.all(slack > 0):
             return open_leaf if len(angle) else Open(None)
         E = self._directions(angle, radius)[0]
-        M = self.S[self.rows] @ E
-        sign = 1
-        if len(self.rows):
-            solved = verified_solve(M.mid, M.rad, np.zeros(len(self.rows)), np.zeros(len(self.rows)))
-            if solved is None:
-                return open_leaf
-            sign = solved[2]
+        sign = _determinant_sign(self.S[self.rows] @ E)
         if J is not None:
-            turned = verified_solve(J.mid, J.rad, np.zeros(len(angle)), np.zeros(len(angle)))
-            if turned is None:
-                return open_leaf
-            sign *= turned[2]
+            sign *= _determinant_sign(J)
+        if not sign:
+            return open_leaf
         least = float(np.min(slack)) if len(slack) else np.inf
         return SpaceRoot(y, w, self.centre, angle, radius, reach, sign, least)
 
@@ -432,15 +451,28 @@ class _Leaf:
         w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
         if not q:
             return y, w, Ball.exact(np.zeros(0)), Ball.exact(np.zeros((0, 0)))
-        force = x[self.column]
-        push = force * turned
-        dE = Ball(np.zeros((m, q)), np.zeros((m, q)))
-        for k in range(q):
-            dE.mid[self.t[k], k], dE.rad[self.t[k], k] = push.mid[k], push.rad[k]
-        z = _solution(PS @ E, PS @ dE)
-        if z is None:
-            return None
-        dv = self.S @ (E @ z - dE)
+        point = None
+        if np.any(radius):
+            point = self._state(angle, np.zeros(q))
+            if point is None:
+                return None
+        span = Ball(np.zeros((q, 1)), radius[:, None])
+        pushed = z = span
+        for _ in range(1 if point is None else 2):
+            pushed = self._pushed(x[self.column] * turned, m)
+            solved = _solution(PS @ E, PS @ pushed)
+            if solved is None:
+                return None
+            z = solved
+            if point is not None:
+                # the mean value form: what the box adds to the values in its middle, dx = -z dpsi
+                x = _smaller(x, point[0][self.rows][:, None] - z @ span)
+        dy = pushed - E @ z
+        change = self.S @ dy
+        dv = Ball(-change.mid, change.rad)
+        if point is not None:
+            y = _smaller(_smaller(y, (E @ x)[:, 0]), point[0] + (dy @ span)[:, 0])
+            w = _smaller(w, point[1] + (dv @ span)[:, 0])
         t1, t2 = self.t[:, 0], self.t[:, 1]
         d1, d2 = d[:, 0], d[:, 1]
         G = w[t1] * d2 - w[t2] * d1
@@ -450,6 +482,14 @@ class _Leaf:
         corrected = J[diagonal, diagonal] + along
         J.mid[diagonal, diagonal], J.rad[diagonal, diagonal] = corrected.mid, corrected.rad
         return y, w, G, J
+
+    def _pushed(self, push: Ball, size: int) -> Ball:
+        """dE/dpsi x: what turning the directions alone does to y."""
+        q = len(self.turning)
+        pushed = Ball(np.zeros((size, q)), np.zeros((size, q)))
+        for k in range(q):
+            pushed.mid[self.t[k], k], pushed.rad[self.t[k], k] = push.mid[k], push.rad[k]
+        return pushed
 
     def _conditions(self, y: Ball, w: Ball, angle: Array, radius: Array) -> tuple[Array, Array]:
         """Conditions that a root has to satisfy, as midpoints and radii; stick by |tau| in both."""

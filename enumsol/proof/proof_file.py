@@ -287,7 +287,7 @@ class Proof:
                 raise ProofFormatError(f"proof {self._name} is damaged or truncated: its checksum does not agree")
 
     def records(self) -> Iterator[Any]:
-        """The records in order, read as a stream: no more of it is expanded than the records that were asked for.
+        """The records in order, read as a stream: only the records asked for are expanded.
 
         Raises
         ------

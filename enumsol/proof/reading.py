@@ -1,6 +1,6 @@
 """The parts of a proof's records, read strictly: for both checkers, which trust nothing that stands in a file.
 
-Every function gives what it says it gives, of the stated size, bounded and finite, or raises ValueError. Numbers of a
+Every function returns a value of the stated kind and size, bounded and finite, or raises ValueError. Numbers of a
 record are finite and whole numbers have at most 18 digits before they come here (``Proof.records``).
 """
 
@@ -44,7 +44,7 @@ class RefusedError(Exception):
 
 
 def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
-    """What a header says that is certified, "problem" or "condensed", once it fits the problem and the kind of proof.
+    """What a header claims to certify, "problem" or "condensed", once it fits the problem and the kind of proof.
 
     Raises
     ------
@@ -101,13 +101,14 @@ def rational_from(text: Any) -> Fraction:
 
 def units_from(header: dict[str, Any], p: int) -> tuple[Array, Array]:
     """Units of forces and displacements, (2p,) powers of two, whose binary exponents a record gives."""
-    force, length = (_exponents(header.get(key), 2 * p) for key in ("force", "length"))
+    force, length = (exponents_from(header.get(key), 2 * p) for key in ("force", "length"))
     if len({a + b for a, b in zip(force, length, strict=True)}) != 1 or force[:p] != force[p:]:
         raise ValueError("the units are no common scaling of energy and of the two directions of a node")
     return np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))
 
 
-def _exponents(value: Any, size: int) -> list[int]:
+def exponents_from(value: Any, size: int) -> list[int]:
+    """``size`` binary exponents of units."""
     if not (
         isinstance(value, list)
         and len(value) == size
@@ -167,7 +168,7 @@ def friction_at(problem: ContactProblem, alpha: Fraction) -> list[Fraction]:
 
 
 def shown(value: Any) -> str:
-    """Something out of a proof as a short text, whatever it is."""
+    """Any value from a proof as a short text."""
     return _SHORT.repr(value)
 
 

@@ -120,14 +120,18 @@ class ActiveSetRelaxation:
         return rows[keep], values[keep]
 
     def choose(self, codes: Codes) -> int:
-        """The contact node that the partial assignment is to be branched on, -1 when all are decided."""
+        """The contact node to branch on, -1 when all are decided."""
         engine = self._engine
         return self._state.choose(np.array(codes, dtype=np.int8), engine.rule, PRUNE_MARGIN + engine.offset)
 
     def forced(self, codes: Codes) -> tuple[int, ...]:
-        """Undecided contact nodes of which one child at most is not excluded by a bound that is at hand."""
+        """Undecided contact nodes with at most one child that no known bound excludes."""
         engine = self._engine
         return self._state.forced(np.array(codes, dtype=np.int8), engine.rule, PRUNE_MARGIN + engine.offset)
+
+    def sector_to_halve(self, codes: Codes) -> int:
+        """In 2D there are no sectors."""
+        return -1
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""

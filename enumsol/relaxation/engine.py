@@ -1,4 +1,4 @@
-"""What the search asks of a relaxation, a convex QP in lambda, and of the engine that solves it (theory, section 5)."""
+"""What a relaxation, a convex QP in lambda, and the engine that solves it offer to the search (theory, section 5)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 #: The compiled module of the active-set method.
 COMPILED = "enumsol.relaxation._active_set"
-#: Largest violation of a row (rows of unit length in the norm of S^{-1}) that the QP takes for none.
+#: Largest violation of a row (rows of unit length in the norm of S^{-1}) that the QP ignores.
 FEASIBILITY_TOLERANCE = 1e-11
 #: A leaf is pruned when its energy bound exceeds this; g' S^{-1} g lies in [1, 4), so it is relative to the data.
 PRUNE_MARGIN = 1e-9
@@ -27,7 +27,7 @@ class Relaxation(Protocol):
     """The solved relaxation of one partial assignment."""
 
     pruned: bool  # the energy bound is above PRUNE_MARGIN: no solution
-    stalled: bool  # the engine gave no answer: nothing may be concluded
+    stalled: bool  # the engine gave no answer: no conclusion
     bound: float
 
     @property
@@ -42,10 +42,13 @@ class Relaxation(Protocol):
         """Rows and their multipliers, which prove ``bound``."""
 
     def choose(self, codes: Codes) -> int:
-        """The contact node that the partial assignment is to be branched on, -1 when all are decided."""
+        """The contact node to branch on, -1 when all are decided."""
 
     def forced(self, codes: Codes) -> tuple[int, ...]:
-        """Undecided contact nodes of which one child at most is not excluded by a bound that is at hand."""
+        """Undecided contact nodes with at most one child that no known bound excludes."""
+
+    def sector_to_halve(self, codes: Codes) -> int:
+        """Of nodes in sectors of slip directions the one to be halved, -1 where there is none, as in 2D."""
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""

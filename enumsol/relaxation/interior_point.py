@@ -45,57 +45,68 @@ class InteriorPointEngine:
 
     def root(self, rows: list[int], modes: list[int]) -> Relaxation:
         """The relaxation with the given rows on."""
-        return _InteriorPointRelaxation(self, rows, modes)
+        return self.solved(dict(zip(rows, modes, strict=True)))
+
+    def solved(self, on: dict[int, int]) -> Relaxation:
+        """The relaxation with these rows and their modes, solved from scratch."""
+        import clarabel  # a fallback: most searches never need it
+
+        equal = [row for row, mode in on.items() if mode == EQUALITY]
+        other = [row for row, mode in on.items() if mode != EQUALITY]
+        order = np.array(equal + other, dtype=np.intp)
+        scale = 1.0 / self.norms[order]
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        answer = clarabel.DefaultSolver(
+            sp.csc_matrix(np.triu(2.0 * self.system.S)),
+            -self.system.g,
+            sp.csc_matrix(-self.normals[order] * scale[:, None]),
+            -self.offsets[order] * scale,
+            [clarabel.ZeroConeT(len(equal)), clarabel.NonnegativeConeT(len(other))],
+            settings,
+        ).solve()
+        found = clarabel.SolverStatus
+        infeasible = answer.status in (found.PrimalInfeasible, found.AlmostPrimalInfeasible)
+        solved = answer.status in (found.Solved, found.AlmostSolved)
+        values = np.array(answer.z) * scale
+        values[len(equal) :] = np.maximum(values[len(equal) :], 0.0)
+        if infeasible:
+            values = self._scaled_ray(order, values)
+        usable = bool((infeasible or solved) and np.all(np.isfinite(values)))
+        bound = self.dual_bound(order, values) if usable else -np.inf
+        return _InteriorPointRelaxation(self, on, order, values, bound, np.array(answer.x) if solved else None)
+
+    def _scaled_ray(self, rows: NDArray[np.intp], values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """An infeasibility certificate, stretched so that the bound it proves is as large as it can be."""
+        direction = self.normals[rows].T @ values
+        rate = float(values @ self.offsets[rows])
+        a, g = self.lower(direction), self.lower(self.system.g)
+        slope, curvature = rate - 0.5 * float(a @ g), 0.25 * float(a @ a)
+        if slope <= 0:
+            return values
+        # an exact ray has curvature 0: stop where the bound is large enough
+        needed = 2.0 * (0.25 * float(g @ g) + PRUNE_MARGIN) / slope
+        return values * (min(needed, 0.5 * slope / curvature) if curvature > 0 else needed)
 
 
 class _InteriorPointRelaxation:
-    def __init__(self, engine: InteriorPointEngine, rows: list[int], modes: list[int]) -> None:
-        import clarabel  # a fallback: most searches never need it
+    """A relaxation that was solved, or not (``forces`` None)."""
 
-        self._engine = engine
-        self._on = dict(zip(rows, modes, strict=True))
-        equal = [row for row, mode in self._on.items() if mode == EQUALITY]
-        other = [row for row, mode in self._on.items() if mode != EQUALITY]
-        order = np.array(equal + other, dtype=np.intp)
-        scale = 1.0 / engine.norms[order]
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        size = len(engine.system.g)
-        solver = clarabel.DefaultSolver(
-            sp.csc_matrix(np.triu(2.0 * engine.system.S)),
-            -engine.system.g,
-            sp.csc_matrix(-engine.normals[order] * scale[:, None]),
-            -engine.offsets[order] * scale,
-            [clarabel.ZeroConeT(len(equal)), clarabel.NonnegativeConeT(len(other))],
-            settings,
-        )
-        answer = solver.solve()
-        status = answer.status
-        infeasible = status in (clarabel.SolverStatus.PrimalInfeasible, clarabel.SolverStatus.AlmostPrimalInfeasible)
-        solved = status in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
-        values = np.array(answer.z) * scale
-        values[len(equal) :] = np.maximum(values[len(equal) :], 0.0)
-        self._rows, self._values = order, values
-        self.forces = np.array(answer.x) if solved else np.zeros(size)
+    def __init__(
+        self,
+        engine: InteriorPointEngine,
+        on: dict[int, int],
+        rows: NDArray[np.intp],
+        values: NDArray[np.float64],
+        bound: float,
+        forces: NDArray[np.float64] | None,
+    ) -> None:
+        self._engine, self._on, self._rows, self._values = engine, on, rows, values
+        self.bound = bound
+        self.pruned = bound > PRUNE_MARGIN
+        self.stalled = forces is None and not self.pruned
+        self.forces = np.zeros(len(engine.system.g)) if forces is None else forces
         self.displacements = engine.system.g - engine.system.S @ self.forces
-        if infeasible:
-            self._scale_ray()
-        usable = bool((infeasible or solved) and np.all(np.isfinite(self._values)))
-        self.bound = engine.dual_bound(order, self._values) if usable else -np.inf
-        self.pruned = usable and self.bound > PRUNE_MARGIN
-        self.stalled = not solved and not self.pruned
-
-    def _scale_ray(self) -> None:
-        """Stretch an infeasibility certificate so that the bound it proves is as large as it can be."""
-        engine = self._engine
-        direction = engine.normals[self._rows].T @ self._values
-        rate = float(self._values @ engine.offsets[self._rows])
-        a, g = engine.lower(direction), engine.lower(engine.system.g)
-        slope, curvature = rate - 0.5 * float(a @ g), 0.25 * float(a @ a)
-        if slope > 0:
-            # an exact ray has curvature 0: stop where the bound is large enough
-            needed = 2.0 * (0.25 * float(g @ g) + PRUNE_MARGIN) / slope
-            self._values = self._values * (min(needed, 0.5 * slope / curvature) if curvature > 0 else needed)
 
     def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Rows and their multipliers, which prove ``bound``."""
@@ -107,12 +118,16 @@ class _InteriorPointRelaxation:
         return largest_violation(codes, self._engine.system.F, self.forces, self.displacements)
 
     def forced(self, codes: Codes) -> tuple[int, ...]:
-        """None: this method has no bound at hand for a child but by solving it."""
+        """None: this method bounds a child only by solving it."""
         del codes
         return ()
+
+    def sector_to_halve(self, codes: Codes) -> int:
+        """In 2D there are no sectors."""
+        del codes
+        return -1
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on, solved from scratch."""
         del last
-        joined = self._on | dict(zip(rows, modes, strict=True))
-        return _InteriorPointRelaxation(self._engine, list(joined), list(joined.values()))
+        return self._engine.solved(self._on | dict(zip(rows, modes, strict=True)))

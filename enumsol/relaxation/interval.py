@@ -137,33 +137,34 @@ class IntervalEngine(CompiledEngine):
         p = system.p
         rule = _active_set.BranchingRule(system.F, *_slip_rows(system), BRANCHING_CANDIDATES)
         start, index, value = _all_rows(system)
+        rows = len(start) - 1
         if not system.loaded:
-            rhs = np.zeros(len(start) - 1)
-            data = _active_set.QPData(system.S, system.g, -system.S, system.g, start, index, value, rhs)
+            data = _active_set.QPData(system.S, system.g, -system.S, system.g, start, index, value, np.zeros(rows))
             super().__init__(data, rule, 2 * p)
             return
-        # half' S^-1 half by the factor that is known to exist
-        curvature = 0.25 * float(np.linalg.norm(np.linalg.solve(system.scaled.cholesky, system.half))) ** 2 + RIDGE
-        form = np.block(
-            [[system.S, -0.5 * system.half[:, None]], [-0.5 * system.half[None, :], np.array([[curvature]])]]
-        )
-        # the last unknown is tau; w follows the 2p + 1 unknowns
-        index = np.where(index >= 2 * p, index + 1, index)
-        rows = len(start) - 1
-        start = np.concatenate([start, start[-1] + np.array([1, 2], dtype=np.intp)])
-        index = np.concatenate([index, np.array([2 * p, 2 * p], dtype=np.intp)])
-        value = np.concatenate([value, [1.0, -1.0]])
-        rhs = np.concatenate([np.zeros(rows), [-1.0, -1.0]])
+        form = _form(system)
+        # the last unknown is tau, between -1 and 1; w follows the 2p + 1 unknowns
+        index = np.append(np.where(index >= 2 * p, index + 1, index), [2 * p, 2 * p])
+        start = np.append(start, start[-1] + np.array([1, 2], dtype=np.intp))
+        value = np.append(value, [1.0, -1.0])
+        rhs = np.append(np.zeros(rows), [-1.0, -1.0])
         W = np.column_stack([-system.S, system.half])
-        load = np.append(system.g, 0.0)
         try:
-            data = _active_set.QPData(form, load, W, system.g, start, index, value, rhs)
+            data = _active_set.QPData(form, np.append(system.g, 0.0), W, system.g, start, index, value, rhs)
         except np.linalg.LinAlgError as error:
             raise InvalidProblemError(
                 "the energy over an interval of alpha is not convex to working precision; expected contact rows "
                 "[Bn; Bt] that are independent beyond rounding (are two contact nodes almost the same point?)"
             ) from error
-        super().__init__(data, rule, 2 * p, offset=curvature, always=(rows, rows + 1))
+        super().__init__(data, rule, 2 * p, offset=float(form[-1, -1]), always=(rows, rows + 1))
+
+
+def _form(system: IntervalSystem) -> NDArray[np.float64]:
+    """Matrix of the convex form in (lambda, tau), shape (2p + 1, 2p + 1)."""
+    # half' S^-1 half by the factor that is known to exist
+    curvature = 0.25 * float(np.linalg.norm(np.linalg.solve(system.scaled.cholesky, system.half))) ** 2 + RIDGE
+    across = -0.5 * system.half[:, None]
+    return np.block([[system.S, across], [across.T, np.array([[curvature]])]])
 
 
 def _all_rows(system: IntervalSystem) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 _FINE, _COARSE = 10, 3
 #: Rounds of tangents, and how far outside the disc the minimiser must lie.
 _ROUNDS, _OUTSIDE = 4, 1e-3
+#: Sectors of this level and below are halved only where nothing else helps.
+_DEEP = 12
 #: Violations of maximum dissipation below this do not tell which sector to halve.
 _DISSIPATION = 1e-7
 #: Rows of a program, and entries of a row.
@@ -193,7 +195,8 @@ class SpaceRelaxation:
         system, y = self._engine.system, self.forces
         tau, v = system.tangential(y), system.tangential(self.displacements)
         slip = y[: system.p] * np.linalg.norm(v, axis=1) - np.sum(tau * v, axis=1)
-        slip[np.array(codes) <= SECTORS] = 0.0
+        array = np.array(codes)
+        slip[(array <= SECTORS) | (array >= SECTORS + (1 << _DEEP))] = 0.0
         best = int(np.argmax(slip))
         return best if slip[best] > _DISSIPATION else -1
 

@@ -98,41 +98,48 @@ def connected_components(
 def _grow(
     degenerate: Sequence[SelectionSolution], known: dict[Codes, SelectionSolution], solver: SelectionSolver
 ) -> list[tuple[list[SelectionSolution], bool]]:
-    """Complete every degenerate solution by the selections that hold with it, and join those that meet."""
-    tried: dict[Codes, SelectionSolution | None] = dict(known)
+    """Add to every degenerate solution the selections that hold with it, and join those that meet."""
+    solved: dict[Codes, SelectionSolution | None] = dict(known)
+    refused: set[Codes] = set()
+
+    def solve(codes: Codes) -> SelectionSolution | None:
+        if codes not in solved:
+            try:
+                solved[codes] = solver.solve(codes)
+            except VertexLimitError:  # the search lists this selection as open
+                solved[codes] = None
+                refused.add(codes)
+        return solved[codes]
+
     groups: list[tuple[list[SelectionSolution], bool]] = []
     placed: set[Codes] = set()
-    refused: set[Codes] = set()
     for seed in degenerate:
         if seed.codes in placed:
             continue
-        group, whole, queue = [seed], True, [seed]
         placed.add(seed.codes)
-        while queue:
-            solution = queue.pop()
-            for vertex in solution.vertices:
-                active = _with_own(solver.active(vertex), solution.codes if solution.dimension == 0 else None)
-                if prod(len(a) for a in active) > MAX_LOCAL_SELECTIONS:
-                    whole = False
-                    continue
-                for codes in product(*(sorted(a) for a in active)):
-                    if codes in placed:
-                        continue
-                    if codes not in tried:
-                        try:
-                            tried[codes] = solver.solve(codes)
-                        except VertexLimitError:
-                            # the search lists this selection as open
-                            tried[codes] = None
-                            refused.add(codes)
-                    whole = whole and codes not in refused
-                    other = tried[codes]
-                    if other is not None and _touch(solution, other, solver):
-                        placed.add(codes)
-                        group.append(other)
-                        queue.append(other)
+        group, whole = [seed], True
+        for solution in group:  # which grows on the way
+            candidates, all_of_them = _holding_at_vertices(solution, solver)
+            others = [other for codes in candidates - placed if (other := solve(codes)) is not None]
+            joined = [other for other in others if _touch(solution, other, solver)]
+            group += joined
+            placed |= {other.codes for other in joined}
+            whole = whole and all_of_them and not candidates & refused
         groups.append((group, whole))
     return _join(groups, solver)
+
+
+def _holding_at_vertices(solution: SelectionSolution, solver: SelectionSolver) -> tuple[set[Codes], bool]:
+    """Selections that hold at a vertex of a solution, and whether none was left out (see MAX_LOCAL_SELECTIONS)."""
+    found: set[Codes] = set()
+    whole = True
+    for vertex in solution.vertices:
+        active = _with_own(solver.active(vertex), solution.codes if solution.dimension == 0 else None)
+        if prod(len(a) for a in active) > MAX_LOCAL_SELECTIONS:
+            whole = False
+        else:
+            found.update(product(*active))
+    return found, whole
 
 
 def _join(

@@ -35,6 +35,7 @@ from enumsol.search.stopping import Stop, StopReason
 from enumsol.search.tree import SearchLimits, SearchOutcome, SearchProgress, TreeSearch
 from enumsol.selections.floats import SIGN_TOLERANCE
 from enumsol.selections.solution import SelectionSolution
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -79,7 +80,7 @@ def enumerate_roots(
         which is read as float64.
     arithmetic : {"verified", "fast", "exact"}
         "verified": every root is enclosed and every excluded selection proven by rigorous error bounds for the data as
-        given, in rationals where a sign cannot be decided otherwise; what stays open is listed. "fast": float64 and a
+        given, in rationals where a sign cannot be decided otherwise; what stays open is listed. "fast": float64 with a
         tolerance, never claimed to be complete. "exact": the data are read as exact rationals and everything is
         decided without rounding (small problems).
     method : {"tree", "exhaustive"}
@@ -87,13 +88,13 @@ def enumerate_roots(
     executor : concurrent.futures.Executor, optional
         Runs subtrees in parallel (method "tree").
     progress : callable, optional
-        Called now and then with a SearchProgress.
+        Called regularly with a SearchProgress.
     stop_after : int, optional
-        Stop when this many roots and families are found; 2 answers "is it unique?".
+        Stop when this many roots and families are found; 2 decides about uniqueness.
     max_nodes : int, optional
-        Stop after so many nodes of the tree (selections, for the exhaustive method).
+        Stop after this many nodes of the tree (selections, for the exhaustive method).
     time_limit : float, optional
-        Stop after so many seconds.
+        Stop after this many seconds.
     proof_path : path, optional
         Stream the proof to this file (arithmetic "verified"); by default it is kept, compressed, in memory.
     tolerance : float
@@ -116,7 +117,7 @@ def enumerate_roots(
     WorkerError
         A worker of the executor died; ``partial`` holds what was found.
     OutputError
-        The proof could not be written to the end, for want of space; ``partial`` holds the result without a proof.
+        There was no space to write the whole proof; ``partial`` holds the result without it.
 
     Examples
     --------
@@ -157,7 +158,11 @@ def enumerate_roots(
         )
     _check_proof(arithmetic, method, proof_path)
     solvers = Solvers(problem, value, arithmetic, tolerance)
-    return _Enumeration(solvers, method, progress, engine, proof_path).run(executor, *counts, seconds)
+    writer = None
+    if arithmetic == "verified":
+        writer = ProofWriter(proof_path)
+        writer.write(solvers.proof_header())
+    return _Enumeration(solvers, method, progress, engine, writer).run(executor, *counts, seconds)
 
 
 def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
@@ -174,17 +179,14 @@ class _Enumeration:
         method: Method,
         progress: Callable[[SearchProgress], object] | None,
         engine: str | None,
-        proof_path: str | Path | None,
+        writer: ProofWriter | None,
     ) -> None:
         self.solvers, self.method, self.progress, self.engine = solvers, method, progress, engine
         self.started = time.perf_counter()
         self.outcome = SearchOutcome()
         self.at_rest: AtRest | None = None
-        self.writer: ProofWriter | None = None
-        if solvers.arithmetic == "verified":
-            self.writer = ProofWriter(proof_path)
-            self.writer.write(solvers.proof_header())
-        self.certifier = solvers.certifier(self.writer)
+        self.writer = writer
+        self.certifier = solvers.certifier(writer)
 
     def run(
         self, executor: Executor | None, stop_after: int | None, max_nodes: int | None, time_limit: float | None
@@ -200,11 +202,11 @@ class _Enumeration:
         except KeyboardInterrupt as interruption:
             self.outcome.stopped = Stop(StopReason.INTERRUPTED, self.outcome.nodes + self.outcome.selections)
             partial = self._result()
-            message = f"enumerate_roots was interrupted; {len(partial)} roots so far"
+            message = f"enumerate_roots was interrupted; {counted(len(partial), 'root')} so far"
             raise Interrupted(message, partial) from interruption
         except WorkerLost as loss:
             partial = self._result()
-            raise WorkerError(f"{loss}; {len(partial)} roots so far", partial) from loss
+            raise WorkerError(f"{loss}; {counted(len(partial), 'root')} so far", partial) from loss
         result = self._result()
         if self.writer is not None and self.writer.failure is not None:
             raise OutputError(self.writer.failure, result)
@@ -258,7 +260,7 @@ class _Enumeration:
             if solution is not None and limits.enough is not None and limits.enough(outcome.solutions):
                 outcome.stopped = Stop(StopReason.ENOUGH_ROOTS)
             elif limits.max_nodes is not None and limits.max_nodes <= outcome.selections < total:
-                outcome.stopped = Stop(StopReason.NODE_LIMIT, limits.max_nodes, "selections")
+                outcome.stopped = Stop(StopReason.NODE_LIMIT, limits.max_nodes, "selection")
             elif limits.deadline is not None and now > limits.deadline and outcome.selections < total:
                 outcome.stopped = Stop(StopReason.TIME_LIMIT)
             if outcome.stopped is not None:
@@ -267,8 +269,7 @@ class _Enumeration:
     def _components(self) -> list[tuple[list[RootComponent], SelectionSolver]]:
         """Components of the root set with the solver whose points they hold."""
         solutions = self.outcome.solutions
-        exact = [s for s in solutions if isinstance(s.vertices[0], tuple)]
-        floats = [s for s in solutions if not isinstance(s.vertices[0], tuple)]
+        exact, floats = [s for s in solutions if s.exact], [s for s in solutions if not s.exact]
         parts: list[tuple[list[RootComponent], SelectionSolver]] = []
         if floats:
             parts.append((connected_components(floats, self.solvers.floats, self._degree), self.solvers.floats))
@@ -291,7 +292,7 @@ class _Enumeration:
         if self.at_rest is not None:
             roots, apart = [self._root(self.at_rest.component, self.at_rest)], 1
         for components, solver in self._components():
-            # of a component that was not examined whole it is not known what joins it
+            # what joins a component that was not examined whole is not known
             apart += sum(c.whole for c in components)
             joinable = joinable or not all(c.whole for c in components)
             roots += [self._root(c, solver) for c in components if c.dimension == 0]

@@ -1,4 +1,4 @@
-"""Condition and derivative of a regular root, computed when asked: a set of thousands of roots seldom is."""
+"""Condition and derivative of a regular root, computed on demand: large sets of roots seldom need them."""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ from enumsol.checks import instance_of
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.problem import ContactProblem
 from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, STATUSES, STICK, contact_status
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence, Set
@@ -33,7 +34,7 @@ LOCATED_SINGULAR_TOLERANCE = 1e-8
 
 
 class SolutionPoint(Protocol):
-    """What the test asks of a root: its alpha, the statuses that hold at every node, and u_t."""
+    """What the test needs of a root: its alpha, the statuses that hold at every node, and u_t."""
 
     @property
     def alpha(self) -> Alpha:
@@ -81,9 +82,8 @@ class LocalBranchTest:
         return cls(bool(signs) and not differing, premise, signs, differing)
 
     def __str__(self) -> str:
-        many = len(self.signs)
         answer = "a local Lipschitz branch exists" if self.exists else "no local Lipschitz branch"
-        detail = f"{many} selection{'s' if many != 1 else ''} hold{'s' if many == 1 else ''}"
+        detail = f"{counted(len(self.signs), 'selection holds', 'selections hold')}"
         if not self.exists:
             detail += f", the sign of {len(self.differing)} of them differs or is zero"
         premise = "" if self.premise else "; F = 0 at some node, so Theorem 4.1 does not carry it over to F"

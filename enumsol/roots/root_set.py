@@ -11,6 +11,7 @@ import numpy as np
 
 from enumsol.roots.root import Root, summary
 from enumsol.sealed import Immutable
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +44,7 @@ class Undecided:
     >>> import enumsol
     >>> roots = enumsol.enumerate_roots(enumsol.gallery.two_node_square(), alpha=3.5, max_nodes=2)
     >>> roots.undecided[0].reason
-    'the search was stopped before it came here'
+    'the search was stopped before it got here'
     """
 
     statuses: tuple[ContactStatus | str | None, ...]
@@ -105,7 +106,7 @@ class RootSet(Sequence[Root], Immutable):
         Why the search ended early, or None.
     at_least : int
         Number of isolated roots and families together if nothing is known to be missing; otherwise a lower bound of it,
-        in which roots and families that a continuum not found may join are counted as one.
+        in which roots and families that an undiscovered continuum may connect are counted as one.
     stats : SearchStats
     certified_data : str
         What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed).
@@ -215,9 +216,9 @@ class RootSet(Sequence[Root], Immutable):
         return f"complete: yes (proven{about})"
 
     def __repr__(self) -> str:
-        heading = f"RootSet at alpha = {float(self.alpha):g}: {_count(len(self), 'root')}"
+        heading = f"RootSet at alpha = {float(self.alpha):g}: {counted(len(self), 'root')}"
         if self.families:
-            heading += f", {_count(len(self.families), 'family', 'families')}"
+            heading += f", {counted(len(self.families), 'family', 'families')}"
         if not self.whole:
             heading += f" found, at least {self.at_least} in all"
         lines = [f"{heading} ({self.arithmetic}, {self.method})"]
@@ -234,8 +235,8 @@ class RootSet(Sequence[Root], Immutable):
         for k, family in enumerate(self.families[:_PRINTED_ROOTS]):
             index = "?" if family.index is None else f"{family.index:+d}"
             lines.append(
-                f"family {k}: dimension {family.dimension}, {_count(len(family.polytopes), 'polytope')}, "
-                f"{_count(len(family.vertices), 'vertex', 'vertices')}, index {index}"
+                f"family {k}: dimension {family.dimension}, {counted(len(family.polytopes), 'polytope')}, "
+                f"{counted(len(family.vertices), 'vertex', 'vertices')}, index {index}"
             )
         # a search that was cut short leaves many alike
         alike = Counter((item.reason, item.hint) for item in self.undecided)
@@ -252,7 +253,3 @@ def _columns(name: str, arrays: list[NDArray[np.float64]]) -> list[tuple[str, ND
     """A quantity of all roots as columns of a frame: one, or in 3D one an axis."""
     values = np.concatenate(arrays) if arrays else np.zeros(0)
     return [(name, values)] if values.ndim == 1 else [(f"{name}{k + 1}", values[:, k]) for k in range(values.shape[1])]
-
-
-def _count(number: int, singular: str, plural: str | None = None) -> str:
-    return f"{number} {singular if number == 1 else plural or singular + 's'}"

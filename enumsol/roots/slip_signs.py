@@ -37,7 +37,7 @@ class SlipSigns:
     known: tuple[int | None, ...]
 
     def sign(self, node: int) -> int | None:
-        """-1, 0 or 1; None where the problem is too large for the rationals that could tell."""
+        """-1, 0 or 1; None where it would take rationals and the problem is too large for them."""
         known = self.known[node]
         return known if known is not None or self._exact is None else self._exact[node]
 

@@ -179,7 +179,7 @@ class _Enumeration:
         if self.arithmetic == "verified":
             try:
                 enclosed = EnclosedSpace.of_problem(
-                    self.problem.enclosure, self.problem, Fraction(self.alpha), self.system.force, self.system.length
+                    self.problem.enclosure, Fraction(self.alpha), self.system.force, self.system.length
                 )
                 _ = enclosed.smallest_eigenvalue  # proven positive, or refused
                 self.certifier.enclosed = enclosed

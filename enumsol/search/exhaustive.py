@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from itertools import product
+from math import prod
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.errors import TooLargeError
 from enumsol.selections.floats import selection_systems
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import FINAL, INEQUALITIES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,7 +33,7 @@ _SCREEN_RANK = 1e-9
 
 def all_codes(F_positive: tuple[bool, ...]) -> Iterator[Codes]:
     """Every selection: four statuses a node, two (open, in contact) where F = 0."""
-    return product(*(range(4) if positive else (OPEN, FRICTIONLESS) for positive in F_positive))
+    return product(*(FINAL[positive] for positive in F_positive))
 
 
 def refuse_if_too_large(F_positive: tuple[bool, ...], limit: int, per_second: float) -> int:
@@ -43,9 +44,7 @@ def refuse_if_too_large(F_positive: tuple[bool, ...], limit: int, per_second: fl
     TooLargeError
         There are more than ``limit``; the message estimates the cost.
     """
-    count = 1
-    for positive in F_positive:
-        count *= 4 if positive else 2
+    count = prod(len(FINAL[positive]) for positive in F_positive)
     if count > limit:
         hours = count / per_second / 3600
         raise TooLargeError(
@@ -89,11 +88,9 @@ def _candidates(system: ScaledSystem, block: NDArray[np.int8]) -> NDArray[np.boo
     size = _SCREEN * (1.0 + np.max(np.abs(force), axis=1, keepdims=True))
     n, t, wn, wt = force[:, :p], force[:, p:], w[:, :p], w[:, p:]
     reach = F * n * (1 + _SCREEN) + size
-    ok = np.where(block == OPEN, wn <= size, n >= -size)
-    ok &= np.where(block == STICK, np.abs(t) <= reach, True)
-    ok &= np.where(block == SLIP_PLUS, wt >= -size, True)
-    ok &= np.where(block == SLIP_MINUS, wt <= size, True)
-    return np.asarray(doubtful | np.all(ok, axis=1))
+    rows = [n + size, t, reach - t, reach + t, size - wn, wt + size, size - wt]  # in the order of RowKind
+    broken = INEQUALITIES[block] & (np.stack(rows, axis=-1) < 0)
+    return np.asarray(doubtful | ~np.any(broken, axis=(1, 2)))
 
 
 def exhaustive_exact(solver: SelectionSolver) -> Iterator[tuple[int, SelectionSolution | None]]:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.selections.solution import Codes
 
-#: Nodes of a piece's tree, per contact node, that are spent before the tree at its middle is looked at.
+#: Nodes of a piece's tree, per contact node, after which the tree at its middle is computed for comparison.
 NODES_PER_CONTACT = 20
 #: A piece whose tree grows beyond this multiple of the tree at its middle alone is cut in two.
 WORTH_CUTTING = 3
@@ -109,7 +109,7 @@ class IntervalCertifier(Protocol):
 
 
 class FastIntervalCertifier:
-    """Floats: what the engine computed is believed."""
+    """Floats: the result of the engine is trusted."""
 
     checkable = False
 
@@ -142,7 +142,7 @@ class _Collector(WithoutProof):
 
 
 class _SizeOnly(_Collector):
-    """The certifier of a tree of which only the size is wanted."""
+    """The certifier of a tree of which only the size matters."""
 
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         del codes, relaxation
@@ -181,7 +181,7 @@ class IntervalTreeSearch(TreeSearch):
         super().__init__(system.scaled, certifier, engine=IntervalEngine(system), splitting=splitting, limits=limits)
 
     def _fall_back(self, codes: Codes) -> None:
-        """No other engine knows intervals: the partial assignment is branched on."""
+        """No other engine handles intervals: the partial assignment is branched on."""
         del codes
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from enumsol.search.solvers import Arithmetic
     from enumsol.selections.solution import Codes
 
-#: Levels of the tree that are examined here; what lies below is handed out. Subtrees differ widely in size, so there
+#: Levels of the tree that are examined here; the subtrees below are handed out. Their sizes differ widely, so there
 #: are many more of them than workers.
 LEVELS = 7
 

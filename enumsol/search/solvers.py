@@ -42,7 +42,7 @@ class Solvers:
     Raises
     ------
     InvalidArgumentError
-        A friction coefficient is positive and underflows to zero: its node would be taken for one without friction.
+        A friction coefficient is positive and underflows to zero: its node would count as one without friction.
     """
 
     def __init__(self, problem: ContactProblem, alpha: Alpha, arithmetic: Arithmetic, tolerance: float) -> None:
@@ -169,5 +169,5 @@ def _positive(system: EnclosedSystem) -> bool:
 
 def _present(value: Any) -> Any:
     if value is None:
-        raise AssertionError("an arithmetic was asked for what it does not have")
+        raise AssertionError("this arithmetic has no such solver")
     return value

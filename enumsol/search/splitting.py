@@ -1,6 +1,6 @@
-"""What the tree knows of a contact node: how its status splits into others, and which rows a status imposes.
+"""How the status of a contact node splits into others, and which rows a status imposes.
 
-The tree itself asks no more of a dimension than this, a certifier for its leaves and an engine for its relaxations.
+With a certifier for its leaves and an engine for its relaxations, this is all that the tree needs of a dimension.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Splitting(Protocol):
     """The statuses of a contact node as the tree sees them."""
 
     def children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
-        """Codes that together cover the node's partial status, in the order in which they are to be examined."""
+        """Codes that together cover the node's partial status, in the order in which they are examined."""
 
     def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
         """(kind, mode) of the rows that the node imposes in a status; those of a child extend its parent's."""
@@ -37,7 +37,7 @@ class PlaneSplitting:
     Parameters
     ----------
     F : (p,) array
-        Friction coefficients; a node with F = 0 is open or in contact, and no more is asked.
+        Friction coefficients; a node with F = 0 is only open or in contact.
     allowed : per node the final codes to be examined; default all
     """
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+from enumsol.texts import counted
+
 
 class StopReason(enum.Enum):
     """What ended a search before its tree did."""
@@ -24,31 +26,31 @@ class Stop:
     ----------
     reason : StopReason
     count : int or None
-        The limit (NODE_LIMIT), or what was done by then (INTERRUPTED).
-    counted : str
-        What ``count`` counts: "nodes" or "selections".
+        The limit (NODE_LIMIT), or the number done by then (INTERRUPTED).
+    unit : str
+        What ``count`` counts: "node" or "selection".
     arcs_of : int or None
-        Of how many selections the arcs were to be worked out, where that was interrupted and not the search.
+        Number of selections whose arcs were wanted, if that stage was interrupted and not the search.
     unexamined : int or None
         Subtrees that are listed as not examined; None where the search keeps no such list.
     loss : str
-        What befell the worker (WORKER_LOST).
+        What happened to the worker (WORKER_LOST).
     """
 
     reason: StopReason
     count: int | None = None
-    counted: str = "nodes"
+    unit: str = "node"
     arcs_of: int | None = None
     unexamined: int | None = None
     loss: str = ""
 
     @property
     def interrupted(self) -> bool:
-        """Whether the user pressed Ctrl-C: what was left then is not accounted for."""
+        """Whether the user pressed Ctrl-C: the rest of the search is unaccounted for."""
         return self.reason is StopReason.INTERRUPTED
 
     def __str__(self) -> str:
-        done = f"{self.count} {self.counted}"
+        done = "" if self.count is None else counted(self.count, self.unit)
         if self.arcs_of is not None:
             done = f"the arcs of {self.count} of {self.arcs_of} selections"
         text = {
@@ -58,4 +60,4 @@ class Stop:
             StopReason.INTERRUPTED: f"interrupted after {done}",
             StopReason.WORKER_LOST: self.loss,
         }[self.reason]
-        return text if self.unexamined is None else f"{text}, {self.unexamined} subtrees not examined"
+        return text if self.unexamined is None else f"{text}, {counted(self.unexamined, 'subtree')} not examined"

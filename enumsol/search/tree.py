@@ -77,7 +77,7 @@ class SearchLimits:
 
     @staticmethod
     def deadline_in(seconds: float | None) -> float | None:
-        """The clock's value after so many seconds from now."""
+        """The clock's value this many seconds from now."""
         return None if seconds is None else time.perf_counter() + seconds
 
     def remaining(self) -> float | None:
@@ -209,10 +209,10 @@ class TreeSearch:
     def skip(self, codes: Codes, hint: str) -> None:
         """Leave a subtree undecided, because the search was stopped."""
         self.certifier.skipped(codes, str(self.outcome.stopped))
-        self.outcome.undecided.append(UndecidedPart(codes, "the search was stopped before it came here", hint))
+        self.outcome.undecided.append(UndecidedPart(codes, "the search was stopped before it got here", hint))
 
     def examine(self, item: TreeNode) -> Iterator[TreeNode]:
-        """Settle one node of the tree, or give its children in the order in which they are to be examined."""
+        """Settle one node of the tree, or give its children in the order in which they are examined."""
         outcome = self.outcome
         outcome.nodes += 1
         relaxation = self._relax(item)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import cho_solve
 
 from enumsol.selections.solution import MAX_BASES, ActiveSets, Codes, SelectionSolution, VertexLimitError
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, active_within
+from enumsol.statuses import CONDITIONS, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind, active_within
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -49,15 +49,16 @@ class FloatSelections:
         # F = size * f: the square of F may overflow
         size = np.maximum(F, 1.0)
         f, one = F / size, 1.0 / size
-        self._cone_scale = size * np.sqrt(np.maximum(f**2 * nn + one**2 * tt - 2 * f * one * nt * turn, 0.0))
+        cone = size * np.sqrt(np.maximum(f**2 * nn + one**2 * tt - 2 * f * one * nt * turn, 0.0))
+        length = self._length_scale.reshape(2, p)
+        self._norms = np.concatenate([self._force_scale.reshape(2, p), cone, length[[0, 1, 1]]])
         snn, stt, snt = np.diagonal(S)[:p], np.diagonal(S)[p:], np.diagonal(S, p)
         # energy norm of the force direction (1, +F) or (1, -F) of a slipping node
         self._slip_scale = size * np.sqrt(np.maximum(one**2 * snn + f**2 * stt + 2 * f * one * snt * turn, 0.0))
 
     def row_norms(self) -> NDArray[np.float64]:
         """Norms by which the rows of relaxations are measured, in the order of their numbers kind * p + node."""
-        p, length = self.p, self._length_scale
-        return np.concatenate([self._force_scale, *self._cone_scale, length[:p], length[p:], length[p:]])
+        return self._norms.ravel()
 
     # -- solving ---------------------------------------------------------------------------------------------------
 
@@ -138,32 +139,25 @@ class FloatSelections:
 
     def slacks(self, codes: Codes, point: NDArray[np.float64], w: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scaled slacks of the selection's inequalities at forces ``point`` and displacements ``w``, in node order."""
-        p, F = self.p, self.system.F
-        out = []
+        rows, out = self._rows(point, w), []
         for i, code in enumerate(codes):
-            if code == OPEN:
-                out.append(-w[i] / self._length_scale[i])
-            elif code == STICK:
-                out.append((F[i] * point[i] - point[p + i]) / self._cone_scale[0, i])
-                out.append((F[i] * point[i] + point[p + i]) / self._cone_scale[1, i])
-            elif code == FRICTIONLESS:
-                out.append(point[i] / self._force_scale[i])
-            else:
-                minus = code == SLIP_MINUS
-                out.append(point[i] * self._slip_scale[int(minus), i])
-                out.append((-w[p + i] if minus else w[p + i]) / self._length_scale[p + i])
+            for kind in CONDITIONS[code].inequalities:
+                if kind == RowKind.NORMAL_FORCE and code != FRICTIONLESS:
+                    out.append(point[i] * self._slip_scale[code - SLIP_PLUS, i])
+                else:
+                    out.append(rows[kind, i] / self._norms[kind, i])
         return np.array(out)
+
+    def _rows(self, point: NDArray[np.float64], w: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of all rows in the order of RowKind, shape (7, p)."""
+        p = self.p
+        bound, t = self.system.F * point[:p], point[p:]
+        return np.array([point[:p], t, bound - t, bound + t, -w[:p], w[p:], -w[p:]])
 
     def active(self, point: NDArray[np.float64]) -> ActiveSets:
         """Per node the codes whose conditions hold at the point within the tolerance."""
-        p, F, tol = self.p, self.system.F, self.tolerance
-        w = self._w(point) / self._length_scale
-        force = point / self._force_scale
-        cone = (F * point[:p] - np.array([[1.0], [-1.0]]) * point[p:]) / np.where(
-            self._cone_scale > 0, self._cone_scale, 1
-        )
-        rows = np.array([force[:p], force[p:], *cone, -w[:p], w[p:], -w[p:]])  # in the order of RowKind
-        return active_within(rows, self.F_positive, tol)
+        rows = self._rows(point, self._w(point)) / np.where(self._norms > 0, self._norms, 1)
+        return active_within(rows, self.F_positive, self.tolerance)
 
     def equal(self, a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
         """Whether two points agree within ten tolerances in scaled forces."""

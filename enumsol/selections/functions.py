@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq, fmpq_mat, fmpz_mat, fmpz_poly
 
 from enumsol.arithmetic.algebraic import integer_polynomial
-from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
 
 if TYPE_CHECKING:
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.solution import Codes
 
 
@@ -31,15 +31,15 @@ class SelectionFunctions:
 
     Parameters
     ----------
-    exact : ExactPath
+    exact : ExactCondensed
     codes : status codes, FRICTIONLESS for the nodes in contact with F = 0 throughout
     """
 
-    def __init__(self, exact: ExactPath, codes: Codes) -> None:
+    def __init__(self, exact: ExactCondensed, codes: Codes) -> None:
         self.exact, self.codes = exact, codes
         self._closed = [i for i, c in enumerate(codes) if c != OPEN]
         self._stuck = [i for i, c in enumerate(codes) if c == STICK]
-        self._cache: dict[tuple[str, int], Any] = {}
+        self._cache: dict[tuple[RowKind, int], Any] = {}
 
     @cached_property
     def det(self) -> Any:
@@ -99,33 +99,28 @@ class SelectionFunctions:
 
     # -- quantities ------------------------------------------------------------------------------------------------
 
-    def normal_force(self, node: int) -> Any:
-        """lambda_n of a node."""
-        return self._get("n", node)
-
-    def gap(self, node: int) -> Any:
-        """w_n of an open node."""
-        return self._get("gap", node)
-
-    def slip(self, node: int) -> Any:
-        """w_t of a node that does not stick."""
-        return self._get("slip", node)
-
-    def cone(self, node: int, direction: int) -> Any:
-        """F lambda_n - direction * lambda_t of a node."""
-        return self._get("cone+" if direction > 0 else "cone-", node)
-
-    def _get(self, kind: str, node: int) -> Any:
+    def row(self, kind: RowKind, node: int) -> Any:
+        """A row of a node: a selection requires that it vanishes, or that it is not negative."""
         key = (kind, node)
         if key not in self._cache:
-            if kind == "n":
-                value = self._forces[node]
-            elif kind in ("gap", "slip"):
-                value = self._displacement(node if kind == "gap" else self.exact.p + node)
-            else:
-                value = self._cone(node, 1 if kind == "cone+" else -1)
-            self._cache[key] = integer_polynomial(value)
+            self._cache[key] = integer_polynomial(self._row(kind, node))
         return self._cache[key]
+
+    def _row(self, kind: RowKind, node: int) -> Any:
+        p = self.exact.p
+        match kind:
+            case RowKind.NORMAL_FORCE:
+                return self._forces[node]
+            case RowKind.TANGENTIAL_FORCE:
+                return self._forces[p + node]
+            case RowKind.PENETRATION:
+                return -self._displacement(node)
+            case RowKind.SLIP_FORWARD:
+                return self._displacement(p + node)
+            case RowKind.SLIP_BACKWARD:
+                return -self.row(RowKind.SLIP_FORWARD, node)
+            case _:
+                return self._cone(node, 1 if kind == RowKind.CONE_PLUS else -1)
 
     @cached_property
     def _forces(self) -> list[Any]:
@@ -150,6 +145,7 @@ class SelectionFunctions:
         return total
 
     def _cone(self, node: int, direction: int) -> Any:
+        """F lambda_n - direction * lambda_t of a node."""
         data = self.exact.integers
         bound = self._forces[node] * fmpz_poly([data.F0[node], data.F1[node]])
         return bound - direction * data.friction_unit * self._forces[self.exact.p + node]

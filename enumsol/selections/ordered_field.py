@@ -13,7 +13,7 @@ from enumsol.selections.rationals import ExactSelections
 from enumsol.statuses import STICK, RowKind
 
 if TYPE_CHECKING:
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.polytopes import Form, Point, Table
     from enumsol.selections.solution import Codes
 
@@ -26,12 +26,12 @@ class FiberSelections(ExactSelections):
 
     Parameters
     ----------
-    exact : ExactPath
+    exact : ExactCondensed
     alpha : fmpq or NumberFieldElement
     push : direction that replaces g, in the perturbations that give the local degree
     """
 
-    def __init__(self, exact: ExactPath, alpha: Any, push: tuple[Any, ...] | None = None) -> None:
+    def __init__(self, exact: ExactCondensed, alpha: Any, push: tuple[Any, ...] | None = None) -> None:
         g, F = exact.at(alpha)
         super().__init__(ExactSystem(exact.S, g if push is None else push, F))
         self.exact, self.alpha = exact, alpha
@@ -52,7 +52,7 @@ class FiberSelections(ExactSelections):
     def forms(self, codes: Codes) -> tuple[list[Form], list[Form]]:
         """Equations and inequalities (>= 0) of a selection as forms over lambda."""
         equations, inequalities = super().forms(codes)
-        # where F = 0 the cone of a sticking node does not imply that its normal force is none of tension
+        # where F = 0 the cone of a sticking node does not imply lambda_n >= 0
         return equations, inequalities + [
             self.form(RowKind.NORMAL_FORCE, i) for i, code in enumerate(codes) if code == STICK
         ]

@@ -135,13 +135,13 @@ class ExactSelections:
             values = [value(form, point) for form in inequalities]
             if any(v < 0 for v in values):
                 return None
-            return SelectionSolution(codes, (point,), 0, sign, all(v > 0 for v in values))
+            return SelectionSolution(codes, (point,), 0, sign, all(v > 0 for v in values), exact=True)
         vertices = polytope_vertices(equations, inequalities, self.row_reduced)
         if not vertices:
             return None
         differences = [[a - b for a, b in zip(v, vertices[0], strict=True)] for v in vertices[1:]]
         dimension = len(self.row_reduced(differences)[1]) if differences else 0
-        return SelectionSolution(codes, tuple(vertices), dimension, 0, strict=False)
+        return SelectionSolution(codes, tuple(vertices), dimension, 0, strict=False, exact=True)
 
     # -- decisions -------------------------------------------------------------------------------------------------
 

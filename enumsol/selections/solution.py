@@ -30,6 +30,8 @@ class SelectionSolution:
         Sign of the selection's determinant; 0 when it is singular.
     strict : bool
         All conditions of the selection hold strictly (only asked of points).
+    exact : bool
+        Vertices are tuples of field elements, not arrays of floats.
     """
 
     codes: Codes
@@ -37,6 +39,7 @@ class SelectionSolution:
     dimension: int
     det_sign: int
     strict: bool
+    exact: bool = False
 
 
 class PointValues(Protocol):

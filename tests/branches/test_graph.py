@@ -187,6 +187,12 @@ def test_figures_of_families_and_sheets(tmp_path):
         sheet.plot(nodes=["x"])
 
 
+def test_claims_say_what_they_rest_on(square):
+    counts = f"{len(square.arcs)} arcs and {len(square.vertices)} vertices"
+    low, high = square.interval
+    assert repr(square.claims) == f"Claims of {counts} for alpha in [{low:g}, {high:g}]: proven"
+
+
 def test_kinds_of_vertices_are_texts_too(square, tmp_path):
     (fold, *_) = square.folds
     assert fold.kind is VertexKind.FOLD

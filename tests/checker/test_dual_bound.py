@@ -8,7 +8,7 @@ import pytest
 from generators import integer_problem
 
 from enumsol.checker.rational import RationalSystem
-from enumsol.condensation.exact import ExactPath, ExactSystem
+from enumsol.condensation.exact import ExactCondensed, ExactSystem
 from enumsol.kernel.rows import row_signs
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.relaxation.interval import IntervalSystem
@@ -61,7 +61,7 @@ def test_a_piece_with_constant_data_is_judged_as_one_alpha(seed):
     seen = set()
     while len(seen) < 2:
         problem = integer_problem(rng, 2)
-        path = ExactPath.from_problem(problem)
+        path = ExactCondensed.from_problem(problem)
         if not any(path.g0):
             continue
         piece = SimpleNamespace(a=Fraction(1), b=Fraction(2))

@@ -133,7 +133,7 @@ def test_csv_has_a_row_a_root_and_node(capsys, tmp_path):
     file = tmp_path / "r.csv"
     status, out, err = run(capsys, "roots", "gallery:one-node-6.3", "--alpha", 2, "--csv", file)
     assert status == 0
-    assert err == "enumsol: note: the CSV holds the isolated roots only, --json the 1 families too\n"
+    assert err == "enumsol: note: the CSV holds the isolated roots only, --json the 1 family too\n"
     assert file.read_text().startswith("alpha,root,node")
 
 

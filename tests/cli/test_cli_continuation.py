@@ -223,7 +223,7 @@ def test_audit_names_points_off_the_graph(capsys, points, tmp_path):
     frame.to_csv(file, index=False)
     status, out, _ = run(capsys, "audit", "gallery:one-node-6.1", file)
     assert status == 3
-    assert "1 points off" in out
+    assert "1 point off" in out
     assert run(capsys, "audit", "gallery:one-node-6.1", file, "--tolerance", 0.1)[0] == 0
 
 

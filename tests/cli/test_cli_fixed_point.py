@@ -99,7 +99,7 @@ def test_ctrl_c_prints_the_last_iterate(capsys, monkeypatch):
         (["gallery:block3d-5", "--alpha", "1"], "did you mean"),
         (["gallery:block3d-4", "--alpha", "-1"], "friction F1 at alpha = -1 is -1"),
         (["gallery:block3d-4", "--alpha", "1", "--start", "-1"], "start is -1"),
-        (["gallery:block3d-4", "--alpha", "1", "--starts", "5"], "is a ContactProblem3D; expected a ContactProblem"),
+        (["gallery:block3d-4", "--alpha", "1", "--starts", "5"], "is a problem in 3D; expected one in 2D"),
         (["gallery:one-node-6.1", "--alpha", "1", "--plot", "p.png"], "--plot is given without --starts"),
         (["gallery:one-node-6.1", "--alpha", "1", "--npz", "-"], "--npz is -, but it is a binary file"),
         (["gallery:one-node-6.1", "--alpha", "1", "--vtu", "x.vtu", "--starts", "5"], "--vtu and --starts are both"),
@@ -114,3 +114,14 @@ def test_bad_input_is_one_sentence(capsys, arguments, message):
     assert err.startswith("enumsol: error: ")
     assert err.count("\n") == 1
     assert message in err
+
+
+def test_what_cannot_be_done_is_refused_before_the_iteration(capsys):
+    for arguments, message in (
+        (("--vtu", "x.txt"), "--vtu is 'x.txt'; expected a name that ends in .vtu"),
+        (("--starts", 3), "--starts is given, but gallery:block3d-4 is a problem in 3D; expected one in 2D"),
+    ):
+        assert main(["fixed-point", "gallery:block3d-4", "--alpha", "0.3", *map(str, arguments)]) == 2
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert message in err

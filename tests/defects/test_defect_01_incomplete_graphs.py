@@ -53,7 +53,7 @@ def test_its_text_claims_neither_uniqueness_nor_a_jump(cut, capsys):
     assert not re.search("one solution (throughout|below)|jump|fold|bifurcation", out)
     assert ("several solutions at or right above alpha = 3" in out) == (len(cut.arcs) == 2)
     assert ("whether there is one is not known" in out) == (len(cut.arcs) < 2)
-    assert out.splitlines()[-1] == f"complete: no (stopped after max_nodes = {nodes} nodes)"
+    assert out.splitlines()[-1] == f"complete: no (stopped after max_nodes = {nodes} node{'s' * (nodes != 1)})"
 
 
 def test_its_json_claims_neither_uniqueness_nor_a_jump(cut, capsys):

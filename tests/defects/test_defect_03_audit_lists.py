@@ -110,6 +110,7 @@ def test_points_of_paths_are_named_by_their_place_in_the_sequence(graph):
     report = audit(paths, branch_graph(graph.problem, (0.0, 10.0)))
     late = [(k, j) for k, path in enumerate(paths) for j, alpha in enumerate(path.alpha) if alpha > 10 + 1e-4]
     assert [(report.points[k].path, report.points[k].row) for k in report.not_compared] == late
+    assert {report.points[k].verdict for k in report.not_compared} == {"not compared"}
 
 
 def test_a_long_list_says_how_much_is_left_out(graph, frame):

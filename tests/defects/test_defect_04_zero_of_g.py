@@ -100,4 +100,4 @@ def test_search_and_checker_ask_one_place(monkeypatch):
     for module in (path, graph_checker):
         monkeypatch.setattr(module, "vanishing_alpha", lambda problem, data: Fraction(5, 7))
     assert Fraction(5, 7) in ends_of_pieces(branch_graph(problem, INTERVAL))
-    assert "not the one that is due" in verify(problem, graph.proof).failures[0]
+    assert "is not the next one" in verify(problem, graph.proof).failures[0]

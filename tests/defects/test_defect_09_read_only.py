@@ -8,6 +8,7 @@ import networkx as nx
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from read_only import assert_locked
 
 import enumsol
 from enumsol import ContactProblem, gallery
@@ -51,16 +52,6 @@ def answers(problem):
     assert np.array_equal(problem.condensed.S, fresh.condensed.S)
     assert np.array_equal(problem.enclosure.S, fresh.enclosure.S)
     return [(root.statuses, root.lambda_n.tolist(), root.lambda_t.tolist(), root.u.tolist()) for root in roots]
-
-
-def assert_locked(array):
-    with pytest.raises(ValueError, match="read-only"):
-        array[...] = 0
-    for locked in (array, array[...], array.view(), array.T):
-        with pytest.raises(ValueError, match="cannot set WRITEABLE"):
-            locked.setflags(write=True)
-    if isinstance(array.base, np.ndarray):
-        assert_locked(array.base)
 
 
 # -- sparse matrices -------------------------------------------------------------------------------------------------
@@ -318,6 +309,15 @@ def test_sealing_keeps_everything_but_the_lock(shape, order, dtype):
         assert_locked(locked)
         array[...] = 0
         assert np.all(locked == 1)
+
+
+@pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))
+@pytest.mark.parametrize("size", [3, 100, 10_000])
+def test_arrays_of_any_size_come_sealed_out_of_a_pickle(size, protocol):
+    """NumPy puts large ones on the bytes of the pickle, and leaves them writable."""
+    matrix = pickle.loads(pickle.dumps(SealedMatrix.of(sp.eye_array(size, format="csr")), protocol))
+    for array in (matrix.data, matrix.indices, matrix.indptr):
+        assert_locked(array)
 
 
 def test_a_sealed_matrix_shares_what_is_sealed_and_copies_what_is_not():

@@ -21,7 +21,7 @@ def test_after_so_many_nodes(capsys, tmp_path, name, nodes):
     quantity = "lambda_n" if nodes != 2 else "u_t"
     status, out = draw(capsys, tmp_path, name, "--max-nodes", nodes, "--quantity", quantity)
     assert status == 3
-    assert out.splitlines()[-1].startswith(f"complete: no (stopped after max_nodes = {nodes} nodes")
+    assert out.splitlines()[-1].startswith(f"complete: no (stopped after max_nodes = {nodes} node")
 
 
 def test_after_no_time(capsys, tmp_path):

@@ -64,7 +64,7 @@ def test_a_process_that_dies_leaves_what_was_found(wedge, death, tmp_path):
     assert str(caught.value).count("\n") == 0
     partial = caught.value.partial
     assert len(partial) > 0
-    assert f"{len(partial)} roots so far" in str(caught.value)
+    assert f"{len(partial)} root{'s' * (len(partial) != 1)} so far" in str(caught.value)
     check_partial(partial, problem, alpha)
 
 
@@ -226,7 +226,7 @@ def test_roots_prints_and_writes_what_was_found(capsys, monkeypatch, tmp_path):
     count = len(content["roots"])
     assert 0 < count < 5
     assert f"{count} root" in out
-    assert f"{count} roots so far" in err
+    assert f"{count} root{'s' * (count != 1)} so far" in err
     assert out.splitlines()[-1].startswith("complete: no (a worker died, ")
     assert content["complete"] is False
     assert content["stopped"].startswith("a worker died, ")

@@ -138,3 +138,8 @@ def test_bad_arguments():
         enumsol.lipschitz_estimate(problem, 0, areas=[1.0, 2.0])
     with pytest.raises(enumsol.InvalidArgumentError, match="lipschitz is -1"):
         enumsol.lipschitz_estimate(problem, 0, lipschitz=-1.0)
+
+
+def test_a_tiny_coefficient_is_not_taken_for_none():
+    estimates = [enumsol.lipschitz_estimate(enumsol.gallery.block3d(2, 2, 1, friction=F), 0) for F in (0.5, 1e-200)]
+    assert estimates[1].factor == pytest.approx(0.5e200 * estimates[0].factor)

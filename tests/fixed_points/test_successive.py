@@ -1,5 +1,6 @@
 """Successive approximations against solutions known otherwise, and how a run that does not converge is told."""
 
+import re
 import warnings
 
 import numpy as np
@@ -317,3 +318,25 @@ def test_bad_arguments(change, message):
     arguments = {"problem": from_compliance(W, -Q, 0.1), "alpha": 0} | change
     with pytest.raises(enumsol.InvalidArgumentError, match=message):
         enumsol.successive_approximations(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("problem", "alpha"),
+    [
+        (enumsol.gallery.block3d(4, 4, 1), 0.3),
+        (enumsol.gallery.block3d(4, 4, 1, friction=enumsol.FrictionTable([0, 0.1], [0.5, 0.3])), 0),
+        (enumsol.gallery.wedge(2, 2), 1),
+    ],
+)
+def test_a_printed_result_is_readable_in_a_terminal(problem, alpha):
+    text = repr(enumsol.successive_approximations(problem, alpha))
+    lines = text.splitlines()
+    assert max(map(len, lines)) <= 110
+    assert max(len(line) for line in lines if "residuals" in line or "converged" in line) <= 80
+    heading = next(line.split() for line in lines if "status" in line)
+    assert heading[:2] == ["node", "status"]
+    assert "slip_bound" not in heading
+    depends = getattr(problem, "depends_on_solution", False)
+    assert ("in slips" in text) == ("F1" in heading) == depends
+    assert ("at all nodes" in text) == (not depends)
+    assert not any("-0.0e" in line or re.search(r"e-1[6-9]\b", line) for line in lines[lines.index(lines[-3]) :])

@@ -252,7 +252,7 @@ def test_pickled_objects_are_never_loaded(tmp_path):
 def test_a_file_that_is_no_problem_file(tmp_path, name, content):
     place = tmp_path / name
     place.write_bytes(content)
-    with pytest.raises(InvalidProblemError, match=r"it is (no|not a readable) ") as caught:
+    with pytest.raises(InvalidProblemError, match=r"it is not a ") as caught:
         read_problem(place)
     assert_one_sentence(caught.value, place)
 

@@ -11,7 +11,7 @@ from flint import fmpq
 from enumsol import gallery
 from enumsol.branches import branch_graph
 from enumsol.branches.gluing import glue
-from enumsol.condensation.exact import ExactPath
+from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError, Interrupted, InvalidArgumentError, TooLargeError
 from enumsol.relaxation.interval import IntervalEngine, IntervalSystem
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
@@ -47,7 +47,7 @@ def test_every_leaf_the_engine_prunes_is_proven_in_rationals(kind):
     rng = np.random.default_rng(11)
     for _ in range(5):
         problem = generic_problem(rng, 3, kind)
-        certifier = ExactIntervalCertifier(ExactPath.from_problem(problem))
+        certifier = ExactIntervalCertifier(ExactCondensed.from_problem(problem))
         search = IntervalSearch(problem.condensed, (Fraction(0), Fraction(6)), None, FastIntervalCertifier())
         search.run()
         for part in search.pieces:
@@ -57,7 +57,7 @@ def test_every_leaf_the_engine_prunes_is_proven_in_rationals(kind):
 
 def test_a_leaf_that_holds_a_solution_cannot_be_excluded(rng):
     problem = one_node((1.5, -4.0))
-    path = ExactPath.from_problem(problem)
+    path = ExactCondensed.from_problem(problem)
     certifier = ExactIntervalCertifier(path)
     piece = Piece(Fraction(2), Fraction(4))
     system = IntervalSystem.from_problem(problem.condensed, 2.0, 4.0, None)

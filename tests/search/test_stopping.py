@@ -13,7 +13,7 @@ from enumsol.search.stopping import Stop, StopReason
     ("stop", "sentence"),
     [
         (Stop(StopReason.NODE_LIMIT, 40), "stopped after max_nodes = 40 nodes"),
-        (Stop(StopReason.NODE_LIMIT, 40, "selections"), "stopped after max_nodes = 40 selections"),
+        (Stop(StopReason.NODE_LIMIT, 40, "selection"), "stopped after max_nodes = 40 selections"),
         (Stop(StopReason.ENOUGH_ROOTS, unexamined=0), "stopped after enough roots, 0 subtrees not examined"),
         (Stop(StopReason.TIME_LIMIT, unexamined=7), "stopped by the time limit, 7 subtrees not examined"),
         (Stop(StopReason.INTERRUPTED, 0), "interrupted after 0 nodes"),

@@ -25,7 +25,7 @@ def solve_or_open(solver: SelectionSolver, codes: Codes) -> SelectionSolution | 
 
 
 class FastCertifier(WithoutProof):
-    """Floats and tolerances: what the engine computed is believed, unless the tolerance could overturn it.
+    """Floats and tolerances: the result of the engine is trusted unless the tolerance could overturn it.
 
     A condition within the tolerance of zero counts as satisfied. Shifting every row of a certificate by twice that
     changes its bound by the multipliers times the shift; a pruning that does not survive it is branched on.

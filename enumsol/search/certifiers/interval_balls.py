@@ -11,13 +11,13 @@ from enumsol.kernel.interval import EnclosedPiece, as_computed, interval_exclusi
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 
 if TYPE_CHECKING:
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.problem import ContactProblem
     from enumsol.relaxation.interval import IntervalSystem
     from enumsol.search.interval import EmptyLeaf, Piece
 
 
-#: Bounds must be this large [energy unit of the piece], so that a checker that adds up in another order agrees.
+#: Bounds must be this large [energy unit of the piece], so that a checker that sums in another order agrees.
 _MARGIN = 1e-12
 
 
@@ -30,11 +30,11 @@ class VerifiedIntervalCertifier:
     Parameters
     ----------
     problem : ContactProblem
-    exact : ExactPath
+    exact : ExactCondensed
         Its data are certified: those of the problem, or S and g as computed.
     """
 
-    def __init__(self, problem: ContactProblem, exact: ExactPath) -> None:
+    def __init__(self, problem: ContactProblem, exact: ExactCondensed) -> None:
         self._enclosure = certified_enclosure(problem, exactly=exact.condensed_exactly)
         self._rationals = ExactIntervalCertifier(exact) if exact.condensed_exactly else None
         self._zero = exact.zero

@@ -15,7 +15,7 @@ from enumsol.statuses import RowKind
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from enumsol.condensation.exact import ExactPath
+    from enumsol.condensation.exact import ExactCondensed
     from enumsol.relaxation.interval import IntervalSystem
     from enumsol.search.interval import EmptyLeaf, Piece
 
@@ -32,12 +32,12 @@ class ExactIntervalCertifier:
 
     Parameters
     ----------
-    exact : ExactPath
+    exact : ExactCondensed
     """
 
     checkable = False
 
-    def __init__(self, exact: ExactPath) -> None:
+    def __init__(self, exact: ExactCondensed) -> None:
         self._exact = exact
         self._inverse: Any = None
         self._systems: tuple[Piece, list[tuple[ExactSelections, ExactSelections]]] | None = None

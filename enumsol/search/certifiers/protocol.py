@@ -76,7 +76,7 @@ class Certified:
 
 
 class Certifier(Protocol):
-    """Decides in one arithmetic what the tree may conclude, and writes the proof of it, if there is to be one.
+    """Decides in one arithmetic what the tree may conclude, and writes the proof, if one is wanted.
 
     Attributes
     ----------
@@ -97,20 +97,20 @@ class Certifier(Protocol):
         """All roots in a complete selection, None when it holds none, why that is open, or what to split further."""
 
     def branching(self, node: int, children: Sequence[int]) -> None:
-        """Take note that a partial assignment is split at ``node`` (called in preorder, for the proof)."""
+        """Record that a partial assignment is split at ``node`` (called in preorder, for the proof)."""
 
     def skipped(self, codes: Codes, reason: str) -> None:
-        """Take note that a subtree was not examined, and why."""
+        """Record that a subtree was not examined, and why."""
 
     def unloaded(self) -> None:
-        """Take note that the body is unloaded, which decides the whole tree."""
+        """Record that the body is unloaded, which decides the whole tree."""
 
     def add(self, part: Certified) -> None:
         """Take over what the certifier of a subtree has proven; its records were written already."""
 
 
 class Unrecorded:
-    """Where the records of no proof go."""
+    """A recorder for searches without a proof."""
 
     def write(self, record: Any) -> None:
         """Nothing to write."""

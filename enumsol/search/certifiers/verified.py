@@ -1,4 +1,4 @@
-"""The certifier of arithmetic "verified" (and the one that writes proofs): nothing is concluded that is not proven.
+"""The certifier of arithmetic "verified" (and the one that writes proofs): only proven conclusions.
 
 Escalation only where needed: balls in double arithmetic first, rationals where a sign cannot be decided and the
 problem is small enough, otherwise the selection is left undecided with the reason.
@@ -17,7 +17,7 @@ from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
 from enumsol.proof.proof_file import fraction_text, packed
 from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
 from enumsol.selections.solution import SelectionSolution
-from enumsol.statuses import FRICTIONLESS, OPEN, STICK
+from enumsol.statuses import CONDITIONS, RowKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -50,7 +50,15 @@ class Leaf(enum.StrEnum):
     UNDECIDED = "u"
 
 
-#: What begins the record of a branching, which is no leaf.
+_ROW_NAMES = {
+    RowKind.NORMAL_FORCE: "the normal force of node {}",
+    RowKind.CONE_PLUS: "the slip bound of node {} (forward)",
+    RowKind.CONE_MINUS: "the slip bound of node {} (backward)",
+    RowKind.PENETRATION: "the gap of node {}",
+    RowKind.SLIP_FORWARD: "the slip condition of node {}",
+    RowKind.SLIP_BACKWARD: "the slip condition of node {}",
+}
+#: Begins the record of a branching, which is not a leaf.
 _BRANCHING = "b"
 
 
@@ -193,15 +201,10 @@ def _reason(codes: Codes, ball: VerifiedSelection | None, node_ids: Sequence[Any
         return "the matrix of a selection may be singular", hint
     if not (np.all(np.isfinite(ball.slack)) and np.all(np.isfinite(ball.slack_rad))):
         return "the solution of a selection overflows float64", "scale the data"
-    names = []
-    for node, code in zip(node_ids, codes, strict=True):
-        if code == OPEN:
-            names.append(f"the gap of node {node}")
-        elif code == STICK:
-            names += [f"the slip bound of node {node} (forward)", f"the slip bound of node {node} (backward)"]
-        else:
-            names.append(f"the normal force of node {node}")
-            if code != FRICTIONLESS:
-                names.append(f"the slip condition of node {node}")
+    names = [
+        _ROW_NAMES[kind].format(node)
+        for node, code in zip(node_ids, codes, strict=True)
+        for kind in CONDITIONS[code].inequalities
+    ]
     k = int(np.argmin(np.where(np.abs(ball.slack) <= ball.slack_rad, np.abs(ball.slack), np.inf)))
     return f"{names[k]} is zero to {abs(ball.slack[k]) + ball.slack_rad[k]:.0e} (scaled)", hint

@@ -1,0 +1,163 @@
+"""The checker of proofs about problems in 3D: leaves are statuses and sectors of slip directions."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE
+from enumsol.checker.tree import TreeChecker
+from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.enclosure import CondensedEnclosure
+from enumsol.condensation.space import EnclosedSpace
+from enumsol.kernel.space import (
+    CONTACT,
+    FORCE,
+    GAP,
+    RIGHT,
+    UNDECIDED,
+    Open,
+    children_of,
+    distinct_roots,
+    exclusion_margin,
+    settle,
+)
+from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, rational_from, shown, shown_alpha
+from enumsol.sectors import DEEPEST, SECTORS, level_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.kernel.space import Row, SpaceRoot
+
+#: Entries of a leaf's record, by its kind.
+_ENTRIES = {"x": 3, "n": 1, "r": 4, "z": 1, "u": 2}
+#: Numbers of directions and sectors in rows are less: tangents may be two levels finer than the finest sector.
+_NUMBERS = 1 << (DEEPEST + 3)
+
+
+@dataclass
+class SpaceChecker(TreeChecker):
+    """Checks one proof of a problem in 3D."""
+
+    roots: list[tuple[tuple[int, ...], SpaceRoot]] = field(default_factory=list)
+    doubtful: int = 0
+
+    # -- header and tree -------------------------------------------------------------------------------------------
+
+    def _read_header(self, header: Any) -> None:
+        self.data = data_of(header, self.problem, "space")
+        if self.data != "problem":
+            raise RefusedError("a proof about a problem in 3D certifies the problem's own data only")
+        try:
+            self.force, self.length = _units(header, self.problem.p)
+            self.alpha = rational_from(header.get("alpha"))
+            pairs = zip(self.problem.friction, self.problem.friction_slope, strict=True)
+            exact = [exactly_at(self.alpha, *pair) for pair in pairs]
+        except ValueError as error:
+            raise RefusedError(f"the header cannot be read: {error}") from None
+        if min(min(column) for column in exact) < 0:
+            raise RefusedError(f"friction is negative at alpha = {shown_alpha(self.alpha)}")
+        self.tangents = [sum(F > 0 for F in node) for node in zip(*exact, strict=True)]
+
+    @cached_property
+    def system(self) -> EnclosedSpace:
+        """Balls for S, g and F in the proof's units."""
+        enclosure = CondensedEnclosure.from_problem(self.problem)
+        enclosed = EnclosedSpace.of_problem(enclosure, self.alpha, self.force, self.length)
+        if not enclosed.smallest_eigenvalue > 0:
+            raise RefusedError("S is not proven positive definite")
+        return enclosed
+
+    def _covering(self, code: int, node: int) -> tuple[int, ...]:
+        if code > SECTORS and level_of(code - SECTORS) > DEEPEST:
+            return ()
+        return children_of(code, self.tangents[node])
+
+    # -- leaves ----------------------------------------------------------------------------------------------------
+
+    def _leaf(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        kind = record[0]
+        if not isinstance(kind, str) or kind not in _ENTRIES:
+            return f"unknown kind of record {shown(kind)}"
+        if len(record) != _ENTRIES[kind]:
+            return f"its record has {len(record)} entries; expected {_ENTRIES[kind]}"
+        if kind == "x":
+            rows, values = _multipliers(record[1], record[2], self.problem.p)
+            positive = exclusion_margin(self.system, codes, rows, values) > 0
+            return None if positive else "its multipliers do not exclude it"
+        if kind == "u":
+            self.undecided += 1
+            return None if isinstance(record[1], str) else "its reason is no text"
+        if kind == "z":
+            unloaded = all(code == UNDECIDED for code in codes) and self.problem.is_unloaded(self.alpha)
+            # g = 0: the energy bound reads y' S y <= 0
+            self.regular += 1
+            return None if unloaded else "the problem is not unloaded"
+        if any(code in (CONTACT, UNDECIDED) for code in codes):
+            return "a root or a solved selection is claimed where statuses are still open"
+        return self._settled(codes, record)
+
+    def _settled(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        found = settle(self.system, codes)
+        if isinstance(found, Open):
+            return "what it holds is not proven"
+        if record[0] == "n":
+            return None if found is None else "it holds a root"
+        if found is None:
+            return "it holds no root"
+        self.roots.append((codes, found))
+        _, mid, rad, index = record
+        centre, radius = (numbers_from(values, len(found.y.mid)) for values in (mid, rad))
+        with np.errstate(over="ignore", invalid="ignore"):
+            inside = (np.abs(centre - found.y.mid) + found.y.rad) * SAFE <= radius
+        if not np.all(inside):
+            return "its enclosure does not hold the root"
+        return None if type(index) is int and index == found.index else "its index is wrong"
+
+    # -- counting --------------------------------------------------------------------------------------------------
+
+    @property
+    def _doubtful(self) -> int:
+        return self.doubtful
+
+    def _count(self) -> tuple[int, int]:
+        """Roots that two leaves share count once; what cannot be told apart leaves the count open."""
+        distinct, doubtful = distinct_roots(self.roots)
+        self.doubtful = len(doubtful)
+        return len(distinct), 0
+
+    def _claim(self, isolated: int, families: int) -> dict[str, int]:
+        return {"roots": self.regular + isolated, "undecided": self.undecided, "leaves": self.leaves}
+
+
+def _units(header: dict[str, Any], p: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Units of forces and displacements of the nodes, powers of two with one product."""
+    force, length = (exponents_from(header.get(key), p) for key in ("force", "length"))
+    if len({a + b for a, b in zip(force, length, strict=True)}) != 1:
+        raise ValueError("the units are no common scaling of energy")
+    return np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))
+
+
+def _multipliers(rows: Any, text: Any, p: int) -> tuple[list[Row], NDArray[np.float64]]:
+    """Rows and as many multipliers."""
+    if not all((isinstance(rows, list), isinstance(text, str))):
+        raise ValueError("its multipliers are no list of rows and a text")
+    values = np.frombuffer(base64.b64decode(text, validate=True), dtype="<f8").astype(np.float64)
+    if len(rows) != len(values):
+        raise ValueError(f"{len(rows)} rows and {len(values)} multipliers")
+    return [_row(row, p) for row in rows], values
+
+
+def _row(row: Any, p: int) -> Row:
+    if not isinstance(row, list) or len(row) != 3 or not all(type(x) is int for x in row):
+        raise ValueError(f"{shown(row)} is no row")
+    kind, node, number = row
+    known = 0 <= kind <= RIGHT and 0 <= node < p and -1 <= number < _NUMBERS
+    if not known or (kind in (GAP, FORCE) and number):
+        raise ValueError(f"row {shown(row)} does not exist")
+    return kind, node, number
