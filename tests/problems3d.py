@@ -33,7 +33,7 @@ def violations(S, g, F, lambda_n, lambda_t):
 
 
 def random_one_node(rng):
-    """S, g, F (1, 2) of one node: isotropic and orthotropic, F from 0.01 to 100, and some without friction on an axis."""
+    """S, g, F (1, 2) of one node: F from 0.01 to 100, isotropic and orthotropic, some 0 on an axis or both."""
     X = rng.normal(size=(3, 3))
     S = X @ X.T + 10 ** rng.uniform(-3, 0) * np.eye(3)
     F = 10 ** rng.uniform(-2, 2, size=2)
