@@ -30,3 +30,50 @@ def violations(S, g, F, lambda_n, lambda_t):
         cone = max(cone, float(np.sqrt(sum(t * t for t in tau))) - lambda_n[i])
         dissipation = max(dissipation, abs(lambda_n[i] * np.hypot(*(F[i] * slip)) - lambda_t[i] @ slip))
     return contact, cone, dissipation
+
+
+def random_one_node(rng):
+    """S, g, F (1, 2) of one node: F from 0.01 to 100, isotropic and orthotropic, some 0 on an axis or both."""
+    X = rng.normal(size=(3, 3))
+    S = X @ X.T + 10 ** rng.uniform(-3, 0) * np.eye(3)
+    F = 10 ** rng.uniform(-2, 2, size=2)
+    kind = rng.integers(0, 20)
+    if kind < 8:
+        F[1] = F[0]
+    elif kind < 10:
+        F[kind - 8] = 0.0
+    elif kind == 10:
+        F[:] = 0.0
+    return S, rng.normal(size=3) * [rng.choice([0.3, 1.0]), 1.0, 1.0], F[None]
+
+
+def random_coupled(rng, p):
+    """S, g, F (p, 2) of strongly coupled nodes with much friction, a third of them isotropic."""
+    X = rng.normal(size=(3 * p, 3 * p))
+    S = X @ X.T + 10 ** rng.uniform(-2, 0) * np.eye(3 * p)
+    F = 10 ** rng.uniform(-0.5, 1.5, size=(p, 2))
+    if rng.random() < 1 / 3:
+        F[:, 1] = F[:, 0]
+    return S, rng.normal(size=3 * p), F
+
+
+def forces(root):
+    return np.concatenate([root.lambda_n, root.lambda_t[:, 0], root.lambda_t[:, 1]])
+
+
+def bounds(root):
+    """Lower and upper ends of the enclosed forces, (3p,) each."""
+    box = np.concatenate([root.enclosure.lambda_n, root.enclosure.lambda_t[:, 0], root.enclosure.lambda_t[:, 1]])
+    return box[:, 0], box[:, 1]
+
+
+def unmatched(roots, wanted, rtol=1e-6):
+    """Numbers of the wanted solutions (arrays like g) that no root encloses, and of the roots that enclose none.
+
+    Enclosures are widened by ``rtol`` of the largest force: the inverse of S in a problem is rounded.
+    """
+    near = rtol * max([np.max(np.abs(lam)) for lam in wanted], default=0.0)
+    boxes = [bounds(root) for root in roots]
+    inside = np.array([[np.all((lam >= low - near) & (lam <= up + near)) for low, up in boxes] for lam in wanted])
+    inside = inside.reshape(len(wanted), len(boxes))
+    return np.flatnonzero(~inside.any(axis=1)).tolist(), np.flatnonzero(~inside.any(axis=0)).tolist()
