@@ -2,7 +2,6 @@
 
 import base64
 import functools
-import json
 import struct
 from fractions import Fraction
 
@@ -79,18 +78,18 @@ def _pick(rng, items):
 
 
 def _row(rng, records):
-    k = _pick(rng, of_kind(records, "x"))
-    rows = records[k][1]
-    if rows:
-        row = _pick(rng, rows)
+    places = [k for k in of_kind(records, "x") if records[k][1]]
+    if places:
+        row = _pick(rng, records[_pick(rng, places)][1])
         j = int(rng.integers(3))
         row[j] = int(_pick(rng, (row[j] + 1, row[j] - 1, 2 * row[j], row[j] // 2, 0, 1, 2**24, 2**40, -1)))
 
 
 def _value(rng, records):
-    k = _pick(rng, of_kind(records, "x"))
-    values = values_of(records[k])
-    if values:
+    places = [k for k in of_kind(records, "x") if records[k][1]]
+    if places:
+        k = _pick(rng, places)
+        values = values_of(records[k])
         j = int(rng.integers(len(values)))
         values[j] = float(_pick(rng, (-values[j], 2 * values[j], values[j] * (1 + 1e-9), 0.0, 1e300, -1e-9)))
         records[k] = with_values(records[k], values)
@@ -127,8 +126,8 @@ def _ball(rng, records):
 
 
 def _claim(rng, records):
-    k = _pick(rng, of_kind(records, "x", "n", "r", "u"))
-    donors = of_kind(records, "x", "n", "r", "u")
+    donors = of_kind(records, "x", "n", "r", "u", "z")
+    k = _pick(rng, donors)
     records[k] = _pick(rng, (["n"], ["u", ""], ["z"], ["x", [], ""], copied(records[_pick(rng, donors)])))
 
 
@@ -208,8 +207,3 @@ class Truth:
             if index == known and np.all(np.abs(y - np.array(mid)) <= np.array(rad) + slack):
                 return True
         return False
-
-
-def text_of(records):
-    """Records as text, for messages."""
-    return json.dumps(records)[:400]
