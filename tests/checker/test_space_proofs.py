@@ -52,6 +52,17 @@ def test_a_root_on_the_end_of_a_sector_counts_once():
     assert "the leaves give" in refused("end", records)
 
 
+def test_roots_that_cannot_be_told_apart_leave_the_count_open(monkeypatch):
+    problem, _, records, _ = case("end")
+    records = copied(records)
+    records[-1]["roots"] = 2
+    monkeypatch.setattr("enumsol.kernel.space.same_root", lambda one, other: None)
+    report = verify(problem, proof_of(records))
+    assert report.ok
+    assert not report.complete
+    assert (report.roots, report.undecided) == (2, 1)
+
+
 def test_the_unloaded_body():
     problem = from_compliance(np.eye(3), np.zeros(3), (0.5, 0.5))
     report = verify(problem, enumerate_roots(problem, 0.0).proof)
