@@ -110,6 +110,7 @@ def _exists(condition: bool) -> None:
         raise ValueError("a node has no such row")
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def exclusion_margin(
     system: EnclosedSpace, codes: Sequence[int], rows: Sequence[Row], values: Array, errors: float = 1.0
 ) -> float:

@@ -1,4 +1,4 @@
-"""Exclusions of proofs in 3D decided in rationals, from docs/proof_format.md (section 7) alone."""
+"""Exclusions of proofs in 3D decided in rationals, from what docs/proof_format.md says of space proofs alone."""
 
 import hashlib
 import struct
@@ -34,7 +34,7 @@ def fractions(array):
 
 
 class Space:
-    """The problem of section 7.1 at alpha = a."""
+    """The problem in 3D of that document, at alpha = a."""
 
     def __init__(self, problem, a=0):
         p = problem.p
@@ -64,7 +64,7 @@ class Space:
         self.g = [c * (product[i][-1] - offset[i]) for i, c in self.y]
 
     def row(self, kind, node, number):
-        """(coefficients on y, coefficients on w) of section 7.4."""
+        """Coefficients on y and on w, as the document gives them for space proofs."""
         t = [self.tau.get((node, k)) for k in range(2)]
         if kind == 0:
             return {}, {node: -1}
@@ -83,7 +83,7 @@ class Space:
         return {}, ({t[1]: d[0], t[0]: -d[1]} if kind == 8 else {t[0]: e[1], t[1]: -e[0]})
 
     def allowed(self, code, kind, number):
-        """The table of section 7.4."""
+        """The table for space proofs."""
         table = {0: "+EE.+.+", 1: "E+.E+.+", 4: "E+.....", 5: "E+..+.+", 6: "++..+.+"}
         if code in (2, 3):
             forward = 1 if code == 2 else -1
@@ -98,7 +98,7 @@ class Space:
         return (table[code] if code < 8 else "E+....+")[kind]
 
     def bound(self, codes, rows, values, force, length):
-        """The left-hand side of (4.2), or None where a multiplier is not allowed."""
+        """The bound under Exclusion in the document, or None where a multiplier is not allowed."""
         size = len(self.g)
         v, constant = list(self.g), Fraction(0)
         for (kind, node, number), value in zip(rows, values, strict=True):
@@ -118,7 +118,7 @@ class Space:
 
 
 def direction(number):
-    """(7.2)."""
+    """Where a sector begins."""
     first = 1 << (number.bit_length() - 1)
     t = Fraction(4 * (number - first), first)
     q, s = divmod(t, 1)

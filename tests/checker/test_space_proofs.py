@@ -311,6 +311,8 @@ def test_multipliers_have_to_be_finite():
         changed = copied(records)
         changed[k] = with_values(records[k], [value] * len(records[k][1]))
         assert "do not exclude" in refused(SEVERAL, changed)
+        changed[k] = with_values(["x", records[k][1] * 3, ""], [value] * len(records[k][1]) * 3)
+        assert "do not exclude" in refused(SEVERAL, changed)
 
 
 # -- mutants -----------------------------------------------------------------------------------------------------------

@@ -17,11 +17,14 @@ from enumsol.kernel.space import (
     FORBIDDEN,
     FORCE,
     FREE,
+    FRICTIONLESS,
     GAP,
     LEFT,
     OPEN,
     RIGHT,
     SLIP,
+    SLIP_MINUS,
+    SLIP_PLUS,
     STICK,
     TANGENT,
     TAU,
@@ -139,6 +142,35 @@ def test_rows_are_what_the_solutions_of_a_status_satisfy(code):
             sign = row_sign(code, row)
             assert sign == FORBIDDEN or value >= -1e-14
             assert sign != FREE or abs(value) <= 1e-14
+
+
+def test_rows_of_a_node_with_one_tangent_or_none():
+    tau = np.array([[-1, 1]])
+    rows = [(GAP, 0, 0), (FORCE, 0, 0), (TAU, 0, 1), (SLIP, 0, 1)]
+    rows += [(kind, 0, sign) for kind in (END, ALONG) for sign in (1, -1)]
+    samples = {
+        OPEN: [[0, 0, -1, 0], [0, 0, -1, 2], [0, 0, 0, -2]],
+        STICK: [[1, 0.5, 0, 0], [1, -1, 0, 0], [0, 0, 0, 0]],
+        SLIP_PLUS: [[1, 1, 0, 2], [0, 0, 0, 1]],
+        SLIP_MINUS: [[1, -1, 0, -2], [0, 0, 0, -1]],
+    }
+    samples[CONTACT] = [*samples[STICK], *samples[SLIP_PLUS], *samples[SLIP_MINUS]]
+    samples[UNDECIDED] = [*samples[OPEN], *samples[CONTACT]]
+    allowed = 0
+    for code, points in samples.items():
+        for row in rows:
+            sign = row_sign(code, row)
+            values = [sum(c * z[i] for i, c in zip(*row_terms(row, tau, 2), strict=True)) for z in points]
+            assert sign == FORBIDDEN or min(values) >= 0
+            assert sign != FREE or not any(values)
+            allowed += sign != FORBIDDEN
+    assert allowed > 20
+    none = np.array([[-1, -1]])
+    assert row_sign(FRICTIONLESS, (GAP, 0, 0)) == FREE
+    assert row_sign(FRICTIONLESS, (FORCE, 0, 0)) != FREE
+    for row in ((TAU, 0, 0), (SLIP, 0, 1), (END, 0, 1), (TANGENT, 0, 4)):
+        with pytest.raises(ValueError, match="no such row"):
+            row_terms(row, none, 1)
 
 
 def test_margins_are_below_the_energy():
