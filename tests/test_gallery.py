@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+import enumsol
 from enumsol import ContactProblem, gallery
 from enumsol.errors import InvalidArgumentError
 
@@ -198,8 +199,11 @@ def test_registry_builds(name):
     assert problem.coordinates.shape == (problem.p, entry.dimension)
     assert np.all(problem.friction_at(entry.alpha) > 0)
     if entry.dimension == 3:
-        assert entry.roots is None
-        assert name in {"one-node-3d", f"block3d-{problem.p}"}
+        assert name in {"one-node-3d", "one-node-3d-3", f"block3d-{problem.p}"}
+        if problem.p < 16:
+            found = enumsol.enumerate_roots(problem, entry.alpha)
+            assert found.complete
+            assert len(found) == entry.roots
     elif problem.p <= 4 and entry.roots is not None:
         roots = brute_force(problem, entry.alpha)
         assert len(roots) == entry.roots
@@ -303,19 +307,15 @@ def test_bad_arguments_of_problems_in_3d_are_named(build, message):
 
 
 def test_functions_for_2d_say_what_takes_problems_in_3d():
-    import enumsol
-
     problem = gallery.block3d(1, 1, 1)
     calls = [
         lambda: enumsol.branch_graph(problem, (0.0, 1.0)),
-        lambda: enumsol.multiplicity_table(problem, [1.0]),
         lambda: enumsol.link_samples(problem, [0.0, 1.0]),
         lambda: enumsol.newton(problem, 1.0),
         lambda: enumsol.follow(problem, [0.0] * 5, interval=(0.0, 1.0)),
         lambda: enumsol.follow_all(problem, (0.0, 1.0)),
         lambda: enumsol.local_branch_test(problem, [0.0] * 5),
         lambda: enumsol.PiecewiseSmoothEquation(problem),
-        lambda: enumsol.verify(problem, None),
     ]
     for call in calls:
         with pytest.raises(InvalidArgumentError, match=r"is a ContactProblem3D; .* \(problems in 3D are taken by enum"):

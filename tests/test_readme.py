@@ -32,7 +32,7 @@ def test_enumeration(elsewhere):
 
 
 def test_branches_and_continuation(elsewhere):
-    assert len(BLOCKS) == 3
+    assert len(BLOCKS) == 4
     seen = {}
     exec(BLOCKS[1], seen)
     graph, path = seen["graph"], seen["path"]
@@ -53,6 +53,13 @@ def test_three_dimensions_and_fixed_points(elsewhere):
     assert seen["limit"].converged
     assert seen["weakening"].converged
     assert (elsewhere / "block.vtu").stat().st_size > 1000
+
+
+def test_all_solutions_in_three_dimensions(elsewhere):
+    seen = {}
+    exec(BLOCKS[3], seen)
+    assert [str(root.statuses[0]) for root in seen["roots"]] == ["stick", "slip", "open"]
+    assert seen["roots"].complete
 
 
 def test_commands(elsewhere, capsys):

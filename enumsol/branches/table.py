@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from enumsol.checks import alpha_list, instance_of, optional_callable, optional_executor
+from enumsol.contact_body import ContactBody
 from enumsol.errors import Interrupted, WorkerError
 from enumsol.executors import WorkerLost, has_result, result_of, submit
 from enumsol.problem import ContactProblem
@@ -15,12 +16,13 @@ from enumsol.roots.enumerate import enumerate_roots
 from enumsol.statuses import STATUSES, ContactStatus
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from concurrent.futures import Executor, Future
 
     import pandas as pd
 
     from enumsol.checks import Alpha, AlphaLike
+    from enumsol.problem3d import ContactProblem3D
     from enumsol.roots.root_set import RootSet
 
 #: Tasks handed to an executor ahead of the one that is awaited; keeps an interruption from waiting for all of them.
@@ -32,6 +34,7 @@ class _Rows:
     """Rows of the table by the place of their alpha."""
 
     alphas: Sequence[Alpha]
+    kinds: Mapping[ContactStatus, str]
     done: dict[int, dict[str, Any]] = field(default_factory=dict)
 
     def frame(self) -> pd.DataFrame:
@@ -41,7 +44,7 @@ class _Rows:
             "alpha",
             "roots",
             "families",
-            *_KINDS.values(),
+            *self.kinds.values(),
             "index_sum",
             "complete",
             "undecided",
@@ -55,10 +58,13 @@ class _Rows:
 
 #: Columns with the number of roots at which at least one node has the status.
 _KINDS = {status: f"with_{status.name.lower()}" for status in STATUSES}
+_KINDS_3D = {
+    status: f"with_{status.name.lower()}" for status in (ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP)
+}
 
 
 def multiplicity_table(
-    problem: ContactProblem,
+    problem: ContactProblem | ContactProblem3D,
     alphas: Iterable[AlphaLike],
     *,
     arithmetic: str = "verified",
@@ -70,7 +76,7 @@ def multiplicity_table(
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     alphas : iterable of float, Fraction or whatever enumerate_roots accepts as alpha
     arithmetic : str
         Of ``enumerate_roots``.
@@ -84,11 +90,11 @@ def multiplicity_table(
     Returns
     -------
     pandas.DataFrame
-        One row an alpha, in the order given: alpha, roots, families, with_open, with_stick, with_slip_plus and
-        with_slip_minus (isolated roots at which at least one node has the status), index_sum (missing where a degree is
-        not known), complete, undecided, stopped (why the search ended early, or missing), nodes of the search, and
-        seconds. Where a search was cut short or left something undecided, the counts are
-        lower bounds.
+        One row an alpha, in the order given: alpha, roots, families; with_open, with_stick, with_slip_plus and
+        with_slip_minus, or in 3D with_slip (isolated roots at which at least one node has the status); index_sum
+        (missing where a degree is not known), complete, undecided, stopped (why the search ended early, or missing),
+        nodes of the search, and seconds. Where a search was cut short or left something undecided, the counts are
+        those of what was found, and so lower bounds.
 
     Raises
     ------
@@ -106,10 +112,12 @@ def multiplicity_table(
     >>> table["roots"].tolist(), bool(table["complete"].all())
     ([1, 2, 3], True)
     """
-    instance_of(problem, ContactProblem, "problem")
+    given: Any = problem
+    if not isinstance(given, ContactBody):
+        instance_of(given, ContactProblem, "problem")
     optional_executor(executor)
     optional_callable(progress, "progress")
-    rows = _Rows(alpha_list(alphas))
+    rows = _Rows(alpha_list(alphas), kinds_of(problem))
     for alpha in rows.alphas:
         problem.friction_at(alpha)
     options = {"arithmetic": arithmetic, **options}
@@ -132,7 +140,7 @@ def multiplicity_table(
 
 
 def _spread(
-    problem: ContactProblem,
+    problem: ContactProblem | ContactProblem3D,
     rows: _Rows,
     executor: Executor,
     progress: Callable[[int, int], object] | None,
@@ -166,7 +174,7 @@ def _spread(
             future.cancel()
 
 
-def table_row(problem: ContactProblem, alpha: Alpha, options: dict[str, Any]) -> dict[str, Any]:
+def table_row(problem: ContactProblem | ContactProblem3D, alpha: Alpha, options: dict[str, Any]) -> dict[str, Any]:
     """One row of the table (a module-level function, so that other processes can import it)."""
     roots = enumerate_roots(problem, alpha, **options)
     counts = kinds(roots)
@@ -174,7 +182,7 @@ def table_row(problem: ContactProblem, alpha: Alpha, options: dict[str, Any]) ->
         "alpha": float(alpha),
         "roots": len(roots),
         "families": len(roots.families),
-        **{name: counts[status] for status, name in _KINDS.items()},
+        **{name: counts[status] for status, name in kinds_of(problem).items()},
         "index_sum": roots.index_sum,
         "complete": roots.complete,
         "undecided": len(roots.undecided),
@@ -182,6 +190,11 @@ def table_row(problem: ContactProblem, alpha: Alpha, options: dict[str, Any]) ->
         "nodes": roots.stats.nodes,
         "seconds": roots.stats.seconds,
     }
+
+
+def kinds_of(problem: ContactProblem | ContactProblem3D) -> Mapping[ContactStatus, str]:
+    """The columns that count roots by the statuses of their nodes."""
+    return _KINDS if isinstance(problem, ContactProblem) else _KINDS_3D
 
 
 def kinds(roots: RootSet) -> Counter[ContactStatus]:

@@ -10,9 +10,9 @@ What a verified proof says
     matrix multiplication of Strassen's kind and changed rounding modes are excluded.
 
 What checker and search share
-    ``checker.verify`` and ``checker.graph`` import nothing of the search, neither its trees and relaxations nor its
-    arcs and results, and a test guards that. They are not independent of all that it uses. These serve both, and an
-    error in one of them may write a false proof and accept it:
+    ``checker.verify``, ``checker.graph`` and ``checker.space`` import nothing of the search, neither its trees and
+    relaxations nor its arcs and results, and a test guards that. They are not independent of all that it uses. These
+    serve both, and an error in one of them may write a false proof and accept it:
 
     - ``kernel.rows``: the codes, the rows and the branchings that cover, on which writer and reader have to agree;
     - ``condensation.enclosure`` and ``arithmetic.balls``: balls for S, g and F, and the proofs that A and S are
@@ -20,6 +20,10 @@ What checker and search share
     - ``kernel.point`` and ``kernel.interval``: the exclusion inequality, the verified solve of a selection and the
       contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled copy of
       the inequality at one alpha);
+    - for problems in 3D, and loaded for their proofs only: ``kernel.space``, the rows and branchings, the exclusion
+      inequality, what a complete assignment holds and which leaves share a root; ``sectors``, the ends of sectors;
+      ``condensation.space``, balls for S and g in the variables in which friction is isotropic; ``problem3d``,
+      ``body3d`` and ``friction``, the data and their checks;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes;
       ``condensation.affine``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
       definite matrix, and floats as rationals;
@@ -40,6 +44,10 @@ What counts as one root
     A root at which every condition holds strictly solves one selection only, and so two such roots of two leaves are
     two. Roots on the border of several selections are decided in rationals and joined where they meet, as are the
     polytopes of a family; none of them can meet a strict root.
+
+    In 3D a root that slips along the common end of two sectors is found in both. Roots of leaves with the same statuses
+    are one if the directions of one lie in the box of angles in which the other is proven to be the only one, and two
+    if their forces differ for certain. Where neither is proven, one more part counts as undecided.
 
 Cross-checks
     They use nothing of the proof and are printed with the result. The indices of all roots and families add up to +1,

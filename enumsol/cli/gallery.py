@@ -52,9 +52,9 @@ def list_() -> None:
 
 
 def _count(entry: GalleryEntry) -> str:
-    if entry.dimension == 3:
-        return "-"  # not enumerated
-    return "family" if entry.roots is None else str(entry.roots)
+    if entry.roots is None:
+        return "family" if entry.dimension == 2 else "-"  # of a large body in 3D the number is not known
+    return str(entry.roots)
 
 
 @app.command()
@@ -75,5 +75,5 @@ def write(
 
     entry = gallery.get(name.removeprefix("gallery:"))
     write_problem(entry.build(), file)
-    command = "roots" if entry.dimension == 2 else "fixed-point"
+    command = "fixed-point" if entry.roots is None and entry.dimension == 3 else "roots"
     typer.echo(f"wrote {entry.name} to {file}; try: enumsol {command} {file} --alpha {entry.alpha:g}")

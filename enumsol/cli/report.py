@@ -25,7 +25,8 @@ def as_text(found: RootSet) -> str:
     from enumsol.roots.root import node_heading  # numpy: not for --help
 
     width = max(4, *(len(str(label)) for label in found.node_ids))
-    lines = [f"{'':>8} {node_heading(width)}"]
+    tangents = 2 if len(found) and found[0].lambda_t.ndim == 2 else 1
+    lines = [f"{'':>8} {node_heading(width, tangents)}"]
     for k, root in enumerate(found):
         lines += _root_rows(f"root {k}", root, found.node_ids, width)
     for k, family in enumerate(found.families):
@@ -90,10 +91,18 @@ def _root(root: Root) -> dict[str, Any]:
         "enclosure": root.enclosure and {name: getattr(root.enclosure, name).tolist() for name in _FIELDS},
         "index": root.index,
         "regular": root.regular,
-        "condition": _finite(root.condition),
         "margin": _finite(root.margin),
-        "dlambda_dalpha": None if root.dlambda_dalpha is None else root.dlambda_dalpha.tolist(),
+        **(_in_space(root) if root.lambda_t.ndim == 2 else _in_plane(root)),
     }
+
+
+def _in_plane(root: Root) -> dict[str, Any]:
+    slope = root.dlambda_dalpha
+    return {"condition": _finite(root.condition), "dlambda_dalpha": None if slope is None else slope.tolist()}
+
+
+def _in_space(root: Any) -> dict[str, Any]:
+    return {"slip_angle": [None if angles[0] != angles[0] else angles for angles in root.slip_angle.tolist()]}
 
 
 def _family(family: RootFamily) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from enumsol.cli import report
-from enumsol.cli.common import ExitStatus, finish, load_problem, note, parse_alpha, so_far, workers
+from enumsol.cli.common import ExitStatus, finish, load_any_problem, note, parse_alpha, so_far, workers
 from enumsol.cli.options import (
     Arithmetic,
     JsonFile,
@@ -27,6 +27,7 @@ from enumsol.texts import counted
 if TYPE_CHECKING:
     from enumsol.checks import Alpha
     from enumsol.problem import ContactProblem
+    from enumsol.problem3d import ContactProblem3D
     from enumsol.roots.root_set import RootSet
 
 Method = Literal["tree", "exhaustive"]
@@ -72,7 +73,7 @@ def roots(
     if jobs > 1 and method != "tree":
         raise InvalidArgumentError(f"--jobs is {jobs} with the exhaustive method; expected 1 job, or the method tree")
     check_writable(proof_file, "--proof")
-    value, body = parse_alpha(alpha), load_problem(problem)
+    value, body = parse_alpha(alpha), load_any_problem(problem)
     limits = {"stop_after": stop_after, "max_nodes": max_nodes, "time_limit": time_limit}
     found, ended = so_far(
         lambda: _search(body, value, jobs, arithmetic=arithmetic, method=method, proof_path=proof_file, **limits)
@@ -90,7 +91,7 @@ def roots(
     finish(ended, _status(found))
 
 
-def _search(problem: ContactProblem, alpha: Alpha, jobs: int, **options: Any) -> RootSet:
+def _search(problem: ContactProblem | ContactProblem3D, alpha: Alpha, jobs: int, **options: Any) -> RootSet:
     from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help
 
     with workers(jobs) as executor, SearchDisplay() as display:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far, workers
+from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, parse_interval, so_far, workers
 from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, count, csv, number, seconds
 from enumsol.cli.output import as_json, check_outputs, deliver
 from enumsol.cli.progress import Display
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from enumsol.checks import Alpha
     from enumsol.problem import ContactProblem
+    from enumsol.problem3d import ContactProblem3D
 
 #: Names of the columns on the terminal, explained by `_CAPTION` underneath.
 _NAMES = {
@@ -25,11 +26,12 @@ _NAMES = {
     "with_stick": "stick",
     "with_slip_plus": "slip+",
     "with_slip_minus": "slip-",
+    "with_slip": "slip",
     "index_sum": "index sum",
 }
 #: Columns that count solutions; a row whose search was cut short shows what it found as a lower bound.
-_COUNTS = ("roots", "families", "open", "stick", "slip+", "slip-")
-_CAPTION = "open, stick, slip+, slip-: how many of the roots have a node in that status"
+_COUNTS = ("roots", "families", "open", "stick", "slip+", "slip-", "slip")
+_CAPTION = "{}: how many of the roots have a node in that status"
 #: Longer tables are printed as runs of equal counts.
 _ROWS = 40
 _FIRST, _LAST = "first alpha", "last alpha"
@@ -61,7 +63,7 @@ def table(
     result could not be written, 141 when nobody read it any more.
     """
     check_outputs(json=json_file, csv=csv_file)
-    values, body = _alphas(first, last, samples, alphas), load_problem(problem)
+    values, body = _alphas(first, last, samples, alphas), load_any_problem(problem)
     limits = {"max_nodes": max_nodes, "time_limit": time_limit}
     options = {name: limit for name, limit in limits.items() if limit is not None}
     frame, ended = so_far(lambda: _search(body, values, arithmetic, jobs, options))
@@ -92,7 +94,11 @@ def _alphas(first: str | None, last: str | None, samples: int, listed: str | Non
 
 
 def _search(
-    problem: ContactProblem, alphas: list[Alpha], arithmetic: Arithmetic, jobs: int, options: dict[str, Any]
+    problem: ContactProblem | ContactProblem3D,
+    alphas: list[Alpha],
+    arithmetic: Arithmetic,
+    jobs: int,
+    options: dict[str, Any],
 ) -> pd.DataFrame:
     from enumsol.branches import multiplicity_table
 
@@ -129,9 +135,11 @@ def _as_text(frame: pd.DataFrame, asked: int, ended: EnumsolError | None) -> str
     shown["index sum"] = shown["index sum"].map("{:+d}".format, na_action="ignore").astype(object).where(known, "?")
     if _gaps(frame).any():
         for name in _COUNTS:
+            if name not in shown:
+                continue
             shown[name] = shown[name].astype(str).where(~_gaps(frame), ">=" + shown[name].astype(str))
     shown["complete"] = ["yes" if value else "no" for value in shown["complete"]]
-    captions = [_CAPTION]
+    captions = [_CAPTION.format(", ".join(name for name in _COUNTS[2:] if name in shown))]
     if len(shown) > _ROWS:
         shown = _runs(shown)
         captions.append(_RUNS_CAPTION)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from enumsol.cli.common import ExitStatus, load_problem
+from enumsol.cli.common import ExitStatus, load_any_problem
 from enumsol.cli.options import ProblemArgument
 
 
@@ -33,7 +33,7 @@ def verify(
     from enumsol.checker.verify import verify as check
     from enumsol.proof.proof_file import Proof
 
-    report = check(load_problem(problem), Proof.load(proof), _show_progress if sys.stderr.isatty() else None)
+    report = check(load_any_problem(problem), Proof.load(proof), _show_progress if sys.stderr.isatty() else None)
     if sys.stderr.isatty():
         typer.echo("\r\033[K", nl=False, err=True)
     typer.echo(repr(report))

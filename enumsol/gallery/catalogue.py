@@ -132,10 +132,12 @@ def _large() -> Iterator[GalleryEntry]:
 
 
 def _solids() -> Iterator[GalleryEntry]:
-    yield GalleryEntry("one-node-3d", "one node by its compliance: a public test", 0.0, None, one_node_3d, 3)
-    for p, cells in ((4, (2, 1, 2)), (9, (3, 2, 2)), (16, (4, 3, 2)), (100, (10, 9, 4))):
+    yield GalleryEntry("one-node-3d", "one node by its compliance: a public test", 0.0, 1, one_node_3d, 3)
+    jamming = partial(one_node_3d, ((2.0, 1.0, 0.2), (1.0, 2.0, 0.1), (0.2, 0.1, 1.0)), (0.9, 6.45, -0.4), 5.0)
+    yield GalleryEntry("one-node-3d-3", "one node that is jammed, slides or is open", 0.0, 3, jamming, 3)
+    for p, cells, roots in ((4, (2, 1, 2), 1), (9, (3, 2, 2), 1), (16, (4, 3, 2), 1), (100, (10, 9, 4), None)):
         summary = f"block in 3D on {p} contact nodes, pressed and sheared"
-        yield GalleryEntry(f"block3d-{p}", summary, 0.5, None, partial(block3d, *cells), 3)
+        yield GalleryEntry(f"block3d-{p}", summary, 0.5, roots, partial(block3d, *cells), 3)
 
 
 #: All named problems, by name.

@@ -15,6 +15,7 @@ from enumsol import branch_graph, checker, enumerate_roots, write_problem
 
 ROOT = Path(enumsol.__file__).parent
 CHECKERS = ("enumsol.checker.verify", "enumsol.checker.graph")
+IN_SPACE = {"enumsol.checker.space", "enumsol.kernel.space", "enumsol.condensation.space", "enumsol.sectors"}
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
 SEARCH = (
     "enumsol.arithmetic.algebraic",
@@ -32,18 +33,29 @@ SEARCH = (
 )
 #: What may write a false proof and accept it: of these modules the search uses no more than these names; None: all.
 SHARED = {
+    "arithmetic.balls": {"SAFE"},
     "arithmetic.rationals": {"is_positive_definite", "rational", "rational_matrix", "to_fraction"},
     "condensation.affine": {"exactly_at"},
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
+    "condensation.space": {"EnclosedSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "vanishing_alpha"},
     "kernel.interval": {"EnclosedPiece", "as_computed", "interval_exclusion_margins"},
     "kernel.point": {"VerifiedSelection", "exclusion_margin", "holds_no_root", "solve_selection"},
     "kernel.rows": None,
+    "kernel.space": None,
     "proof.proof_file": {"Proof", "ProofWriter", "Recorder", "fraction_text", "packed"},
     "proof.reading": {"fits", "rational_text"},
+    "sectors": None,
 }
 #: Rooms of such modules, and the checkers' own, of which the search uses nothing.
-TRUSTED = ("enumsol.arithmetic.", "enumsol.checker.", "enumsol.condensation.", "enumsol.kernel.", "enumsol.proof.")
+TRUSTED = (
+    "enumsol.arithmetic.",
+    "enumsol.checker.",
+    "enumsol.condensation.",
+    "enumsol.kernel.",
+    "enumsol.proof.",
+    "enumsol.sectors",
+)
 #: Of these rooms what proves nothing: the data, and S and g as computed.
 DATA = {"condensation.condensed", "condensation.data", "condensation.factorization"}
 
@@ -98,7 +110,7 @@ def closure_of(modules):
 
 def test_no_module_of_the_search_is_imported_however_indirectly():
     closure = closure_of(CHECKERS)
-    assert closure >= {*CHECKERS, "enumsol.checker.rational", "enumsol.checker.hull"}
+    assert closure >= {*CHECKERS, *IN_SPACE, "enumsol.checker.rational", "enumsol.checker.hull"}
     assert not {module for module in closure if is_search(module)}
     # the public names stand in a module that imports for types only
     assert all(what is None for module in closure for name, what in imports_of(module) if name == "enumsol")
@@ -158,6 +170,23 @@ def test_no_module_of_the_search_is_loaded_by_a_verification(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     modules = set(json.loads(done.stdout.splitlines()[-1]))
     assert modules >= {*CHECKERS, "enumsol.checker.hull"}
+    assert not {module for module in modules if is_search(module)}
+    assert not modules & IN_SPACE
+
+
+def test_a_proof_in_space_loads_no_more_than_the_checker(tmp_path):
+    problem = enumsol.gallery.block3d(2, 1, 2)
+    write_problem(problem, tmp_path / "0.npz")
+    enumerate_roots(problem, 1.0).proof.save(tmp_path / "0.proof")
+    code = (
+        "import sys, json, enumsol; from enumsol.checker.verify import verify; "
+        "from enumsol.proof.proof_file import Proof; "
+        f"assert verify(enumsol.read_problem('{tmp_path}/0.npz'), Proof.load('{tmp_path}/0.proof')).complete; "
+        "print(json.dumps(sorted(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    modules = set(json.loads(done.stdout.splitlines()[-1]))
+    assert modules >= IN_SPACE
     assert not {module for module in modules if is_search(module)}
 
 

@@ -1,0 +1,220 @@
+"""Exclusions of proofs in 3D decided in rationals, from docs/proof_format.md (section 7) alone."""
+
+import hashlib
+import struct
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from problems3d import from_compliance
+from proof_tools import copied, leaves_of, proof_of
+from space_proofs import case, of_kind, values_of, with_values
+
+from enumsol import ContactProblem3D, verify
+from enumsol.checker.space import SpaceChecker
+
+
+def solved(A, B):
+    """A^-1 B by elimination in Fractions."""
+    n = len(A)
+    rows = [[*a, *b] for a, b in zip(A, B, strict=True)]
+    for k in range(n):
+        pivot = next(i for i in range(k, n) if rows[i][k])
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        rows[k] = [x / rows[k][k] for x in rows[k]]
+        for i in range(n):
+            if i != k and rows[i][k]:
+                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
+    return [row[n:] for row in rows]
+
+
+def fractions(array):
+    return [[Fraction(x) for x in row] for row in np.atleast_2d(array).tolist()]
+
+
+class Space:
+    """The problem of section 7.1 at alpha = a."""
+
+    def __init__(self, problem, a=0):
+        p = problem.p
+        B = fractions(np.vstack([M.toarray() for M in (problem.Bn, problem.Bt1, problem.Bt2)]))
+        slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
+        f = [Fraction(x) + a * Fraction(y) for x, y in zip(problem.f.tolist(), slope.tolist(), strict=True)]
+        offset = [Fraction(x) for x in [*problem.gap.tolist(), *problem.slip_offset.T.ravel().tolist()]]
+        X = solved(
+            fractions(problem.A.toarray()), [[*column, x] for column, x in zip(zip(*B, strict=True), f, strict=True)]
+        )
+        product = [
+            [sum(b * x for b, x in zip(row, column, strict=True)) for column in zip(*X, strict=True)] for row in B
+        ]
+        self.F = [
+            [Fraction(x) + a * Fraction(y) for x, y in zip(F.tolist(), slope.tolist(), strict=True)]
+            for F, slope in zip(problem.friction, problem.friction_slope, strict=True)
+        ]
+        # places in (lambda_n, lambda_t1, lambda_t2) and factors D of the components of y
+        self.y = [(i, Fraction(1)) for i in range(p)]
+        self.tau = {}
+        for i in range(p):
+            for k in range(2):
+                if self.F[k][i] > 0:
+                    self.tau[i, k] = len(self.y)
+                    self.y.append(((1 + k) * p + i, self.F[k][i]))
+        self.S = [[product[i][j] * c * d for j, d in self.y] for i, c in self.y]
+        self.g = [c * (product[i][-1] - offset[i]) for i, c in self.y]
+
+    def row(self, kind, node, number):
+        """(coefficients on y, coefficients on w) of section 7.4."""
+        t = [self.tau.get((node, k)) for k in range(2)]
+        if kind == 0:
+            return {}, {node: -1}
+        if kind == 1:
+            return {node: 1}, {}
+        if kind in (2, 3):
+            return ({t[number]: 1}, {}) if kind == 2 else ({}, {t[number]: 1})
+        if kind in (4, 5):
+            (only,) = (k for k in t if k is not None)
+            return ({node: 1, only: -number}, {}) if kind == 4 else ({}, {only: number})
+        d, e = direction(number), direction(following(number))
+        if kind == 6:
+            return {node: 1, t[0]: -d[0], t[1]: -d[1]}, {}
+        if kind == 7:
+            return {t[0]: d[0] + e[0], t[1]: d[1] + e[1], node: -(1 + d[0] * e[0] + d[1] * e[1])}, {}
+        return {}, ({t[1]: d[0], t[0]: -d[1]} if kind == 8 else {t[0]: e[1], t[1]: -e[0]})
+
+    def allowed(self, code, kind, number):
+        """The table of section 7.4."""
+        table = {0: "+EE.+.+", 1: "E+.E+.+", 4: "E+.....", 5: "E+..+.+", 6: "++..+.+"}
+        if code in (2, 3):
+            forward = 1 if code == 2 else -1
+            return {0: "E", 1: "+", 4: "E" if number == forward else "+", 5: "+" if number == forward else "."}.get(
+                kind, "."
+            )
+        if kind > 6:
+            inner = code - 8
+            while code > 8 and inner > number:
+                inner //= 2
+            return "+" if code > 8 and inner == number else "."
+        return (table[code] if code < 8 else "E+....+")[kind]
+
+    def bound(self, codes, rows, values, force, length):
+        """The left-hand side of (4.2), or None where a multiplier is not allowed."""
+        size = len(self.g)
+        v, constant = list(self.g), Fraction(0)
+        for (kind, node, number), value in zip(rows, values, strict=True):
+            sign = self.allowed(codes[node], kind, number)
+            if sign == "." or (sign == "+" and value < 0):
+                return None
+            forces, displacements = self.row(kind, node, number)
+            u = Fraction(value) * Fraction(2) ** (length[node] if forces else force[node])
+            for i, c in forces.items():
+                v[i] += u * c
+            for i, c in displacements.items():
+                constant += u * c * self.g[i]
+                for j in range(size):
+                    v[j] -= u * c * self.S[i][j]
+        z = solved(self.S, [[x] for x in v])
+        return -constant - sum(x * y[0] for x, y in zip(v, z, strict=True)) / 4
+
+
+def direction(number):
+    """(7.2)."""
+    first = 1 << (number.bit_length() - 1)
+    t = Fraction(4 * (number - first), first)
+    q, s = divmod(t, 1)
+    x, y = (1 - s * s) / (1 + s * s), 2 * s / (1 + s * s)
+    for _ in range(q):
+        x, y = -y, x
+    return (63 * x - 16 * y) / 65, (16 * x + 63 * y) / 65
+
+
+def following(number):
+    first = 1 << (number.bit_length() - 1)
+    return number + 1 if number + 1 < 2 * first else first
+
+
+def excluded(problem, records, alpha=0):
+    """Whether all exclusions of a proof hold in rationals."""
+    space, header = Space(problem, alpha), records[0]
+    for k, codes in leaves_of(records):
+        if records[k][0] == "x":
+            bound = space.bound(codes, records[k][1], values_of(records[k]), header["force"], header["length"])
+            if bound is None or not bound > 0:
+                return False
+    return True
+
+
+@pytest.mark.parametrize("name", [(1, 22), (1, 0), (2, 0), "end", "one tangent"], ids=str)
+def test_exclusions_hold_in_rationals(name):
+    problem, _, records, _ = case(name)
+    assert of_kind(records, "x")
+    assert excluded(problem, records)
+
+
+def test_what_is_accepted_of_changed_multipliers_holds_in_rationals():
+    rng = np.random.default_rng(8)
+    counts = [0, 0]
+    for name in ((1, 22), (2, 0), "one tangent"):
+        problem, _, records, _ = case(name)
+        space, header = Space(problem), records[0]
+        codes = dict(leaves_of(records))
+        checker = SpaceChecker(problem, None)
+        checker._read_header(header)
+        for k in of_kind(records, "x"):
+            for _ in range(15):
+                rows, values = copied(records[k][1]), values_of(records[k])
+                j = int(rng.integers(len(rows)))
+                values[j] *= float(rng.choice((0.0, 0.5, 1.01, 1.2, 2.0, -1.0)))
+                if rng.random() < 0.3:
+                    rows[j][2] = int(rng.integers(4, 40)) if rows[j][0] > 5 else rows[j][2]
+                accepted = checker._leaf(codes[k], with_values(["x", rows, ""], values)) is None
+                bound = space.bound(codes[k], rows, values, header["force"], header["length"])
+                assert accepted == (bound is not None and bound > 0)
+                counts[accepted] += 1
+    assert min(counts) > 20
+
+
+def test_the_fingerprint_is_that_of_the_document():
+    rng = np.random.default_rng(2)
+    A = sp.csc_array(np.diag([2.0, 3.0, 4.0]))
+    eye = np.eye(3)
+    problem = ContactProblem3D(
+        A,
+        eye[:1],
+        eye[1:2],
+        eye[2:],
+        rng.normal(size=3),
+        0.25,
+        (0.5, 0.75),
+        (1.0, 2.0),
+        rng.normal(size=3),
+        [[0.1, 0.2]],
+    )
+    digest = hashlib.sha256(b"enumsol problem in 3D, 1")
+    matrices = [
+        part for M in (A, *(sp.csc_array(eye[k : k + 1]) for k in range(3))) for part in (M.indptr, M.indices, M.data)
+    ]
+    vectors = (problem.f, [0.25], [0.5], [0.75], [1.0], [2.0], problem.load_slope, [0.1, 0.2])
+    for part in ([3, 1], *matrices, *vectors):
+        kind = "q" if np.asarray(part).dtype.kind == "i" else "d"
+        digest.update(struct.pack(f"<{len(part)}{kind}", *part) + b"|")
+    assert digest.hexdigest() == problem.fingerprint
+
+
+def test_balls_hold_the_exact_system():
+    """Load, friction, gap and slip offset at an alpha that is no float."""
+    S = np.array([[4.0, 1.0, 0.5], [1.0, 3.0, -1.0], [0.5, -1.0, 2.0]])
+    more = {"gap": 0.1, "slip_offset": [[0.3, -0.7]], "load_slope": np.array([0.1, 0.7, -0.3])}
+    problem = from_compliance(S, np.array([1.0, 2.0, 0.5]), (0.3, 0.7), friction_slope=(0.1, 0.9), **more)
+    header = copied(case((1, 0))[2][0])
+    header |= {"problem": problem.fingerprint, "alpha": "1/3"}
+    checker = SpaceChecker(problem, None)
+    checker._read_header(header)
+    found, exact = checker.system, Space(problem, Fraction(1, 3))
+    force, length = (Fraction(2) ** header[key][0] for key in ("force", "length"))
+    for i in range(3):
+        assert abs(Fraction(found.g[i]) - exact.g[i] / length) <= Fraction(found.g_rad[i])
+        for j in range(3):
+            assert abs(Fraction(found.S[i, j]) - exact.S[i][j] * force / length) <= Fraction(found.S_rad[i, j])
+    assert np.all(found.S_rad < 1e-14 * np.max(found.S))
+    assert verify(problem, proof_of([header, ["u", ""], {"roots": 0, "undecided": 1, "leaves": 1}])).ok

@@ -1,0 +1,359 @@
+"""Proofs about problems in 3D: accepted as they are, refused with a reason when they were tampered with."""
+
+import numpy as np
+import pytest
+from problems3d import from_compliance
+from proof_tools import copied, leaves_of, proof_of
+from space_proofs import RANDOM, Truth, case, mutant, of_kind, random_problem, values_of, with_values
+
+import enumsol
+from enumsol import Proof, ProofFormatError, enumerate_roots, gallery, verify
+from enumsol.checker.stability import stability_radius
+from enumsol.kernel.space import OPEN, STICK
+from enumsol.sectors import DEEPEST, SECTORS
+
+BLOCKS = [("block", cells, alpha) for cells in ((2, 1, 2), (3, 2, 2)) for alpha in (0.5, 1.0, 3.0)]
+NAMES = [*RANDOM, "end", "one tangent", *BLOCKS]
+SEVERAL = (2, 0)
+
+
+def refused(name, records):
+    """The reasons why tampered records are refused."""
+    report = verify(case(name)[0], proof_of(records))
+    assert not report.ok
+    assert not report.complete
+    assert "REFUSED" in repr(report)
+    return " ".join(report.failures)
+
+
+@pytest.mark.parametrize("name", NAMES, ids=str)
+def test_proofs_are_accepted(name):
+    problem, alpha, records, data = case(name)
+    report = verify(problem, Proof(data))
+    assert report.complete, report
+    roots = enumerate_roots(problem, alpha)
+    assert (report.roots, report.families, report.alpha) == (len(roots), 0, alpha)
+    assert report.leaves == len(leaves_of(records))
+    assert sum(root.index for root in roots) == 1
+
+
+@pytest.mark.parametrize("name", RANDOM, ids=str)
+def test_the_count_is_known(name):
+    problem, _, _, data = case(name)
+    assert verify(problem, Proof(data)).roots == RANDOM[name]
+
+
+def test_a_root_on_the_end_of_a_sector_counts_once():
+    problem, _, records, _ = case("end")
+    assert len(of_kind(records, "r")) == 2
+    assert verify(problem, proof_of(records)).roots == 1
+    records = copied(records)
+    records[-1]["roots"] = 2
+    assert "the leaves give" in refused("end", records)
+
+
+def test_roots_that_cannot_be_told_apart_leave_the_count_open(monkeypatch):
+    problem, _, records, _ = case("end")
+    records = copied(records)
+    records[-1]["roots"] = 2
+    monkeypatch.setattr("enumsol.kernel.space.same_root", lambda one, other: None)
+    report = verify(problem, proof_of(records))
+    assert report.ok
+    assert not report.complete
+    assert (report.roots, report.undecided) == (2, 1)
+
+
+def test_the_unloaded_body():
+    problem = from_compliance(np.eye(3), np.zeros(3), (0.5, 0.5))
+    report = verify(problem, enumerate_roots(problem, 0.0).proof)
+    assert report.complete
+    assert (report.roots, report.leaves) == (1, 1)
+    records = copied(case((1, 0))[2])
+    assert "not unloaded" in refused((1, 0), [records[0], ["z"], {"roots": 1, "undecided": 0, "leaves": 1}])
+
+
+def test_undecided_leaves_are_counted():
+    problem = case(SEVERAL)[0]
+    found = enumerate_roots(problem, 0.0, max_nodes=3)
+    report = verify(problem, found.proof)
+    assert report.ok
+    assert not report.complete
+    assert report.undecided == len(found.undecided) > 0
+
+
+# -- other problems and other kinds ------------------------------------------------------------------------------------
+
+
+def test_plane_and_space_are_told_apart():
+    plane, space = gallery.one_node_triangle(), case((1, 0))[0]
+    in_plane, in_space = enumerate_roots(plane, 5.0).proof, enumerate_roots(space, 0.0).proof
+    graph = enumsol.branch_graph(plane, (4, 5)).proof
+    for problem, proof in ((plane, in_space), (space, in_plane), (space, graph)):
+        report = verify(problem, proof)
+        assert not report.ok
+        assert "another problem" in report.failures[0]
+    with pytest.raises(enumsol.InvalidArgumentError, match=r"problem is a dict; expected a ContactProblem"):
+        verify({}, in_space)
+    with pytest.raises(enumsol.InvalidArgumentError, match=r"problem is a ContactProblem3D; expected a ContactProblem"):
+        stability_radius(space, in_space)
+
+
+def test_another_problem_and_another_alpha():
+    records = copied(case((1, 22))[2])
+    assert "another problem" in " ".join(verify(random_problem(1, 23), proof_of(records)).failures)
+    name = BLOCKS[1]
+    records = copied(case(name)[2])
+    for alpha in ("3", "1/2"):
+        # a proof may hold elsewhere but not say something wrong there; roots move with friction
+        records[0]["alpha"] = alpha
+        refused(name, records)
+
+
+def test_friction_beyond_floats_negative_or_a_function_is_refused():
+    S, g = np.eye(3), np.array([1.0, 2.0, 0.5])
+    problem = from_compliance(S, g, (0.5, 0.5), friction_slope=(1e300, 1.0))
+    records = copied(enumsol_records(problem))
+    records[0]["alpha"] = "1" + "0" * 20
+    report = verify(problem, proof_of(records))
+    assert "underflows float64" in " ".join(report.failures)
+    records[0]["alpha"] = "-1"
+    assert "negative" in " ".join(verify(problem, proof_of(records)).failures)
+    by_slip = from_compliance(S, g, lambda node, slip: 0.5 + 0.1 * node / (1 + slip))
+    assert "depends on the solution" in " ".join(verify(by_slip, proof_of(records)).failures)
+
+
+def enumsol_records(problem):
+    from proof_tools import records_of
+
+    return records_of(enumerate_roots(problem, 0.0).proof)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("kind", None),
+        ("kind", "graph"),
+        ("data", "condensed"),
+        ("p", 2),
+        ("force", []),
+        ("force", [901]),
+        ("length", [0.0]),
+        ("length", "0"),
+        ("alpha", "1e3"),
+        ("alpha", 0),
+    ],
+)
+def test_headers_that_make_no_sense(key, value):
+    records = copied(case((1, 22))[2])
+    records[0][key] = value
+    refused((1, 22), records)
+
+
+def test_units_need_one_product():
+    records = copied(case(SEVERAL)[2])
+    records[0]["force"][0] += 1
+    assert "common scaling" in refused(SEVERAL, records)
+
+
+# -- the tree ----------------------------------------------------------------------------------------------------------
+
+
+def sectors_at(records):
+    """Branchings into sectors."""
+    return [k for k in of_kind(records, "b") if min(records[k][2]) > SECTORS or len(records[k][2]) == 5]
+
+
+def test_gaps_between_sectors():
+    _, _, records, _ = case(SEVERAL)
+    places = sectors_at(records)
+    assert places
+    for k in places:
+        for change in ("drop", "neighbour", "twice", "wider"):
+            changed = copied(records)
+            codes = changed[k][2]
+            j = codes.index(max(codes))
+            if change == "drop":
+                del codes[j]
+            else:
+                codes[j] = {"neighbour": codes[j] + 1, "twice": codes[j - 1], "wider": (codes[j] + SECTORS) // 2}[
+                    change
+                ]
+            assert "does not cover" in refused(SEVERAL, changed)
+
+
+def test_branchings_of_the_wrong_kind():
+    _, _, records, _ = case((1, 22))
+    first = of_kind(records, "b")[0]
+    for record in (["b", 1, [0, 5]], ["b", 0, [0, 4]], ["b", 0, [0, 1, 2, 3]], ["b", -1, [0, 5]], ["b", True, [0, 5]]):
+        changed = copied(records)
+        changed[first] = record
+        assert "does not cover" in refused((1, 22), changed)
+
+
+def test_sectors_end_at_a_depth():
+    _, _, records, _ = case((1, 22))
+    code, changed = (
+        4,
+        [copied(records[0]), ["b", 0, [0, 5]], ["u", ""], ["b", 0, [1, *(SECTORS + k for k in range(4, 8))]]],
+    )
+    changed.append(["u", ""])
+    for _ in range(DEEPEST):
+        code *= 2
+        changed.append(["b", 0, [SECTORS + code, SECTORS + code + 1]])
+    assert "does not cover" in refused((1, 22), changed)
+
+
+def test_leaves_merged_and_doubled():
+    _, _, records, _ = case(SEVERAL)
+    for k in of_kind(records, "x", "n", "r"):
+        changed = copied(records)
+        del changed[k]
+        refused(SEVERAL, changed)
+        changed.insert(k, copied(records[k]))
+        changed.insert(k, copied(records[k]))
+        refused(SEVERAL, changed)
+    # a branching replaced by one leaf of its own
+    for k in of_kind(records, "b"):
+        changed = copied(records)
+        changed[k] = ["n"]
+        refused(SEVERAL, changed)
+
+
+@pytest.mark.parametrize("key", ["roots", "undecided", "leaves"])
+def test_wrong_counts(key):
+    for step in (-1, 1):
+        records = copied(case(SEVERAL)[2])
+        records[-1][key] += step
+        assert "the counts at the end" in refused(SEVERAL, records)
+
+
+# -- leaves ------------------------------------------------------------------------------------------------------------
+
+
+def test_wrong_claims_about_leaves():
+    _, _, records, _ = case(SEVERAL)
+    codes = dict(leaves_of(records))
+    for k in of_kind(records, "r", "n"):
+        changed = copied(records)
+        if records[k][0] == "r":
+            changed[k] = ["n"]
+            expected = "it holds a root"
+        else:
+            changed[k] = copied(records[of_kind(records, "r")[0]])
+            expected = "it holds no root"
+        assert expected in refused(SEVERAL, changed), codes[k]
+    for k in of_kind(records, "x"):
+        if {5, 6} & set(codes[k]):
+            changed = copied(records)
+            changed[k] = ["n"]
+            assert "still open" in refused(SEVERAL, changed)
+
+
+def test_roots_moved_and_turned():
+    _, _, records, _ = case(SEVERAL)
+    for k in of_kind(records, "r"):
+        for index in (-records[k][3], 0, 1.0 * records[k][3], str(records[k][3])):
+            changed = copied(records)
+            changed[k][3] = index
+            assert "its index is wrong" in refused(SEVERAL, changed)
+        for j in range(len(records[k][1])):
+            if records[k][2][j] > 1e-200:
+                changed = copied(records)
+                changed[k][1][j] += 8 * records[k][2][j]
+                assert "its enclosure does not hold" in refused(SEVERAL, changed)
+        changed = copied(records)
+        changed[k][2] = [0.0] * len(changed[k][2])
+        assert "its enclosure does not hold" in refused(SEVERAL, changed)
+        changed[k][2] = changed[k][2][1:]
+        assert "expected 6 numbers" in refused(SEVERAL, changed)
+
+
+def test_multipliers_of_the_wrong_sign_and_rows_of_others():
+    _, _, records, _ = case(SEVERAL)
+    for k in of_kind(records, "x"):
+        changed = copied(records)
+        changed[k] = with_values(records[k], [-v for v in values_of(records[k])])
+        assert "do not exclude" in refused(SEVERAL, changed)
+        changed = copied(records)
+        for row in changed[k][1]:
+            row[1] = 1 - row[1]
+        refused(SEVERAL, changed)
+
+
+#: No such node, kind, number or type of number.
+NO_ROWS = ([0, 2, 0], [0, -1, 0], [10, 0, 4], [-1, 0, 4], [6, 0, 2**40], [6, 0, 3], [8, 0, 0], [0, 0, 1], [2, 0, 2])
+
+
+@pytest.mark.parametrize(
+    "row", [*NO_ROWS, [2, 0, -1], [4, 0, 1], [6, 0, 4.0], [6, True, 4], [6, 0], "x", None], ids=str
+)
+def test_rows_that_do_not_exist(row):
+    _, _, records, _ = case(SEVERAL)
+    k = of_kind(records, "x")[0]
+    changed = copied(records)
+    changed[k] = with_values(["x", [*records[k][1], row], ""], [*values_of(records[k]), 0.0])
+    # a row that there is but not in this status is refused by its sign
+    assert "leaf" in refused(SEVERAL, changed)
+
+
+@pytest.mark.parametrize("text", ["AAAA", "A", 5, None, "\u00e9"])
+def test_multipliers_that_cannot_be_read(text):
+    _, _, records, _ = case(SEVERAL)
+    changed = copied(records)
+    changed[of_kind(records, "x")[0]][2] = text
+    assert "cannot be followed" in refused(SEVERAL, changed)
+
+
+def test_multipliers_have_to_be_finite():
+    _, _, records, _ = case(SEVERAL)
+    k = of_kind(records, "x")[0]
+    for value in (np.nan, np.inf, 1e308):
+        changed = copied(records)
+        changed[k] = with_values(records[k], [value] * len(records[k][1]))
+        assert "do not exclude" in refused(SEVERAL, changed)
+
+
+# -- mutants -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [(1, 22), SEVERAL, (2, 5), "end", "one tangent"], ids=str)
+def test_no_mutant_is_accepted_with_another_claim(name):
+    problem, _, records, data = case(name)
+    truth, accepted = Truth(problem), 0
+    rng = np.random.default_rng(12)
+    for _ in range(200):
+        proof, how = mutant(rng, records, data)
+        try:
+            report = verify(problem, proof)
+        except ProofFormatError:
+            continue
+        if report.ok:
+            accepted += 1
+            assert truth.agrees(report, proof), how
+        else:
+            assert report.failures
+    # some say the same in another way
+    assert 0 < accepted < 150
+
+
+def test_the_judge_of_mutants_sees_wrong_claims():
+    problem, _, records, data = case(SEVERAL)
+    report, truth = verify(problem, Proof(data)), Truth(problem)
+    assert truth.agrees(report, proof_of(records))
+    k = of_kind(records, "r")[0]
+    for change in ("index", "ball", "count"):
+        changed = copied(records)
+        if change == "index":
+            changed[k][3] *= -1
+        elif change == "ball":
+            changed[k][1][0] += 0.1
+        else:
+            changed[-1]["roots"] -= 1
+        assert not truth.agrees(report, proof_of(changed))
+
+
+def test_leaves_stand_for_all_statuses():
+    _, _, records, _ = case(SEVERAL)
+    codes = {codes for _, codes in leaves_of(records)}
+    assert {code for leaf in codes for code in leaf} >= {OPEN, STICK}
+    assert any(code > SECTORS for leaf in codes for code in leaf)
