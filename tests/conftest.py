@@ -26,6 +26,8 @@ UNTRACED = {
     "test_random_problems",
     "test_root_counts",
     "test_singular_selections",
+    "test_space_coupled",
+    "test_space_one_node",
 }
 
 

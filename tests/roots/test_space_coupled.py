@@ -52,3 +52,38 @@ def test_what_successive_approximations_reach():
         _, unreached = unmatched(roots, [forces(limit) for limit in away if limit.converged])
         assert {k for k, root in enumerate(roots) if root.index == -1} <= set(unreached)
     assert several >= 3
+
+
+#: lambda_n, tau / lambda_n and w of a node at a border: grazing, stick at its limit along an axis and beside it
+BORDERS = {
+    "grazing": (0, (0, 0), (0, 1, -2)),
+    "stick at its limit": (1, (1, 0), (0, 0, 0)),
+    "stick at its limit, oblique": (5, (0.6, 0.8), (0, 0, 0)),
+}
+REGULAR = {"open": (0, (0, 0), (-1, 0, 1)), "stick": (2, (0.5, 0), (0, 0, 0)), "slip": (1, (-1, 0), (0, -1, 0))}
+
+
+@pytest.mark.parametrize("beside", REGULAR)
+@pytest.mark.parametrize("border", BORDERS)
+def test_a_node_at_a_border_is_undecided_or_right(border, beside):
+    rng = np.random.default_rng(9)
+    X = rng.integers(-1, 2, size=(6, 6))
+    A, F, nodes = X @ X.T + np.eye(6), np.array([[1.0, 1.0], [0.5, 2.0]]), (BORDERS[border], REGULAR[beside])
+    lam, w = np.zeros(6), np.zeros(6)
+    for i, (n, tau, here) in enumerate(nodes):
+        lam[[i, 2 + i, 4 + i]] = n * np.array([1, *(F[i] * tau)])
+        w[[i, 2 + i, 4 + i]] = here
+    f = A @ w + lam
+    S = np.linalg.inv(A)
+    assert oracles3d.violation(S, S @ f, F, lam) < 1e-12
+    rows = np.eye(6)
+    problem = enumsol.ContactProblem3D(A, rows[:2], rows[2:4], rows[4:], f, friction=tuple(F.T))
+    roots = enumerate_roots(problem, 0, max_nodes=400)
+    here = [root for root in roots if unmatched([root], [lam]) == ([], [])]
+    assert here or roots.undecided
+    assert not roots.complete or (len(here) == 1 and roots.index_sum == 1)
+    for root in roots:
+        assert oracles3d.violation(S, S @ f, F, forces(root)) < 1e-9
+    if not here:
+        # the part of the tree that may hold it is among those left open
+        assert any(str(part.statuses[1]) in (beside, "None", "contact") for part in roots.undecided)
