@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from functools import cache
+from functools import lru_cache
 
 #: The status code of sector i is SECTORS + i.
 SECTORS = 8
@@ -23,7 +23,7 @@ def level_of(number: int) -> int:
     return number.bit_length() - 1
 
 
-@cache
+@lru_cache(maxsize=1 << 16)
 def start_of(number: int) -> tuple[Fraction, Fraction]:
     """Where a sector begins, a rational point of the circle: its cosine and sine, exactly."""
     place = Fraction(4 * (number - (1 << level_of(number))), 1 << level_of(number))
@@ -34,7 +34,7 @@ def start_of(number: int) -> tuple[Fraction, Fraction]:
     return (63 * x - 16 * y) / 65, (16 * x + 63 * y) / 65
 
 
-@cache
+@lru_cache(maxsize=1 << 16)
 def direction(number: int) -> tuple[float, float]:
     """Where a sector begins in floats, each off by at most half a unit in the last place."""
     x, y = start_of(number)

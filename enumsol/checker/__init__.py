@@ -20,8 +20,9 @@ What checker and search share
     - ``kernel.point`` and ``kernel.interval``: the exclusion inequality, the verified solve of a selection and the
       contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled copy of
       the inequality at one alpha);
-    - for problems in 3D, and loaded for their proofs only: ``kernel.space``, the rows and branchings, the exclusion
-      inequality, what a complete assignment holds and which leaves share a root; ``sectors``, the ends of sectors;
+    - for problems in 3D, and loaded for their proofs only: ``kernel.space``, the rows and branchings and the
+      exclusion inequality; ``kernel.leaves``, what a complete assignment holds and which leaves share a root;
+      ``kernel.ball_arrays``, linear systems of balls; ``sectors``, the ends of sectors;
       ``condensation.space``, balls for S and g in the variables in which friction is isotropic; ``problem3d``,
       ``body3d`` and ``friction``, the data and their checks;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes;

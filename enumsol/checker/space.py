@@ -14,25 +14,16 @@ from enumsol.checker.tree import TreeChecker
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.condensation.space import EnclosedSpace
-from enumsol.kernel.space import (
-    CONTACT,
-    FORCE,
-    GAP,
-    RIGHT,
-    UNDECIDED,
-    Open,
-    children_of,
-    distinct_roots,
-    exclusion_margin,
-    settle,
-)
+from enumsol.kernel.leaves import Open, distinct_roots, settle
+from enumsol.kernel.space import CONTACT, FORCE, GAP, RIGHT, UNDECIDED, children_of, exclusion_margin
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, rational_from, shown, shown_alpha
 from enumsol.sectors import DEEPEST, SECTORS, level_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.kernel.space import Row, SpaceRoot
+    from enumsol.kernel.leaves import SpaceRoot
+    from enumsol.kernel.space import Row
 
 #: Entries of a leaf's record, by its kind.
 _ENTRIES = {"x": 3, "n": 1, "r": 4, "z": 1, "u": 2}

@@ -13,7 +13,8 @@ from enumsol.arithmetic.balls import SAFE
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.space import EnclosedSpace, SpaceSystem
 from enumsol.errors import Interrupted, InvalidArgumentError, OutputError
-from enumsol.kernel.space import Ball, distinct_roots
+from enumsol.kernel.ball_arrays import Ball
+from enumsol.kernel.leaves import distinct_roots
 from enumsol.proof.proof_file import ProofWriter
 from enumsol.proof.reading import rational_text
 from enumsol.relaxation.space import SpaceEngine
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
     from enumsol.checks import Alpha
     from enumsol.condensation.condensed import CondensedProblem3D
-    from enumsol.kernel.space import SpaceRoot
+    from enumsol.kernel.leaves import SpaceRoot
     from enumsol.problem3d import ContactProblem3D
     from enumsol.proof.proof_file import Proof
     from enumsol.search.tree import SearchProgress

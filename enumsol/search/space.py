@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.kernel.space import Open, children_of, exclusion_margin, settle
+from enumsol.kernel.leaves import Open, settle
+from enumsol.kernel.space import children_of, exclusion_margin
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space import SpaceEngine, imposed
 from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.condensation.space import EnclosedSpace
-    from enumsol.kernel.space import SpaceRoot
+    from enumsol.kernel.leaves import SpaceRoot
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
     from enumsol.selections.solution import Codes

@@ -15,7 +15,14 @@ from enumsol import branch_graph, checker, enumerate_roots, write_problem
 
 ROOT = Path(enumsol.__file__).parent
 CHECKERS = ("enumsol.checker.verify", "enumsol.checker.graph")
-IN_SPACE = {"enumsol.checker.space", "enumsol.kernel.space", "enumsol.condensation.space", "enumsol.sectors"}
+IN_SPACE = {
+    "enumsol.checker.space",
+    "enumsol.kernel.space",
+    "enumsol.kernel.leaves",
+    "enumsol.kernel.ball_arrays",
+    "enumsol.condensation.space",
+    "enumsol.sectors",
+}
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
 SEARCH = (
     "enumsol.arithmetic.algebraic",
@@ -43,6 +50,8 @@ SHARED = {
     "kernel.point": {"VerifiedSelection", "exclusion_margin", "holds_no_root", "solve_selection"},
     "kernel.rows": None,
     "kernel.space": None,
+    "kernel.leaves": None,
+    "kernel.ball_arrays": None,
     "proof.proof_file": {"Proof", "ProofWriter", "Recorder", "fraction_text", "packed"},
     "proof.reading": {"fits", "rational_text"},
     "sectors": None,

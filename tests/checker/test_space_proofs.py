@@ -56,7 +56,7 @@ def test_roots_that_cannot_be_told_apart_leave_the_count_open(monkeypatch):
     problem, _, records, _ = case("end")
     records = copied(records)
     records[-1]["roots"] = 2
-    monkeypatch.setattr("enumsol.kernel.space.same_root", lambda one, other: None)
+    monkeypatch.setattr("enumsol.kernel.leaves.same_root", lambda one, other: None)
     report = verify(problem, proof_of(records))
     assert report.ok
     assert not report.complete

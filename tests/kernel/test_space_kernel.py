@@ -9,6 +9,8 @@ from space_proofs import on_the_end_of_a_sector, random_problem
 
 from enumsol import enumerate_roots
 from enumsol.condensation.space import EnclosedSpace, SpaceSystem
+from enumsol.kernel.ball_arrays import Ball, determinant_sign
+from enumsol.kernel.leaves import SpaceRoot, _cut, _Leaf, distinct_roots, same_root, settle
 from enumsol.kernel.space import (
     ALONG,
     CHORD,
@@ -29,18 +31,10 @@ from enumsol.kernel.space import (
     TANGENT,
     TAU,
     UNDECIDED,
-    Ball,
-    SpaceRoot,
-    _cut,
-    _determinant_sign,
-    _Leaf,
     children_of,
-    distinct_roots,
     exclusion_margin,
     row_sign,
     row_terms,
-    same_root,
-    settle,
 )
 from enumsol.sectors import DEEPEST, SECTORS, contains, end_number, start_of
 
@@ -313,6 +307,6 @@ def test_cut_boxes_hold_what_both_hold():
 
 def test_the_sign_of_a_determinant_with_columns_of_different_size():
     M = np.array([[1e-12, 2.0], [3e-12, -1.0]])
-    assert _determinant_sign(Ball(M, 1e-10 * np.abs(M))) == -1
-    assert _determinant_sign(Ball(M, np.abs(M))) == 0
-    assert _determinant_sign(Ball.exact(np.zeros((0, 0)))) == 1
+    assert determinant_sign(Ball(M, 1e-10 * np.abs(M))) == -1
+    assert determinant_sign(Ball(M, np.abs(M))) == 0
+    assert determinant_sign(Ball.exact(np.zeros((0, 0)))) == 1

@@ -1,0 +1,350 @@
+"""The trusted kernel in 3D: what a leaf holds, by Krawczyk's operator on balls (theory, section 12.3).
+
+A leaf gives every node a status: open, in contact without friction, slip+ or slip- along one axis, stick, or a sector
+of slip directions. What is concluded here holds for all data in the balls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
+from enumsol.kernel.ball_arrays import Ball, determinant_sign, smaller, solution
+from enumsol.kernel.space import OPEN, SLIP_PLUS, STICK
+from enumsol.sectors import SECTORS, direction, end_number
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space import EnclosedSpace
+
+    Array = NDArray[np.float64]
+
+#: A sector's box of directions is this share of its width wider on both sides: a root on an end lies inside two boxes.
+_WIDENED = 0.125
+#: Contractions of a box before the leaf is given up.
+_CONTRACTIONS = 10
+#: Contractions of a box that holds exactly one zero, down to rounding.
+_REFINEMENTS = 60
+
+
+def _cut(angle: Array, radius: Array, reach: Array, move: Ball) -> tuple[Array, Array]:
+    """The part of a box of angles that lies within ``move`` of its centre."""
+    low, high = np.maximum(move.mid - move.rad, -radius), np.minimum(move.mid + move.rad, radius)
+    middle = 0.5 * (low + high)
+    # low, high, their middle and the new centre are rounded by less than a unit each
+    return angle + middle, np.maximum(high - middle, middle - low) * SAFE + 4 * UNIT * reach
+
+
+@dataclass(frozen=True)
+class SpaceRoot:
+    """Exactly one root in a box of directions, regular: all conditions hold strictly.
+
+    Attributes
+    ----------
+    y, w : Ball of shape (m,)
+        Forces (lambda_n, tau) and displacements, scaled.
+    centre : (q, 2) array
+        A direction for every node in a sector; angles count from there.
+    angle, angle_rad : (q,) arrays
+        The root's directions.
+    reach : (q,) array
+        There is no other root with these statuses and angles up to ``reach``.
+    index : int
+    slack : float
+        A lower bound of the least slack.
+    """
+
+    y: Ball
+    w: Ball
+    centre: Array
+    angle: Array
+    angle_rad: Array
+    reach: Array
+    index: int
+    slack: float
+
+
+@dataclass(frozen=True)
+class Open:
+    """A leaf that is not settled.
+
+    Attributes
+    ----------
+    node : int or None
+        The node whose sector is the widest, or None where there are none.
+    """
+
+    node: int | None
+
+
+def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | None:
+    """What a leaf holds: exactly one root in its box, no root (None), or it is not settled."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _Leaf(system, codes).settle()
+
+
+class _Leaf:
+    """Equations of a leaf: y = E(psi) x with x = (lambda_n of the nodes in contact, tau of the sticking ones).
+
+    psi are angles of the slip directions d = cos psi c + sin psi c' from a direction c in every sector, c' a quarter
+    turn further. P picks w_n of the nodes in contact and the slips of the sticking ones: P (g - S E x) = 0. The
+    directions are zeros of G_i = v_i1 d_i2 - v_i2 d_i1.
+    """
+
+    def __init__(self, system: EnclosedSpace, codes: Sequence[int]) -> None:
+        self.system = system
+        self.S, self.g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
+        tau = system.tau
+        self.open = [i for i, code in enumerate(codes) if code == OPEN]
+        self.closed = [i for i, code in enumerate(codes) if code != OPEN]
+        self.stick = [i for i, code in enumerate(codes) if code == STICK]
+        self.sliding = [(i, 1.0 if codes[i] == SLIP_PLUS else -1.0) for i in self.closed if codes[i] in (2, 3)]
+        self.turning = [i for i, code in enumerate(codes) if code > SECTORS]
+        self.numbers = [codes[i] - SECTORS for i in self.turning]
+        self.rows = [*self.closed, *(int(t) for i in self.stick for t in tau[i] if t >= 0)]
+        self.column = [self.closed.index(i) for i in self.turning]
+        self.t = tau[self.turning].reshape(-1, 2)
+        E = np.zeros((len(system.g), len(self.rows)))
+        E[self.rows, np.arange(len(self.rows))] = 1.0
+        for i, sign in self.sliding:
+            E[int(np.max(tau[i])), self.closed.index(i)] = sign
+        self.E0 = E
+        self.centre, self.half = self._boxes()
+
+    def _boxes(self) -> tuple[Array, Array]:
+        """A direction in the middle of every sector, and an angle on both sides that covers it."""
+        centres, halves = [], []
+        for number in self.numbers:
+            a, b = (np.array(direction(n)) for n in (number, end_number(number)))
+            c = a + b
+            c /= np.hypot(*c)
+            # the angle to an end is 2 arcsin(|a - c| / 2), at most 1.12 |a - c| for sectors of a quarter
+            halves.append(1.12 * max(np.hypot(*(a - c)), np.hypot(*(b - c))) + 1e-14)
+            centres.append(c)
+        return np.array(centres).reshape(-1, 2), np.array(halves)
+
+    # -- what the leaf holds ---------------------------------------------------------------------------------------
+
+    def settle(self) -> SpaceRoot | Open | None:
+        q = len(self.turning)
+        open_leaf = Open(self.turning[int(np.argmax(self.half))] if q else None)
+        reach = (1.0 + 2.0 * _WIDENED) * self.half
+        angle, radius = np.zeros(q), reach.copy()
+        for _ in range(_CONTRACTIONS):
+            state = self._state(angle, radius)
+            if state is None:
+                return open_leaf
+            y, w, _, J = state
+            if self._broken(y, w, angle, radius):
+                return None
+            if not q:
+                return self._root(y, w, angle, radius, reach, None, open_leaf)
+            move = self._move(angle, radius, J)
+            if move is None:
+                return open_leaf
+            if np.any(np.abs(move.mid) > (move.rad + radius) * SAFE):
+                return None
+            # the box holds exactly one zero
+            inside = np.all(move.size < radius)
+            new_angle, new_radius = _cut(angle, radius, reach, move)
+            if inside:
+                return self._refined(new_angle, new_radius, reach, open_leaf)
+            if np.all(new_radius > 0.9 * radius):
+                return open_leaf
+            angle, radius = new_angle, new_radius
+        return open_leaf
+
+    def _move(self, angle: Array, radius: Array, J: Ball) -> Ball | None:
+        """Krawczyk's operator: a ball of psi - angle for all zeros psi in a box over which J holds dG/dpsi."""
+        point = self._state(angle, np.zeros(len(angle)))
+        if point is None:
+            return None
+        try:
+            Y = Ball.exact(np.asarray(np.linalg.inv(J.mid), dtype=np.float64))
+        except np.linalg.LinAlgError:
+            return None
+        return (Ball.exact(np.eye(len(angle))) - Y @ J) @ Ball(np.zeros(len(angle)), radius) - Y @ point[2]
+
+    def _refined(self, angle: Array, radius: Array, reach: Array, open_leaf: Open) -> SpaceRoot | Open | None:
+        """The one zero of a box, enclosed as closely as floats can."""
+        for _ in range(_REFINEMENTS):
+            if np.any(self._outside(angle, radius)):
+                return None
+            state = self._state(angle, radius)
+            move = None if state is None else self._move(angle, radius, state[3])
+            if move is None:
+                return open_leaf
+            new_angle, new_radius = _cut(angle, radius, reach, move)
+            if not np.all(new_radius <= radius + 8 * UNIT * reach):
+                return open_leaf
+            done = np.all(new_radius > 0.9 * radius)
+            angle, radius = new_angle, new_radius
+            if done:
+                break
+        state = self._state(angle, radius)
+        if state is None:
+            return open_leaf
+        y, w, _, J = state
+        if self._broken(y, w, angle, radius) or np.any(self._outside(angle, radius)):
+            return None
+        return self._root(y, w, angle, radius, reach, J, open_leaf)
+
+    def _outside(self, angle: Array, radius: Array) -> NDArray[np.bool_]:
+        """Which directions are outside of their sectors for certain; what lies there belongs to another leaf."""
+        return np.abs(angle) - radius > self.half * (1.0 + 1e-9)
+
+    def _root(
+        self, y: Ball, w: Ball, angle: Array, radius: Array, reach: Array, J: Ball | None, open_leaf: Open
+    ) -> SpaceRoot | Open:
+        slack = self._slacks(y, w, angle, radius)
+        if not np.all(slack > 0):
+            return open_leaf if len(angle) else Open(None)
+        E = self._directions(angle, radius)[0]
+        sign = determinant_sign(self.S[self.rows] @ E)
+        if J is not None:
+            sign *= determinant_sign(J)
+        if not sign:
+            return open_leaf
+        least = float(np.min(slack)) if len(slack) else np.inf
+        return SpaceRoot(y, w, self.centre, angle, radius, reach, sign, least)
+
+    # -- evaluation over a box -------------------------------------------------------------------------------------
+
+    def _directions(self, angle: Array, radius: Array) -> tuple[Ball, Ball, Ball]:
+        """E, d (q, 2) and d' (q, 2) over a box of angles."""
+        c, across = self.centre, np.stack([-self.centre[:, 1], self.centre[:, 0]], axis=1)
+        cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        # what is known of cos and sin is their derivatives; floats of a library are off by a few units
+        spread = (np.minimum(radius, 2.0) * SAFE + 64 * UNIT)[:, None] * np.ones((1, 2))
+        d = Ball(cos * c + sin * across, spread)
+        turned = Ball(cos * across - sin * c, spread)
+        mid, rad = self.E0.copy(), np.zeros_like(self.E0)
+        for k, column in enumerate(self.column):
+            mid[self.t[k], column], rad[self.t[k], column] = d.mid[k], d.rad[k]
+        return Ball(mid, rad), d, turned
+
+    def _state(self, angle: Array, radius: Array) -> tuple[Ball, Ball, Ball, Ball] | None:
+        """y, w, G and dG/dpsi over a box; None where the linear system is not proven regular in it."""
+        q, m = len(angle), len(self.g.mid)
+        E, d, turned = self._directions(angle, radius)
+        PS = self.S[self.rows]
+        x = solution(PS @ E, self.g[self.rows][:, None])
+        if x is None:
+            return None
+        y = (E @ x)[:, 0]
+        w = self.g - (self.S @ y[:, None])[:, 0]
+        # w vanishes where the equations say so, exactly
+        w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
+        if not q:
+            return y, w, Ball.exact(np.zeros(0)), Ball.exact(np.zeros((0, 0)))
+        point = None
+        if np.any(radius):
+            point = self._state(angle, np.zeros(q))
+            if point is None:
+                return None
+        span = Ball(np.zeros((q, 1)), radius[:, None])
+        pushed = z = span
+        for _ in range(1 if point is None else 2):
+            pushed = self._pushed(x[self.column] * turned, m)
+            solved = solution(PS @ E, PS @ pushed)
+            if solved is None:
+                return None
+            z = solved
+            if point is not None:
+                # the mean value form: what the box adds to the values in its middle, dx = -z dpsi
+                x = smaller(x, point[0][self.rows][:, None] - z @ span)
+        dy = pushed - E @ z
+        change = self.S @ dy
+        dv = Ball(-change.mid, change.rad)
+        if point is not None:
+            y = smaller(smaller(y, (E @ x)[:, 0]), point[0] + (dy @ span)[:, 0])
+            w = smaller(w, point[1] + (dv @ span)[:, 0])
+        t1, t2 = self.t[:, 0], self.t[:, 1]
+        d1, d2 = d[:, 0], d[:, 1]
+        G = w[t1] * d2 - w[t2] * d1
+        J = dv[t1] * d2[:, None] - dv[t2] * d1[:, None]
+        along = w[t1] * turned[:, 1] - w[t2] * turned[:, 0]
+        diagonal = np.arange(q)
+        corrected = J[diagonal, diagonal] + along
+        J.mid[diagonal, diagonal], J.rad[diagonal, diagonal] = corrected.mid, corrected.rad
+        return y, w, G, J
+
+    def _pushed(self, push: Ball, size: int) -> Ball:
+        """dE/dpsi x: what turning the directions alone does to y."""
+        q = len(self.turning)
+        pushed = Ball(np.zeros((size, q)), np.zeros((size, q)))
+        for k in range(q):
+            pushed.mid[self.t[k], k], pushed.rad[self.t[k], k] = push.mid[k], push.rad[k]
+        return pushed
+
+    def _conditions(self, y: Ball, w: Ball, angle: Array, radius: Array) -> tuple[Array, Array]:
+        """Conditions that a root has to satisfy, as midpoints and radii; stick by |tau| in both."""
+        tau = self.system.tau
+        mid = [-w.mid[i] for i in self.open] + [y.mid[i] for i in self.closed]
+        rad = [w.rad[i] for i in self.open] + [y.rad[i] for i in self.closed]
+        for i in self.stick:
+            t = [int(k) for k in tau[i] if k >= 0]
+            if t:
+                length = float(np.linalg.norm(y.mid[t]))
+                mid.append(y.mid[i] - length)
+                rad.append(
+                    (y.rad[i] + float(upper_norm(y.rad[t])) + 16 * UNIT * (abs(y.mid[i]) + length)) * SAFE + TINY
+                )
+        for i, sign in self.sliding:
+            along = int(np.max(tau[i]))
+            mid.append(sign * w.mid[along])
+            rad.append(w.rad[along])
+        if self.turning:
+            _, d, _ = self._directions(angle, radius)
+            forward = w[self.t[:, 0]] * d[:, 0] + w[self.t[:, 1]] * d[:, 1]
+            mid, rad = [*mid, *forward.mid], [*rad, *forward.rad]
+        return np.array(mid), np.array(rad)
+
+    def _broken(self, y: Ball, w: Ball, angle: Array, radius: Array) -> bool:
+        """Whether some condition is broken in the whole box."""
+        mid, rad = self._conditions(y, w, angle, radius)
+        return bool(np.any(mid < -rad))
+
+    def _slacks(self, y: Ball, w: Ball, angle: Array, radius: Array) -> Array:
+        """Lower bounds of the conditions."""
+        mid, rad = self._conditions(y, w, angle, radius)
+        return mid - rad * SAFE
+
+
+def same_root(one: SpaceRoot, other: SpaceRoot) -> bool | None:
+    """Whether two roots of leaves with the same statuses up to sectors are one; None where that is open.
+
+    The leaves have the same nodes open, sticking and slipping. They are one if one root's directions lie in the box in
+    which the other is the only root; they are two if their forces differ.
+    """
+    if np.any(np.abs(one.y.mid - other.y.mid) > (one.y.rad + other.y.rad) * SAFE):
+        return False
+    # the angle of one root's centre from the other's
+    c, e = other.centre, one.centre
+    shift = np.arctan2(c[:, 0] * e[:, 1] - c[:, 1] * e[:, 0], np.sum(c * e, axis=1))
+    away = np.abs(shift + one.angle) + one.angle_rad + 1e-12
+    return True if np.all(away < other.reach) else None
+
+
+def distinct_roots(
+    found: Sequence[tuple[tuple[int, ...], SpaceRoot]],
+) -> tuple[list[tuple[tuple[int, ...], SpaceRoot]], list[tuple[int, ...]]]:
+    """Roots of leaves without those that two leaves share, and the leaves whose roots could not be told apart."""
+    distinct: list[tuple[tuple[int, ...], SpaceRoot]] = []
+    doubtful = []
+    for codes, root in found:
+        pattern = [min(code, SECTORS) for code in codes]
+        alike = [other for known, other in distinct if [min(code, SECTORS) for code in known] == pattern]
+        answers = [same_root(root, other) for other in alike]
+        if True in answers:
+            continue
+        if None in answers:
+            doubtful.append(codes)
+        distinct.append((codes, root))
+    return distinct, doubtful
