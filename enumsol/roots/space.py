@@ -108,15 +108,7 @@ def enumerate_in_space(
     progress: Callable[[SearchProgress], object] | None,
     proof_path: str | Path | None,
 ) -> RootSet:
-    """All solutions of a problem in 3D; arguments as of enumerate_roots, which has checked them.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The coefficients depend on the solution, or are negative at alpha.
-    Interrupted, OutputError
-        As enumerate_roots.
-    """
+    """All solutions of a problem in 3D; arguments and errors as of enumerate_roots, which has checked the arguments."""
     problem.friction_at(alpha)  # refuses what cannot be enumerated before anything is computed
     return _Enumeration(problem, alpha, arithmetic, progress, proof_path).run(stop_after, max_nodes, time_limit)
 
@@ -137,6 +129,7 @@ class _Enumeration:
         condensed = problem.condensed
         self.system = SpaceSystem.scaled(condensed.S, condensed.free_displacements(alpha), problem.friction_at(alpha))
         self.outcome = SearchOutcome()
+        self.enclosed = EnclosedSpace.of_floats(self.system)
         self.certifier: SpaceCertifier | None = None
         self.at_rest = problem.is_unloaded(alpha)
         self.proof_path = proof_path
@@ -158,13 +151,12 @@ class _Enumeration:
         return result
 
     def _search(self, limits: SearchLimits) -> None:
-        enclosed = EnclosedSpace.of_floats(self.system)
         if self.arithmetic == "verified":
             self.writer = ProofWriter(self.proof_path)
             self.writer.write(self._header())
         engine = SpaceEngine(self.system)
         recorder = Unrecorded() if self.writer is None else self.writer
-        self.certifier = SpaceCertifier(engine, enclosed, recorder)
+        self.certifier = SpaceCertifier(engine, self.enclosed, recorder)
         if self.at_rest:
             self.certifier.unloaded()
             return
@@ -179,11 +171,10 @@ class _Enumeration:
         self.outcome = search.outcome
         if self.arithmetic == "verified":
             try:
-                enclosed = EnclosedSpace.of_problem(
-                    self.problem.enclosure, Fraction(self.alpha), self.system.force, self.system.length
-                )
-                _ = enclosed.smallest_eigenvalue  # proven positive, or refused
-                self.certifier.enclosed = enclosed
+                units = self.system.force, self.system.length
+                self.enclosed = EnclosedSpace.of_problem(self.problem.enclosure, Fraction(self.alpha), *units)
+                _ = self.enclosed.smallest_eigenvalue  # proven positive, or refused
+                self.certifier.enclosed = self.enclosed
             except NotEnclosedError as error:
                 codes = search.first().codes
                 self.certifier.skipped(codes, str(error))
@@ -266,9 +257,6 @@ class _Enumeration:
         closed = np.array([code != OPEN for code in codes])
         u_n = np.where(closed, 0.0, np.minimum(u_n, 0.0))
         u_t = np.where((np.array(codes) == STICK)[:, None] & (F > 0), 0.0, u_t)
-        enclosure = None
-        if self.arithmetic == "verified":
-            enclosure = self._enclosure(codes, found)
         return Root3D(
             alpha=self.alpha,
             statuses=tuple(_status(code, u_t[i]) for i, code in enumerate(codes)),
@@ -281,7 +269,7 @@ class _Enumeration:
             index=found.index,
             regular=True,
             margin=found.slack,
-            enclosure=enclosure,
+            enclosure=self._enclosure(codes, found) if self.arithmetic == "verified" else None,
             _condensed=self.problem.condensed,
         )
 
@@ -307,10 +295,8 @@ class _Enumeration:
     def _enclosure(self, codes: Codes, found: SpaceRoot) -> Enclosure:
         """Bounds of forces and displacements in the problem's units."""
         problem, system, p = self.problem, self.system, self.problem.p
-        exact = self.certifier.enclosed if self.certifier is not None else None
-        assert exact is not None
-        one = np.tile(1.0, 3 * p)
-        S, S_rad, g, g_rad = problem.enclosure.in_units(Fraction(self.alpha), one, one)
+        exact = self.enclosed
+        S, S_rad, g, g_rad = problem.enclosure.in_units(Fraction(self.alpha), np.ones(3 * p), np.ones(3 * p))
         forces = Ball(np.zeros(3 * p), np.zeros(3 * p))
         forces.mid[:p], forces.rad[:p] = found.y.mid[:p] * system.force, found.y.rad[:p] * system.force
         for k in range(2):
@@ -321,7 +307,9 @@ class _Enumeration:
             forces.mid[place], forces.rad[place] = part.mid * system.force[occurs], part.rad * system.force[occurs]
         w = Ball(g, g_rad) - (Ball(S, S_rad) @ Ball(forces.mid[:, None], forces.rad[:, None]))[:, 0]
         for i, code in enumerate(codes):
-            if code != OPEN:
+            if code == OPEN:
+                forces.mid[i::p] = forces.rad[i::p] = 0.0
+            else:
                 w.mid[i] = w.rad[i] = 0.0
             for k in range(2):
                 if code == STICK and system.tau[i, k] >= 0:
@@ -335,9 +323,7 @@ class _Enumeration:
         p = self.problem.p
         zero, plane = np.zeros(p), np.zeros((p, 2))
         every = frozenset((ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP))
-        enclosure = None
-        if self.arithmetic == "verified":
-            enclosure = Enclosure(*(np.zeros(shape) for shape in ((p, 2), (p, 2, 2)) * 2))
+        bounds = Enclosure(*(np.zeros(shape) for shape in ((p, 2), (p, 2, 2)) * 2))
         return Root3D(
             alpha=self.alpha,
             statuses=(ContactStatus.OPEN,) * p,
@@ -350,7 +336,7 @@ class _Enumeration:
             index=1,
             regular=False,
             margin=0.0,
-            enclosure=enclosure,
+            enclosure=bounds if self.arithmetic == "verified" else None,
             _condensed=self.problem.condensed,
         )
 

@@ -163,24 +163,62 @@ def test_gallery_list_and_write(capsys, tmp_path):
 def test_gallery_writes_problems_in_3d(capsys, tmp_path):
     file = tmp_path / "p.npz"
     status, out, _ = run(capsys, "gallery", "write", "block3d-4", file)
-    assert (status, out) == (0, f"wrote block3d-4 to {file}; try: enumsol fixed-point {file} --alpha 0.5\n")
+    assert (status, out) == (0, f"wrote block3d-4 to {file}; try: enumsol roots {file} --alpha 0.5\n")
     assert read_problem(file).fingerprint == gallery.get("block3d-4").build().fingerprint
-    assert_refused(*run(capsys, "roots", file, "--alpha", 1), f"{file} is a ContactProblem3D; expected")
+    status, out, _ = run(capsys, "gallery", "write", "block3d-100", tmp_path / "large.npz")
+    assert "try: enumsol fixed-point" in out
     status, out, _ = run(capsys, "gallery", "list")
-    assert [line.split()[:3] for line in out.splitlines()[-5:]] == [
-        ["one-node-3d", "0", "-"],
-        *([f"block3d-{p}", "0.5", "-"] for p in (4, 9, 16, 100)),
+    assert [line.split()[:3] for line in out.splitlines()[-6:]] == [
+        ["one-node-3d", "0", "1"],
+        ["one-node-3d-3", "0", "3"],
+        *([f"block3d-{p}", "0.5", "1"] for p in (4, 9, 16)),
+        ["block3d-100", "0.5", "-"],
     ]
+
+
+def test_all_solutions_in_3d(capsys, tmp_path):
+    proof, table = tmp_path / "node.proof", tmp_path / "node.csv"
+    arguments = ("roots", "gallery:one-node-3d-3", "--alpha", 0, "--proof", proof, "--csv", table)
+    status, out, err = run(capsys, *arguments)
+    assert (status, err) == (0, "")
+    assert out.endswith("index sum: +1\ncomplete: yes (proven)\n")
+    assert [line.split()[-7] for line in out.splitlines()[1:4]] == ["stick", "slip", "open"]
+    assert table.read_text().splitlines()[0].split(",")[4:10] == [
+        "lambda_n", "lambda_t1", "lambda_t2", "u_n", "u_t1", "u_t2"
+    ]  # fmt: skip
+    status, out, _ = run(capsys, "verify", "gallery:one-node-3d-3", proof)
+    assert status == 0
+    assert "complete: yes" in out
+    status, out, _ = run(capsys, "roots", "gallery:one-node-3d-3", "--alpha", 0, "--json", "-")
+    slides = json.loads(out)["roots"][1]
+    assert slides["statuses"] == ["slip"]
+    low, high = slides["slip_angle"][0]
+    assert low < np.arctan2(slides["u_t"][0][1], slides["u_t"][0][0]) < high < low + 1e-6
+    status, out, _ = run(capsys, "table", "gallery:block3d-4", "--from", 0.5, "--to", 1, "--samples", 2)
+    assert status == 0
+    assert "open, stick, slip: how many" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--jobs", 2), "executor is given, which problems in 3D do not take yet"),
+        (("--arithmetic", "exact"), 'arithmetic is "exact", which problems in 3D do not have'),
+        (
+            ("--arithmetic", "fast", "--method", "exhaustive"),
+            'method is "exhaustive", which problems in 3D do not have',
+        ),
+    ],
+)
+def test_what_3d_does_not_have_is_refused(capsys, arguments, message):
+    assert_refused(*run(capsys, "roots", "gallery:one-node-3d", "--alpha", 0, *arguments), message)
 
 
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("roots", "gallery:block3d-4", "--alpha", 1),
-        ("table", "gallery:block3d-4", "--from", 0, "--to", 1),
         ("graph", "gallery:block3d-4", "--from", 0, "--to", 1),
         ("follow", "gallery:one-node-3d", "--from", 0, "--to", 1, "--start", 1),
-        ("verify", "gallery:one-node-3d", "some.proof"),
         ("audit", "gallery:one-node-3d", "some.csv"),
     ],
 )
