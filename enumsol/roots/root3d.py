@@ -1,0 +1,83 @@
+"""Isolated solutions in 3D."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.roots.root import ContactState, Enclosure, node_table
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.condensed import CondensedProblem3D
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Root3D(ContactState):
+    """An isolated solution in 3D at one alpha.
+
+    Attributes
+    ----------
+    statuses : tuple of p ContactStatus
+        OPEN, STICK or SLIP. A node in contact whose coefficients are both 0 slips wherever u_t is not 0.
+    lambda_n, u_n : (p,) arrays
+        Normal contact forces [force], and Bn u - gap [length].
+    lambda_t, u_t : (p, 2) arrays
+        Along the local axes [force, length].
+    slip_angle : (p, 2) array
+        Bounds of the angle of F u_t in the local axes, the lower one in [-pi, pi); nan where the node does not slip
+        against friction [radians].
+    index : int or None
+        Local degree: the sign of the Jacobian determinant of the normal map (theory, section 12.4).
+    regular : bool
+        Every condition holds strictly.
+    margin : float
+        The least slack of the conditions, in scaled units [-].
+    enclosure : Enclosure or None
+        Proven bounds, with shapes (p, 2) and, of tangential components, (p, 2, 2): lower and upper ones last.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> root = enumsol.enumerate_roots(enumsol.gallery.one_node_3d(), alpha=0)[0]
+    >>> root.statuses, root.lambda_t.shape
+    ((ContactStatus.SLIP,), (1, 2))
+    """
+
+    slip_angle: Array
+    index: int | None
+    regular: bool
+    margin: float
+    enclosure: Enclosure | None = field(repr=False, compare=False)
+    _condensed: CondensedProblem3D = field(repr=False, compare=False)
+
+    @property
+    def u(self) -> Array:
+        """Displacement of all degrees of freedom, shape (n,) [length]; computed at every access."""
+        forces = np.concatenate([self.lambda_n, self.lambda_t.ravel(order="F")])
+        return self._condensed.displacement(self.alpha, forces)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Statuses and directions of slip on the contact surface; matplotlib Axes, those of a new figure for None.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The problem has no coordinates.
+        MissingDependencyError
+            matplotlib is not installed.
+        """
+        from enumsol.roots.space_plots import draw_slips  # matplotlib comes with the first picture
+
+        return draw_slips(self, self._condensed.problem, ax)
+
+    def __repr__(self) -> str:
+        index = "?" if self.index is None else f"{self.index:+d}"
+        regular = "regular" if self.regular else "not regular"
+        heading = f"Root at alpha = {float(self.alpha):g}: index {index}, {regular}, margin {self.margin:.2e}"
+        return "\n".join([heading, *node_table(self, self._condensed.problem.node_ids)])

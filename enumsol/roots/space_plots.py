@@ -1,0 +1,59 @@
+"""A picture of a solution in 3D: statuses and slips on the contact surface."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.errors import InvalidArgumentError
+from enumsol.figures import new_figure
+from enumsol.statuses import ContactStatus
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.problem3d import ContactProblem3D
+
+_MARKS = {
+    ContactStatus.OPEN: ("o", "none"),
+    ContactStatus.STICK: ("s", "tab:blue"),
+    ContactStatus.SLIP: ("o", "tab:red"),
+}
+
+
+def draw_slips(root: Any, problem: ContactProblem3D, ax: Any) -> Any:
+    """See Root3D.plot."""
+    if problem.coordinates is None:
+        raise InvalidArgumentError("the problem has no coordinates; expected a problem made with coordinates=")
+    places = problem.coordinates
+    # the two coordinate axes along which the contact surface extends most
+    shown = np.sort(np.argsort(np.ptp(places, axis=0), kind="stable")[1:])
+    moves = np.einsum("pk,pkc->pc", root.u_t, _axes(problem, shown))[:, shown]
+    if ax is None:
+        ax = new_figure(figsize=(6.4, 5.0)).subplots()
+    for status, (marker, face) in _MARKS.items():
+        at = places[[found is status for found in root.statuses]][:, shown]
+        if len(at):
+            ax.plot(*at.T, marker, mec="black", mfc=face, label=f"{status.value} ({len(at)})")
+    size = np.linalg.norm(moves, axis=1)
+    slides = np.array([found is ContactStatus.SLIP for found in root.statuses]) & (size > 0)
+    if np.any(slides):
+        d = moves[slides] / size[slides, None]
+        ax.quiver(*places[slides][:, shown].T, *d.T, size[slides], cmap="viridis", angles="xy", width=0.005)
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.15)
+    ax.set_xlabel("xyz"[shown[0]])
+    ax.set_ylabel("xyz"[shown[1]])
+    ax.set_title(f"directions of slip at alpha = {float(root.alpha):g}, index {root.index:+d}")
+    ax.legend()
+    return ax
+
+
+def _axes(problem: ContactProblem3D, shown: NDArray[np.intp]) -> NDArray[np.float64]:
+    """The local axes t1, t2 of every contact row in global axes, (p, 2, 3); those shown where no mesh tells them."""
+    if problem.mesh is None:
+        return np.tile(np.eye(3)[shown], (problem.p, 1, 1))
+    component = problem.mesh.dofs % 3
+    sums = np.eye(3)[component]
+    return np.stack([problem.Bt1 @ sums, problem.Bt2 @ sums], axis=1)
