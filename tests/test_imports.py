@@ -72,6 +72,18 @@ def test_a_search_does_not_load_the_checker():
     assert not modules & {"enumsol.checker.verify", "enumsol.io", "enumsol.branches", "enumsol.continuation"}
 
 
+def test_a_problem_in_2d_loads_nothing_of_3d():
+    code = "from concurrent.futures import ThreadPoolExecutor\nimport enumsol\n"
+    code += "problem = enumsol.gallery.two_node_square()\nwith ThreadPoolExecutor(2) as executor:\n"
+    code += "    roots = enumsol.enumerate_roots(problem, 3.5, executor=executor)\n"
+    code += "assert enumsol.verify(problem, roots.proof).complete and len(enumsol.multiplicity_table(problem, [1]))\n0"
+    modules = {name.removeprefix("enumsol.") for name in modules_after(code) if name.startswith("enumsol.")}
+    assert {"search.parallel", "search.solvers", "roots.enumeration"} <= modules
+    of_space = {"sectors", "friction", "body3d", "problem3d", "kernel.leaves", "kernel.ball_arrays", "roots.root3d"}
+    assert not modules & of_space
+    assert not [name for name in modules if "space" in name]
+
+
 def test_a_branch_graph_loads_algebra_and_graphs_only():
     code = "import enumsol; graph = enumsol.branch_graph(enumsol.gallery.two_node_square(), (0.0, 10.0)); "
     modules = modules_after(code + "assert graph.complete")

@@ -17,7 +17,7 @@ from enumsol.kernel.space import OPEN, SLIP_PLUS, STICK
 from enumsol.sectors import SECTORS, direction, end_number
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -333,12 +333,15 @@ def same_root(one: SpaceRoot, other: SpaceRoot) -> bool | None:
 
 
 def distinct_roots(
-    found: Sequence[tuple[tuple[int, ...], SpaceRoot]],
+    found: Iterable[tuple[tuple[int, ...], SpaceRoot]],
 ) -> tuple[list[tuple[tuple[int, ...], SpaceRoot]], list[tuple[int, ...]]]:
-    """Roots of leaves without those that two leaves share, and the leaves whose roots could not be told apart."""
+    """Roots of leaves without those that two leaves share, and the leaves whose roots could not be told apart.
+
+    Neither depends on the order in which the leaves are given.
+    """
     distinct: list[tuple[tuple[int, ...], SpaceRoot]] = []
     doubtful = []
-    for codes, root in found:
+    for codes, root in sorted(found, key=lambda leaf: leaf[0]):
         pattern = [min(code, SECTORS) for code in codes]
         alike = [other for known, other in distinct if [min(code, SECTORS) for code in known] == pattern]
         answers = [same_root(root, other) for other in alike]

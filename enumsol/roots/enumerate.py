@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from enumsol.checks import (
     alpha_value,
@@ -18,24 +18,19 @@ from enumsol.checks import (
     share,
 )
 from enumsol.contact_body import ContactBody
-from enumsol.errors import Interrupted, InvalidArgumentError, OutputError, WorkerError
-from enumsol.executors import WorkerLost
+from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
-from enumsol.proof.proof_file import Proof, ProofWriter
 from enumsol.roots.at_rest import AtRest
 from enumsol.roots.builder import RootBuilder, in_order, named, root_family
 from enumsol.roots.components import RootComponent, connected_components
+from enumsol.roots.enumeration import Enumeration
 from enumsol.roots.local_degree import perturbed_degree
-from enumsol.roots.root_set import RootSet, SearchStats
-from enumsol.search.certifiers.protocol import UndecidedPart
+from enumsol.roots.root_set import RootSet
 from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
-from enumsol.search.parallel import run_parallel
 from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.search.tree import SearchLimits, SearchOutcome, SearchProgress, TreeSearch
+from enumsol.search.tree import SearchLimits, SearchProgress
 from enumsol.selections.floats import SIGN_TOLERANCE
-from enumsol.selections.solution import SelectionSolution
-from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -142,27 +137,18 @@ def enumerate_roots(
     counts = optional_count(stop_after, "stop_after"), optional_count(max_nodes, "max_nodes")
     seconds, tolerance = optional_seconds(time_limit), share(tolerance)
     if _is_in_space(problem):
-        from enumsol.roots.space import check_supported, enumerate_in_space  # not for problems in 2D
+        # not for problems in 2D
+        from enumsol.roots.space import SpaceEnumeration, check_supported
+        from enumsol.search.space_solvers import SpaceSolvers
 
-        check_supported(arithmetic, method, executor, engine)
+        check_supported(arithmetic, method, engine)
         _check_proof(arithmetic, method, proof_path)
-        return enumerate_in_space(
-            problem,
-            value,
-            arithmetic,
-            stop_after=counts[0],
-            max_nodes=counts[1],
-            time_limit=seconds,
-            progress=progress,
-            proof_path=proof_path,
+        return SpaceEnumeration(SpaceSolvers(problem, value, arithmetic), progress, proof_path).run(
+            executor, *counts, seconds
         )
     _check_proof(arithmetic, method, proof_path)
-    solvers = Solvers(problem, value, arithmetic, tolerance)
-    writer = None
-    if arithmetic == "verified":
-        writer = ProofWriter(proof_path)
-        writer.write(solvers.proof_header())
-    return _Enumeration(solvers, method, progress, engine, writer).run(executor, *counts, seconds)
+    solvers = Solvers(problem, value, arithmetic, tolerance, engine)
+    return _Enumeration(solvers, method, progress, proof_path).run(executor, *counts, seconds)
 
 
 def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
@@ -170,54 +156,23 @@ def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
     return isinstance(problem, ContactBody) and not isinstance(problem, ContactProblem)
 
 
-class _Enumeration:
-    """One call of enumerate_roots."""
+class _Enumeration(Enumeration[Solvers]):
+    """One call of enumerate_roots in 2D."""
 
     def __init__(
         self,
         solvers: Solvers,
         method: Method,
         progress: Callable[[SearchProgress], object] | None,
-        engine: str | None,
-        writer: ProofWriter | None,
+        proof_path: str | Path | None,
     ) -> None:
-        self.solvers, self.method, self.progress, self.engine = solvers, method, progress, engine
-        self.started = time.perf_counter()
-        self.outcome = SearchOutcome()
-        self.at_rest: AtRest | None = None
-        self.writer = writer
-        self.certifier = solvers.certifier(writer)
+        super().__init__(solvers, progress, proof_path)
+        self.method = method
 
-    def run(
-        self, executor: Executor | None, stop_after: int | None, max_nodes: int | None, time_limit: float | None
-    ) -> RootSet:
-        """Search, then build the result; an interruption keeps what was found."""
-        deadline = None if time_limit is None else self.started + time_limit
-        limits = SearchLimits(self._enough(stop_after), max_nodes, deadline)
-        try:
-            if self.method == "exhaustive":
-                self._exhaustive(limits)
-            else:
-                self._tree(limits, executor)
-        except KeyboardInterrupt as interruption:
-            self.outcome.stopped = Stop(StopReason.INTERRUPTED, self.outcome.nodes + self.outcome.selections)
-            partial = self._result()
-            message = f"enumerate_roots was interrupted; {counted(len(partial), 'root')} so far"
-            raise Interrupted(message, partial) from interruption
-        except WorkerLost as loss:
-            partial = self._result()
-            raise WorkerError(f"{loss}; {counted(len(partial), 'root')} so far", partial) from loss
-        result = self._result()
-        if self.writer is not None and self.writer.failure is not None:
-            raise OutputError(self.writer.failure, result)
-        return result
-
-    def _enough(self, stop_after: int | None) -> Callable[[list[SelectionSolution]], bool] | None:
-        if stop_after is None:
-            return None
+    def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
         counted = [0, 0]
 
-        def enough(solutions: list[SelectionSolution]) -> bool:
+        def enough(solutions: list[Any]) -> bool:
             # several selections may hold at one root: count roots, and only when something was added
             if len(solutions) >= stop_after and len(solutions) != counted[0]:
                 counted[:] = [len(solutions), sum(len(part) for part, _ in self._components())]
@@ -225,22 +180,14 @@ class _Enumeration:
 
         return enough
 
-    def _tree(self, limits: SearchLimits, executor: Executor | None) -> None:
-        solvers = self.solvers
-        search = TreeSearch(solvers.scaled, self.certifier, engine=self.engine, limits=limits, progress=self.progress)
-        self.outcome = search.outcome
-        if solvers.unloaded():
-            self.certifier.unloaded()
-            self.at_rest = AtRest(solvers.floats.F_positive, proven=solvers.arithmetic != "fast")
-        elif (reason := solvers.undecidable) is not None:
-            # without any means of proof the tree would only grow
-            codes = search.first().codes
-            self.certifier.skipped(codes, reason)
-            self.outcome.undecided.append(UndecidedPart(codes, reason, "hold the body better, or scale the data"))
-        elif executor is not None:
-            run_parallel(executor, solvers, search, self.engine, solvers.floats.tolerance)
+    def _examined(self) -> int:
+        return self.outcome.nodes + self.outcome.selections
+
+    def _search(self, limits: SearchLimits, executor: Executor | None) -> None:
+        if self.method == "exhaustive":
+            self._exhaustive(limits)
         else:
-            search.run()
+            super()._search(limits, executor)
 
     def _exhaustive(self, limits: SearchLimits) -> None:
         outcome, reported = self.outcome, self.started
@@ -289,8 +236,9 @@ class _Enumeration:
         roots: list[Root] = []
         families: list[RootFamily] = []
         apart, joinable = 0, False
-        if self.at_rest is not None:
-            roots, apart = [self._root(self.at_rest.component, self.at_rest)], 1
+        if self.unloaded:
+            at_rest = AtRest(solvers.floats.F_positive, proven=solvers.arithmetic != "fast")
+            roots, apart = [self._root(at_rest.component, at_rest)], 1
         for components, solver in self._components():
             # what joins a component that was not examined whole is not known
             apart += sum(c.whole for c in components)
@@ -308,33 +256,12 @@ class _Enumeration:
             arithmetic=solvers.arithmetic,
             method=self.method,
             stopped=None if outcome.stopped is None else str(outcome.stopped),
-            stats=SearchStats(
-                nodes=outcome.nodes,
-                pruned=outcome.pruned,
-                selections=outcome.selections,
-                qps=outcome.qps,
-                fallback_qps=outcome.fallback_qps,
-                seconds=time.perf_counter() - self.started,
-                escalations=self.certifier.certified.escalations,
-                presolved=outcome.presolved,
-            ),
+            stats=self._stats(),
             node_ids=solvers.problem.node_ids,
             at_least=None if whole else apart + int(joinable),
             certified_data=solvers.data,
-            proof=self._proof(len(roots), len(families)),
+            proof=self._proof(roots=len(roots), families=len(families)),
         )
-
-    def _proof(self, roots: int, families: int) -> Proof | None:
-        """The proof, closed; None when the search was interrupted or there was no room to write its end."""
-        if self.writer is None:
-            return None
-        outcome = self.outcome
-        whole = outcome.stopped is None or not outcome.stopped.interrupted
-        if whole:
-            undecided, leaves = len(outcome.undecided), self.certifier.certified.leaves
-            self.writer.write({"roots": roots, "families": families, "undecided": undecided, "leaves": leaves})
-        proof = self.writer.close()
-        return proof if whole and self.writer.failure is None else None
 
 
 def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None) -> None:

@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-import time
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
-from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.condensation.space import EnclosedSpace, SpaceSystem
-from enumsol.errors import Interrupted, InvalidArgumentError, OutputError
+from enumsol.errors import InvalidArgumentError
 from enumsol.kernel.ball_arrays import Ball
 from enumsol.kernel.leaves import distinct_roots
-from enumsol.proof.proof_file import ProofWriter
-from enumsol.proof.reading import rational_text
-from enumsol.relaxation.space import SpaceEngine
+from enumsol.roots.enumeration import Enumeration
 from enumsol.roots.root import Enclosure
 from enumsol.roots.root3d import Root3D
-from enumsol.roots.root_set import RootSet, SearchStats, Undecided
+from enumsol.roots.root_set import RootSet, Undecided
 from enumsol.sealed import sealed
-from enumsol.search.certifiers.protocol import UndecidedPart, Unrecorded
-from enumsol.search.space import SpaceCertifier, SpaceSplitting
-from enumsol.search.stopping import Stop, StopReason
-from enumsol.search.tree import SearchLimits, SearchOutcome, TreeSearch
+from enumsol.search.certifiers.protocol import UndecidedPart
+from enumsol.search.space_solvers import SpaceSolvers
 from enumsol.sectors import SECTORS, direction, end_number
 from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus
 
@@ -34,129 +27,37 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.checks import Alpha
     from enumsol.kernel.leaves import SpaceRoot
-    from enumsol.problem3d import ContactProblem3D
-    from enumsol.proof.proof_file import Proof
     from enumsol.search.tree import SearchProgress
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
 
 
-def enumerate_in_space(
-    problem: ContactProblem3D,
-    alpha: Alpha,
-    arithmetic: str,
-    *,
-    stop_after: int | None,
-    max_nodes: int | None,
-    time_limit: float | None,
-    progress: Callable[[SearchProgress], object] | None,
-    proof_path: str | Path | None,
-) -> RootSet:
-    """All solutions of a problem in 3D; arguments and errors as of enumerate_roots, which has checked the arguments."""
-    problem.friction_at(alpha)  # refuses what cannot be enumerated before anything is computed
-    return _Enumeration(problem, alpha, arithmetic, progress, proof_path).run(stop_after, max_nodes, time_limit)
-
-
-class _Enumeration:
-    """One call of enumerate_in_space."""
+class SpaceEnumeration(Enumeration[SpaceSolvers]):
+    """One call of enumerate_roots in 3D."""
 
     def __init__(
         self,
-        problem: ContactProblem3D,
-        alpha: Alpha,
-        arithmetic: str,
+        solvers: SpaceSolvers,
         progress: Callable[[SearchProgress], object] | None,
         proof_path: str | Path | None,
     ) -> None:
-        self.problem, self.alpha, self.arithmetic, self.progress = problem, alpha, arithmetic, progress
-        self.started = time.perf_counter()
-        condensed = problem.condensed
-        self.system = SpaceSystem.scaled(condensed.S, condensed.free_displacements(alpha), problem.friction_at(alpha))
-        self.outcome = SearchOutcome()
-        self.enclosed = EnclosedSpace.of_floats(self.system)
-        self.certifier: SpaceCertifier | None = None
-        self.at_rest = problem.is_unloaded(alpha)
-        self.proof_path = proof_path
-        self.writer: ProofWriter | None = None
+        super().__init__(solvers, progress, proof_path)
+        self.problem, self.alpha, self.arithmetic = solvers.problem, solvers.alpha, solvers.arithmetic
+        self.system, self.enclosed = solvers.system, solvers.enclosed
 
-    def run(self, stop_after: int | None, max_nodes: int | None, time_limit: float | None) -> RootSet:
-        """Search, then build the result; an interruption keeps what was found."""
-        limits = SearchLimits(self._enough(stop_after), max_nodes, SearchLimits.deadline_in(time_limit))
-        try:
-            self._search(limits)
-        except KeyboardInterrupt as interruption:
-            self.outcome.stopped = Stop(StopReason.INTERRUPTED, self.outcome.nodes)
-            partial = self._result()
-            message = f"enumerate_roots was interrupted; {len(partial)} roots so far"
-            raise Interrupted(message, partial) from interruption
-        result = self._result()
-        if self.writer is not None and self.writer.failure is not None:
-            raise OutputError(self.writer.failure, result)
-        return result
+    def _distinct(self) -> tuple[list[tuple[Codes, SpaceRoot]], list[Codes]]:
+        return distinct_roots(self.certifier.certified.verified.items())
 
-    def _search(self, limits: SearchLimits) -> None:
-        if self.arithmetic == "verified":
-            self.writer = ProofWriter(self.proof_path)
-            self.writer.write(self._header())
-        engine = SpaceEngine(self.system)
-        recorder = Unrecorded() if self.writer is None else self.writer
-        self.certifier = SpaceCertifier(engine, self.enclosed, recorder)
-        if self.at_rest:
-            self.certifier.unloaded()
-            return
-        search = TreeSearch(
-            self.system,
-            self.certifier,
-            engine=engine,
-            splitting=SpaceSplitting(engine),
-            limits=limits,
-            progress=self.progress,
-        )
-        self.outcome = search.outcome
-        if self.arithmetic == "verified":
-            try:
-                units = self.system.force, self.system.length
-                self.enclosed = EnclosedSpace.of_problem(self.problem.enclosure, Fraction(self.alpha), *units)
-                _ = self.enclosed.smallest_eigenvalue  # proven positive, or refused
-                self.certifier.enclosed = self.enclosed
-            except NotEnclosedError as error:
-                codes = search.first().codes
-                self.certifier.skipped(codes, str(error))
-                self.outcome.undecided.append(
-                    UndecidedPart(codes, str(error), "hold the body better, or scale the data")
-                )
-                return
-        search.run()
-
-    def _header(self) -> dict[str, Any]:
-        return {
-            "format": "enumsol-proof",
-            "version": 1,
-            "kind": "space",
-            "problem": self.problem.fingerprint,
-            "alpha": rational_text(Fraction(self.alpha), "alpha"),
-            "p": self.problem.p,
-            "data": "problem",
-            "force": (np.frexp(self.system.force)[1] - 1).tolist(),
-            "length": (np.frexp(self.system.length)[1] - 1).tolist(),
-        }
-
-    def _found(self) -> list[tuple[Codes, SpaceRoot]]:
-        return [] if self.certifier is None else self.certifier.roots
-
-    def _enough(self, stop_after: int | None) -> Callable[[list[Any]], bool] | None:
-        if stop_after is None:
-            return None
-        return lambda solutions: len(solutions) >= stop_after and len(distinct_roots(self._found())[0]) >= stop_after
+    def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
+        return lambda solutions: len(solutions) >= stop_after and len(self._distinct()[0]) >= stop_after
 
     def _result(self) -> RootSet:
         outcome = self.outcome
-        distinct, doubtful = distinct_roots(self._found())
+        distinct, doubtful = self._distinct()
         roots = [self._root(codes, root) for codes, root in distinct]
-        if self.at_rest:
+        if self.unloaded:
             roots = [self._rest()]
         roots.sort(key=lambda root: (-float(np.sum(root.lambda_n)), root.lambda_n.tolist(), root.lambda_t.tolist()))
         undecided = [self._named(part) for part in outcome.undecided]
@@ -170,28 +71,11 @@ class _Enumeration:
             arithmetic=self.arithmetic,
             method="tree",
             stopped=None if outcome.stopped is None else str(outcome.stopped),
-            stats=SearchStats(
-                nodes=outcome.nodes,
-                pruned=outcome.pruned,
-                selections=outcome.selections,
-                qps=outcome.qps,
-                fallback_qps=outcome.fallback_qps,
-                seconds=time.perf_counter() - self.started,
-            ),
+            stats=self._stats(),
             node_ids=self.problem.node_ids,
             at_least=None if whole else max(len(roots) - len(doubtful), min(len(roots), 1)),
-            proof=self._proof(len(roots)),
+            proof=self._proof(roots=len(roots)),
         )
-
-    def _proof(self, roots: int) -> Proof | None:
-        if self.writer is None or self.certifier is None:
-            return None
-        whole = self.outcome.stopped is None or not self.outcome.stopped.interrupted
-        if whole:
-            leaves = self.certifier.certified.leaves
-            self.writer.write({"roots": roots, "undecided": len(self.outcome.undecided), "leaves": leaves})
-        proof = self.writer.close()
-        return proof if whole and self.writer.failure is None else None
 
     # -- in the user's terms ---------------------------------------------------------------------------------------
 
@@ -324,7 +208,7 @@ def _around(middle: float, radius: float) -> Array:
     return sealed(np.array([low, middle + radius]) - 2.0 * np.pi * turns)
 
 
-def check_supported(arithmetic: str, method: str, executor: object, engine: str | None) -> None:
+def check_supported(arithmetic: str, method: str, engine: str | None) -> None:
     """Refuse what is not offered in 3D.
 
     Raises
@@ -338,7 +222,6 @@ def check_supported(arithmetic: str, method: str, executor: object, engine: str 
             'arithmetic is "exact", which problems in 3D do not have; expected "verified" or "fast"',
         ),
         (method != "tree", 'method is "exhaustive", which problems in 3D do not have; expected "tree"'),
-        (executor is not None, "executor is given, which problems in 3D do not take yet; expected None"),
         (engine == "clarabel", 'engine is "clarabel", which problems in 3D do not take; expected None'),
     ):
         if wrong:

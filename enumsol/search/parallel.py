@@ -3,26 +3,56 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from enumsol.executors import WorkerLost, has_result, result_of, submit
-from enumsol.search.solvers import Solvers
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.search.tree import SearchLimits, SearchOutcome, TreeNode, TreeSearch
+from enumsol.search.tree import SearchLimits, SearchOutcome, TreeNode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from concurrent.futures import Executor, Future
 
-    from enumsol.checks import Alpha
-    from enumsol.problem import ContactProblem
-    from enumsol.search.certifiers.protocol import Certified
-    from enumsol.search.solvers import Arithmetic
+    from enumsol.proof.proof_file import Recorder
+    from enumsol.search.certifiers.protocol import Certified, Certifier
+    from enumsol.search.tree import SearchProgress, TreeSearch
     from enumsol.selections.solution import Codes
 
 #: Levels of the tree that are examined here; the subtrees below are handed out. Their sizes differ widely, so there
 #: are many more of them than workers.
 LEVELS = 7
+
+
+class Searchable(Protocol):
+    """A problem in 2D or 3D at one alpha in one arithmetic: all that a search of its tree is made from."""
+
+    @property
+    def arithmetic(self) -> str:
+        """In which it is searched."""
+
+    @property
+    def undecidable(self) -> str | None:
+        """Why nothing can be proven about this problem, or None."""
+
+    def certifier(self, recorder: Recorder | None) -> Certifier:
+        """The certifier of this arithmetic."""
+
+    def search(
+        self,
+        certifier: Certifier,
+        limits: SearchLimits | None = None,
+        progress: Callable[[SearchProgress], object] | None = None,
+    ) -> TreeSearch:
+        """A search of the tree with a certifier made here."""
+
+    def remake(self) -> Callable[[], Searchable]:
+        """Makes the same again, also in another process."""
+
+    def unloaded(self) -> bool:
+        """Whether g = 0, so that only lambda = 0 solves."""
+
+    def proof_header(self) -> dict[str, Any]:
+        """First record of a proof."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +62,7 @@ class _Answer:
     certified: Certified
 
 
-def run_parallel(
-    executor: Executor, solvers: Solvers, search: TreeSearch, engine: str | None, tolerance: float
-) -> None:
+def run_parallel(executor: Executor, solvers: Searchable, search: TreeSearch) -> None:
     """Search the tree with the help of an executor; ``search`` collects the outcome, which does not depend on timing.
 
     Its outcome is filled as the subtrees come in, so that an interruption keeps those that did.
@@ -45,11 +73,10 @@ def run_parallel(
         A worker died. The outcome holds the subtrees that were finished by then; the others are undecided in it and in
         its proof.
     """
-    limits = search.limits
+    limits, remake = search.limits, solvers.remake()
 
     def hand_out(codes: Codes) -> Future[_Answer]:
-        given = (solvers.problem, solvers.alpha, solvers.arithmetic, tolerance, engine, limits.max_nodes)
-        return submit(executor, _subtree, codes, *given, limits.remaining())
+        return submit(executor, _subtree, codes, remake, limits.max_nodes, limits.remaining())
 
     plan = _Plan(hand_out)
     try:
@@ -124,22 +151,12 @@ class _Records:
         self.records.append(record)
 
 
-def _subtree(
-    codes: Codes,
-    problem: ContactProblem,
-    alpha: Alpha,
-    arithmetic: Arithmetic,
-    tolerance: float,
-    engine: str | None,
-    max_nodes: int | None,
-    seconds: float | None,
-) -> _Answer:
+def _subtree(codes: Codes, remake: Callable[[], Searchable], max_nodes: int | None, seconds: float | None) -> _Answer:
     """Search below a partial assignment, in a worker; everything here can be pickled."""
-    solvers = Solvers(problem, alpha, arithmetic, tolerance)
-    records = _Records()
+    solvers, records = remake(), _Records()
     certifier = solvers.certifier(records)
     limits = SearchLimits(max_nodes=max_nodes, deadline=SearchLimits.deadline_in(seconds))
-    outcome = TreeSearch(solvers.scaled, certifier, engine=engine, limits=limits).run([codes])
+    outcome = solvers.search(certifier, limits).run([codes])
     return _Answer(outcome, records.records, certifier.certified)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -15,14 +15,18 @@ from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.proof.reading import rational_text
 from enumsol.search.certifiers.floats import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.search.tree import TreeSearch
 from enumsol.selections.floats import FloatSelections
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from enumsol.checks import Alpha
     from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Recorder
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rationals import ExactCertifier
+    from enumsol.search.tree import SearchLimits, SearchProgress
     from enumsol.selections.rationals import ExactSelections
 
 Arithmetic = Literal["fast", "verified", "exact"]
@@ -38,6 +42,8 @@ class Solvers:
     arithmetic : {"fast", "verified", "exact"}
     tolerance : float
         Sign tolerance of fast arithmetic.
+    engine : {"active-set", "clarabel"} or None
+        Solver of the relaxations; None for the best available.
 
     Raises
     ------
@@ -45,8 +51,15 @@ class Solvers:
         A friction coefficient is positive and underflows to zero: its node would count as one without friction.
     """
 
-    def __init__(self, problem: ContactProblem, alpha: Alpha, arithmetic: Arithmetic, tolerance: float) -> None:
-        self.problem, self.alpha, self.arithmetic = problem, alpha, arithmetic
+    def __init__(
+        self,
+        problem: ContactProblem,
+        alpha: Alpha,
+        arithmetic: Arithmetic,
+        tolerance: float,
+        engine: str | None = None,
+    ) -> None:
+        self.problem, self.alpha, self.arithmetic, self.engine = problem, alpha, arithmetic, engine
         self.scaled = problem.condensed.at(alpha).scaled
         self.floats = FloatSelections(self.scaled, tolerance)
         exact = exactly_at(Fraction(alpha), *problem.friction)
@@ -131,6 +144,19 @@ class Solvers:
         return VerifiedCertifier(
             self.scaled, self.enclosed, lambda: self.exact_certifier, _present(recorder), self.problem.node_ids
         )
+
+    def search(
+        self,
+        certifier: Certifier,
+        limits: SearchLimits | None = None,
+        progress: Callable[[SearchProgress], object] | None = None,
+    ) -> TreeSearch:
+        """A search of the tree with a certifier made here."""
+        return TreeSearch(self.scaled, certifier, engine=self.engine, limits=limits, progress=progress)
+
+    def remake(self) -> Callable[[], Solvers]:
+        """Makes the same again, also in another process."""
+        return partial(Solvers, self.problem, self.alpha, self.arithmetic, self.floats.tolerance, self.engine)
 
     def unloaded(self) -> bool:
         """Whether g = 0, so that only lambda = 0 solves: in the data (verified, exact) or as computed (fast)."""

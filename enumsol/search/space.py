@@ -73,13 +73,13 @@ class SpaceCertifier:
 
     def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, recorder: Recorder) -> None:
         self._engine, self.enclosed, self.recorder = engine, enclosed, recorder
-        self.roots: list[tuple[Codes, SpaceRoot]] = []
+        self._roots: dict[Codes, SpaceRoot] = {}
         self._leaves = 0
 
     @property
     def certified(self) -> Certified:
         """What was proven so far."""
-        return Certified({}, None, self._leaves)
+        return Certified(self._roots, None, self._leaves)
 
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
@@ -112,7 +112,7 @@ class SpaceCertifier:
             self._leaf("u", _DEGENERATE)
             return UndecidedPart(codes, _DEGENERATE, "perturb the load or the friction coefficients")
         else:
-            self.roots.append((codes, answer))
+            self._roots[codes] = answer
             self._leaf("r", answer.y.mid.tolist(), (4.0 * answer.y.rad).tolist(), answer.index)
         return answer
 
@@ -121,8 +121,9 @@ class SpaceCertifier:
         self._leaf("z")
 
     def add(self, part: Certified) -> None:
-        """Subtrees of a problem in 3D are not handed out."""
-        raise NotImplementedError
+        """Take over what the certifier of a subtree has proven."""
+        self._roots |= part.verified
+        self._leaves += part.leaves
 
     def _leaf(self, kind: str, *record: object) -> None:
         self._leaves += 1

@@ -199,10 +199,20 @@ def test_all_solutions_in_3d(capsys, tmp_path):
     assert "open, stick, slip: how many" in out
 
 
+def test_jobs_in_3d(capsys, tmp_path):
+    proof = tmp_path / "block.proof"
+    status, out, _ = run(capsys, "roots", "gallery:block3d-9", "--alpha", 0.5, "--jobs", 2, "--proof", proof)
+    assert status == 0
+    assert out == run(capsys, "roots", "gallery:block3d-9", "--alpha", 0.5)[1]
+    status, out, _ = run(capsys, "verify", "gallery:block3d-9", proof)
+    assert status == 0
+    table = ("table", "gallery:block3d-4", "--from", 0.5, "--to", 1, "--samples", 2)
+    assert run(capsys, *table, "--jobs", 2)[:2] == run(capsys, *table)[:2]
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--jobs", 2), "executor is given, which problems in 3D do not take yet"),
         (("--arithmetic", "exact"), 'arithmetic is "exact", which problems in 3D do not have'),
         (
             ("--arithmetic", "fast", "--method", "exhaustive"),

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from enumsol.kernel.point import VerifiedSelection
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
     from enumsol.selections.solution import Codes
@@ -64,13 +63,13 @@ class Certified:
 
     Attributes
     ----------
-    verified : balls of the regular roots, by their codes
+    verified : balls of the regular roots, by their codes: VerifiedSelection, in 3D SpaceRoot
     escalations : Escalations or None
     leaves : int
         Leaves written to the proof.
     """
 
-    verified: Mapping[Codes, VerifiedSelection] = field(default_factory=dict)
+    verified: Mapping[Codes, Any] = field(default_factory=dict)
     escalations: Escalations | None = None
     leaves: int = 0
 

@@ -1,0 +1,132 @@
+"""One call of enumerate_roots: what it is in 2D and 3D alike."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from enumsol.errors import Interrupted, OutputError, WorkerError
+from enumsol.executors import WorkerLost
+from enumsol.proof.proof_file import ProofWriter
+from enumsol.roots.root_set import SearchStats
+from enumsol.search.certifiers.protocol import UndecidedPart
+from enumsol.search.parallel import Searchable, run_parallel
+from enumsol.search.stopping import Stop, StopReason
+from enumsol.search.tree import SearchLimits, SearchOutcome
+from enumsol.texts import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from concurrent.futures import Executor
+    from pathlib import Path
+
+    from enumsol.proof.proof_file import Proof
+    from enumsol.roots.root_set import RootSet
+    from enumsol.search.tree import SearchProgress
+
+_Solvers = TypeVar("_Solvers", bound=Searchable)
+
+
+class Enumeration(ABC, Generic[_Solvers]):
+    """A search at one alpha, its proof, and its result.
+
+    Parameters
+    ----------
+    solvers : Searchable
+    progress : callable or None
+    proof_path : path or None
+        Where to write the proof (arithmetic "verified"); None keeps it in memory.
+    """
+
+    def __init__(
+        self,
+        solvers: _Solvers,
+        progress: Callable[[SearchProgress], object] | None,
+        proof_path: str | Path | None,
+    ) -> None:
+        self.solvers, self.progress = solvers, progress
+        self.started = time.perf_counter()
+        self.outcome = SearchOutcome()
+        self.unloaded = False
+        self.writer = None
+        if solvers.arithmetic == "verified":
+            self.writer = ProofWriter(proof_path)
+            self.writer.write(solvers.proof_header())
+        self.certifier = solvers.certifier(self.writer)
+
+    def run(
+        self, executor: Executor | None, stop_after: int | None, max_nodes: int | None, time_limit: float | None
+    ) -> RootSet:
+        """Search, then build the result; an interruption keeps what was found."""
+        deadline = None if time_limit is None else self.started + time_limit
+        limits = SearchLimits(None if stop_after is None else self._enough(stop_after), max_nodes, deadline)
+        try:
+            self._search(limits, executor)
+        except KeyboardInterrupt as interruption:
+            self.outcome.stopped = Stop(StopReason.INTERRUPTED, self._examined())
+            partial = self._result()
+            message = f"enumerate_roots was interrupted; {counted(len(partial), 'root')} so far"
+            raise Interrupted(message, partial) from interruption
+        except WorkerLost as loss:
+            partial = self._result()
+            raise WorkerError(f"{loss}; {counted(len(partial), 'root')} so far", partial) from loss
+        result = self._result()
+        if self.writer is not None and self.writer.failure is not None:
+            raise OutputError(self.writer.failure, result)
+        return result
+
+    def _search(self, limits: SearchLimits, executor: Executor | None) -> None:
+        """Search the tree."""
+        solvers = self.solvers
+        search = solvers.search(self.certifier, limits, self.progress)
+        self.outcome = search.outcome
+        if solvers.unloaded():
+            self.certifier.unloaded()
+            self.unloaded = True
+        elif (reason := solvers.undecidable) is not None:
+            # without any means of proof the tree would only grow
+            codes = search.first().codes
+            self.certifier.skipped(codes, reason)
+            self.outcome.undecided.append(UndecidedPart(codes, reason, "hold the body better, or scale the data"))
+        elif executor is not None:
+            run_parallel(executor, solvers, search)
+        else:
+            search.run()
+
+    def _examined(self) -> int:
+        """What an interruption says was done."""
+        return self.outcome.nodes
+
+    @abstractmethod
+    def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
+        """Whether solutions of leaves are so many roots and families."""
+
+    @abstractmethod
+    def _result(self) -> RootSet:
+        """What was found, in the user's terms."""
+
+    def _stats(self) -> SearchStats:
+        outcome = self.outcome
+        return SearchStats(
+            nodes=outcome.nodes,
+            pruned=outcome.pruned,
+            selections=outcome.selections,
+            qps=outcome.qps,
+            fallback_qps=outcome.fallback_qps,
+            seconds=time.perf_counter() - self.started,
+            escalations=self.certifier.certified.escalations,
+            presolved=outcome.presolved,
+        )
+
+    def _proof(self, **counts: int) -> Proof | None:
+        """The proof, closed; None when the search was interrupted or there was no room to write its end."""
+        if self.writer is None:
+            return None
+        outcome = self.outcome
+        whole = outcome.stopped is None or not outcome.stopped.interrupted
+        if whole:
+            leaves = self.certifier.certified.leaves
+            self.writer.write({**counts, "undecided": len(outcome.undecided), "leaves": leaves})
+        proof = self.writer.close()
+        return proof if whole and self.writer.failure is None else None

@@ -1,0 +1,121 @@
+"""One problem in 3D at one alpha in one arithmetic: what a search needs (theory, section 12)."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.space import EnclosedSpace, SpaceSystem
+from enumsol.proof.reading import rational_text
+from enumsol.relaxation.space import SpaceEngine
+from enumsol.search.certifiers.protocol import Unrecorded
+from enumsol.search.space import SpaceCertifier, SpaceSplitting
+from enumsol.search.tree import TreeSearch
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from enumsol.checks import Alpha
+    from enumsol.problem3d import ContactProblem3D
+    from enumsol.proof.proof_file import Recorder
+    from enumsol.search.certifiers.protocol import Certifier
+    from enumsol.search.tree import SearchLimits, SearchProgress
+
+
+class SpaceSolvers:
+    """System, balls, engine and certifier for one problem in 3D at one alpha.
+
+    Parameters
+    ----------
+    problem : ContactProblem3D
+    alpha : float or Fraction
+    arithmetic : {"fast", "verified"}
+
+    Raises
+    ------
+    InvalidArgumentError, InvalidProblemError
+        Of ``problem.friction_at`` and of the condensation.
+    """
+
+    def __init__(self, problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> None:
+        self.problem, self.alpha, self.arithmetic = problem, alpha, arithmetic
+        friction = problem.friction_at(alpha)  # refuses what cannot be enumerated before anything is computed
+        condensed = problem.condensed
+        self.system = SpaceSystem.scaled(condensed.S, condensed.free_displacements(alpha), friction)
+
+    @cached_property
+    def _engine(self) -> SpaceEngine:
+        """Its rows are numbered in the order in which certifier, splitting and relaxations ask for them."""
+        return SpaceEngine(self.system)
+
+    @cached_property
+    def _enclosed(self) -> tuple[EnclosedSpace, str | None]:
+        floats = EnclosedSpace.of_floats(self.system)
+        if self.arithmetic == "fast":
+            return floats, None
+        try:
+            units = self.system.force, self.system.length
+            enclosed = EnclosedSpace.of_problem(self.problem.enclosure, Fraction(self.alpha), *units)
+            _ = enclosed.smallest_eigenvalue  # proven positive, or refused
+        except NotEnclosedError as error:
+            return floats, str(error)
+        return enclosed, None
+
+    @property
+    def enclosed(self) -> EnclosedSpace:
+        """Balls for the scaled system; in fast arithmetic, or where nothing can be proven, without radii."""
+        return self._enclosed[0]
+
+    @property
+    def undecidable(self) -> str | None:
+        """Why verified arithmetic cannot prove anything about this problem, or None."""
+        return self._enclosed[1]
+
+    def certifier(self, recorder: Recorder | None) -> SpaceCertifier:
+        """The certifier of this arithmetic."""
+        if recorder is None or self.arithmetic == "fast":
+            recorder = Unrecorded()
+        return SpaceCertifier(self._engine, self.enclosed, recorder)
+
+    def search(
+        self,
+        certifier: Certifier,
+        limits: SearchLimits | None = None,
+        progress: Callable[[SearchProgress], object] | None = None,
+    ) -> TreeSearch:
+        """A search of the tree with a certifier made here."""
+        engine = self._engine
+        splitting = SpaceSplitting(engine)
+        return TreeSearch(self.system, certifier, engine=engine, splitting=splitting, limits=limits, progress=progress)
+
+    def remake(self) -> Callable[[], SpaceSolvers]:
+        """Makes the same again, also in another process."""
+        return partial(SpaceSolvers, self.problem, self.alpha, self.arithmetic)
+
+    def unloaded(self) -> bool:
+        """Whether g = 0 for the data as given, so that only lambda = 0 solves."""
+        return self.problem.is_unloaded(self.alpha)
+
+    def proof_header(self) -> dict[str, Any]:
+        """First record of a proof (see enumsol.proof.proof_file).
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is a fraction of more digits than a proof may hold.
+        """
+        return {
+            "format": "enumsol-proof",
+            "version": 1,
+            "kind": "space",
+            "problem": self.problem.fingerprint,
+            "alpha": rational_text(Fraction(self.alpha), "alpha"),
+            "p": self.problem.p,
+            "data": "problem",
+            "force": (np.frexp(self.system.force)[1] - 1).tolist(),
+            "length": (np.frexp(self.system.length)[1] - 1).tolist(),
+        }
