@@ -199,8 +199,8 @@ def test_registry_builds(name):
     assert problem.coordinates.shape == (problem.p, entry.dimension)
     assert np.all(problem.friction_at(entry.alpha) > 0)
     if entry.dimension == 3:
-        assert name in {"one-node-3d", "one-node-3d-3", f"block3d-{problem.p}"}
-        if problem.p < 16:
+        assert name in {"one-node-3d", "one-node-3d-3", f"block3d-{problem.p}", f"wedge3d-{problem.p}-{entry.roots}"}
+        if problem.p < 16 and "wedge" not in name:  # those in tests/roots
             found = enumsol.enumerate_roots(problem, entry.alpha)
             assert found.complete
             assert len(found) == entry.roots
@@ -289,6 +289,33 @@ def test_block3d_is_its_own_mirror_image():
     assert np.allclose(problem.condensed.g0, sign * problem.condensed.g0[mirror], rtol=0, atol=1e-13)
 
 
+@pytest.mark.parametrize(("multipliers", "p"), [("elements", 8), ("nodes", 18)])
+def test_wedge3d_geometry_and_load(multipliers, p):
+    slope = math.radians(20.0)
+    problem = gallery.wedge3d(2, 2, 3, (0.1, 0.2, 0.3), multipliers=multipliers, size=(1.0, 2.0, 3.0))
+    x, y, z = problem.coordinates.T
+    assert problem.p == p
+    assert np.allclose(np.abs(x), 0.5 + z * math.tan(slope))
+    assert np.max(z) == (1.5 if multipliers == "elements" else 2.0)
+    if multipliers == "elements":
+        assert np.allclose(problem.coordinates[:4], problem.coordinates[4:] * [-1, 1, 1])
+        assert gallery.wedge3d(2, 2, 3, ratio=2).p == 2
+    # rigid motions in terms of the local axes: across, along the notch and out of it
+    across, along, out = (np.tile(direction, problem.n // 3) for direction in np.eye(3))
+    side, c, s = np.sign(x), math.cos(slope), math.sin(slope)
+    expected = {"Bn": (side * c, 0 * y, -s), "Bt1": (side * s, 0 * y, c), "Bt2": (0 * y, -side, 0)}
+    for name, values in expected.items():
+        for motion, value in zip((across, along, out), values, strict=True):
+            assert np.allclose(getattr(problem, name) @ motion, value, atol=1e-12), name
+    # springs and load are what was asked for in all
+    top = 1.0 * 2.0 + 2.0 * 3.0 * math.tan(slope) * 2.0
+    assert np.allclose(problem.f.reshape(-1, 3).sum(axis=0), np.array([0.1, 0.2, 0.3]) * top)
+    stiffness = [motion @ (problem.A @ motion) for motion in (across, along, out)]
+    assert np.allclose(stiffness, [0.04, 0.04, 0.02])
+    assert np.all(problem.gap == -5e-4)
+    assert np.array_equal(problem.friction_at(2.0), np.tile([2.0, 1.2], (p, 1)))
+
+
 @pytest.mark.parametrize(
     ("build", "message"),
     [
@@ -299,6 +326,15 @@ def test_block3d_is_its_own_mirror_image():
         (lambda: gallery.block3d(0, 1, 1), "nx is 0; expected an integer of at least 1"),
         (lambda: gallery.block3d(1, 1, 1, pull=(0, 1)), r"pull is \(0, 1\); expected three finite numbers"),
         (lambda: gallery.block3d(1, 1, 1, gap="wide"), "gap is 'wide'; expected a finite number"),
+        (lambda: gallery.wedge3d(1, 1, 1), "nz is 1; expected an integer of at least 2"),
+        (
+            lambda: gallery.wedge3d(1, 1, 2, springs=(1, 1, 0)),
+            r"springs is \(1, 1, 0\); expected three stiffnesses > 0",
+        ),
+        (lambda: gallery.wedge3d(1, 1, 2, half_angle=81), "half_angle is 81; expected degrees between 0 and 80"),
+        (lambda: gallery.wedge3d(1, 1, 2, pull=(0, 1)), r"pull is \(0, 1\); expected three finite numbers"),
+        (lambda: gallery.wedge3d(1, 1, 2, press=math.nan), "press is nan; expected a finite number"),
+        (lambda: gallery.wedge3d(1, 1, 2, multipliers="facets"), "multipliers is 'facets'; expected"),
     ],
 )
 def test_bad_arguments_of_problems_in_3d_are_named(build, message):

@@ -1,13 +1,13 @@
 """Named contact problems for documentation, tests and benchmarks: small closed forms, blocks, wedges and chains.
 
-Every function returns a `ContactProblem`, `one_node_3d` and `block3d` a `ContactProblem3D`. `GALLERY` lists ready-made
-ones with a parameter value at which each is worth a look and, where it is known, the number of its roots there; `get`
-finds one by name.
+Every function returns a `ContactProblem`, those whose names end with 3d a `ContactProblem3D`. `GALLERY` lists
+ready-made ones with a parameter value at which each is worth a look and, where it is known, the number of its roots
+there; `get` finds one by name.
 """
 
 from enumsol.gallery.catalogue import GALLERY, GalleryEntry, close_names, get
 from enumsol.gallery.problems import chain, clamped_block, one_node_triangle, two_node_square, wedge
-from enumsol.gallery.solids import block3d, one_node_3d
+from enumsol.gallery.solids import block3d, one_node_3d, wedge3d
 
 __all__ = [
     "GALLERY",
@@ -21,4 +21,5 @@ __all__ = [
     "one_node_triangle",
     "two_node_square",
     "wedge",
+    "wedge3d",
 ]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from enumsol.checks import shown
 from enumsol.errors import InvalidArgumentError
 from enumsol.gallery.problems import chain, clamped_block, one_node_triangle, two_node_square, wedge
-from enumsol.gallery.solids import block3d, one_node_3d
+from enumsol.gallery.solids import block3d, one_node_3d, wedge3d
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -138,6 +138,13 @@ def _solids() -> Iterator[GalleryEntry]:
     for p, cells, roots in ((4, (2, 1, 2), 1), (9, (3, 2, 2), 1), (16, (4, 3, 2), 1), (100, (10, 9, 4), None)):
         summary = f"block in 3D on {p} contact nodes, pressed and sheared"
         yield GalleryEntry(f"block3d-{p}", summary, 0.5, roots, partial(block3d, *cells), 3)
+    for p, nz in ((2, 2), (4, 3)):
+        summary = f"wedge in 3D on {p} patches, pulled straight: jammed, free or sliding out"
+        yield GalleryEntry(f"wedge3d-{p}-3", summary, 1.0, 3, partial(wedge3d, 2, 1, nz), 3)
+    build = partial(wedge3d, 2, 2, 2, (0.0, 5e-5, 5e-4))
+    yield GalleryEntry("wedge3d-4-9", "wedge in 3D, pulled obliquely: either end may come out", 3.0, 9, build, 3)
+    build = partial(wedge3d, 2, 1, 2, (4e-4, 1e-4, 1e-3), multipliers="nodes")
+    yield GalleryEntry("wedge3d-8-5", "wedge in 3D on 8 nodes, pulled obliquely: it may hang tilted", 2.0, 5, build, 3)
 
 
 #: All named problems, by name.

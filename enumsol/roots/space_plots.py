@@ -40,7 +40,8 @@ def draw_slips(root: Any, problem: ContactProblem3D, ax: Any) -> Any:
     slides = np.array([found is ContactStatus.SLIP for found in root.statuses]) & (size > 0)
     if np.any(slides):
         d = moves[slides] / size[slides, None]
-        ax.quiver(*places[slides][:, shown].T, *d.T, size[slides], cmap="viridis", angles="xy", width=0.005)
+        colours = {"cmap": "viridis", "clim": (0.0, np.max(size[slides]))}  # equal slips in the same colour
+        ax.quiver(*places[slides][:, shown].T, *d.T, size[slides], angles="xy", width=0.005, **colours)
     ax.set_aspect("equal", adjustable="datalim")
     ax.margins(0.15)
     ax.set_xlabel("xyz"[shown[0]])

@@ -168,11 +168,15 @@ def test_gallery_writes_problems_in_3d(capsys, tmp_path):
     status, out, _ = run(capsys, "gallery", "write", "block3d-100", tmp_path / "large.npz")
     assert "try: enumsol fixed-point" in out
     status, out, _ = run(capsys, "gallery", "list")
-    assert [line.split()[:3] for line in out.splitlines()[-6:]] == [
+    assert [line.split()[:3] for line in out.splitlines()[-10:]] == [
         ["one-node-3d", "0", "1"],
         ["one-node-3d-3", "0", "3"],
         *([f"block3d-{p}", "0.5", "1"] for p in (4, 9, 16)),
         ["block3d-100", "0.5", "-"],
+        *(
+            [f"wedge3d-{name}", alpha, name[-1]]
+            for name, alpha in zip(("2-3", "4-3", "4-9", "8-5"), "1132", strict=True)
+        ),
     ]
 
 

@@ -1,0 +1,70 @@
+"""Wedges in 3D that jam: all roots, against Newton's method and successive approximations from many starts."""
+
+import numpy as np
+import oracles3d
+import pytest
+from problems3d import forces, unmatched
+
+import enumsol
+
+JAMMED, FREE = ("stick",), ("open",)
+#: Kinds of roots by entry: statuses that occur in each, from the largest normal forces to the least.
+KINDS = {
+    "wedge3d-2-3": [JAMMED, ("slip",), FREE],
+    "wedge3d-4-3": [JAMMED, ("slip",), FREE],
+    "wedge3d-4-9": [
+        JAMMED,
+        *[("slip", "stick")] * 2,
+        *[("open", "stick")] * 2,
+        *[("open", "slip")] * 2,
+        ("slip",),
+        FREE,
+    ],
+    "wedge3d-8-5": [*[("open", "slip", "stick")] * 3, ("open", "slip"), FREE],
+}
+#: Numbers of the roots that successive approximations reach from starts all over.
+REACHED = {"wedge3d-2-3": {0, 2}, "wedge3d-4-3": {0, 2}, "wedge3d-4-9": {0, 8}, "wedge3d-8-5": {4}}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_all_roots_of_a_wedge_that_jams(name):
+    entry = enumsol.gallery.get(name)
+    problem, alpha = entry.build(), entry.alpha
+    roots = enumsol.enumerate_roots(problem, alpha)
+    assert roots.complete
+    assert roots.index_sum == 1
+    assert enumsol.verify(problem, roots.proof)
+    kinds = [tuple(sorted({str(status) for status in root.statuses})) for root in roots]
+    assert sorted(kinds) == sorted(KINDS[name])
+    assert kinds[0] == KINDS[name][0]
+    assert kinds[-1] == FREE
+    assert min(root.margin for root in roots) > 5e-3
+
+    condensed = problem.condensed
+    data = condensed.S, condensed.free_displacements(alpha), problem.friction_at(alpha)
+    for root in roots:
+        assert oracles3d.violation(*data, forces(root)) < 1e-9
+        assert oracles3d.index(*data, forces(root)) == root.index
+        assert enumsol.is_fixed_point(problem, root)
+    rng = np.random.default_rng(1)
+    missed, unreached = unmatched(roots, oracles3d.newton_set(*data, 2000, rng))
+    assert not missed
+    assert len(unreached) <= 1
+
+    size = max(np.max(root.lambda_n) for root in roots)
+    starts = [0.0, *(size * rng.exponential(size=(12, problem.p)))]
+    limits = [enumsol.successive_approximations(problem, alpha, start, max_iterations=100) for start in starts]
+    missed, unreached = unmatched(roots, [forces(limit) for limit in limits if limit.converged])
+    assert not missed
+    # the others are limits of none: those of index -1, and of +1 too
+    assert set(range(len(roots))) - set(unreached) == REACHED[name]
+
+
+def test_a_wedge_pulled_straight_is_its_own_mirror_image():
+    roots = enumsol.enumerate_roots(enumsol.gallery.wedge3d(2, 1, 3), 1)
+    for root in roots:
+        np.testing.assert_allclose(root.lambda_n[:2], root.lambda_n[2:], rtol=1e-9, atol=1e-18)
+    out = roots[1]
+    # it slides out of the notch on both walls, pressed together: along the first axis
+    assert np.all(out.u_t[:, 0] > 0)
+    assert np.all(np.abs(out.slip_angle) < 0.05)
