@@ -22,6 +22,8 @@ from enumsol.kernel.point import margins
 from enumsol.kernel.rows import ROW_KINDS, UNDECIDED, row_table
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from enumsol.arithmetic.balls import Array
@@ -98,6 +100,20 @@ def as_computed(problem: ContactProblem) -> CondensedEnclosure:
     c = problem.condensed
     zero, none = np.zeros_like(c.S), np.zeros_like(c.g0)
     return CondensedEnclosure(c.S, zero, c.g0, none, c.g1, none, 0.0, problem)
+
+
+def interval_row_tables() -> NDArray[np.int8]:
+    """What the multipliers may be, shape (2, 8, 9), by status code as in rows.row_table; second: friction varies."""
+    return np.stack([_CONSTANT, _VARYING])
+
+
+def interval_exclusion_margin(
+    piece: EnclosedPiece, codes: Sequence[int], rows: NDArray[np.intp], values: Array, errors: float = 1.0
+) -> float:
+    """Proven lower bound on the energy over one partial assignment and a piece (see interval_exclusion_margins)."""
+    leaf = np.zeros(len(rows), dtype=np.intp)
+    found = interval_exclusion_margins(piece, np.array([codes], dtype=np.intp), leaf, rows, values, errors)
+    return float(found[0])
 
 
 def interval_exclusion_margins(

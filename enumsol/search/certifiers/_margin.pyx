@@ -1,8 +1,8 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, initializedcheck=False
-"""The exclusion inequality of enumsol.kernel.point in compiled loops, for the search.
+"""The exclusion inequalities of enumsol.kernel.point and enumsol.kernel.interval in compiled loops, for the search.
 
-Formula and error bounds are those of ``exclusion_margin`` there, which the checker uses; tests compare the two. Sums in
-double arithmetic: the a-priori bounds hold for any order of summation and for fused multiply-adds.
+Formula and error bounds are those of ``margins`` there, which the checker uses; tests compare the two. Sums in double
+arithmetic: the a-priori bounds hold for any order of summation and for fused multiply-adds.
 """
 
 from libc.math cimport fabs, isfinite, sqrt
@@ -13,44 +13,49 @@ cdef extern from "_dense.h" nogil:
 import numpy as np
 
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma
-from enumsol.kernel.rows import FORBIDDEN, NONNEGATIVE, row_table
+from enumsol.kernel.interval import interval_row_tables
+from enumsol.kernel.rows import FORBIDDEN, NONNEGATIVE
 
 
 cdef class Margins:
-    """Exclusion margins on one EnclosedSystem.
+    """Exclusion margins that hold at all of some EnclosedSystems which differ in g and F only.
 
     Parameters
     ----------
-    system : EnclosedSystem
+    ends : sequence of EnclosedSystem
+        One for a single alpha or a load that does not vary, otherwise both ends of a piece of the interval.
+    low, high : (p,) arrays
+        The smallest and the largest friction coefficients; equal where friction is constant.
     """
 
     cdef Py_ssize_t p
-    cdef double[:, ::1] S, inverse
-    cdef double[::1] g, g_rad, F, F_rad
+    cdef double[:, ::1] S, inverse, g, g_rad
+    cdef double[::1] low, high, F_rad
     cdef double form_error, smallest, safe, tiny, root_tiny, unit
-    cdef signed char[:, ::1] table
+    cdef signed char[:, :, ::1] tables
     cdef signed char forbidden, nonnegative
     cdef double[:, ::1] work
 
-    def __init__(self, system):
-        self.p = system.p
-        self.S = np.ascontiguousarray(system.S)
-        self.inverse = np.ascontiguousarray(system.inverse)
-        self.g = np.array(system.g)
-        self.g_rad = np.array(system.g_rad)
-        self.F = np.array(system.F)
-        self.F_rad = np.array(system.F_rad)
-        self.form_error = system.form_error
-        self.smallest = system.smallest_eigenvalue
+    def __init__(self, ends, low, high):
+        first = ends[0]
+        self.p = first.p
+        self.S = np.ascontiguousarray(first.S)
+        self.inverse = np.ascontiguousarray(first.inverse)
+        self.g = np.stack([end.g for end in ends])
+        self.g_rad = np.stack([end.g_rad for end in ends])
+        self.low, self.high = np.array(low), np.array(high)
+        self.F_rad = np.where(np.asarray(low) == high, np.max([end.F_rad for end in ends], axis=0), 0.0)
+        self.form_error = first.form_error
+        self.smallest = first.smallest_eigenvalue
         self.safe, self.tiny, self.root_tiny, self.unit = SAFE, TINY, ROOT_TINY, UNIT
-        self.table = np.ascontiguousarray(row_table(), dtype=np.int8)
+        self.tables = np.ascontiguousarray(interval_row_tables(), dtype=np.int8)
         self.forbidden, self.nonnegative = FORBIDDEN, NONNEGATIVE
-        self.work = np.zeros((9, 2 * system.p))
+        self.work = np.zeros((9, 2 * self.p))
 
     def margin(self, codes, Py_ssize_t[::1] rows, double[::1] values):
         """Proven lower bound on the energy over a partial assignment; -inf when the multipliers are not allowed."""
         cdef Py_ssize_t j, i, kind, code, n = 2 * self.p, p = self.p, count = len(rows)
-        cdef double v, a, terms, k
+        cdef double v, a, terms, k, F, least, bound
         cdef double[::1] y = self.work[0], c = self.work[1], c_rad = self.work[2]
         cdef signed char sign
         terms = gamma(count + 16)
@@ -59,10 +64,11 @@ cdef class Margins:
         for j in range(count):
             kind, i = rows[j] // p, rows[j] % p
             v = values[j]
-            if rows[j] < 0 or kind >= 7 or not isfinite(v):
+            if rows[j] < 0 or kind >= 9 or not isfinite(v):
                 return -np.inf
             code = codes[i]
-            sign = self.table[7 if code == 6 and self.F[i] == 0.0 else code, kind]
+            F = self.high[i]
+            sign = self.tables[self.low[i] != F, 7 if code == 6 and F == 0.0 else code, kind]
             if sign == self.forbidden or (sign == self.nonnegative and v < 0.0):
                 return -np.inf
             a = fabs(v)
@@ -74,32 +80,47 @@ cdef class Margins:
                 c[p + i] += v
                 c_rad[p + i] += terms * a
             elif kind <= 3:
-                c[i] += self.F[i] * v
+                c[i] += F * v
                 c[p + i] += -v if kind == 2 else v
-                c_rad[i] += (terms * self.F[i] + self.F_rad[i]) * a
+                c_rad[i] += (terms * F + self.F_rad[i]) * a
                 c_rad[p + i] += terms * a
             elif kind == 4:
                 y[i] += v
-            else:
+            elif kind <= 6:
                 y[p + i] += -v if kind == 5 else v
-        return self._bound(k)
+            else:
+                F = self.low[i]
+                c[i] -= F * v
+                c[p + i] += v if kind == 7 else -v
+                c_rad[i] += terms * F * a
+                c_rad[p + i] += terms * a
+        for i in range(n):
+            c_rad[i] *= self.safe
+        matvec(&self.S[0, 0], n, n, &y[0], &self.work[6, 0])
+        least = self._bound(0, k)
+        for j in range(1, len(self.g)):
+            # what no end has proven positive is of no use
+            if not least > 0.0:
+                break
+            bound = self._bound(j, k)
+            least = bound if bound < least else least
+        return least
 
-    cdef double _bound(self, double k) noexcept:
+    cdef double _bound(self, Py_ssize_t end, double k) noexcept:
         cdef Py_ssize_t i, n = 2 * self.p
         cdef double[::1] y = self.work[0], c = self.work[1], c_rad = self.work[2], q = self.work[3]
         cdef double[::1] x = self.work[4], Sx = self.work[5], Sy = self.work[6], q_rad = self.work[7]
+        cdef double[::1] g = self.g[end], g_rad = self.g_rad[end]
         cdef double first = 0, cross = 0, y_form = 0, x_form = 0, first_error = 0, cross_error = 0
         cdef double yy = 0, xx = 0, rr = 0, dd = 0, qq = 0, rest, tail, total, error, margin
         for i in range(n):
-            c_rad[i] *= self.safe
-            q[i] = self.g[i] + c[i]
-            q_rad[i] = (self.g_rad[i] + c_rad[i] + 2 * self.unit * fabs(q[i])) * self.safe
+            q[i] = g[i] + c[i]
+            q_rad[i] = (g_rad[i] + c_rad[i] + 2 * self.unit * fabs(q[i])) * self.safe
         matvec(&self.inverse[0, 0], n, n, &q[0], &x[0])
         matvec(&self.S[0, 0], n, n, &x[0], &Sx[0])
-        matvec(&self.S[0, 0], n, n, &y[0], &Sy[0])
         for i in range(n):
-            first += y[i] * (self.g[i] - c[i])
-            first_error += fabs(y[i]) * (k * (fabs(self.g[i]) + fabs(c[i])) + self.g_rad[i] + c_rad[i])
+            first += y[i] * (g[i] - c[i])
+            first_error += fabs(y[i]) * (k * (fabs(g[i]) + fabs(c[i])) + g_rad[i] + c_rad[i])
             cross += x[i] * q[i]
             cross_error += fabs(x[i]) * (k * fabs(q[i]) + q_rad[i])
             y_form += y[i] * Sy[i]

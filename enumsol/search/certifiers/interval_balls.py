@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
-from enumsol.kernel.interval import EnclosedPiece, as_computed, interval_exclusion_margins
+from enumsol.kernel.interval import EnclosedPiece, as_computed, interval_exclusion_margin
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+    from numpy.typing import NDArray
+
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.problem import ContactProblem
     from enumsol.relaxation.interval import IntervalSystem
     from enumsol.search.interval import EmptyLeaf, Piece
+    from enumsol.selections.solution import Codes
 
+    Margin = Callable[[Codes, NDArray[np.intp], NDArray[np.float64]], float]
 
 #: Bounds must be this large [energy unit of the piece], so that a checker that sums in another order agrees.
 _MARGIN = 1e-12
@@ -39,7 +45,7 @@ class VerifiedIntervalCertifier:
         self._rationals = ExactIntervalCertifier(exact) if exact.condensed_exactly else None
         self._zero = exact.zero
         self._used_rationals = False
-        self._piece: tuple[Piece, EnclosedPiece | None] | None = None
+        self._piece: tuple[Piece, Margin | None] | None = None
 
     @property
     def checkable(self) -> bool:
@@ -48,20 +54,18 @@ class VerifiedIntervalCertifier:
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
-        enclosed = self._enclosed(piece, system)
-        if enclosed is not None:
-            codes = np.array([leaf.codes], dtype=np.intp)
-            first = np.zeros(len(leaf.rows), dtype=np.intp)
-            margins = interval_exclusion_margins(enclosed, codes, first, leaf.rows, leaf.values, errors=2.0)
-            return bool(margins[0] > _MARGIN)
+        margin = self._margin_on(piece, system)
+        if margin is not None:
+            return margin(leaf.codes, leaf.rows, leaf.values) > _MARGIN
         if self._rationals is None:
             return False
         self._used_rationals = True
         return self._rationals.excluded(piece, system, leaf)
 
-    def _enclosed(self, piece: Piece, system: IntervalSystem) -> EnclosedPiece | None:
+    def _margin_on(self, piece: Piece, system: IntervalSystem) -> Margin | None:
         if self._piece is None or self._piece[0] != piece:
-            self._piece = (piece, self._make(piece, system))
+            enclosed = self._make(piece, system)
+            self._piece = (piece, None if enclosed is None else _margin(enclosed))
         return self._piece[1]
 
     def _make(self, piece: Piece, system: IntervalSystem) -> EnclosedPiece | None:
@@ -77,6 +81,15 @@ class VerifiedIntervalCertifier:
         except NotEnclosedError:
             return None
         return enclosed if positive else None
+
+
+def _margin(piece: EnclosedPiece) -> Margin:
+    """The exclusion inequality, compiled where that is installed."""
+    try:
+        from enumsol.search.certifiers._margin import Margins
+    except ImportError:
+        return partial(interval_exclusion_margin, piece, errors=2.0)
+    return Margins(piece.ends, piece.low, piece.high).margin
 
 
 def certified_enclosure(problem: ContactProblem, *, exactly: bool) -> CondensedEnclosure | None:

@@ -187,7 +187,7 @@ def _margins(system: EnclosedSystem) -> Callable[[Codes, NDArray[np.intp], Array
         from enumsol.search.certifiers._margin import Margins
     except ImportError:
         return partial(exclusion_margin, system, errors=2.0)
-    return Margins(system).margin
+    return Margins((system,), system.F, system.F).margin
 
 
 def _fraction(value: Any) -> str:
