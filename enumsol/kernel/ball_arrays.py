@@ -65,32 +65,65 @@ def smaller(one: Ball, other: Ball) -> Ball:
     return Ball(np.where(first, one.mid, other.mid), np.where(first, one.rad, other.rad))
 
 
+class Inverse:
+    """Systems with a matrix of balls that is proven regular; made by ``of``.
+
+    Attributes
+    ----------
+    approximate : (n, n) array
+        An approximate inverse of the matrix with its columns scaled; no claim rests on its accuracy.
+    """
+
+    def __init__(self, M: Ball, scale: Array, approximate: Array, defect: Array, weights: Array, share: float) -> None:
+        self.approximate = approximate
+        self._M, self._scale, self._defect, self._weights, self._share = M, scale, defect, weights, share
+
+    @classmethod
+    def of(cls, M: Ball, approximate: Array | None = None) -> Inverse | None:
+        """None where the matrix is not proven regular.
+
+        Parameters
+        ----------
+        M : Ball of shape (n, n), n > 0
+        approximate : that of another matrix with the same midpoints, if it is known
+        """
+        n = len(M.mid)
+        scale = column_scale(M)
+        M = Ball(M.mid * scale, M.rad * scale + TINY)
+        if approximate is None:
+            try:
+                approximate = np.asarray(np.linalg.inv(M.mid), dtype=np.float64)
+            except np.linalg.LinAlgError:
+                return None
+        defect = (Ball.exact(approximate) @ M - Ball.exact(np.eye(n))).size
+        # weights u > 0 near the Perron vector of the defect: it contracts in the norm max |x| / u if anywhere
+        u = np.ones(n)
+        for _ in range(_POWER_STEPS):
+            u = defect @ u + 1e-3 * u
+            u = u / np.max(u) + 1e-9
+        contraction = float(np.max(upper_sum(defect * u, axis=1) / u)) * SAFE
+        if not contraction < _LARGEST_CONTRACTION:
+            return None
+        return cls(M, scale, approximate, defect, u, 1.0 - contraction)
+
+    def solve(self, B: Ball) -> Ball:
+        """All X with M X = B, columns of unknowns."""
+        R = Ball.exact(self.approximate)
+        X = Ball.exact(self.approximate @ B.mid)
+        step = (R @ (B - self._M @ X)).size
+        # |error| <= step + defect |error|; with step <= t u in every column |error| <= t u / (1 - contraction)
+        u = self._weights
+        largest = np.max(step / u[:, None], axis=0) / self._share * SAFE
+        rad = (step + upper_sum(self._defect * u, axis=1)[:, None] * largest) * SAFE
+        return Ball(X.mid * self._scale[:, None], rad * self._scale[:, None] + TINY)
+
+
 def solution(M: Ball, B: Ball) -> Ball | None:
     """All X with M X = B, columns of unknowns; None where M is not proven regular."""
-    n = len(M.mid)
-    if not n:
+    if not len(M.mid):
         return Ball.exact(np.zeros_like(B.mid))
-    scale = column_scale(M)
-    M = Ball(M.mid * scale, M.rad * scale + TINY)
-    try:
-        R = Ball.exact(np.asarray(np.linalg.inv(M.mid), dtype=np.float64))
-    except np.linalg.LinAlgError:
-        return None
-    defect = (R @ M - Ball.exact(np.eye(n))).size
-    # weights u > 0 near the Perron vector of the defect: it contracts in the norm max |x| / u if anywhere
-    u = np.ones(n)
-    for _ in range(_POWER_STEPS):
-        u = defect @ u + 1e-3 * u
-        u = u / np.max(u) + 1e-9
-    contraction = float(np.max(upper_sum(defect * u, axis=1) / u)) * SAFE
-    if not contraction < _LARGEST_CONTRACTION:
-        return None
-    X = Ball.exact(R.mid @ B.mid)
-    step = (R @ (B - M @ X)).size
-    # |error| <= step + defect |error|; with step <= t u in every column |error| <= t u / (1 - contraction)
-    largest = np.max(step / u[:, None], axis=0) / (1.0 - contraction) * SAFE
-    rad = (step + upper_sum(defect * u, axis=1)[:, None] * largest) * SAFE
-    return Ball(X.mid * scale[:, None], rad * scale[:, None] + TINY)
+    inverse = Inverse.of(M)
+    return None if inverse is None else inverse.solve(B)
 
 
 def determinant_sign(M: Ball) -> int:
