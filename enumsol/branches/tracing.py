@@ -155,6 +155,8 @@ class _Cutting:
 
     def run(self) -> tuple[Box, list[tuple[float, float]]]:
         """The box with its parts, and the intervals behind them that need boxes of their own."""
+        if self._expansion.rough and not self._whole and self._decided(self.low, self.high) is None:
+            return Box(self.low, self.high, ()), self._rest(self.low, self.high)
         parts: list[Part] = []
         cells = [(low, high, _HALVINGS) for low, high in pairwise(self._ends())]
         cells.reverse()
@@ -169,11 +171,15 @@ class _Cutting:
             elif self._whole or (self._keep_flat and self._is_flat(low, high)):
                 _append(parts, self._open(low, high))
             else:
-                rest = [(low, high)] if (low, high) != (self.low, self.high) else [(low, middle), (middle, high)]
-                if cells:
-                    rest.append((high, self.high))
-                return Box(self.low, self.high, tuple(parts)), rest
+                return Box(self.low, self.high, tuple(parts)), self._rest(low, high)
         return Box(self.low, self.high, tuple(parts)), []
+
+    def _rest(self, low: float, high: float) -> list[tuple[float, float]]:
+        """What is left when a part cannot be decided: the part and what lies behind it, or two halves."""
+        middle = 0.5 * (low + self.high)
+        if self._expansion.rough or (low, high) == (self.low, self.high):
+            return [(low, middle), (middle, self.high)]
+        return [(low, high), *([(high, self.high)] if high < self.high else [])]
 
     def _ends(self) -> list[float]:
         """Where the box is cut first: around groups of zeros."""

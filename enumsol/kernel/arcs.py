@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 
 #: Terms of the series of z, squarings of its resolvent's bound, and the largest such bound.
 _TERMS, _SQUARINGS, _LARGEST_GROWTH = 16, 6, 1e6
-#: Imaginary parts (tau) of what counts as a zero, and sizes by error bounds of what counts as flat; for guesses.
-_NEAR_REAL, _FLAT = 1e-2, 32.0
+#: Imaginary parts (tau) of what counts as a zero, and sizes by error bounds of what counts as flat, and errors
+#: of what counts as rough; for guesses.
+_NEAR_REAL, _FLAT, _ROUGH = 1e-2, 32.0, 1e-9
 
 NORMAL_FORCE, TANGENTIAL_FORCE, CONE_PLUS, CONE_MINUS, PENETRATION, SLIP_FORWARD, SLIP_BACKWARD = range(7)
 
@@ -170,6 +171,12 @@ class Expansion:
         real = np.sort(roots.real[np.abs(roots.imag) < _NEAR_REAL])
         found = [self._middle + self._radius * float(x) for x in real]
         return [alpha for alpha in found if self.low < alpha < self.high]
+
+    @property
+    def rough(self) -> bool:
+        """Whether the series was truncated too early for bounds near those of rounding: the interval is long."""
+        size = np.sum(np.abs(self._coefficients), axis=1)
+        return bool(np.median(self._error / (size + TINY)) > _ROUGH)
 
     def flat(self, condition: int) -> bool:
         """Whether a condition is nowhere larger than the bound of its error allows to tell."""
