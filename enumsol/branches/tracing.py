@@ -1,35 +1,74 @@
 """Where a selection holds over an interval of alpha, found by the polynomials of the kernel (theory, section 7.14).
 
-The interval is cut into boxes, on each of which the conditions are polynomials with bounds of their errors, and the boxes
-into parts: the selection holds throughout, or nowhere, or exactly one condition changes its sign. What is left stays open.
+The interval is cut into boxes, on each of which the conditions are known with bounds of their errors, and the boxes
+into parts: the selection holds throughout, or nowhere, or exactly one condition changes its sign. What is left stays
+open.
 """
 
 from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
+from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator
 
-    from enumsol.kernel.arcs import ArcSelection, Expansion
+    from enumsol.kernel.arcs import ArcSelection, OverInterval
+    from enumsol.kernel.precise import PreciseSelection
+    from enumsol.kernel.selection_rows import SelectionRows
+
+    Number = float | Fraction
+    Interval = tuple[Number, Number]
+
+
+class AlphaExpansion(Protocol):
+    """Conditions of a selection over an interval, as arcs.Expansion and precise.PreciseExpansion know them."""
+
+    low: Any
+    high: Any
+    apart: Any
+    final: bool
+
+    @property
+    def rough(self) -> bool:
+        """Whether shorter intervals give smaller errors."""
+
+    def over(self, low: Any, high: Any) -> OverInterval:
+        """What is known over a part."""
+
+    def slopes(self, low: Any, high: Any) -> Any:
+        """Signs of the conditions' slopes over a part."""
+
+    def index(self, low: Any, high: Any) -> int:
+        """Sign of the determinant over a part."""
+
+    def zeros(self, condition: int) -> list[Any]:
+        """Where a condition seems to vanish."""
+
+    def flat(self, condition: int) -> bool:
+        """Whether a condition cannot be told from zero."""
+
+    def zero_bounds(self, condition: int, slope: int, low: Any, high: Any) -> Any:
+        """Bounds of the only zero in a part."""
+
 
 #: Bounds of errors are multiplied by this, so that a checker that rounds otherwise agrees.
 ERRORS = 2.0
-#: Boxes are not cut below this share of the interval, nor below so many units in the last place of alpha.
-_SMALLEST_BOX, _SMALLEST_UNITS = 2.0**-40, 64.0
+#: Boxes are not cut below so many units in the last place of alpha, or in many digits below this share of the interval.
+_SMALLEST_UNITS, _SMALLEST_PRECISE = 64.0, 2.0**-60
+#: Boxes shorter than this share of the interval are traced in many digits.
+_PRECISE_BOX = 2.0**-10
 #: Expansions of one selection, after which what is left stays open.
 _MOST_BOXES = 200
-#: Zeros closer than this, relative to their box, are not separated in it.
-_APART = 1e-5
-#: Boxes shorter than this share of the interval are not cut because of a condition too small for the bound of its error.
-_FLAT_BOX = 2.0**-5
-#: Halvings of a part that is not decided, and enlargements of a zero's enclosure.
-_HALVINGS, _WIDENINGS = 5, 60
+#: Boxes shorter than this share of the interval are not cut because of a condition that cannot be told from zero.
+_FLAT_BOX = 2.0**-12
+#: Halvings of a part that is not decided.
+_HALVINGS = 5
 
 
 class PartKind(enum.StrEnum):
@@ -48,7 +87,7 @@ class Part:
     Attributes
     ----------
     kind : PartKind
-    low, high : float
+    low, high : float or Fraction
     condition : int
         At an event the condition that changes its sign, as numbered by the selection; -1 elsewhere.
     zero : (float, float)
@@ -62,10 +101,10 @@ class Part:
     """
 
     kind: PartKind
-    low: float
-    high: float
+    low: Number
+    high: Number
     condition: int = -1
-    zero: tuple[float, float] = (np.nan, np.nan)
+    zero: Interval = (np.nan, np.nan)
     rising: bool = False
     index: int = 0
     doubtful: frozenset[int] = frozenset()
@@ -75,8 +114,8 @@ class Part:
 class Box:
     """An interval on which one expansion decides: its parts, from left to right."""
 
-    low: float
-    high: float
+    low: Number
+    high: Number
     parts: tuple[Part, ...]
 
 
@@ -93,8 +132,8 @@ class Trace:
     """
 
     selection: ArcSelection
-    low: float
-    high: float
+    low: Number
+    high: Number
     boxes: list[Box] = field(default_factory=list)
 
     @property
@@ -103,30 +142,70 @@ class Trace:
         return (part for box in self.boxes for part in box.parts)
 
 
-def trace(selection: ArcSelection, low: float, high: float) -> Trace:
-    """Cut [low, high] into boxes and parts."""
-    found = Trace(selection, low, high)
-    smallest = max(_SMALLEST_BOX * (high - low), _SMALLEST_UNITS * float(np.spacing(max(abs(low), abs(high)))))
-    waiting = [(low, high)]
-    count = 0
-    while waiting:
-        first, last = waiting.pop()
-        count += 1
-        middle = 0.5 * (first + last)
-        whole = count > _MOST_BOXES or last - first <= smallest or not first < middle < last
-        expansion = None if count > _MOST_BOXES else selection.expansion(first, last, ERRORS)
-        if expansion is not None:
-            share = (last - first) / (high - low)
-            box, rest = _Cutting(selection, expansion, whole=whole, flat=share < _FLAT_BOX).run()
+def trace(selection: ArcSelection, low: float, high: float, precise: Callable[[], PreciseSelection | None]) -> Trace:
+    """Cut [low, high] into boxes and parts.
+
+    Parameters
+    ----------
+    selection : ArcSelection
+    low, high : float
+    precise : gives the same selection in balls of many digits, for short boxes; None where there is none
+    """
+    return _Tracing(selection, low, high, precise).run()
+
+
+class _Tracing:
+    """One selection being traced."""
+
+    def __init__(
+        self, selection: ArcSelection, low: float, high: float, precise: Callable[[], PreciseSelection | None]
+    ) -> None:
+        self._selection, self._length, self._precise = selection, high - low, precise
+        self._spacing = _SMALLEST_UNITS * float(np.spacing(max(abs(low), abs(high))))
+        self._found = Trace(selection, low, high)
+        self._count = 0
+
+    def run(self) -> Trace:
+        """Box by box, from left to right."""
+        waiting: list[Interval] = [(self._found.low, self._found.high)]
+        while waiting:
+            first, last = waiting.pop()
+            self._count += 1
+            waiting += reversed(self._box(first, last))
+        return self._found
+
+    def _box(self, first: Number, last: Number) -> list[Interval]:
+        """Add a box, or as much of it as is decided; what is left."""
+        rows, share = self._selection.rows, float(last - first) / self._length
+        precise = self._precise() if share < _PRECISE_BOX and self._count <= _MOST_BOXES else None
+        smallest = share < _SMALLEST_PRECISE if precise is not None else float(last - first) <= self._spacing
+        whole = self._count > _MOST_BOXES or smallest
+        tried: list[tuple[Box, list[Interval]]] = []
+        if self._count <= _MOST_BOXES and isinstance(first, float) and isinstance(last, float):
+            expansion = self._selection.expansion(first, last, ERRORS)
+            if expansion is not None:
+                flat = share < _FLAT_BOX and precise is None
+                tried.append(_Cutting(rows, expansion, whole=whole, flat=flat).run())
+        if precise is not None and not (tried and _decides(*tried[0])):
+            fine = precise.expansion(first, last)
+            if fine is not None:
+                tried.insert(0, _Cutting(rows, fine, whole=whole, flat=share < _PRECISE_BOX).run())
+        if tried:
+            box, rest = tried[0]
             if box.parts:
-                found.boxes.append(box)
-            waiting += reversed(rest)
-        elif whole:
-            everywhere = frozenset(range(selection.system.p))
-            found.boxes.append(Box(first, last, (Part(PartKind.OPEN, first, last, doubtful=everywhere),)))
-        else:
-            waiting += [(middle, last), (first, middle)]
-    return found
+                self._found.boxes.append(box)
+            return rest
+        if whole:
+            everywhere = frozenset(range(len(rows.codes)))
+            self._found.boxes.append(Box(first, last, (Part(PartKind.OPEN, first, last, doubtful=everywhere),)))
+            return []
+        middle = (first + last) / 2
+        return [(first, middle), (middle, last)]
+
+
+def _decides(box: Box, rest: list[Interval]) -> bool:
+    """Whether nothing stays open."""
+    return not rest and all(part.kind is not PartKind.OPEN for part in box.parts)
 
 
 class _Cutting:
@@ -134,8 +213,8 @@ class _Cutting:
 
     Parameters
     ----------
-    selection : ArcSelection
-    expansion : Expansion
+    rows : SelectionRows
+    expansion : AlphaExpansion
         That of the box.
     whole : bool
         The box is not to be cut further: what is not decided stays open.
@@ -143,17 +222,19 @@ class _Cutting:
         Nor is it where a condition is flat.
     """
 
-    def __init__(self, selection: ArcSelection, expansion: Expansion, *, whole: bool, flat: bool) -> None:
-        self._selection, self._expansion, self._whole, self._keep_flat = selection, expansion, whole, flat
+    def __init__(self, rows: SelectionRows, expansion: AlphaExpansion, *, whole: bool, flat: bool) -> None:
+        self._rows, self._expansion, self._whole, self._keep_flat = rows, expansion, whole, flat
+        self.low: Number
+        self.high: Number
         self.low, self.high = expansion.low, expansion.high
         known = expansion.over(self.low, self.high)
-        count = len(selection.conditions)
+        count = len(self._rows.conditions)
         # of conditions that may vanish: those of which this expansion cannot tell, and the zeros of the others
         doubtful = [*known.doubtful.tolist(), *([] if known.regular else [count])]
         self._flat = [k for k in doubtful if expansion.flat(k)]
         self._zeros = sorted((zero, k) for k in doubtful if k not in self._flat for zero in expansion.zeros(k))
 
-    def run(self) -> tuple[Box, list[tuple[float, float]]]:
+    def run(self) -> tuple[Box, list[Interval]]:
         """The box with its parts, and the intervals behind them that need boxes of their own."""
         if self._expansion.rough and not self._whole and self._decided(self.low, self.high) is None:
             return Box(self.low, self.high, ()), self._rest(self.low, self.high)
@@ -163,28 +244,28 @@ class _Cutting:
         while cells:
             low, high, halvings = cells.pop()
             part = self._decided(low, high)
-            middle = 0.5 * (low + high)
+            middle = (low + high) / 2
             if part is not None:
                 _append(parts, part)
             elif halvings and low < middle < high and not self._tight(low, high):
                 cells += [(middle, high, halvings - 1), (low, middle, halvings - 1)]
-            elif self._whole or (self._keep_flat and self._is_flat(low, high)):
+            elif self._whole or self._stays_open(low, high):
                 _append(parts, self._open(low, high))
             else:
                 return Box(self.low, self.high, tuple(parts)), self._rest(low, high)
         return Box(self.low, self.high, tuple(parts)), []
 
-    def _rest(self, low: float, high: float) -> list[tuple[float, float]]:
+    def _rest(self, low: Number, high: Number) -> list[Interval]:
         """What is left when a part cannot be decided: the part and what lies behind it, or two halves."""
-        middle = 0.5 * (low + self.high)
+        middle = (low + self.high) / 2
         if self._expansion.rough or (low, high) == (self.low, self.high):
             return [(low, middle), (middle, self.high)]
         return [(low, high), *([(high, self.high)] if high < self.high else [])]
 
-    def _ends(self) -> list[float]:
+    def _ends(self) -> list[Any]:
         """Where the box is cut first: around groups of zeros."""
-        reach = _APART * (self.high - self.low)
-        groups: list[list[float]] = []
+        reach = self._expansion.apart
+        groups: list[list[Any]] = []
         for zero, _ in self._zeros:
             if groups and zero - groups[-1][1] <= reach:
                 groups[-1][1] = zero
@@ -193,25 +274,31 @@ class _Cutting:
         borders = [self.low, *(x for group in groups for x in group), self.high]
         ends = [self.low]
         for k, (first, last) in enumerate(groups):
-            before, after = first - borders[2 * k], borders[2 * k + 3] - last
-            ends += [first - before / 3.0, last + after / 3.0]
+            before, after = (first - borders[2 * k]) / 4, (borders[2 * k + 3] - last) / 4
+            if first < last:
+                before, after = min(before, 4 * reach), min(after, 4 * reach)
+            ends += [first - before, last + after]
         ends.append(self.high)
         return [x for k, x in enumerate(ends) if not k or x > ends[k - 1]]
 
-    def _tight(self, low: float, high: float) -> bool:
+    def _tight(self, low: Number, high: Number) -> bool:
         """Whether halving does not help: several zeros close together, or a condition that is flat."""
         if self._is_flat(low, high):
             return True
         inside = [(zero, k) for zero, k in self._zeros if low < zero < high]
-        return len(inside) > 1 and inside[-1][0] - inside[0][0] <= _APART * (self.high - self.low)
+        return len(inside) > 1 and inside[-1][0] - inside[0][0] <= self._expansion.apart
 
-    def _is_flat(self, low: float, high: float) -> bool:
+    def _stays_open(self, low: Number, high: Number) -> bool:
+        """Whether a box of its own would not decide a part."""
+        return (self._expansion.final and self._tight(low, high)) or (self._keep_flat and self._is_flat(low, high))
+
+    def _is_flat(self, low: Number, high: Number) -> bool:
         """Whether a condition cannot be told from zero."""
         known = self._expansion.over(low, high)
         doubtful = [*known.doubtful.tolist(), *([] if known.regular else [len(known.conditions)])]
         return any(k in self._flat for k in doubtful)
 
-    def _decided(self, low: float, high: float) -> Part | None:
+    def _decided(self, low: Number, high: Number) -> Part | None:
         expansion = self._expansion
         known = expansion.over(low, high)
         if known.none:
@@ -229,36 +316,17 @@ class _Cutting:
         signs = [self._sign(alpha, condition) for alpha in (low, high)]
         if not slope or signs != [-slope, slope]:
             return None
-        zero = self._enclosed(condition, slope, low, high)
+        zero = expansion.zero_bounds(condition, slope, low, high)
         return Part(PartKind.EVENT, low, high, condition, zero, slope > 0, index)
 
-    def _sign(self, alpha: float, condition: int) -> int:
+    def _sign(self, alpha: Number, condition: int) -> int:
         return int(self._expansion.over(alpha, alpha).conditions[condition])
 
-    def _enclosed(self, condition: int, slope: int, low: float, high: float) -> tuple[float, float]:
-        """Floats on both sides of the zero at which the condition has opposite signs, proven."""
-        at = self._selection.at
-        zero = next((z for z, k in self._zeros if k == condition and low < z < high), 0.5 * (low + high))
-        rise = self._expansion.rise(condition, zero)
-        found = at(zero)
-        if found is None or not np.isfinite(rise) or rise * slope <= 0.0:
-            return low, high
-        zero -= float(found[2].mid[condition]) / rise
-        width = 2.0 * ERRORS * float(found[2].rad[condition]) / abs(rise) + 2.0 * float(np.spacing(abs(zero)))
-        for _ in range(_WIDENINGS):
-            first, last = zero - width, zero + width
-            if not low <= first < last <= high:
-                break
-            if [self._selection.sign_at(alpha, condition, ERRORS) for alpha in (first, last)] == [-slope, slope]:
-                return first, last
-            width *= 2.0
-        return low, high
-
-    def _open(self, low: float, high: float) -> Part:
+    def _open(self, low: Number, high: Number) -> Part:
         known = self._expansion.over(low, high)
-        nodes = frozenset(range(self._selection.system.p))
+        nodes = frozenset(range(len(self._rows.codes)))
         if known.regular:
-            nodes = frozenset(self._selection.conditions[k][0] for k in known.doubtful)
+            nodes = frozenset(self._rows.conditions[k][0] for k in known.doubtful)
         return Part(PartKind.OPEN, low, high, doubtful=nodes)
 
 

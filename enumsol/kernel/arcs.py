@@ -1,8 +1,8 @@
 """The trusted kernel over alpha: where one selection holds, and where its conditions vanish (theory, section 7.14).
 
 A selection with unknowns y (lambda_n of the nodes in contact, lambda_t of the sticking ones) asks for M(alpha) y =
-g_R(alpha), both affine in alpha. Here it is written with one unknown more: N(alpha) z = e for z = (y, t), where N has the
-rows [M, -g_R] and one row v', and e is the last unit vector. Where N is regular and t is not zero, y / t is the
+g_R(alpha), both affine in alpha. Here it is written with one unknown more: N(alpha) z = e for z = (y, t), where N has
+the rows [M, -g_R] and one row v', and e is the last unit vector. Where N is regular and t is not zero, y / t is the
 selection's only solution; where t = 0 there is none. So zeros of det M need no care, as long as N is regular there.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_sum
 from enumsol.kernel.ball_arrays import Ball, Inverse, determinant_sign, solution
-from enumsol.kernel.rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.kernel.selection_rows import SelectionRows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,8 +34,9 @@ _TERMS, _SQUARINGS, _LARGEST_GROWTH = 16, 6, 1e6
 #: Imaginary parts (tau) of what counts as a zero, and sizes by error bounds of what counts as flat, and errors
 #: of what counts as rough; for guesses.
 _NEAR_REAL, _FLAT, _ROUGH = 1e-2, 32.0, 1e-9
-
-NORMAL_FORCE, TANGENTIAL_FORCE, CONE_PLUS, CONE_MINUS, PENETRATION, SLIP_FORWARD, SLIP_BACKWARD = range(7)
+#: Zeros closer than this, relative to their interval, are not told apart; a zero's first enclosure by its radius, and
+#: enlargements of it.
+_APART, _MARGIN, _WIDENINGS = 1e-5, 4.0, 60
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class OverInterval:
     Attributes
     ----------
     conditions : int8 array
-        1 or -1 where a condition of ``ArcSelection.conditions`` is positive or negative throughout, else 0.
+        1 or -1 where a condition of ``SelectionRows.conditions`` is positive or negative throughout, else 0.
     regular : bool
         The selection has exactly one solution at every alpha.
     none : bool
@@ -101,7 +102,7 @@ class OverInterval:
         return self.regular and bool(np.all(self.conditions > 0))
 
     @property
-    def doubtful(self) -> Array:
+    def doubtful(self) -> NDArray[np.intp]:
         """Numbers of the conditions whose signs are not known."""
         return np.flatnonzero(self.conditions == 0)
 
@@ -114,7 +115,13 @@ class Expansion:
     Attributes
     ----------
     low, high : float
+    apart : float
+        Zeros closer than this are not told apart.
+    final : bool
+        False: they may be in a shorter interval.
     """
+
+    final = False
 
     def __init__(
         self,
@@ -124,8 +131,11 @@ class Expansion:
         error: Array,
         slope_error: Array,
         bordered: Ball,
+        selection: ArcSelection,
     ) -> None:
         self.low, self.high = ends
+        self.apart = _APART * (ends[1] - ends[0])
+        self._selection = selection
         self._middle, self._radius = scale
         self._bordered = bordered
         self._coefficients, self._error, self._slope_error = coefficients, error, slope_error
@@ -149,7 +159,7 @@ class Expansion:
         """
         part = self._tau(low, high)
         t = _bernstein_signs(self._coefficients[-1:], self._rounded[-1:], *part)[0]
-        return _bernstein_signs(self._slope, self._slope_rounded, *part)[:-1] * t
+        return np.asarray(_bernstein_signs(self._slope, self._slope_rounded, *part)[:-1] * t, dtype=np.int8)
 
     def index(self, low: float, high: float) -> int:
         """Sign of det M over a part, 0 where it is not proven."""
@@ -182,8 +192,28 @@ class Expansion:
         """Whether a condition is nowhere larger than the bound of its error allows to tell."""
         return bool(np.sum(np.abs(self._coefficients[condition])) <= _FLAT * self._rounded[condition])
 
-    def rise(self, condition: int, alpha: float) -> float:
-        """Slope of a condition over t at an alpha at which it vanishes; no claim rests on it."""
+    def zero_bounds(self, condition: int, slope: int, low: float, high: float) -> tuple[float, float]:
+        """Bounds of the only zero of a condition in a part, at whose ends it has opposite signs.
+
+        ``slope`` is the sign of its slope there.
+        """
+        zero = next((alpha for alpha in self.zeros(condition) if low < alpha < high), 0.5 * (low + high))
+        found, rise = self._selection.at(zero), self._rise(condition, zero)
+        if found is None or not np.isfinite(rise) or rise * slope <= 0.0:
+            return low, high
+        zero -= float(found[2].mid[condition]) / rise
+        width = _MARGIN * float(found[2].rad[condition]) / abs(rise) + 2.0 * float(np.spacing(abs(zero)))
+        for _ in range(_WIDENINGS):
+            first, last = zero - width, zero + width
+            if not low <= first < last <= high:
+                break
+            if [self._selection.sign_at(alpha, condition) for alpha in (first, last)] == [-slope, slope]:
+                return first, last
+            width *= 2.0
+        return low, high
+
+    def _rise(self, condition: int, alpha: float) -> float:
+        """Slope of a condition over t at an alpha at which it vanishes, nearly."""
         tau = (alpha - self._middle) / self._radius
         t = np.polynomial.polynomial.polyval(tau, self._coefficients[-1])
         return float(np.polynomial.polynomial.polyval(tau, self._slope[condition]) / t / self._radius)
@@ -205,47 +235,25 @@ class ArcSelection:
 
     Attributes
     ----------
-    conditions : tuple of (node, kind)
-        What has to be nonnegative, by kinds of rows.
+    system : ArcSystem
+    rows : SelectionRows
     """
 
     def __init__(self, system: ArcSystem, codes: Sequence[int]) -> None:
-        self.system, self.codes = system, tuple(codes)
-        p = system.p
-        closed = [i for i, code in enumerate(codes) if code != OPEN]
-        stick = [i for i, code in enumerate(codes) if code == STICK]
-        slip = [i for i in closed if codes[i] in (SLIP_PLUS, SLIP_MINUS)]
-        self._rows = np.array([*closed, *(p + i for i in stick)], dtype=np.intp)
-        self._size = len(self._rows)
-        self._closed = np.array(closed, dtype=np.intp)
-        place = {i: j for j, i in enumerate(closed)}
-        self._slip = np.array(slip, dtype=np.intp)
-        self._slip_columns = np.array([place[i] for i in slip], dtype=np.intp)
-        self._slip_signs = np.array([1.0 if codes[i] == SLIP_PLUS else -1.0 for i in slip])
-        self._stick = np.array(stick, dtype=np.intp)
-        self._stick_columns = np.array([place[i] for i in stick], dtype=np.intp)
-        self._fixed = system.S[:, self._rows]
-        turning = system.S[:, p + self._slip]
-        self._turning = Ball(turning.mid * self._slip_signs, turning.rad)
-        # conditions on w: row of w and sign
-        opened = [i for i, code in enumerate(codes) if code == OPEN]
-        self._w_rows = np.array([*opened, *(p + self._slip)], dtype=np.intp)
-        self._w_signs = np.concatenate([-np.ones(len(opened)), self._slip_signs])
-        forward = [SLIP_FORWARD if codes[i] == SLIP_PLUS else SLIP_BACKWARD for i in slip]
-        self.conditions: tuple[tuple[int, int], ...] = (
-            *((i, PENETRATION) for i in opened),
-            *zip(slip, forward, strict=True),
-            *((i, NORMAL_FORCE) for i in closed),
-            *((i, CONE_PLUS) for i in stick),
-            *((i, CONE_MINUS) for i in stick),
-        )
+        self.system = system
+        self.rows = rows = SelectionRows(codes)
+        self._size = len(rows.unknown)
+        self._fixed = system.S[:, rows.unknown]
+        turning = system.S[:, system.p + rows.slip]
+        self._turning = Ball(turning.mid * rows.slip_signs, turning.rad)
 
     # -- what is proven --------------------------------------------------------------------------------------------
 
     def expansion(self, low: float, high: float, errors: float = 1.0) -> Expansion | None:
         """The conditions over [low, high] as polynomials; None where the interval is too long.
 
-        Bounds of errors are multiplied by ``errors``: a search asks for more than its checker, which may round otherwise.
+        Bounds of errors are multiplied by ``errors``: a search asks for more than its checker, which may round
+        otherwise.
         """
         middle = 0.5 * (low + high)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -254,7 +262,7 @@ class ArcSelection:
 
     def at(self, alpha: float) -> tuple[Ball, Ball, Ball] | None:
         """lambda, w and the conditions at one alpha, scaled; None where the selection is not proven regular."""
-        p, rows = self.system.p, self._rows
+        p, rows = self.system.p, self.rows.unknown
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             F, g = self._friction(alpha), self._load(alpha)
             W = self._columns(F)
@@ -266,23 +274,22 @@ class ArcSelection:
             y = y[:, 0]
             forces = Ball(np.zeros(2 * p), np.zeros(2 * p))
             forces.mid[rows], forces.rad[rows] = y.mid, y.rad
-            slip = F[self._slip] * y[self._slip_columns]
-            forces.mid[p + self._slip], forces.rad[p + self._slip] = slip.mid * self._slip_signs, slip.rad
-            bound, stuck, moves = F[self._stick] * y[self._stick_columns], y[len(self._closed) :], w[self._w_rows]
-            moves = Ball(moves.mid * self._w_signs, moves.rad)
-            return forces, w, _joined(moves, y[: len(self._closed)], bound - stuck, bound + stuck)
+            slip = F[self.rows.slip] * y[self.rows.slip_columns]
+            forces.mid[p + self.rows.slip], forces.rad[p + self.rows.slip] = slip.mid * self.rows.slip_signs, slip.rad
+            bound, stuck, moves = (
+                F[self.rows.stick] * y[self.rows.stick_columns],
+                y[len(self.rows.closed) :],
+                w[self.rows.moving],
+            )
+            moves = Ball(moves.mid * self.rows.moving_signs, moves.rad)
+            return forces, w, _joined(moves, y[: len(self.rows.closed)], bound - stuck, bound + stuck)
 
-    def index(self, alpha: float) -> int:
-        """Sign of det M at an alpha, 0 where it is not proven."""
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            return determinant_sign(self._columns(self._friction(alpha))[self._rows])
-
-    def sign_at(self, alpha: float, condition: int, errors: float = 1.0) -> int:
+    def sign_at(self, alpha: float, condition: int) -> int:
         """Sign of a condition at an alpha at which the selection is regular; 0 where it is not proven."""
         found = self.at(alpha)
         if found is None:
             return 0
-        value, radius = float(found[2].mid[condition]), errors * SAFE * float(found[2].rad[condition])
+        value, radius = float(found[2].mid[condition]), SAFE * float(found[2].rad[condition])
         return int(value > radius) - int(value < -radius)
 
     # -- evaluation ------------------------------------------------------------------------------------------------
@@ -293,10 +300,15 @@ class ArcSelection:
     def _columns(self, F: Ball) -> Ball:
         """S dlambda/dy, (2p, size)."""
         mid, rad = self._fixed.mid.copy(), self._fixed.rad.copy()
-        k = self._slip_columns
-        moved = self._fixed[:, k] + F[self._slip] * self._turning
+        k = self.rows.slip_columns
+        moved = self._fixed[:, k] + F[self.rows.slip] * self._turning
         mid[:, k], rad[:, k] = moved.mid, moved.rad
         return Ball(mid, rad)
+
+    @cached_property
+    def _regular(self) -> bool:
+        """Whether a constant M is proven regular."""
+        return not self._size or Inverse.of(self._columns(self._friction(0.0))[self.rows.unknown]) is not None
 
     @property
     def _plain(self) -> Array:
@@ -307,14 +319,14 @@ class ArcSelection:
 
     def _direction(self, alpha: float) -> Array | None:
         """The last row of N: z at this alpha, of length one, so that N is regular even where det M vanishes."""
-        if not self._size:
-            return self._plain
-        M, g = self._columns(self._friction(alpha)).mid[self._rows], self._load(alpha).mid[self._rows]
+        if not np.any(self.system.F1[self.rows.slip]) and self._regular:
+            return self._plain  # z is affine
+        M, g = self._columns(self._friction(alpha)).mid[self.rows.unknown], self._load(alpha).mid[self.rows.unknown]
         try:
             v = np.append(np.linalg.solve(M, g), 1.0)
-            if not np.all(np.isfinite(v)):
-                raise np.linalg.LinAlgError
         except np.linalg.LinAlgError:
+            v = np.array([np.inf])
+        if not np.all(np.isfinite(v)):
             try:
                 v = np.linalg.svd(np.column_stack([M, -g]))[2][-1]
             except np.linalg.LinAlgError:
@@ -360,20 +372,20 @@ class ArcSelection:
         slope_error = growth * (float(upper_sum(defect * powers)) + norm * error) * SAFE * SAFE
         F1 = Ball.exact(self.system.F1) * step
         coefficients, off, off_slope = self._polynomials((W, W1), (g, g1), (F, F1), Z, u, (error, slope_error))
-        return Expansion(ends, (middle, radius), coefficients, errors * off, errors * off_slope, N)
+        return Expansion(ends, (middle, radius), coefficients, errors * off, errors * off_slope, N, self)
 
     def _slope(self) -> Ball:
         """dW/dalpha."""
         mid, rad = np.zeros_like(self._fixed.mid), np.zeros_like(self._fixed.mid)
-        moved = Ball.exact(self.system.F1[self._slip]) * self._turning
-        mid[:, self._slip_columns], rad[:, self._slip_columns] = moved.mid, moved.rad
+        moved = Ball.exact(self.system.F1[self.rows.slip]) * self._turning
+        mid[:, self.rows.slip_columns], rad[:, self.rows.slip_columns] = moved.mid, moved.rad
         return Ball(mid, rad)
 
     def _bordered(self, W: Ball, g: Ball, v: Array) -> Ball:
         k = self._size
         mid, rad = np.empty((k + 1, k + 1)), np.zeros((k + 1, k + 1))
-        mid[:k, :k], rad[:k, :k] = W.mid[self._rows], W.rad[self._rows]
-        mid[:k, k], rad[:k, k] = -g.mid[self._rows], g.rad[self._rows]
+        mid[:k, :k], rad[:k, :k] = W.mid[self.rows.unknown], W.rad[self.rows.unknown]
+        mid[:k, k], rad[:k, k] = -g.mid[self.rows.unknown], g.rad[self.rows.unknown]
         mid[k] = v
         return Ball(mid, rad)
 
@@ -391,7 +403,7 @@ class ArcSelection:
         z is a series whose error is at most ``errors[0]`` u, and that of its slope ``errors[1]`` u.
         """
         (W, W1), (g, g1), (F, F1) = columns, load, friction
-        rows, closed = self._w_rows, len(self._closed)
+        rows, closed = self.rows.moving, len(self.rows.closed)
         y, t = Z[:-1], Z[-1:]
         parts, moving = [], []
 
@@ -400,7 +412,7 @@ class ArcSelection:
             parts.append(_shifted(constant, slope))
             moving.append((reach, turn))
 
-        signs = self._w_signs[:, None]
+        signs = self.rows.moving_signs[:, None]
         w = g[rows][:, None] * t - W[rows] @ y
         w1 = g1[rows][:, None] * t - W1[rows] @ y
         add(
@@ -411,9 +423,9 @@ class ArcSelection:
         )
         nothing = Ball.exact(np.zeros((closed, _TERMS)))
         add(y[:closed], nothing, u[:closed], np.zeros(closed))
-        held, stuck, j = y[self._stick_columns], y[closed:], self._stick_columns
-        bound, bound1 = F[self._stick][:, None] * held, F1[self._stick][:, None] * held
-        reach, turn = F[self._stick].size * u[j] + u[closed:-1], F1[self._stick].size * u[j]
+        held, stuck, j = y[self.rows.stick_columns], y[closed:], self.rows.stick_columns
+        bound, bound1 = F[self.rows.stick][:, None] * held, F1[self.rows.stick][:, None] * held
+        reach, turn = F[self.rows.stick].size * u[j] + u[closed:-1], F1[self.rows.stick].size * u[j]
         add(bound - stuck, bound1, reach, turn)
         add(bound + stuck, bound1, reach, turn)
         add(t, Ball.exact(np.zeros((1, _TERMS))), u[-1:], np.zeros(1))
@@ -471,7 +483,7 @@ def _bernstein_signs(coefficients: Array, error: Array, low: float, high: float)
     """1 or -1 where a polynomial is proven positive or negative over [low, high], else 0."""
     values = coefficients @ _to_bernstein(coefficients.shape[1] - 1, low, high)
     positive, negative = np.min(values, axis=1) > error, np.max(values, axis=1) < -error
-    return positive.astype(np.int8) - negative.astype(np.int8)
+    return np.asarray(positive.astype(np.int8) - negative.astype(np.int8))
 
 
 def _to_bernstein(degree: int, low: float, high: float) -> Array:
