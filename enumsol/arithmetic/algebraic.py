@@ -150,6 +150,8 @@ class CriticalAlpha:
         """-1, 0 or 1 as this number is less than, equal to or greater than ``other``."""
         if self is other:
             return 0
+        if isinstance(other, EnclosedAlpha):
+            return -other.compare(self)
         checked = False
         while True:
             if self.poly is None and other.poly is None:
@@ -192,6 +194,35 @@ class CriticalAlpha:
                     self._settle(fmpq(-factor[0], factor[1]))
                 return factor
         raise AssertionError("an isolated root belongs to no factor")
+
+
+class EnclosedAlpha(CriticalAlpha):
+    """A real number of which bounds are known and nothing else; exact where they are equal.
+
+    Parameters
+    ----------
+    lo, hi : fmpq
+    """
+
+    __slots__ = ()
+
+    def __init__(self, lo: Any, hi: Any) -> None:
+        super().__init__(None, lo, hi)
+
+    @property
+    def is_rational(self) -> bool:
+        """Whether the number is known exactly."""
+        return bool(self.lo == self.hi)
+
+    def compare(self, other: CriticalAlpha) -> int:
+        """-1 or 1 where the bounds tell the numbers apart; 0 where they are equal or may be."""
+        while not isinstance(other, EnclosedAlpha) and other.lo < self.hi and self.lo < other.hi:
+            if other.poly is None or other.hi - other.lo < (self.hi - self.lo) / 4:
+                break
+            other.refine()
+        if self.hi < other.lo:
+            return -1
+        return int(other.hi < self.lo)
 
 
 def real_roots(poly: Any, a: Any, b: Any) -> list[CriticalAlpha]:

@@ -6,12 +6,17 @@ import time
 from fractions import Fraction
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 from enumsol.arithmetic.rationals import rational
+from enumsol.branches.following import follow
 from enumsol.branches.gluing import glue
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.branches.make_elements import make_arcs, make_vertices
+from enumsol.branches.make_traced import make_traced
 from enumsol.branches.proof_records import write_graph_proof
+from enumsol.branches.traced import TracedProblem
 from enumsol.checks import (
     alpha_interval,
     instance_of,
@@ -21,7 +26,10 @@ from enumsol.checks import (
     optional_seconds,
 )
 from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed
+from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
@@ -106,13 +114,13 @@ def branch_graph(
     max_nodes, time_limit = optional_count(max_nodes, "max_nodes"), optional_seconds(time_limit)
     _check_friction(problem, a, b)
     started = time.perf_counter()
-    exactly = arithmetic == "exact" or problem.n <= FAST_EXACT_DOF
-    exact = ExactCondensed.from_problem(problem) if exactly else ExactCondensed.from_condensed(problem)
-    certifier = _certifier(problem, exact, arithmetic)
+    traced = _traced(problem, (a, b)) if arithmetic == "verified" else None
+    exact = _condensed(problem, arithmetic) if traced is None or problem.n <= FAST_EXACT_DOF else None
+    certifier = _certifier(problem, exact, arithmetic, traced)
     search = IntervalSearch(
         problem.condensed,
         (a, b),
-        exact.zero,
+        traced.origin if exact is None and traced is not None else exact.zero if exact is not None else None,
         certifier,
         max_nodes=max_nodes,
         deadline=None if time_limit is None else started + time_limit,
@@ -121,9 +129,23 @@ def branch_graph(
     candidates = _candidates(search, exact)
     searched = time.perf_counter()
     tick = _stage(progress, "arcs")
-    gluing = glue(exact, candidates, rational(a), rational(b), tick, cut_short=search.stopped is not None)
-    stops = [stop for stop in (search.stopped, gluing.interrupted) if stop is not None]
-    arcs = make_arcs(gluing)
+    stops = [] if search.stopped is None else [search.stopped]
+    followed = None if traced is None else follow(traced, search, tick)
+    if followed is not None and followed.interrupted is not None:
+        stops.append(followed.interrupted)
+    if exact is None and followed is not None and followed.joined.open and problem.n <= EXACT_DOF_LIMIT:
+        # several conditions vanish at once, or none is regular: decided without rounding
+        exact = ExactCondensed.from_problem(problem)
+    reasons: list[str]
+    if exact is None and traced is not None and followed is not None:
+        vertices, arcs = make_traced(traced, followed.joined)
+        reasons = followed.reasons
+    else:
+        assert exact is not None
+        gluing = glue(exact, candidates, rational(a), rational(b), tick, cut_short=bool(stops))
+        stops += [] if gluing.interrupted is None else [gluing.interrupted]
+        arcs = make_arcs(gluing)
+        vertices, reasons = make_vertices(gluing, arcs), gluing.reasons
     stats = GraphStats(
         pieces=len(search.pieces),
         nodes=search.nodes,
@@ -136,9 +158,9 @@ def branch_graph(
         exact=exact,
         interval=(a, b),
         arithmetic=arithmetic,
-        vertices=tuple(make_vertices(gluing, arcs)),
+        vertices=tuple(vertices),
         arcs=tuple(arcs),
-        reasons=(*map(str, stops), *gluing.reasons),
+        reasons=(*map(str, stops), *reasons),
         stats=stats,
         pieces=tuple(search.pieces),
         proof=_proof(search, certifier, problem, exact),
@@ -149,15 +171,36 @@ def branch_graph(
     return graph
 
 
-def _certifier(problem: ContactProblem, exact: ExactCondensed, arithmetic: Arithmetic) -> IntervalCertifier:
-    if arithmetic == "exact":
+def _traced(problem: ContactProblem, interval: tuple[Fraction, Fraction]) -> TracedProblem | None:
+    """The problem in balls; None where its data cannot be enclosed, or are no load at all."""
+    loads = (problem.f, problem.gap, problem.slip_offset, problem.load_slope)
+    if not any(part is not None and np.any(part) for part in loads):
+        return None
+    try:
+        return TracedProblem(problem, interval, vanishing_alpha(problem, "problem"))
+    except NotEnclosedError:
+        return None
+
+
+def _condensed(problem: ContactProblem, arithmetic: Arithmetic) -> ExactCondensed:
+    exactly = arithmetic == "exact" or problem.n <= FAST_EXACT_DOF
+    return ExactCondensed.from_problem(problem) if exactly else ExactCondensed.from_condensed(problem)
+
+
+def _certifier(
+    problem: ContactProblem, exact: ExactCondensed | None, arithmetic: Arithmetic, traced: TracedProblem | None
+) -> IntervalCertifier:
+    if arithmetic == "exact" and exact is not None:
         return ExactIntervalCertifier(exact)
-    return VerifiedIntervalCertifier(problem, exact) if arithmetic == "verified" else FastIntervalCertifier()
+    if arithmetic == "fast":
+        return FastIntervalCertifier()
+    zero = exact.zero if exact is not None else None if traced is None else traced.origin
+    return VerifiedIntervalCertifier(problem, exact, zero)
 
 
-def _candidates(search: IntervalSearch, exact: ExactCondensed) -> set[Codes]:
+def _candidates(search: IntervalSearch, exact: ExactCondensed | None) -> set[Codes]:
     """The selections that may hold somewhere; Ctrl-C keeps those that were found."""
-    if exact.unloaded:
+    if exact is not None and exact.unloaded:
         # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
         return {(OPEN,) * exact.p}
     try:
@@ -168,11 +211,11 @@ def _candidates(search: IntervalSearch, exact: ExactCondensed) -> set[Codes]:
 
 
 def _proof(
-    search: IntervalSearch, certifier: IntervalCertifier, problem: ContactProblem, exact: ExactCondensed
+    search: IntervalSearch, certifier: IntervalCertifier, problem: ContactProblem, exact: ExactCondensed | None
 ) -> Proof | None:
     if not certifier.checkable or not search.pieces or search.stopped is not None:
         return None
-    about = "problem" if exact.condensed_exactly else "condensed"
+    about = "problem" if exact is None or exact.condensed_exactly else "condensed"
     return write_graph_proof(problem, search.interval, about, search.pieces)
 
 

@@ -5,25 +5,20 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.rationals import rational
 from enumsol.checks import alpha_value
 from enumsol.errors import InvalidArgumentError
 from enumsol.roots.root import ContactState
-from enumsol.selections.functions import SelectionFunctions
-from enumsol.selections.ordered_field import as_float
-from enumsol.selections.polytopes import dot
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.arithmetic.algebraic import CriticalAlpha
+    from enumsol.branches.arc_values import ArcValues
     from enumsol.checks import AlphaLike
-    from enumsol.condensation.exact import ExactCondensed
     from enumsol.roots.root import RootFamily
     from enumsol.selections.solution import Codes
     from enumsol.statuses import ContactStatus
@@ -71,7 +66,7 @@ class Vertex(ContactState):
     number : int
         Its place in ``graph.vertices``, which are in the order of alpha.
     alpha : float
-        Rounded to the nearest float from ``exact``.
+        Rounded from ``exact``.
     kind : VertexKind
         "transition", "fold", "bifurcation", "family", "sheet", "touch", "point", "unsettled", "broken" or "end".
     border : bool
@@ -98,7 +93,11 @@ class Vertex(ContactState):
 
     @property
     def enclosure(self) -> tuple[Fraction, Fraction]:
-        """Rational bounds on alpha, less than a unit in its last place apart; equal where alpha is known exactly."""
+        """Rational bounds on alpha, equal where it is known exactly.
+
+        They are less than a unit in its last place apart, except for a vertex in balls of double arithmetic (a problem
+        of more than 250 degrees of freedom) and one that was left open.
+        """
         return self.exact.enclosure()
 
 
@@ -137,7 +136,7 @@ class Arc:
     grazing: bool
     selections: tuple[Codes, ...] = field(repr=False)
     sample: Fraction = field(repr=False)
-    _exact: ExactCondensed = field(repr=False)
+    _values: ArcValues = field(repr=False)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -149,11 +148,7 @@ class Arc:
         """hi - lo."""
         return self.hi - self.lo
 
-    @cached_property
-    def _functions(self) -> SelectionFunctions:
-        return SelectionFunctions(self._exact, self.selections[0])
-
-    def _point(self, alpha: AlphaLike) -> tuple[Any, ...]:
+    def _at(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         exact = alpha_value(alpha)
         value = float(exact)
         if self.dimension:
@@ -164,27 +159,25 @@ class Arc:
             raise InvalidArgumentError(
                 f"alpha is {value:.17g}; expected a value on the arc, [{self.lo!r}, {self.hi!r}]"
             )
-        point = self._functions.forces_at(rational(exact))
-        if point is None:  # bounded arcs have no poles, but a rounded end may lie beyond the exact one
-            point = self._functions.forces_at(rational(self.sample))
-        return point if point is not None else ()
+        return self._values.at(Fraction(exact))
 
     def values(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(lambda_n, lambda_t) at an alpha of the arc, arrays of shape (p,) [force]; exact, then rounded.
+        """(lambda_n, lambda_t) at an alpha of the arc, arrays of shape (p,) [force].
+
+        Exact, then rounded, on a graph whose ``arcs_by`` is "exact"; else in double arithmetic.
 
         Raises
         ------
         InvalidArgumentError
             alpha is outside the arc, or the arc is a sheet.
         """
-        forces = np.array([as_float(v) for v in self._point(alpha)])
-        return forces[: self._exact.p], forces[self._exact.p :]
+        forces = self._at(alpha)[0]
+        return forces[: len(self.statuses)], forces[len(self.statuses) :]
 
     def displacements(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(u_n, u_t) at an alpha of the arc, two arrays of shape (p,) [length]; errors as ``values``."""
-        point, g = self._point(alpha), self._exact.at(rational(alpha_value(alpha)))[0]
-        moves = np.array([as_float(a - dot(row, point)) for a, row in zip(g, self._exact.rows, strict=True)])
-        return moves[: self._exact.p], moves[self._exact.p :]
+        moves = self._at(alpha)[1]
+        return moves[: len(self.statuses)], moves[len(self.statuses) :]
 
     def sampled(self, count: int = 33) -> NDArray[np.float64]:
         """Values of alpha along the arc, denser towards its ends (Chebyshev points), ends included."""

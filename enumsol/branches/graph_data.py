@@ -49,8 +49,8 @@ class GraphData:
     Attributes
     ----------
     problem : ContactProblem
-    exact : ExactCondensed
-        The condensed problem in rationals, on which the arcs rest.
+    exact : ExactCondensed or None
+        The condensed problem in rationals, on which the arcs rest; None where they were followed in ball arithmetic.
     interval : (Fraction, Fraction)
     arithmetic : str
     vertices : tuple of Vertex
@@ -66,7 +66,7 @@ class GraphData:
     """
 
     problem: ContactProblem
-    exact: ExactCondensed
+    exact: ExactCondensed | None
     interval: tuple[Fraction, Fraction]
     arithmetic: str
     vertices: tuple[Vertex, ...]
@@ -79,7 +79,12 @@ class GraphData:
     @property
     def certified_data(self) -> str:
         """What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed)."""
-        return "problem" if self.exact.condensed_exactly else "condensed"
+        return "problem" if self.exact is None or self.exact.condensed_exactly else "condensed"
+
+    @property
+    def arcs_by(self) -> str:
+        """How arcs were followed: "exact" (functions of alpha in rationals) or "balls"."""
+        return "balls" if self.exact is None else "exact"
 
     @property
     def complete(self) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from flint import fmpq
 
 from enumsol.arithmetic.rationals import to_fraction
+from enumsol.branches.arc_values import ExactArcValues
 from enumsol.branches.elements import CUTS, Arc, Branch, Component, Vertex, VertexKind
 from enumsol.roots.builder import polytope
 from enumsol.roots.root import RootFamily
@@ -18,11 +19,17 @@ from enumsol.selections.polytopes import dot
 from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, RowKind
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
 
     from enumsol.branches.gluing import GluedArc, GluedVertex, Gluing
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.roots.root import Polytope
+    from enumsol.selections.solution import ActiveSets
+    from enumsol.statuses import ContactStatus
+
+    Array = NDArray[np.float64]
 
 
 #: What networkx's graph shows of vertices and arcs.
@@ -46,7 +53,7 @@ def make_arcs(gluing: Gluing) -> list[Arc]:
             grazing=gluing.arcs[edge.codes].grazing,
             selections=(edge.codes, *(c for c in edge.selections if c != edge.codes)),
             sample=to_fraction(fmpq(edge.sample)),
-            _exact=exact,
+            _values=ExactArcValues(exact, edge.codes, to_fraction(fmpq(edge.sample))),
         )
         for number, edge in enumerate(gluing.edges)
     ]
@@ -75,22 +82,17 @@ def _vertex(gluing: Gluing, number: int, glued: GluedVertex, left: Sequence[Arc]
     """A vertex with the arcs that end there from the left and begin there to the right."""
     border = glued.alpha.is_rational and glued.alpha.lo in (gluing.a, gluing.b)
     p = gluing.exact.p
-    degrees = (_sum(left), _sum(right)) if glued.settled else (None, None)
+    degrees = (degree_of(left), degree_of(right)) if glued.settled else (None, None)
     # at the last alpha there are arcs from the left only
     degree = degrees[0] if border and glued.alpha.lo == gluing.b else degrees[1]
     forces, w = _values(gluing, glued)
-    active = tuple(
-        frozenset(
-            name
-            for code in codes
-            for name in (slip_names(_slip_sign(gluing, glued, i)) if code == FRICTIONLESS else (STATUSES[code],))
-        )
-        for i, codes in enumerate(glued.active)
-    )
+    active = named_active(glued.active, lambda node: _slip_sign(gluing, glued, node))
     return Vertex(
         number=number,
         alpha=float(glued.alpha),
-        kind=_kind(left, right, border=border, dimension=glued.dimension) if glued.settled else VertexKind.UNSETTLED,
+        kind=vertex_kind(left, right, border=border, dimension=glued.dimension)
+        if glued.settled
+        else VertexKind.UNSETTLED,
         border=border,
         statuses=tuple(next(s for s in STATUSES if s in names) for names in active),
         active=active,
@@ -106,12 +108,39 @@ def _vertex(gluing: Gluing, number: int, glued: GluedVertex, left: Sequence[Arc]
     )
 
 
-def _sum(arcs: Sequence[Arc]) -> int | None:
+def named_active(active: ActiveSets, slip_sign: Callable[[int], int]) -> tuple[frozenset[ContactStatus], ...]:
+    """Names of the statuses that hold at every node; ``slip_sign`` gives the sign of u_t where there is no friction."""
+    return tuple(
+        frozenset(
+            name
+            for code in codes
+            for name in (slip_names(slip_sign(node)) if code == FRICTIONLESS else (STATUSES[code],))
+        )
+        for node, codes in enumerate(active)
+    )
+
+
+def with_zeros(forces: Array, w: Array, active: ActiveSets) -> tuple[Array, Array]:
+    """Forces and displacements with exact zeros where the statuses say so."""
+    p = len(active)
+    for i, codes in enumerate(active):
+        if OPEN in codes:
+            forces[[i, p + i]] = 0.0
+        if codes - {OPEN}:
+            w[i] = 0.0
+        if STICK in codes or {SLIP_PLUS, SLIP_MINUS} <= codes:
+            w[p + i] = 0.0
+    return forces + 0.0, w + 0.0
+
+
+def degree_of(arcs: Sequence[Arc]) -> int | None:
+    """Sum of the indices; None where one is not known."""
     indices = [arc.index for arc in arcs]
     return None if any(index is None for index in indices) else sum(index for index in indices if index is not None)
 
 
-def _kind(left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dimension: int) -> VertexKind:
+def vertex_kind(left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dimension: int) -> VertexKind:
+    """What a settled vertex is, by the arcs that end there from the left and begin there to the right."""
     if any(arc.dimension for arc in (*left, *right)):
         return VertexKind.SHEET
     if dimension:
@@ -163,15 +192,7 @@ def _values(gluing: Gluing, glued: GluedVertex) -> tuple[Any, Any]:
         (fmpq(0),) * (2 * p),
     )
     w = np.array([as_float(a - dot(row, point)) for a, row in zip(exact.at(alpha)[0], exact.rows, strict=True)])
-    forces = np.array([as_float(v) for v in point])
-    for i, active in enumerate(glued.active):
-        if OPEN in active:
-            forces[[i, p + i]] = 0.0
-        if active - {OPEN}:
-            w[i] = 0.0
-        if STICK in active or {SLIP_PLUS, SLIP_MINUS} <= active:
-            w[p + i] = 0.0
-    return forces + 0.0, w + 0.0
+    return with_zeros(np.array([as_float(v) for v in point]), w, glued.active)
 
 
 def _family(glued: GluedVertex, index: int | None, *, proven: bool) -> RootFamily | None:

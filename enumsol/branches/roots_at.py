@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
+from enumsol.condensation.affine import exactly_at
 from enumsol.roots.builder import RootBuilder, in_order, root_family
 from enumsol.roots.components import connected_components
+from enumsol.roots.enumerate import roots_of_selections
 from enumsol.roots.local_degree import perturbed_degree
 from enumsol.roots.root_set import RootSet, SearchStats
+from enumsol.search.stopping import Stop, StopReason
 from enumsol.selections.floats import FloatSelections
 from enumsol.selections.rationals import ExactSelections
 from enumsol.statuses import FRICTIONLESS, OPEN
@@ -24,6 +28,8 @@ if TYPE_CHECKING:
 def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> RootSet:
     """Roots and families that the selections have at ``alpha``; in floats where these find all of them."""
     problem = data.problem
+    if data.exact is None:
+        return _in_balls(data, alpha, selections)
     floats = FloatSelections(problem.condensed.at(alpha).scaled)
     solver: Any = floats
     exact = data.arithmetic != "fast"
@@ -51,11 +57,18 @@ def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> Root
         undecided=(),
         arithmetic=data.arithmetic,
         method="graph",
-        stopped=None if not data.all_reasons else "the branch graph is not complete",
+        stopped=str(Stop(StopReason.GRAPH_INCOMPLETE)) if data.all_reasons else None,
         stats=SearchStats(selections=len(selections)),
         node_ids=problem.node_ids,
         at_least=whole + int(whole < len(components)) if data.all_reasons else None,
     )
+
+
+def _in_balls(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> RootSet:
+    """Roots that the selections are proven to have, for the problem's data as given."""
+    positive = [F > 0 for F in exactly_at(Fraction(alpha), *data.problem.friction)]
+    codes = _codes_at(selections, tuple(positive))
+    return roots_of_selections(data.problem, alpha, codes, whole=not data.all_reasons)
 
 
 def _codes_at(selections: Sequence[Codes], F_positive: tuple[bool, ...]) -> list[Codes]:

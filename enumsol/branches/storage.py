@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import asdict
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import networkx as nx
@@ -13,11 +14,14 @@ import numpy as np
 import scipy.sparse as sp
 from flint import fmpq, fmpz, fmpz_poly
 
-from enumsol.arithmetic.algebraic import CriticalAlpha
+from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
+from enumsol.branches.arc_values import ExactArcValues, TracedArcValues
 from enumsol.branches.elements import Arc, Vertex, VertexKind
 from enumsol.branches.graph_data import GraphData, GraphStats
+from enumsol.branches.traced import TracedProblem
 from enumsol.checks import file_path
 from enumsol.condensation.exact import ExactCondensed
+from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import InvalidArgumentError
 from enumsol.files import writing
 from enumsol.problem import ContactProblem
@@ -25,8 +29,11 @@ from enumsol.roots.root import Polytope, RootFamily
 from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
+
+    from enumsol.branches.arc_values import ArcValues
+    from enumsol.selections.solution import Codes
 
 FORMAT, VERSION = "enumsol-branch-graph", 2
 #: Version 1 gave kinds to the vertices of graphs that were not complete; only its complete graphs are read.
@@ -42,7 +49,8 @@ def save_graph(data: GraphData, file: str | Path) -> None:
         "format": FORMAT,
         "version": VERSION,
         "problem": _problem_record(data.problem),
-        "condensed_exactly": data.exact.condensed_exactly,
+        "arcs_by": data.arcs_by,
+        "condensed_exactly": data.certified_data == "problem",
         "interval": [str(end) for end in data.interval],
         "arithmetic": data.arithmetic,
         "reasons": list(data.reasons),
@@ -85,13 +93,25 @@ def load_graph(file: str | Path) -> GraphData:
 
 def _from_record(record: dict[str, Any]) -> GraphData:
     problem = _problem(record["problem"])
-    exactly = record["condensed_exactly"]
-    exact = ExactCondensed.from_problem(problem) if exactly else ExactCondensed.from_condensed(problem)
     first, last = (_fraction(end) for end in record["interval"])
-    vertices = tuple(_vertex(k, item) for k, item in enumerate(record["vertices"]))
-    arcs = tuple(_arc(k, item, vertices, exact) for k, item in enumerate(record["arcs"]))
+    exact, values = _values(problem, record, (first, last))
+    balls = exact is None
+    vertices = tuple(_vertex(k, item, balls=balls) for k, item in enumerate(record["vertices"]))
+    arcs = tuple(_arc(k, item, vertices, values) for k, item in enumerate(record["arcs"]))
     reasons, stats = tuple(record["reasons"]), GraphStats(**record["stats"])
     return GraphData(problem, exact, (first, last), record["arithmetic"], vertices, arcs, reasons, stats)
+
+
+def _values(
+    problem: ContactProblem, record: dict[str, Any], interval: tuple[Fraction, Fraction]
+) -> tuple[ExactCondensed | None, Callable[[Codes, Fraction], ArcValues]]:
+    """The condensed problem in rationals, if arcs rest on it, and what gives an arc its values."""
+    if record.get("arcs_by", "exact") == "balls":
+        traced = TracedProblem(problem, interval, vanishing_alpha(problem, "problem"))
+        return None, partial(TracedArcValues, traced)
+    exactly = record["condensed_exactly"]
+    exact = ExactCondensed.from_problem(problem) if exactly else ExactCondensed.from_condensed(problem)
+    return exact, partial(ExactArcValues, exact)
 
 
 # -- the problem -------------------------------------------------------------------------------------------------------
@@ -177,7 +197,7 @@ def _fraction(text: str) -> Fraction:
     return Fraction(text)
 
 
-def _vertex(number: int, item: dict[str, Any]) -> Vertex:
+def _vertex(number: int, item: dict[str, Any], *, balls: bool) -> Vertex:
     lo, hi = (fmpq(*_fraction(item[end]).as_integer_ratio()) for end in ("lo", "hi"))
     coefficients = item["polynomial"]
     poly = None if coefficients is None else fmpz_poly([fmpz(c) for c in coefficients])
@@ -200,7 +220,7 @@ def _vertex(number: int, item: dict[str, Any]) -> Vertex:
         index_left=item["index_left"],
         index_right=item["index_right"],
         selections=tuple(tuple(codes) for codes in item["selections"]),
-        exact=CriticalAlpha(poly, lo, hi),
+        exact=EnclosedAlpha(lo, hi) if balls else CriticalAlpha(poly, lo, hi),
     )
 
 
@@ -217,16 +237,20 @@ def _arc_record(arc: Arc) -> dict[str, Any]:
     }
 
 
-def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], exact: ExactCondensed) -> Arc:
+def _arc(
+    number: int, item: dict[str, Any], vertices: Sequence[Vertex], values: Callable[[Codes, Fraction], ArcValues]
+) -> Arc:
+    selections = tuple(tuple(codes) for codes in item["selections"])
+    sample = _fraction(item["sample"])
     return Arc(
         number=number,
         statuses=_statuses(item["statuses"]),
         lo=vertices[item["tail"]].alpha,
         hi=vertices[item["head"]].alpha,
         **{name: item[name] for name in ("tail", "head", "index", "dimension", "grazing")},
-        selections=tuple(tuple(codes) for codes in item["selections"]),
-        sample=_fraction(item["sample"]),
-        _exact=exact,
+        selections=selections,
+        sample=sample,
+        _values=values(selections[0], sample),
     )
 
 

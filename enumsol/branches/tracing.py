@@ -127,13 +127,16 @@ class Trace:
     ----------
     selection : ArcSelection
     low, high : float
+    side : float
+        1 or -1 above or below an alpha at which g vanishes (see kernel.interval), else 0.
     boxes : list of Box
         Its parts, box by box from left to right. A box may reach beyond its parts.
     """
 
     selection: ArcSelection
-    low: Number
-    high: Number
+    low: float
+    high: float
+    side: float = 0.0
     boxes: list[Box] = field(default_factory=list)
 
     @property
@@ -142,7 +145,13 @@ class Trace:
         return (part for box in self.boxes for part in box.parts)
 
 
-def trace(selection: ArcSelection, low: float, high: float, precise: Callable[[], PreciseSelection | None]) -> Trace:
+def trace(
+    selection: ArcSelection,
+    low: float,
+    high: float,
+    precise: Callable[[], PreciseSelection | None],
+    side: float = 0.0,
+) -> Trace:
     """Cut [low, high] into boxes and parts.
 
     Parameters
@@ -150,19 +159,18 @@ def trace(selection: ArcSelection, low: float, high: float, precise: Callable[[]
     selection : ArcSelection
     low, high : float
     precise : gives the same selection in balls of many digits, for short boxes; None where there is none
+    side : that of the selection's system
     """
-    return _Tracing(selection, low, high, precise).run()
+    return _Tracing(Trace(selection, low, high, side), precise).run()
 
 
 class _Tracing:
     """One selection being traced."""
 
-    def __init__(
-        self, selection: ArcSelection, low: float, high: float, precise: Callable[[], PreciseSelection | None]
-    ) -> None:
-        self._selection, self._length, self._precise = selection, high - low, precise
-        self._spacing = _SMALLEST_UNITS * float(np.spacing(max(abs(low), abs(high))))
-        self._found = Trace(selection, low, high)
+    def __init__(self, found: Trace, precise: Callable[[], PreciseSelection | None]) -> None:
+        self._found, self._selection, self._precise = found, found.selection, precise
+        self._length = found.high - found.low
+        self._spacing = _SMALLEST_UNITS * float(np.spacing(max(abs(found.low), abs(found.high))))
         self._count = 0
 
     def run(self) -> Trace:

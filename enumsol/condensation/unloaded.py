@@ -11,10 +11,14 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Protocol
 
-from enumsol.condensation.data import ProblemData
+import numpy as np
+
+from enumsol.condensation.data import EXACT_DOF_LIMIT, ProblemData
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.condensation.data import Data
@@ -37,21 +41,33 @@ def vanishing_alpha(problem: CondensedData, data: Data) -> Fraction | None:
     data : {"problem", "condensed"}
         Which g: the one of A, Bn, Bt, f, load_slope, gap and slip_offset as given, or g as computed in floats.
 
+    Notes
+    -----
+    "problem", with more than EXACT_DOF_LIMIT degrees of freedom: only a load that vanishes while there is neither gap
+    nor slip offset is recognised.
+
     Raises
     ------
     NotEnclosedError
-        "problem": A has more than EXACT_DOF_LIMIT degrees of freedom or is singular, so that rationals cannot tell.
+        "problem": A is singular.
     """
     if problem.load_slope is None:
         return None
     if data == "condensed":
-        parts = (problem.condensed.g0.tolist(), problem.condensed.g1.tolist())
-        zero = _common_zero(*([Fraction(x) for x in part] for part in parts))
-        return None if zero is None else Fraction(zero)
+        return _of_floats(problem.condensed.g0, problem.condensed.g1)
+    if problem.n > EXACT_DOF_LIMIT:
+        still = not np.any(problem.gap) and not np.any(problem.slip_offset)
+        return _of_floats(problem.f, problem.load_slope) if still else None
     from enumsol.condensation.free_displacements import free_displacements  # python-flint, not needed by all proofs
 
     zero = _common_zero(*free_displacements(problem))
     return None if zero is None else Fraction(int(zero.p), int(zero.q))
+
+
+def _of_floats(constant: NDArray[np.float64], slope: NDArray[np.float64]) -> Fraction | None:
+    """The only alpha at which constant + alpha slope vanishes, exactly."""
+    zero = _common_zero(*([Fraction(x) for x in part.tolist()] for part in (constant, slope)))
+    return None if zero is None else Fraction(zero)
 
 
 def _common_zero(g0: Sequence[Any], g1: Sequence[Any]) -> Any:

@@ -26,6 +26,7 @@ from enumsol.roots.components import RootComponent, connected_components
 from enumsol.roots.enumeration import Enumeration
 from enumsol.roots.local_degree import perturbed_degree
 from enumsol.roots.root_set import RootSet
+from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
 from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.search.stopping import Stop, StopReason
@@ -33,16 +34,16 @@ from enumsol.search.tree import SearchLimits, SearchProgress
 from enumsol.selections.floats import SIGN_TOLERANCE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from concurrent.futures import Executor
     from pathlib import Path
 
     from typing_extensions import TypeIs
 
-    from enumsol.checks import AlphaLike
+    from enumsol.checks import Alpha, AlphaLike
     from enumsol.problem3d import ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
-    from enumsol.selections.solution import ActiveSets, PointValues, SelectionSolver
+    from enumsol.selections.solution import ActiveSets, Codes, PointValues, SelectionSolver
 
 Method = Literal["tree", "exhaustive"]
 #: The exhaustive method reports progress this often [seconds].
@@ -162,7 +163,7 @@ class _Enumeration(Enumeration[Solvers]):
     def __init__(
         self,
         solvers: Solvers,
-        method: Method,
+        method: str,
         progress: Callable[[SearchProgress], object] | None,
         proof_path: str | Path | None,
     ) -> None:
@@ -262,6 +263,42 @@ class _Enumeration(Enumeration[Solvers]):
             certified_data=solvers.data,
             proof=self._proof(roots=len(roots), families=len(families)),
         )
+
+
+def roots_of_selections(problem: ContactProblem, alpha: Alpha, selections: Sequence[Codes], *, whole: bool) -> RootSet:
+    """The roots that complete selections are proven to have at one alpha (arithmetic "verified", without a proof).
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    alpha : float or Fraction
+    selections : codes of complete selections
+    whole : no others hold
+    """
+    solvers = Solvers(problem, alpha, "verified", SIGN_TOLERANCE)
+    return _Selected(solvers, "graph", None, None).select(selections, whole=whole)
+
+
+class _Selected(_Enumeration):
+    """The roots of given selections."""
+
+    def select(self, selections: Sequence[Codes], *, whole: bool) -> RootSet:
+        """Examine them one by one."""
+        outcome = self.outcome
+        self.unloaded = self.solvers.unloaded()
+        for codes in () if self.unloaded else selections:
+            outcome.selections += 1
+            found = self.certifier.selection(codes)
+            if isinstance(found, UndecidedPart):
+                outcome.undecided.append(found)
+            elif found is not None:
+                outcome.solutions.append(found)
+        if not whole:
+            outcome.stopped = Stop(StopReason.GRAPH_INCOMPLETE)
+        return self._result()
+
+    def _proof(self, **counts: int) -> None:
+        del counts
 
 
 def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None) -> None:

@@ -16,6 +16,7 @@ class StopReason(enum.Enum):
     TIME_LIMIT = enum.auto()
     INTERRUPTED = enum.auto()
     WORKER_LOST = enum.auto()
+    GRAPH_INCOMPLETE = enum.auto()
 
 
 @dataclass(frozen=True)
@@ -59,5 +60,6 @@ class Stop:
             StopReason.TIME_LIMIT: "stopped by the time limit",
             StopReason.INTERRUPTED: f"interrupted after {done}",
             StopReason.WORKER_LOST: self.loss,
+            StopReason.GRAPH_INCOMPLETE: "the branch graph is not complete",
         }[self.reason]
         return text if self.unexamined is None else f"{text}, {counted(self.unexamined, 'subtree')} not examined"

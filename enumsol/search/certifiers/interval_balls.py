@@ -11,6 +11,7 @@ from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from fractions import Fraction
 
     import numpy as np
     from numpy.typing import NDArray
@@ -36,14 +37,18 @@ class VerifiedIntervalCertifier:
     Parameters
     ----------
     problem : ContactProblem
-    exact : ExactCondensed
-        Its data are certified: those of the problem, or S and g as computed.
+    exact : ExactCondensed or None
+        Its data are certified: those of the problem, or S and g as computed. None: those of the problem, without
+        recourse to rationals.
+    zero : Fraction or None
+        The alpha at which g vanishes, in the data that are certified.
     """
 
-    def __init__(self, problem: ContactProblem, exact: ExactCondensed) -> None:
-        self._enclosure = certified_enclosure(problem, exactly=exact.condensed_exactly)
-        self._rationals = ExactIntervalCertifier(exact) if exact.condensed_exactly else None
-        self._zero = exact.zero
+    def __init__(self, problem: ContactProblem, exact: ExactCondensed | None, zero: Fraction | None) -> None:
+        exactly = exact is None or exact.condensed_exactly
+        self._enclosure = certified_enclosure(problem, exactly=exactly)
+        self._rationals = ExactIntervalCertifier(exact) if exact is not None and exactly else None
+        self._zero = zero
         self._used_rationals = False
         self._piece: tuple[Piece, Margin | None] | None = None
 

@@ -1,0 +1,69 @@
+"""The selections that a search handed on, followed over alpha in ball arithmetic and joined (theory, section 7.14)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from enumsol.branches.joining import Joined, join
+from enumsol.search.stopping import Stop, StopReason
+from enumsol.texts import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from fractions import Fraction
+
+    from enumsol.branches.traced import TracedProblem
+    from enumsol.branches.tracing import Trace
+    from enumsol.search.interval import IntervalSearch
+    from enumsol.selections.solution import Codes
+
+    Bounds = tuple[Fraction, Fraction]
+
+
+@dataclass
+class Followed:
+    """Traces of selections, and what they join to.
+
+    Attributes
+    ----------
+    traces : list of Trace
+    joined : Joined
+    interrupted : Stop or None
+        How far it got, if Ctrl-C was pressed.
+    """
+
+    traces: list[Trace] = field(default_factory=list)
+    joined: Joined = field(default_factory=Joined)
+    interrupted: Stop | None = None
+
+    @property
+    def reasons(self) -> list[str]:
+        """What was left open or contradicts completeness."""
+        found = list(self.joined.reasons)
+        for place in self.joined.open:
+            members = counted(len(place.members), "selection")
+            found.append(
+                f"what {members} do for alpha in [{float(place.low):.17g}, {float(place.high):.17g}] is not decided"
+            )
+        return found
+
+
+def follow(traced: TracedProblem, search: IntervalSearch, tick: Callable[[float], object] | None) -> Followed:
+    """Trace all selections handed on, where they were; after a search that was cut short, over the whole interval."""
+    pieces: dict[Codes, list[Bounds]] = {}
+    for found in search.pieces:
+        for codes in found.selections:
+            pieces.setdefault(codes, []).append((found.piece.a, found.piece.b))
+    followed = Followed()
+    for k, codes in enumerate(sorted(pieces)):
+        where = pieces[codes] if search.stopped is None else [search.interval]
+        try:
+            followed.traces += traced.trace(codes, where)
+            if tick is not None:
+                tick((k + 1) / len(pieces))
+        except KeyboardInterrupt:
+            followed.interrupted = Stop(StopReason.INTERRUPTED, k, arcs_of=len(pieces))
+            break
+    followed.joined = join(followed.traces, search.interval, traced.origin, traced.sharpen)
+    return followed
