@@ -41,6 +41,7 @@ from enumsol.statuses import OPEN
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from enumsol.branches.following import Followed
     from enumsol.checks import AlphaLike
     from enumsol.proof.proof_file import Proof
     from enumsol.search.interval import IntervalCertifier
@@ -163,7 +164,7 @@ def branch_graph(
         reasons=(*map(str, stops), *reasons),
         stats=stats,
         pieces=tuple(search.pieces),
-        proof=_proof(search, certifier, problem, exact),
+        proof=_proof(search, certifier, problem, exact, followed),
     )
     graph = BranchGraph(data)
     if any(stop.interrupted for stop in stops):
@@ -211,12 +212,17 @@ def _candidates(search: IntervalSearch, exact: ExactCondensed | None) -> set[Cod
 
 
 def _proof(
-    search: IntervalSearch, certifier: IntervalCertifier, problem: ContactProblem, exact: ExactCondensed | None
+    search: IntervalSearch,
+    certifier: IntervalCertifier,
+    problem: ContactProblem,
+    exact: ExactCondensed | None,
+    followed: Followed | None,
 ) -> Proof | None:
     if not certifier.checkable or not search.pieces or search.stopped is not None:
         return None
     about = "problem" if exact is None or exact.condensed_exactly else "condensed"
-    return write_graph_proof(problem, search.interval, about, search.pieces)
+    arcs = followed if about == "problem" and followed is not None and followed.interrupted is None else None
+    return write_graph_proof(problem, search.interval, about, search.pieces, arcs)
 
 
 def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callable[[float], object] | None:

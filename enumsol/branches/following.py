@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from fractions import Fraction
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from enumsol.branches.traced import TracedProblem
     from enumsol.branches.tracing import Trace
     from enumsol.search.interval import IntervalSearch
@@ -29,10 +32,14 @@ class Followed:
     ----------
     traces : list of Trace
     joined : Joined
+    force, length : (2p,) arrays
+        Units in which they were followed.
     interrupted : Stop or None
         How far it got, if Ctrl-C was pressed.
     """
 
+    force: NDArray[np.float64]
+    length: NDArray[np.float64]
     traces: list[Trace] = field(default_factory=list)
     joined: Joined = field(default_factory=Joined)
     interrupted: Stop | None = None
@@ -55,7 +62,7 @@ def follow(traced: TracedProblem, search: IntervalSearch, tick: Callable[[float]
     for found in search.pieces:
         for codes in found.selections:
             pieces.setdefault(codes, []).append((found.piece.a, found.piece.b))
-    followed = Followed()
+    followed = Followed(traced.force, traced.length)
     for k, codes in enumerate(sorted(pieces)):
         where = pieces[codes] if search.stopped is None else [search.interval]
         try:

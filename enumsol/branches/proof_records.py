@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import enum
-from typing import TYPE_CHECKING
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.branches.tracing import PartKind
 from enumsol.proof.proof_file import Proof, ProofWriter, packed
 from enumsol.proof.reading import fits
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from fractions import Fraction
 
+    from enumsol.branches.following import Followed
+    from enumsol.branches.tracing import Part
     from enumsol.problem import ContactProblem
     from enumsol.search.interval import SearchedPiece
     from enumsol.selections.solution import Codes
@@ -28,9 +31,16 @@ class GraphLeaf(enum.StrEnum):
 
 
 def write_graph_proof(
-    problem: ContactProblem, interval: tuple[Fraction, Fraction], data: str, pieces: Sequence[SearchedPiece]
+    problem: ContactProblem,
+    interval: tuple[Fraction, Fraction],
+    data: str,
+    pieces: Sequence[SearchedPiece],
+    followed: Followed | None,
 ) -> Proof | None:
-    """The leaves of all pieces with their multipliers; None if the end of a piece has too many digits for it."""
+    """The leaves of all pieces with their multipliers, and the traces of the selections handed on.
+
+    None if the end of a piece has too many digits for it.
+    """
     if not all(fits(end) for found in pieces for end in (found.piece.a, found.piece.b)):
         return None
     writer = ProofWriter()
@@ -65,8 +75,40 @@ def write_graph_proof(
                 writer.write([kind, _text(codes)])
         leaves += len(found.empty)
         selections |= set(found.selections)
-    writer.write({"pieces": len(pieces), "leaves": leaves, "selections": len(selections)})
+    counts = {"pieces": len(pieces), "leaves": leaves, "selections": len(selections)}
+    if followed is not None:
+        counts |= _write_arcs(writer, followed)
+    writer.write(counts)
     return writer.close()
+
+
+def _write_arcs(writer: ProofWriter, followed: Followed) -> dict[str, int]:
+    """Where every selection holds, box by box; the counts for the footer."""
+    force, length = ((np.frexp(units)[1] - 1).tolist() for units in (followed.force, followed.length))
+    writer.write({"traces": len(followed.traces), "force": force, "length": length})
+    for trace in followed.traces:
+        ends = [_number(end) for end in (trace.low, trace.high)]
+        writer.write(["t", _text(trace.selection.rows.codes), *ends, int(trace.side)])
+        for box in trace.boxes:
+            ends = [_number(end) for end in (box.low, box.high)]
+            writer.write(["b", *ends, int(box.precise), [_part(part) for part in box.parts]])
+    return {"traces": len(followed.traces), "arcs": len(followed.joined.arcs)}
+
+
+def _part(part: Part) -> list[Any]:
+    """The kind of a part, its upper end, and what it says; its lower end is the upper end of the part before."""
+    end = _number(part.high)
+    if part.kind is PartKind.HOLDS:
+        return [part.kind, end, part.index]
+    if part.kind is PartKind.EVENT:
+        zero = [_number(bound) for bound in part.zero]
+        return [part.kind, end, part.index, part.condition, int(part.rising), *zero]
+    return [part.kind, end]
+
+
+def _number(value: float | Fraction) -> float | str:
+    """An alpha: a float, or a fraction as text."""
+    return float(value) if isinstance(value, float) else str(Fraction(value))
 
 
 def _text(codes: Codes) -> str:

@@ -112,11 +112,22 @@ class Part:
 
 @dataclass(frozen=True)
 class Box:
-    """An interval on which one expansion decides: its parts, from left to right."""
+    """An interval on which one expansion decides.
+
+    Attributes
+    ----------
+    low, high : float or Fraction
+        Those of the expansion; the parts may end before.
+    parts : tuple of Part
+        From left to right.
+    precise : bool
+        Decided in many digits.
+    """
 
     low: Number
     high: Number
     parts: tuple[Part, ...]
+    precise: bool = False
 
 
 @dataclass
@@ -254,14 +265,30 @@ class _Cutting:
             part = self._decided(low, high)
             middle = (low + high) / 2
             if part is not None:
-                _append(parts, part)
+                self._append(parts, part)
             elif halvings and low < middle < high and not self._tight(low, high):
                 cells += [(middle, high, halvings - 1), (low, middle, halvings - 1)]
             elif self._whole or self._stays_open(low, high):
-                _append(parts, self._open(low, high))
+                self._append(parts, self._open(low, high))
             else:
-                return Box(self.low, self.high, tuple(parts)), self._rest(low, high)
-        return Box(self.low, self.high, tuple(parts)), []
+                return Box(self.low, self.high, tuple(parts), self._expansion.final), self._rest(low, high)
+        return Box(self.low, self.high, tuple(parts), self._expansion.final), []
+
+    def _append(self, parts: list[Part], part: Part) -> None:
+        """Add a part, joined with the last one where the expansion shows at once what both say."""
+        last = parts[-1] if parts else None
+        if last is not None and last.kind is part.kind and last.index == part.index:
+            known = self._expansion.over(last.low, part.high)
+            both = {
+                PartKind.NONE: known.none,
+                PartKind.HOLDS: known.holds and self._expansion.index(last.low, part.high) == part.index,
+                PartKind.OPEN: True,
+            }
+            if both.get(part.kind):
+                doubtful = last.doubtful | part.doubtful
+                parts[-1] = Part(part.kind, last.low, part.high, index=part.index, doubtful=doubtful)
+                return
+        parts.append(part)
 
     def _rest(self, low: Number, high: Number) -> list[Interval]:
         """What is left when a part cannot be decided: the part and what lies behind it, or two halves."""
@@ -336,12 +363,3 @@ class _Cutting:
         if known.regular:
             nodes = frozenset(self._rows.conditions[k][0] for k in known.doubtful)
         return Part(PartKind.OPEN, low, high, doubtful=nodes)
-
-
-def _append(parts: list[Part], part: Part) -> None:
-    """Add a part, joined with the last one where both say the same."""
-    last = parts[-1] if parts else None
-    if last is not None and last.kind is part.kind and part.kind is not PartKind.EVENT and last.index == part.index:
-        parts[-1] = Part(part.kind, last.low, part.high, index=part.index, doubtful=last.doubtful | part.doubtful)
-    else:
-        parts.append(part)

@@ -9,8 +9,8 @@ fractions ``"a/b"`` in decimal digits.
 
 What is checked: pieces partition the interval (it is cut first where g vanishes, see ``condensation.unloaded``), with
 the subtrees left by a piece searched in both its halves; the leaves of every piece cover all selections of its roots;
-every exclusion is proven at both ends of the piece. Not checked: that the arcs of the selections handed on are all
-there. They follow from these selections by exact algebra, and the balance of degrees checks them (theory, section 7.7).
+every exclusion is proven at both ends of the piece. Where the selections handed on hold, and how their arcs are joined,
+is checked by ``enumsol.checker.arcs``, if the proof says it.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.checker.arcs import ArcChecker, ArcCount
 from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.condensation.unloaded import vanishing_alpha
@@ -106,8 +107,10 @@ class GraphChecker:
         self.failures: list[str] = []
         self.pieces = self.leaves = 0
         self.selections: set[bytes] = set()
+        self._handed: dict[tuple[int, ...], list[tuple[Fraction, Fraction]]] = {}
         self.interval: tuple[Fraction, Fraction] | None = None
         self.data: Data = "problem"
+        self.arcs: ArcCount | None = None
         self._friction: list[bool] = []
         self._zero: Fraction | None = None
 
@@ -122,7 +125,15 @@ class GraphChecker:
         failures = tuple(self.failures)
         selections = frozenset() if failures else frozenset(map(tuple, self.selections))
         return GraphVerificationReport(
-            not failures, failures, self.interval, self.pieces, self.leaves, selections, self.data
+            not failures,
+            failures,
+            self.interval,
+            self.pieces,
+            self.leaves,
+            selections,
+            self.data,
+            None if self.arcs is None else self.arcs.arcs,
+            0 if self.arcs is None else self.arcs.open,
         )
 
     def _check(self, interval: tuple[Fraction, Fraction], records: Iterator[Any]) -> None:
@@ -139,8 +150,13 @@ class GraphChecker:
             if len(cut):
                 waiting += [((x + y) / 2, y, cut), (x, (x + y) / 2, cut)]
         claim = {"pieces": self.pieces, "leaves": self.leaves, "selections": len(self.selections)}
+        if self.data == "problem" and isinstance(record, dict) and "force" in record and "piece" not in record:
+            origin = self._zero if self._zero is not None and a <= self._zero <= b else None
+            checker = ArcChecker(self.problem, self.enclosure, (a, b), origin, self._handed, self._fail)
+            self.arcs, record = checker.run(record, records)
+            claim |= {"traces": checker.traces, "arcs": self.arcs.arcs}
         if record != claim:
-            found = "missing" if record is _END else shown(record)
+            found = shown(record) if isinstance(record, (dict, list)) else "missing"
             self._fail(f"the counts at the end are {found}; the pieces give {claim!r}")
         if next(records, _END) is not _END:
             self._fail("records follow after the end of the proof")
@@ -195,6 +211,8 @@ class GraphChecker:
         if not covers(piece.roots, piece.leaves(), self._friction):
             self._fail(f"piece {number}: its leaves do not cover all selections")
         self.selections.update(row.tobytes() for row in handed)
+        for row in handed.tolist():
+            self._handed.setdefault(tuple(row), []).append((piece.a, piece.b))
         if self.progress is not None:
             self.progress(self.leaves)
         return piece.leaves("c"), record

@@ -74,7 +74,7 @@ class VerificationReport:
 
 @dataclass(frozen=True)
 class GraphVerificationReport:
-    """What the checker found about a branch graph's search.
+    """What the checker found about a branch graph.
 
     Attributes
     ----------
@@ -88,6 +88,10 @@ class GraphVerificationReport:
     selections : frozenset of tuples of status codes
     data : str
         "problem": about the problem's own matrices; "condensed": about S and g as computed.
+    arcs : int or None
+        Arcs of these selections, all of them checked with their ends; None where the proof does not hold them.
+    open : int
+        Short intervals of alpha in which the proof leaves open what some selection does.
     """
 
     ok: bool
@@ -97,11 +101,18 @@ class GraphVerificationReport:
     leaves: int
     selections: frozenset[tuple[int, ...]]
     data: str
+    arcs: int | None = None
+    open: int = 0
 
     @property
     def complete(self) -> bool:
         """Same as ok: a search that was cut short has no proof."""
         return self.ok
+
+    @property
+    def whole(self) -> bool:
+        """Every solution for every alpha in the interval lies on one of the arcs, whose ends are joined as proven."""
+        return self.ok and self.arcs is not None and not self.open
 
     def __repr__(self) -> str:
         ends = () if self.interval is None else tuple(float(end) for end in self.interval)
@@ -113,9 +124,18 @@ class GraphVerificationReport:
             (
                 f"proof: verified{where}",
                 f"  {found}; every solution lies in one of {counted(len(self.selections), 'selection')}",
+                *self._arcs(ends),
                 f"  certified data: {_DATA[self.data]}",
             )
         )
+
+    def _arcs(self, ends: tuple[float, ...]) -> list[str]:
+        if self.arcs is None:
+            return []
+        arcs = counted(self.arcs, "arc")
+        if self.whole:
+            return [f"  every solution for every alpha in [{ends[0]:g}, {ends[1]:g}] lies on these arcs: {arcs}"]
+        return [f"  {arcs}; left open in {counted(self.open, 'short interval')} of alpha"]
 
 
 _DATA = {"problem": "A, Bn, Bt, f as given", "condensed": "S and g as computed"}
