@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -39,12 +40,12 @@ from enumsol.search.stopping import Stop, StopReason
 from enumsol.statuses import OPEN
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from enumsol.branches.following import Followed
     from enumsol.checks import AlphaLike
     from enumsol.proof.proof_file import Proof
-    from enumsol.search.interval import IntervalCertifier
+    from enumsol.search.interval import IntervalCertifier, SearchedPiece
     from enumsol.selections.solution import Codes
 
 Arithmetic = Literal["fast", "verified", "exact"]
@@ -115,13 +116,14 @@ def branch_graph(
     max_nodes, time_limit = optional_count(max_nodes, "max_nodes"), optional_seconds(time_limit)
     _check_friction(problem, a, b)
     started = time.perf_counter()
-    traced = _traced(problem, (a, b)) if arithmetic == "verified" else None
-    exact = _condensed(problem, arithmetic) if traced is None or problem.n <= FAST_EXACT_DOF else None
-    certifier = _certifier(problem, exact, arithmetic, traced)
+    traced = _traced(problem, (a, b)) if arithmetic == "verified" and problem.n > FAST_EXACT_DOF else None
+    exact = _condensed(problem, arithmetic) if traced is None else None
+    zero = traced.origin if exact is None and traced is not None else None if exact is None else exact.zero
+    certifier = _certifier(problem, exact, arithmetic, zero)
     search = IntervalSearch(
         problem.condensed,
         (a, b),
-        traced.origin if exact is None and traced is not None else exact.zero if exact is not None else None,
+        zero,
         certifier,
         max_nodes=max_nodes,
         deadline=None if time_limit is None else started + time_limit,
@@ -131,13 +133,14 @@ def branch_graph(
     searched = time.perf_counter()
     tick = _stage(progress, "arcs")
     stops = [] if search.stopped is None else [search.stopped]
-    followed = None if traced is None else follow(traced, search, tick)
-    if followed is not None and followed.interrupted is not None:
-        stops.append(followed.interrupted)
-    if exact is None and followed is not None and followed.joined.open and problem.n <= EXACT_DOF_LIMIT:
-        # several conditions vanish at once, or none is regular: decided without rounding
-        exact = ExactCondensed.from_problem(problem)
-    reasons: list[str]
+    followed = None
+    if traced is not None:
+        followed = follow(traced, search.pieces, tick, cut_short=bool(stops))
+        stops += [] if followed.interrupted is None else [followed.interrupted]
+        if followed.joined.open and not stops and problem.n <= EXACT_DOF_LIMIT:
+            # several conditions vanish at once, or a selection is singular: decided without rounding
+            exact = ExactCondensed.from_problem(problem)
+    reasons: Sequence[str]
     if exact is None and traced is not None and followed is not None:
         vertices, arcs = make_traced(traced, followed.joined)
         reasons = followed.reasons
@@ -164,7 +167,7 @@ def branch_graph(
         reasons=(*map(str, stops), *reasons),
         stats=stats,
         pieces=tuple(search.pieces),
-        proof=_proof(search, certifier, problem, exact, followed),
+        make_proof=_proof(search, certifier, problem, exact, followed),
     )
     graph = BranchGraph(data)
     if any(stop.interrupted for stop in stops):
@@ -189,14 +192,11 @@ def _condensed(problem: ContactProblem, arithmetic: Arithmetic) -> ExactCondense
 
 
 def _certifier(
-    problem: ContactProblem, exact: ExactCondensed | None, arithmetic: Arithmetic, traced: TracedProblem | None
+    problem: ContactProblem, exact: ExactCondensed | None, arithmetic: Arithmetic, zero: Fraction | None
 ) -> IntervalCertifier:
     if arithmetic == "exact" and exact is not None:
         return ExactIntervalCertifier(exact)
-    if arithmetic == "fast":
-        return FastIntervalCertifier()
-    zero = exact.zero if exact is not None else None if traced is None else traced.origin
-    return VerifiedIntervalCertifier(problem, exact, zero)
+    return FastIntervalCertifier() if arithmetic == "fast" else VerifiedIntervalCertifier(problem, exact, zero)
 
 
 def _candidates(search: IntervalSearch, exact: ExactCondensed | None) -> set[Codes]:
@@ -217,12 +217,26 @@ def _proof(
     problem: ContactProblem,
     exact: ExactCondensed | None,
     followed: Followed | None,
-) -> Proof | None:
+) -> Callable[[], Proof | None] | None:
+    """What makes the proof, once it is asked for; None when there is none."""
     if not certifier.checkable or not search.pieces or search.stopped is not None:
         return None
-    about = "problem" if exact is None or exact.condensed_exactly else "condensed"
-    arcs = followed if about == "problem" and followed is not None and followed.interrupted is None else None
-    return write_graph_proof(problem, search.interval, about, search.pieces, arcs)
+    if exact is None or exact.condensed_exactly:
+        return partial(_proof_of_problem, problem, search.interval, search.pieces, followed)
+    return partial(write_graph_proof, problem, search.interval, "condensed", search.pieces, None)
+
+
+def _proof_of_problem(
+    problem: ContactProblem,
+    interval: tuple[Fraction, Fraction],
+    pieces: Sequence[SearchedPiece],
+    followed: Followed | None,
+) -> Proof | None:
+    """The proof for the problem's own data, with the arcs where they can be followed in balls."""
+    if followed is None and (traced := _traced(problem, interval)) is not None:
+        followed = follow(traced, pieces)
+    whole = followed is None or followed.interrupted is None
+    return write_graph_proof(problem, interval, "problem", pieces, followed if whole else None)
 
 
 def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callable[[float], object] | None:

@@ -10,7 +10,7 @@ from enumsol.search.stopping import Stop, StopReason
 from enumsol.texts import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from fractions import Fraction
 
     import numpy as np
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from enumsol.branches.traced import TracedProblem
     from enumsol.branches.tracing import Trace
-    from enumsol.search.interval import IntervalSearch
+    from enumsol.search.interval import SearchedPiece
     from enumsol.selections.solution import Codes
 
     Bounds = tuple[Fraction, Fraction]
@@ -56,21 +56,34 @@ class Followed:
         return found
 
 
-def follow(traced: TracedProblem, search: IntervalSearch, tick: Callable[[float], object] | None) -> Followed:
-    """Trace all selections handed on, where they were; after a search that was cut short, over the whole interval."""
-    pieces: dict[Codes, list[Bounds]] = {}
-    for found in search.pieces:
+def follow(
+    traced: TracedProblem,
+    pieces: Sequence[SearchedPiece],
+    tick: Callable[[float], object] | None = None,
+    *,
+    cut_short: bool = False,
+) -> Followed:
+    """Trace all selections handed on, where they were; after a search that was cut short, over the whole interval.
+
+    Parameters
+    ----------
+    traced : TracedProblem
+    pieces : sequence of SearchedPiece
+    tick : called with the share of the selections done
+    cut_short : the search was stopped before it had looked everywhere
+    """
+    where: dict[Codes, list[Bounds]] = {}
+    for found in pieces:
         for codes in found.selections:
-            pieces.setdefault(codes, []).append((found.piece.a, found.piece.b))
+            where.setdefault(codes, []).append((found.piece.a, found.piece.b))
     followed = Followed(traced.force, traced.length)
-    for k, codes in enumerate(sorted(pieces)):
-        where = pieces[codes] if search.stopped is None else [search.interval]
+    for k, codes in enumerate(sorted(where)):
         try:
-            followed.traces += traced.trace(codes, where)
+            followed.traces += traced.trace(codes, [traced.interval] if cut_short else where[codes])
             if tick is not None:
-                tick((k + 1) / len(pieces))
+                tick((k + 1) / len(where))
         except KeyboardInterrupt:
-            followed.interrupted = Stop(StopReason.INTERRUPTED, k, arcs_of=len(pieces))
+            followed.interrupted = Stop(StopReason.INTERRUPTED, k, arcs_of=len(where))
             break
-    followed.joined = join(followed.traces, search.interval, traced.origin, traced.sharpen)
+    followed.joined = join(followed.traces, traced.interval, traced.origin, traced.sharpen)
     return followed

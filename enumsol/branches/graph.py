@@ -9,7 +9,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from enumsol.arithmetic.algebraic import CriticalAlpha
+from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps, uniqueness_bound
 from enumsol.branches.elements import VertexKind
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from enumsol.branches.elements import Arc, Branch, Component, Vertex
     from enumsol.branches.graph_data import GraphData
     from enumsol.checks import AlphaLike
+    from enumsol.proof.proof_file import Proof
     from enumsol.roots.root import Root, RootFamily
     from enumsol.roots.root_set import RootSet
 
@@ -62,8 +63,8 @@ class BranchGraph(Immutable):
     pieces : tuple of SearchedPiece
         The search's leaves with their multipliers, piece by piece of the interval (empty after ``load``).
     proof : Proof or None
-        In verified arithmetic: the search's leaves for ``enumsol.verify`` (None after ``load``, for a search that was
-        cut short, and where rationals had to decide about leaves).
+        In verified arithmetic: the search's leaves and the arcs, for ``enumsol.verify`` (None after ``load``, for a
+        search that was cut short, and where rationals had to decide about leaves).
 
     Examples
     --------
@@ -84,10 +85,14 @@ class BranchGraph(Immutable):
         self.arcs = data.arcs
         self.stats = data.stats
         self.pieces = data.pieces
-        self.proof = data.proof
         self.graph = multigraph(self.vertices, self.arcs)
         self.reasons = data.all_reasons
         self._freeze()
+
+    @property
+    def proof(self) -> Proof | None:
+        """The proof for ``enumsol.verify``, made when it is first asked for."""
+        return self.data.proof
 
     @property
     def complete(self) -> bool:
@@ -173,8 +178,8 @@ class BranchGraph(Immutable):
 
     # -- solutions at one alpha ------------------------------------------------------------------------------------
 
-    def _located(self, alpha: AlphaLike) -> tuple[list[Arc], list[Vertex]]:
-        """Arcs over an alpha and vertices at it, decided exactly."""
+    def _located(self, alpha: AlphaLike) -> tuple[list[Arc], list[Vertex], list[Vertex]]:
+        """Arcs over an alpha, vertices at it, and vertices whose bounds are too wide to tell on which side it lies."""
         value = Fraction(alpha_value(alpha))
         if not self.exact_interval[0] <= value <= self.exact_interval[1]:
             raise InvalidArgumentError(
@@ -184,11 +189,26 @@ class BranchGraph(Immutable):
         point = CriticalAlpha.rational(rational(value))
         order = [v.exact.compare(point) for v in self.vertices]
         arcs = [arc for arc in self.arcs if order[arc.tail] < 0 < order[arc.head]]
-        return arcs, [v for v, o in zip(self.vertices, order, strict=True) if o == 0]
+        equal = [v for v, o in zip(self.vertices, order, strict=True) if o == 0]
+        near = [v for v in equal if isinstance(v.exact, EnclosedAlpha) and not v.exact.is_rational]
+        return arcs, [v for v in equal if v not in near], near
 
     def arcs_at(self, alpha: AlphaLike) -> tuple[Arc, ...]:
-        """Arcs and sheets that pass over an alpha inside the interval (vertices at it do not count)."""
-        return tuple(self._located(alpha)[0])
+        """Arcs and sheets that pass over an alpha inside the interval (vertices at it do not count).
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is outside the interval, or cannot be told from a vertex of which only bounds are known.
+        """
+        arcs, _, near = self._located(alpha)
+        if near:
+            low, high = (float(bound) for bound in near[0].enclosure)
+            raise InvalidArgumentError(
+                f"alpha is {float(alpha_value(alpha))!r}, which cannot be told from vertex {near[0].number}, between "
+                f"{low!r} and {high!r}; expected another alpha, or roots_at, which solves there"
+            )
+        return tuple(arcs)
 
     def roots_at(self, alpha: AlphaLike) -> RootSet:
         """All solutions at one alpha, as enumerate_roots returns them; of a graph with gaps, those that were found.
@@ -198,8 +218,10 @@ class BranchGraph(Immutable):
         InvalidArgumentError
             alpha is outside the interval.
         """
-        arcs, vertices = self._located(alpha)
-        codes = {c for arc in arcs for c in arc.selections} | {c for v in vertices for c in v.selections}
+        arcs, vertices, near = self._located(alpha)
+        beside = {v.number for v in near}
+        arcs += [arc for arc in self.arcs if beside & {arc.tail, arc.head}]
+        codes = {c for arc in arcs for c in arc.selections} | {c for v in (*vertices, *near) for c in v.selections}
         return roots_of(self.data, alpha_value(alpha), sorted(codes))
 
     def multiplicity_at(self, alpha: AlphaLike) -> int:
@@ -213,7 +235,10 @@ class BranchGraph(Immutable):
             The graph has gaps; ``at_least`` gives a lower bound.
         """
         found = self._multiplicity(alpha)
-        self._whole("the number of solutions", f"there are {found} at alpha = {float(alpha_value(alpha)):.8g}")
+        where = f"there are {found} at alpha = {float(alpha_value(alpha)):.8g}"
+        self._whole("the number of solutions", where)
+        if not found.exact:
+            raise IncompleteGraphError(f"the number of solutions is not known so close to a vertex; {where}")
         return found.count
 
     def at_least(self, alpha: AlphaLike) -> int:
@@ -227,7 +252,11 @@ class BranchGraph(Immutable):
         return self._multiplicity(alpha).count
 
     def _multiplicity(self, alpha: AlphaLike) -> Multiplicity:
-        return self.claims.multiplicity(*self._located(alpha))
+        arcs, vertices, near = self._located(alpha)
+        if near and self.claims.whole:
+            roots = self.roots_at(alpha)
+            return Multiplicity(roots.at_least, exact=roots.whole)
+        return self.claims.multiplicity(arcs, vertices + near)
 
     @cached_property
     def _steps(self) -> MultiplicitySteps:

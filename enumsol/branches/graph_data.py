@@ -10,6 +10,7 @@ from enumsol.branches.claims import Claims, Standing
 from enumsol.branches.elements import VertexKind
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from fractions import Fraction
 
     from enumsol.branches.elements import Arc, Vertex
@@ -61,8 +62,8 @@ class GraphData:
     stats : GraphStats
     pieces : tuple of SearchedPiece
         Not kept in files.
-    proof : Proof or None
-        Not kept in files.
+    make_proof : callable or None
+        Makes the proof; not kept in files.
     """
 
     problem: ContactProblem
@@ -74,7 +75,12 @@ class GraphData:
     reasons: tuple[str, ...]
     stats: GraphStats
     pieces: tuple[SearchedPiece, ...] = ()
-    proof: Proof | None = None
+    make_proof: Callable[[], Proof | None] | None = None
+
+    @cached_property
+    def proof(self) -> Proof | None:
+        """The proof, made when it is first asked for; None when there is none."""
+        return None if self.make_proof is None else self.make_proof()
 
     @property
     def certified_data(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from functools import cached_property, partial
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -61,6 +61,10 @@ class TracedProblem:
         }
         self._selections: dict[tuple[Codes, float], ArcSelection] = {}
         self._precise: dict[tuple[Codes, float], PreciseSelection] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Made again: balls of many digits cannot be pickled."""
+        return type(self), (self.problem, self.interval, self.origin)
 
     @cached_property
     def _precise_system(self) -> PreciseSystem | None:
