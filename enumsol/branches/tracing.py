@@ -10,6 +10,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -63,6 +64,8 @@ ERRORS = 2.0
 _SMALLEST_UNITS, _SMALLEST_PRECISE = 64.0, 2.0**-60
 #: Boxes shorter than this share of the interval are traced in many digits.
 _PRECISE_BOX = 2.0**-10
+#: Boxes on which a selection seems to be singular are not cut below this share.
+_SINGULAR = 2.0**-26
 #: Expansions of one selection, after which what is left stays open.
 _MOST_BOXES = 200
 #: Boxes shorter than this share of the interval are not cut because of a condition that cannot be told from zero.
@@ -209,6 +212,8 @@ class _Tracing:
             fine = precise.expansion(first, last)
             if fine is not None:
                 tried.insert(0, _Cutting(rows, fine, whole=whole, flat=share < _PRECISE_BOX).run())
+        if not tried and share < _SINGULAR:
+            whole = True
         if tried:
             box, rest = tried[0]
             if box.parts:
@@ -218,7 +223,7 @@ class _Tracing:
             everywhere = frozenset(range(len(rows.codes)))
             self._found.boxes.append(Box(first, last, (Part(PartKind.OPEN, first, last, doubtful=everywhere),)))
             return []
-        middle = (first + last) / 2
+        middle = _between(first, last)
         return [(first, middle), (middle, last)]
 
 
@@ -246,12 +251,23 @@ class _Cutting:
         self.low: Number
         self.high: Number
         self.low, self.high = expansion.low, expansion.high
-        known = expansion.over(self.low, self.high)
-        count = len(self._rows.conditions)
-        # of conditions that may vanish: those of which this expansion cannot tell, and the zeros of the others
-        doubtful = [*known.doubtful.tolist(), *([] if known.regular else [count])]
-        self._flat = [k for k in doubtful if expansion.flat(k)]
-        self._zeros = sorted((zero, k) for k in doubtful if k not in self._flat for zero in expansion.zeros(k))
+
+    @cached_property
+    def _doubtful(self) -> list[int]:
+        """Conditions that may vanish; their number stands for the determinant."""
+        known = self._expansion.over(self.low, self.high)
+        return [*known.doubtful.tolist(), *([] if known.regular else [len(self._rows.conditions)])]
+
+    @cached_property
+    def _flat(self) -> list[int]:
+        """Those of which the expansion cannot tell."""
+        return [k for k in self._doubtful if self._expansion.flat(k)]
+
+    @cached_property
+    def _zeros(self) -> list[tuple[Any, int]]:
+        """Where the others seem to vanish."""
+        some = [k for k in self._doubtful if k not in self._flat]
+        return sorted((zero, k) for k in some for zero in self._expansion.zeros(k))
 
     def run(self) -> tuple[Box, list[Interval]]:
         """The box with its parts, and the intervals behind them that need boxes of their own."""
@@ -263,7 +279,7 @@ class _Cutting:
         while cells:
             low, high, halvings = cells.pop()
             part = self._decided(low, high)
-            middle = (low + high) / 2
+            middle = _between(low, high)
             if part is not None:
                 self._append(parts, part)
             elif halvings and low < middle < high and not self._tight(low, high):
@@ -292,7 +308,7 @@ class _Cutting:
 
     def _rest(self, low: Number, high: Number) -> list[Interval]:
         """What is left when a part cannot be decided: the part and what lies behind it, or two halves."""
-        middle = (low + self.high) / 2
+        middle = _between(low, self.high)
         if self._expansion.rough or (low, high) == (self.low, self.high):
             return [(low, middle), (middle, self.high)]
         return [(low, high), *([(high, self.high)] if high < self.high else [])]
@@ -363,3 +379,9 @@ class _Cutting:
         if known.regular:
             nodes = frozenset(self._rows.conditions[k][0] for k in known.doubtful)
         return Part(PartKind.OPEN, low, high, doubtful=nodes)
+
+
+def _between(low: Number, high: Number) -> Number:
+    """The middle; as a fraction where no float lies between."""
+    middle = (low + high) / 2
+    return middle if low < middle < high else (Fraction(low) + Fraction(high)) / 2
