@@ -113,10 +113,11 @@ class TracedProblem:
     def sharpen(self, found: Trace, part: Part) -> Bounds | None:
         """Narrower bounds of an event's zero; None where there is no need or no means."""
         low, high = (Fraction(end) for end in part.zero)
-        if float(high - low) <= _NARROW * abs(float(low)):
+        width = Fraction(_NARROW * max(abs(float(low)), abs(float(high))))
+        if high - low <= width:
             return None
         precise = self.precise(found.selection.rows.codes, found.side)
-        return None if precise is None else precise.enclosed(part.condition, low, high)
+        return None if precise is None else precise.enclosed(part.condition, low, high, width / 4)
 
     # -- values ----------------------------------------------------------------------------------------------------
 

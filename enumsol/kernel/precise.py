@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
 #: Bits of the arithmetic; zeros are enclosed to 2^-_ZERO_BITS relative to the interval, and closer ones are one.
 PRECISION, _ZERO_BITS = 320, 200
-#: Steps of Newton's method from the middle of an interval; bound of how much M may change over an interval, and of
-#: rises that count as none where norms are chosen.
-_STEPS, _LARGEST_SHIFT, _NO_RISE = 8, 0.5, 1e-250
+#: Steps of Newton's method from the middle of an interval, enlargements of a zero's bounds, bound of how much M may
+#: change over an interval, and of rises that count as none where norms are chosen.
+_STEPS, _WIDENINGS, _LARGEST_SHIFT, _NO_RISE = 8, 6, 0.5, 1e-250
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,11 +192,10 @@ class PreciseSelection:
             slopes = (self._c[1] + self._C[1] * y) * radius + (self._C[0] + self._C[1] * a) * rise
             return PreciseExpansion(self, first, last, self.values(a, y), slopes, index)
 
-    def newton(self, condition: int, low: Fraction, high: Fraction) -> Fraction | None:
-        """Where a condition seems to vanish between two alphas; no claim rests on it."""
+    def newton(self, condition: int, low: Fraction, high: Fraction, width: Fraction) -> Fraction | None:
+        """Where a condition seems to vanish between two alphas, to a part of ``width``; no claim rests on it."""
         with _precision():
-            alpha, step = (low + high) / 2, high - low
-            unit = Fraction(1, 2 ** (_ZERO_BITS + 16)) * (high - low)
+            alpha, unit = (low + high) / 2, width / 2**8
             for _ in range(_STEPS):
                 a = _ball(alpha)
                 solved = self.solve(a)
@@ -209,22 +208,28 @@ class PreciseSelection:
                 step = _fraction((self.values(a, y)[condition, 0] / rise).mid())
                 # a multiple of the unit: ends of enclosures keep few digits
                 alpha = min(max(low + round((alpha - step - low) / unit) * unit, low), high)
-                if abs(step) <= 4 * unit:
+                # the next step is about the square of this one
+                if step * step <= unit * (high - low):
                     break
             return alpha
 
-    def enclosed(self, condition: int, low: Fraction, high: Fraction) -> tuple[Fraction, Fraction] | None:
-        """Bounds of the only zero of a condition between two alphas: its signs there are proven to be opposite."""
-        alpha = self.newton(condition, low, high)
+    def enclosed(
+        self, condition: int, low: Fraction, high: Fraction, width: Fraction | None = None
+    ) -> tuple[Fraction, Fraction] | None:
+        """Bounds of the only zero of a condition between two alphas: its signs there are proven to be opposite.
+
+        They are about ``width`` apart, by default as close as zeros are told apart.
+        """
+        width = Fraction(1, 2**_ZERO_BITS) * (high - low) if width is None else width
+        alpha = self.newton(condition, low, high, width)
         if alpha is None:
             return None
-        width = Fraction(1, 2**_ZERO_BITS) * (high - low)
-        for _ in range(3):
+        for _ in range(_WIDENINGS):
             ends = max(alpha - width, low), min(alpha + width, high)
             signs = [self.signs_at(end) for end in ends]
             if all(found is not None for found in signs) and _opposite(signs, condition):
                 return ends
-            width *= 2**40
+            width *= 2**20
         return None
 
     def forces(self, alpha: Fraction) -> tuple[list[Any], list[Any]] | None:
@@ -294,7 +299,8 @@ class PreciseExpansion:
         """Alphas inside the interval at which a condition seems to vanish; no claim rests on them."""
         if condition >= len(self._rises) or not self._rises[condition]:
             return []
-        found = self._selection.newton(condition, self.low, self.high)
+        width = (self.high - self.low) / 2**_ZERO_BITS
+        found = self._selection.newton(condition, self.low, self.high, width)
         return [] if found is None or not self.low < found < self.high else [found]
 
     def flat(self, condition: int) -> bool:
