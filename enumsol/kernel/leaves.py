@@ -220,10 +220,12 @@ class _Leaf:
         """E, d (q, 2) and d' (q, 2) over a box of angles."""
         c, across = self.centre, np.stack([-self.centre[:, 1], self.centre[:, 0]], axis=1)
         cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        # what is known of cos and sin is their derivatives; floats of a library are off by a few units
-        spread = (np.minimum(radius, 2.0) * SAFE + 64 * UNIT)[:, None] * np.ones((1, 2))
-        d = Ball(cos * c + sin * across, spread)
-        turned = Ball(cos * across - sin * c, spread)
+        mid_d, mid_turned = cos * c + sin * across, cos * across - sin * c
+        # |d(psi + r) - d(psi)| <= min(|d'(psi)| r + r^2 / 2, r), and d' likewise; libraries are off by a few units
+        r = np.minimum(radius, 2.0)[:, None]
+        bent = 0.5 * r * r
+        d = Ball(mid_d, np.minimum(np.abs(mid_turned) * r + bent, r) * SAFE + 64 * UNIT)
+        turned = Ball(mid_turned, np.minimum(np.abs(mid_d) * r + bent, r) * SAFE + 64 * UNIT)
         mid, rad = self.E0.copy(), np.zeros_like(self.E0)
         for k, column in enumerate(self.column):
             mid[self.t[k], column], rad[self.t[k], column] = d.mid[k], d.rad[k]
