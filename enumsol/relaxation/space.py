@@ -276,4 +276,4 @@ class SpaceRelaxation:
         found = self._found.pop(tuple(rows), None)
         if found is not None:
             return found
-        return SpaceRelaxation(self._engine, self._state if last else self._state.copy(), rows, modes)
+        return type(self)(self._engine, self._state if last else self._state.copy(), rows, modes)
