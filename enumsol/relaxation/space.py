@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     Children = dict[tuple[int, ...], "SpaceRelaxation"]
 
 #: Level of the directions on which tangents are put where the minimiser leaves the disc, and of those put anyway.
-_FINE, _COARSE = 10, 3
+_FINE, COARSE = 10, 3
 #: Rounds of tangents, and how far outside the disc the minimiser must lie.
-_ROUNDS, _OUTSIDE = 4, 1e-3
+ROUNDS, _OUTSIDE = 4, 1e-3
 #: Sectors of this level and below are halved only where nothing else helps.
 _DEEP = 12
 #: Violations of maximum dissipation below this do not tell which sector to halve.
@@ -127,7 +127,7 @@ def imposed(tau: NDArray[np.intp], node: int, code: int) -> list[tuple[Row, int]
             *_with([(FORCE, node, 0), *((TAU, node, k) for k in axes)], EQUALITY),
         ]
     if len(axes) == 2:
-        inequalities += [(TANGENT, node, (1 << _COARSE) + k) for k in range(1 << _COARSE)]
+        inequalities += [(TANGENT, node, (1 << COARSE) + k) for k in range(1 << COARSE)]
     elif axes:
         forward = 1 if code == SLIP_PLUS else -1 if code == SLIP_MINUS else 0
         inequalities += [(END, node, sign) for sign in (1, -1) if sign != forward]
@@ -158,7 +158,7 @@ class SpaceRelaxation:
         self._found: Children = {}
         self._kept: tuple[Array, Array, tuple[NDArray[np.intp], Array]] | None = None
         self._solve(rows, modes)
-        for _ in range(_ROUNDS):
+        for _ in range(ROUNDS):
             if self.pruned or self.stalled:
                 break
             rows = self._cuts()
@@ -214,12 +214,12 @@ class SpaceRelaxation:
         at most one child that is not excluded is taken, or else the one that promises the smallest tree. Where none is
         violated, sectors wider than others are halved if that excludes one half.
         """
-        score = self._violations(codes)
+        score = self.violations(codes)
         best, most = -1, 0.0
         for node in np.argsort(-score, kind="stable").tolist():
             if not score[node] > 0.0:
                 break
-            children = self._children(node, codes[node])
+            children = self.solved_children(node, codes[node])
             left = np.array([child.bound for child in children.values() if not child.pruned])
             if len(left) <= 1:
                 return self._chosen(node, children)
@@ -228,14 +228,14 @@ class SpaceRelaxation:
             if not most >= promise:
                 best, most = node, promise
                 self._found = {rows: child._released() for rows, child in children.items() if child.pruned}
-        return best if best >= 0 else self._contracted(codes)
+        return best if best >= 0 else self.contracted(codes)
 
-    def _contracted(self, codes: Codes) -> int:
+    def contracted(self, codes: Codes) -> int:
         """A node whose sector is wider than another's and of which one half is excluded, or -1."""
         levels = {node: level_of(code - SECTORS) for node, code in enumerate(codes) if code > SECTORS}
         deepest = min(max(levels.values(), default=0), _DEEP)
         for node in sorted((node for node, level in levels.items() if level < deepest), key=levels.__getitem__):
-            children = self._children(node, codes[node])
+            children = self.solved_children(node, codes[node])
             if sum(not child.pruned for child in children.values()) <= 1:
                 return self._chosen(node, children)
         return -1
@@ -245,12 +245,12 @@ class SpaceRelaxation:
         self._found = {rows: child._released() if child.pruned else child for rows, child in children.items()}
         return node
 
-    def _children(self, node: int, code: int) -> Children:
+    def solved_children(self, node: int, code: int) -> Children:
         """The relaxations of all children of a node, by their rows."""
         parts = [self._engine.imposed(node, child) for child in self._engine.children(node, code)]
         return {tuple(rows): self.child(rows, modes, last=False) for rows, modes in parts}
 
-    def _violations(self, codes: Codes) -> Array:
+    def violations(self, codes: Codes) -> Array:
         """How much complementarity is violated at every node that can be branched on; -inf at the others."""
         system, y, w = self._engine.system, self.forces, self.displacements
         array, p = np.array(codes), system.p
