@@ -141,8 +141,10 @@ class Worker:
 
     def run(self, task: Task, max_nodes: int | None = None, deadline: float | None = None) -> TreeResult:
         """Search the tree of a task."""
-        _, _, trees = self._on(task.piece)
-        return trees.run(task.roots, min(LARGEST_TREE, max_nodes or LARGEST_TREE), deadline)
+        trees = self._on(task.piece)[2]
+        result = trees.run(task.roots, LARGEST_TREE if max_nodes is None else min(LARGEST_TREE, max_nodes), deadline)
+        result.checkable = self.leaves.checkable
+        return result
 
     def system(self, piece: Piece) -> IntervalSystem:
         """The system of a piece."""
@@ -180,12 +182,15 @@ class IntervalSearch:
     Attributes
     ----------
     interval : (Fraction, Fraction)
+    worker : Worker
     pieces : list of SearchedPiece
         In the order of their trees: the halves come directly after what was cut.
     nodes : int
     stopped : Stop or None
     selections : set of codes
         All complete selections that the trees could not exclude.
+    checkable : bool
+        Whether a checker can repeat what was excluded.
     """
 
     def __init__(
@@ -199,7 +204,7 @@ class IntervalSearch:
         deadline: float | None = None,
         progress: Callable[[float], object] | None = None,
     ) -> None:
-        self._worker = Worker(condensed, interval, origin, leaves)
+        self.worker = Worker(condensed, interval, origin, leaves)
         self._p, self._origin = len(condensed.F0), origin
         self.interval, self.progress = interval, progress
         self.max_nodes, self.deadline = max_nodes, deadline
@@ -207,6 +212,7 @@ class IntervalSearch:
         self.nodes = 0
         self.stopped: Stop | None = None
         self.selections: set[Codes] = set()
+        self.checkable = leaves.checkable
 
     def first(self) -> list[Task]:
         """The whole tree over the whole interval, or over both sides of the alpha at which g vanishes."""
@@ -225,7 +231,7 @@ class IntervalSearch:
         waiting = self.first()[::-1]
         while waiting:
             task = waiting.pop()
-            found = SearchedPiece(task.piece, self._worker.system(task.piece), [root.codes for root in task.roots])
+            found = SearchedPiece(task.piece, self.worker.system(task.piece), [root.codes for root in task.roots])
             self.pieces.append(found)
             cut = self._search(task, found, known)
             if self.stopped is not None and found.cut:
@@ -234,7 +240,7 @@ class IntervalSearch:
                 continue
             found.cut = [subtree.codes for subtree in cut]
             waiting += Task.halves(task.piece, cut)[::-1]
-            if not cut and self.progress is not None:
+            if not cut and not known and self.progress is not None:
                 a, b = self.interval
                 self.progress(float((task.piece.b - a) / (b - a)))
 
@@ -249,6 +255,7 @@ class IntervalSearch:
                 found.cut = [subtree.codes for subtree in left]
                 return []
             self.nodes += result.nodes
+            self.checkable = self.checkable and result.checkable
             found.empty += result.empty
             found.selections += result.selections
             self.selections.update(result.selections)
@@ -259,10 +266,11 @@ class IntervalSearch:
     def _result(self, task: Task, known: TreeResult | None) -> TreeResult | None:
         """What the tree of a task comes to; None once a limit is reached."""
         rest = None if self.max_nodes is None else self.max_nodes - self.nodes
-        if known is not None and (rest is None or known.nodes <= rest):
+        # near the limit a tree is smaller than it was without it
+        if known is not None and (rest is None or rest >= LARGEST_TREE):
             return known
         if self.stopped is None and rest is not None and rest <= 0:
             self.stopped = Stop(StopReason.NODE_LIMIT, self.max_nodes)
         elif self.stopped is None and self.deadline is not None and time.perf_counter() > self.deadline:
             self.stopped = Stop(StopReason.TIME_LIMIT)
-        return None if self.stopped is not None else self._worker.run(task, rest, self.deadline)
+        return None if self.stopped is not None else self.worker.run(task, rest, self.deadline)

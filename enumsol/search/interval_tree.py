@@ -77,6 +77,8 @@ class TreeResult:
         Not examined, since the tree reached its largest size or a limit.
     nodes : int
         Relaxations over the piece and at its middle.
+    checkable : bool
+        Whether a checker can repeat what was excluded.
     """
 
     empty: list[EmptyLeaf] = field(default_factory=list)
@@ -84,6 +86,7 @@ class TreeResult:
     cut: list[Subtree] = field(default_factory=list)
     rest: list[Subtree] = field(default_factory=list)
     nodes: int = 0
+    checkable: bool = True
 
 
 class IntervalSplitting(PlaneSplitting):
