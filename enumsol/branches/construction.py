@@ -18,20 +18,24 @@ from enumsol.checks import (
     one_of,
     optional_callable,
     optional_count,
+    optional_executor,
     optional_seconds,
 )
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import Interrupted, InvalidArgumentError, WorkerError
+from enumsol.executors import WorkerLost
 from enumsol.problem import ContactProblem
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 from enumsol.search.interval import FastIntervalCertifier, IntervalSearch
+from enumsol.search.interval_parallel import run_parallel
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.statuses import OPEN
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from concurrent.futures import Executor
 
     from enumsol.checks import AlphaLike
     from enumsol.proof.proof_file import Proof
@@ -49,6 +53,7 @@ def branch_graph(
     progress: Callable[[str, float], object] | None = None,
     max_nodes: int | None = None,
     time_limit: float | None = None,
+    executor: Executor | None = None,
 ) -> BranchGraph:
     """All solutions over an interval of alpha, as arcs glued at vertices (theory, section 7).
 
@@ -73,6 +78,9 @@ def branch_graph(
         Stop the search after this many nodes; the graph is then reported as incomplete.
     time_limit : float, optional
         Stop the search after this many seconds.
+    executor : concurrent.futures.Executor, optional
+        Searches the pieces of the interval, and parts of large ones, in its workers. The graph and its proof are those
+        found without it.
 
     Returns
     -------
@@ -90,6 +98,8 @@ def branch_graph(
     Interrupted
         On Ctrl-C during the search, or while arcs are worked out; ``partial`` is the graph of what was found so far,
         which is not complete.
+    WorkerError
+        A worker of the executor died; ``partial`` likewise.
 
     Examples
     --------
@@ -103,6 +113,7 @@ def branch_graph(
     a, b = (Fraction(end) for end in alpha_interval(interval))
     one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     optional_callable(progress, "progress")
+    optional_executor(executor)
     max_nodes, time_limit = optional_count(max_nodes, "max_nodes"), optional_seconds(time_limit)
     _check_friction(problem, a, b)
     started = time.perf_counter()
@@ -118,7 +129,7 @@ def branch_graph(
         deadline=None if time_limit is None else started + time_limit,
         progress=_stage(progress, "search"),
     )
-    candidates = _candidates(search, exact)
+    candidates, loss = _candidates(search, exact, executor)
     searched = time.perf_counter()
     tick = _stage(progress, "arcs")
     gluing = glue(exact, candidates, rational(a), rational(b), tick, cut_short=search.stopped is not None)
@@ -141,11 +152,13 @@ def branch_graph(
         reasons=(*map(str, stops), *gluing.reasons),
         stats=stats,
         pieces=tuple(search.pieces),
-        proof=_proof(search, certifier, problem, exact),
+        proof=_proof(search, problem, exact),
     )
     graph = BranchGraph(data)
     if any(stop.interrupted for stop in stops):
         raise Interrupted("branch_graph was interrupted; the arcs found so far are kept", graph)
+    if loss is not None:
+        raise WorkerError(f"{loss}; the arcs found so far are kept", graph) from loss
     return graph
 
 
@@ -155,22 +168,28 @@ def _certifier(problem: ContactProblem, exact: ExactCondensed, arithmetic: Arith
     return VerifiedIntervalCertifier(problem, exact) if arithmetic == "verified" else FastIntervalCertifier()
 
 
-def _candidates(search: IntervalSearch, exact: ExactCondensed) -> set[Codes]:
-    """The selections that may hold somewhere; Ctrl-C keeps those that were found."""
+def _candidates(
+    search: IntervalSearch, exact: ExactCondensed, executor: Executor | None
+) -> tuple[set[Codes], WorkerLost | None]:
+    """The selections that may hold somewhere; Ctrl-C and the loss of a worker keep those that were found."""
     if exact.unloaded:
         # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
-        return {(OPEN,) * exact.p}
+        return {(OPEN,) * exact.p}, None
+    loss = None
     try:
-        search.run()
+        if executor is None:
+            search.run()
+        else:
+            run_parallel(executor, search)
     except KeyboardInterrupt:
         search.stopped = Stop(StopReason.INTERRUPTED, search.nodes)
-    return search.selections
+    except WorkerLost as lost:
+        loss = lost
+    return search.selections, loss
 
 
-def _proof(
-    search: IntervalSearch, certifier: IntervalCertifier, problem: ContactProblem, exact: ExactCondensed
-) -> Proof | None:
-    if not certifier.checkable or not search.pieces or search.stopped is not None:
+def _proof(search: IntervalSearch, problem: ContactProblem, exact: ExactCondensed) -> Proof | None:
+    if not search.checkable or not search.pieces or search.stopped is not None:
         return None
     about = "problem" if exact.condensed_exactly else "condensed"
     return write_graph_proof(problem, search.interval, about, search.pieces)
