@@ -86,10 +86,10 @@ class WorkerError(_PartialResultError, RuntimeError):
 
     Attributes
     ----------
-    partial : RootSet or pandas.DataFrame
+    partial : RootSet, BranchGraph or pandas.DataFrame
         For enumerate_roots: the roots of the subtrees that were finished, with ``complete`` False and the other
-        subtrees under ``undecided``; its proof covers what was finished. For multiplicity_table: the rows that were
-        finished.
+        subtrees under ``undecided``; its proof covers what was finished. For branch_graph: the arcs of what was
+        finished. For multiplicity_table: the rows that were finished.
     """
 
 

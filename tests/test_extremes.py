@@ -278,7 +278,7 @@ def test_the_checker_finds_better_bounds_than_the_search():
     margins = pytest.importorskip("enumsol.search.certifiers._margin").Margins
     found = Solvers(problem, 1.0, "verified", 1e-9)
     system, rng = found.enclosed, np.random.default_rng(1)
-    search = margins(system)
+    search = margins((system,), system.F, system.F)
     p, compared = problem.p, 0
     for _ in range(200):
         # rows -w_n >= 0 of all nodes and cones, with the multipliers of any size that no exclusion would have

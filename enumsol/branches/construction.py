@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Literal
@@ -24,6 +25,7 @@ from enumsol.checks import (
     one_of,
     optional_callable,
     optional_count,
+    optional_executor,
     optional_seconds,
 )
 from enumsol.condensation.affine import exactly_at
@@ -31,17 +33,21 @@ from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed
 from enumsol.condensation.unloaded import vanishing_alpha
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import Interrupted, InvalidArgumentError, WorkerError
+from enumsol.executors import WorkerLost
 from enumsol.problem import ContactProblem
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 from enumsol.search.interval import FastIntervalCertifier, IntervalSearch
+from enumsol.search.interval_parallel import run_parallel
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.statuses import OPEN
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from concurrent.futures import Executor
 
+    from enumsol.branches.elements import Arc, Vertex
     from enumsol.branches.following import Followed
     from enumsol.checks import AlphaLike
     from enumsol.proof.proof_file import Proof
@@ -59,6 +65,7 @@ def branch_graph(
     progress: Callable[[str, float], object] | None = None,
     max_nodes: int | None = None,
     time_limit: float | None = None,
+    executor: Executor | None = None,
 ) -> BranchGraph:
     """All solutions over an interval of alpha, as arcs glued at vertices (theory, section 7).
 
@@ -83,6 +90,9 @@ def branch_graph(
         Stop the search after this many nodes; the graph is then reported as incomplete.
     time_limit : float, optional
         Stop the search after this many seconds.
+    executor : concurrent.futures.Executor, optional
+        Searches the pieces of the interval, and parts of large ones, in its workers. The graph and its proof are those
+        found without it.
 
     Returns
     -------
@@ -100,6 +110,8 @@ def branch_graph(
     Interrupted
         On Ctrl-C during the search, or while arcs are worked out; ``partial`` is the graph of what was found so far,
         which is not complete.
+    WorkerError
+        A worker of the executor died; ``partial`` likewise.
 
     Examples
     --------
@@ -113,6 +125,7 @@ def branch_graph(
     a, b = (Fraction(end) for end in alpha_interval(interval))
     one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     optional_callable(progress, "progress")
+    optional_executor(executor)
     max_nodes, time_limit = optional_count(max_nodes, "max_nodes"), optional_seconds(time_limit)
     _check_friction(problem, a, b)
     started = time.perf_counter()
@@ -129,27 +142,10 @@ def branch_graph(
         deadline=None if time_limit is None else started + time_limit,
         progress=_stage(progress, "search"),
     )
-    candidates = _candidates(search, exact)
+    candidates, loss = _candidates(search, exact, executor)
     searched = time.perf_counter()
     tick = _stage(progress, "arcs")
-    stops = [] if search.stopped is None else [search.stopped]
-    followed = None
-    if traced is not None:
-        followed = follow(traced, search.pieces, tick, cut_short=bool(stops))
-        stops += [] if followed.interrupted is None else [followed.interrupted]
-        if followed.joined.open and not stops and problem.n <= EXACT_DOF_LIMIT:
-            # several conditions vanish at once, or a selection is singular: decided without rounding
-            exact = ExactCondensed.from_problem(problem)
-    reasons: Sequence[str]
-    if exact is None and traced is not None and followed is not None:
-        vertices, arcs = make_traced(traced, followed.joined)
-        reasons = followed.reasons
-    else:
-        assert exact is not None
-        gluing = glue(exact, candidates, rational(a), rational(b), tick, cut_short=bool(stops))
-        stops += [] if gluing.interrupted is None else [gluing.interrupted]
-        arcs = make_arcs(gluing)
-        vertices, reasons = make_vertices(gluing, arcs), gluing.reasons
+    made = _make(problem, search, candidates, traced, exact, tick)
     stats = GraphStats(
         pieces=len(search.pieces),
         nodes=search.nodes,
@@ -159,20 +155,63 @@ def branch_graph(
     )
     data = GraphData(
         problem=problem,
-        exact=exact,
+        exact=made.exact,
         interval=(a, b),
         arithmetic=arithmetic,
-        vertices=tuple(vertices),
-        arcs=tuple(arcs),
-        reasons=(*map(str, stops), *reasons),
+        vertices=tuple(made.vertices),
+        arcs=tuple(made.arcs),
+        reasons=(*map(str, made.stops), *made.reasons),
         stats=stats,
         pieces=tuple(search.pieces),
-        make_proof=_proof(search, certifier, problem, exact, followed),
+        make_proof=_proof(search, problem, made.exact, made.followed),
     )
     graph = BranchGraph(data)
-    if any(stop.interrupted for stop in stops):
+    if any(stop.interrupted for stop in made.stops):
         raise Interrupted("branch_graph was interrupted; the arcs found so far are kept", graph)
+    if loss is not None:
+        raise WorkerError(f"{loss}; the arcs found so far are kept", graph) from loss
     return graph
+
+
+@dataclass
+class _Made:
+    """Vertices and arcs, and how they were found."""
+
+    exact: ExactCondensed | None
+    followed: Followed | None
+    stops: list[Stop]
+    vertices: Sequence[Vertex] = ()
+    arcs: Sequence[Arc] = ()
+    reasons: Sequence[str] = ()
+
+
+def _make(
+    problem: ContactProblem,
+    search: IntervalSearch,
+    candidates: set[Codes],
+    traced: TracedProblem | None,
+    exact: ExactCondensed | None,
+    tick: Callable[[float], object] | None,
+) -> _Made:
+    """Arcs in ball arithmetic; without rounding where there is no such way, or it leaves something open."""
+    made = _Made(exact, None, [] if search.stopped is None else [search.stopped])
+    if traced is not None:
+        made.followed = follow(traced, search.pieces, tick, cut_short=bool(made.stops))
+        joined, interrupted = made.followed.joined, made.followed.interrupted
+        made.stops += [] if interrupted is None else [interrupted]
+        if not joined.open or made.stops or problem.n > EXACT_DOF_LIMIT:
+            made.vertices, made.arcs = make_traced(traced, joined)
+            made.reasons = made.followed.reasons
+            return made
+        # several conditions vanish at once, or a selection is singular
+        made.exact = ExactCondensed.from_problem(problem)
+    assert made.exact is not None
+    a, b = (rational(end) for end in search.interval)
+    gluing = glue(made.exact, candidates, a, b, tick, cut_short=bool(made.stops))
+    made.stops += [] if gluing.interrupted is None else [gluing.interrupted]
+    made.arcs = make_arcs(gluing)
+    made.vertices, made.reasons = make_vertices(gluing, made.arcs), gluing.reasons
+    return made
 
 
 def _traced(problem: ContactProblem, interval: tuple[Fraction, Fraction]) -> TracedProblem | None:
@@ -199,27 +238,31 @@ def _certifier(
     return FastIntervalCertifier() if arithmetic == "fast" else VerifiedIntervalCertifier(problem, exact, zero)
 
 
-def _candidates(search: IntervalSearch, exact: ExactCondensed | None) -> set[Codes]:
-    """The selections that may hold somewhere; Ctrl-C keeps those that were found."""
+def _candidates(
+    search: IntervalSearch, exact: ExactCondensed | None, executor: Executor | None
+) -> tuple[set[Codes], WorkerLost | None]:
+    """The selections that may hold somewhere; Ctrl-C and the loss of a worker keep those that were found."""
     if exact is not None and exact.unloaded:
         # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
-        return {(OPEN,) * exact.p}
+        return {(OPEN,) * exact.p}, None
+    loss = None
     try:
-        search.run()
+        if executor is None:
+            search.run()
+        else:
+            run_parallel(executor, search)
     except KeyboardInterrupt:
         search.stopped = Stop(StopReason.INTERRUPTED, search.nodes)
-    return search.selections
+    except WorkerLost as lost:
+        loss = lost
+    return search.selections, loss
 
 
 def _proof(
-    search: IntervalSearch,
-    certifier: IntervalCertifier,
-    problem: ContactProblem,
-    exact: ExactCondensed | None,
-    followed: Followed | None,
+    search: IntervalSearch, problem: ContactProblem, exact: ExactCondensed | None, followed: Followed | None
 ) -> Callable[[], Proof | None] | None:
     """What makes the proof, once it is asked for; None when there is none."""
-    if not certifier.checkable or not search.pieces or search.stopped is not None:
+    if not search.checkable or not search.pieces or search.stopped is not None:
         return None
     if exact is None or exact.condensed_exactly:
         return partial(_proof_of_problem, problem, search.interval, search.pieces, followed)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, note, parse_interval, so_far
+from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, note, parse_interval, so_far, workers
 from enumsol.cli.options import (
     Arithmetic,
     DrawnQuantity,
@@ -16,6 +16,7 @@ from enumsol.cli.options import (
     MaxNodes,
     PlotFile,
     ProblemArgument,
+    count,
     csv,
     file,
     node,
@@ -44,6 +45,7 @@ def graph(
     ] = "verified",
     max_nodes: MaxNodes = None,
     time_limit: Annotated[float | None, seconds("Stop the search after so long.")] = None,
+    jobs: Annotated[int, count("Processes to search with.")] = 1,
     save_file: Annotated[str | None, file("--save", "Write the graph, for enumsol audit and follow.")] = None,
     json_file: JsonFile = None,
     csv_file: Annotated[str | None, csv("an arc")] = None,
@@ -60,8 +62,8 @@ def graph(
     Prints branches, folds, bifurcations and continua, and whether the graph is complete.
 
     Exit status: 0 when complete (in fast arithmetic, which proves nothing: when the degrees balance at every vertex);
-    3 when the graph is known to be incomplete; 2 on bad input; 130 on Ctrl-C, after printing the graph so far; 74 when
-    a result could not be written, 141 when nobody read it any more.
+    3 when the graph is known to be incomplete; 2 on bad input; 71 when a process of --jobs died, 130 on Ctrl-C, both
+    after printing the graph so far; 74 when a result could not be written, 141 when nobody read it any more.
     """
     check_outputs(json=json_file, csv=csv_file)
     for option, path in (("--save", save_file), ("--graphml", graphml_file), ("--proof", proof_file)):
@@ -71,7 +73,8 @@ def graph(
     check_plot(plot_file)
     interval, body = parse_interval(first, last), load_problem(problem)
     chosen = None if nodes is None else [body.node_ids[node_row(body, label.strip())] for label in nodes.split(",")]
-    found, ended = so_far(lambda: build(body, interval, arithmetic, max_nodes=max_nodes, time_limit=time_limit))
+    limits = {"max_nodes": max_nodes, "time_limit": time_limit}
+    found, ended = so_far(lambda: build(body, interval, arithmetic, jobs, **limits))
     deliver(
         (proof_file, lambda path: _write_proof(found, path)),
         (save_file, found.save),
@@ -98,17 +101,18 @@ def build(
     problem: ContactProblem,
     interval: tuple[Alpha, Alpha],
     arithmetic: Arithmetic = "verified",
+    jobs: int = 1,
     **limits: Any,
 ) -> BranchGraph:
     """The graph, with progress on stderr."""
     from enumsol.branches import branch_graph
 
-    with Display("branch graph") as display:
+    with workers(jobs) as executor, Display("branch graph") as display:
 
         def progress(stage: str, share: float) -> None:
             display.show(share, stage)
 
-        return branch_graph(problem, interval, arithmetic, progress=progress, **limits)
+        return branch_graph(problem, interval, arithmetic, progress=progress, executor=executor, **limits)
 
 
 def read_graph(file: str, problem: ContactProblem) -> BranchGraph:

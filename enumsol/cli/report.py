@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from enumsol.roots.root import Root, RootFamily
-    from enumsol.roots.root_set import RootSet
+    from enumsol.roots.root import Enclosure, Root, RootFamily
+    from enumsol.roots.root_set import RootSet, Undecided
 
 #: The table over contact nodes is printed when it has at most so many rows.
 _ROWS = 24
@@ -65,10 +65,7 @@ def as_json(found: RootSet, problem: str) -> str:
         "node_ids": list(found.node_ids),
         "roots": [_root(root) for root in found],
         "families": [_family(family) for family in found.families],
-        "undecided": [
-            {"statuses": [_status(s) for s in item.statuses], "reason": item.reason, "hint": item.hint}
-            for item in found.undecided
-        ],
+        "undecided": [_undecided(item) for item in found.undecided],
         "stats": {
             name: getattr(stats, name) for name in ("nodes", "pruned", "selections", "qps", "fallback_qps", "seconds")
         },
@@ -88,7 +85,7 @@ def _root(root: Root) -> dict[str, Any]:
         "statuses": [status.value for status in root.statuses],
         "active": [sorted(status.value for status in holds) for holds in root.active],
         **{name: getattr(root, name).tolist() for name in _FIELDS},
-        "enclosure": root.enclosure and {name: getattr(root.enclosure, name).tolist() for name in _FIELDS},
+        "enclosure": _bounds(root.enclosure),
         "index": root.index,
         "regular": root.regular,
         "margin": _finite(root.margin),
@@ -102,7 +99,22 @@ def _in_plane(root: Root) -> dict[str, Any]:
 
 
 def _in_space(root: Any) -> dict[str, Any]:
-    return {"slip_angle": [None if angles[0] != angles[0] else angles for angles in root.slip_angle.tolist()]}
+    return {"slip_angle": _angles(root.slip_angle)}
+
+
+def _undecided(item: Undecided) -> dict[str, Any]:
+    content = {"statuses": [_status(s) for s in item.statuses], "reason": item.reason, "hint": item.hint}
+    if item.slip_angle is None:
+        return content
+    return {**content, "leaves": item.leaves, "slip_angle": _angles(item.slip_angle), "bounds": _bounds(item.bounds)}
+
+
+def _bounds(box: Enclosure | None) -> dict[str, Any] | None:
+    return None if box is None else {name: getattr(box, name).tolist() for name in _FIELDS}
+
+
+def _angles(angles: Any) -> list[list[float] | None]:
+    return [None if math.isnan(low) else [low, high] for low, high in angles.tolist()]
 
 
 def _family(family: RootFamily) -> dict[str, Any]:

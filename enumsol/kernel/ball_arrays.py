@@ -136,6 +136,20 @@ def determinant_sign(M: Ball) -> int:
     return 0 if solved is None else solved[2]
 
 
+def nearly_singular(M: Array) -> bool:
+    """Whether a finite matrix has a condition number above a million."""
+    return bool(np.all(np.isfinite(M))) and not np.linalg.cond(M) < 1e6
+
+
+def rough_inverse(J: Ball) -> Array:
+    """An inverse of J's middle in the rows and directions in which J is surely not singular."""
+    known = np.linalg.norm(J.rad, axis=1) < 0.5 * np.linalg.norm(J.mid, axis=1)
+    mid, rad = J.mid * known[:, None], J.rad * known[:, None]
+    size = float(np.linalg.norm(mid, 2))
+    cut = min(1.0, 2.0 * float(np.linalg.norm(rad)) / size + 1e-10) if size > 0 else 1.0
+    return np.asarray(np.linalg.pinv(mid, cut))
+
+
 def column_scale(M: Ball) -> Array:
     """Powers of two by which columns get a size near one."""
     return np.asarray(np.ldexp(1.0, -np.frexp(np.max(np.abs(M.mid), axis=0) + TINY)[1]))

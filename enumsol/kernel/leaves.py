@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
-from enumsol.kernel.ball_arrays import Ball, determinant_sign, smaller, solution
+from enumsol.kernel.ball_arrays import Ball, determinant_sign, nearly_singular, rough_inverse, smaller, solution
 from enumsol.kernel.space import OPEN, SLIP_PLUS, STICK
 from enumsol.sectors import SECTORS, direction, end_number
 
@@ -31,6 +31,10 @@ _WIDENED = 0.125
 _CONTRACTIONS = 10
 #: Contractions of a box that holds exactly one zero, down to rounding.
 _REFINEMENTS = 60
+#: Boxes of directions narrower than this hold a point, and forces known no better are not known; neither is halved for.
+_POINT = 2.0**-24
+#: Directions that change no G by more (scaled) are not halved, nor for a linear system that they change by no more.
+_NEGLIGIBLE, _SINGULAR = 2.0**-44, 2.0**-36
 
 
 def _cut(angle: Array, radius: Array, reach: Array, move: Ball) -> tuple[Array, Array]:
@@ -72,21 +76,35 @@ class SpaceRoot:
 
 @dataclass(frozen=True)
 class Open:
-    """A leaf that is not settled.
+    """A leaf that is not settled, with bounds of all solutions in it.
 
     Attributes
     ----------
     node : int or None
-        The node whose sector is the widest, or None where there are none.
+        The node whose sector is to be halved, the widest; None where that is not expected to help.
+    y, w : Ball of shape (m,), or None
+        As in SpaceRoot; None where the linear system is not proven regular in the box.
+    centre : (q, 2) array
+    angle, angle_rad : (q,) arrays
+        As in SpaceRoot.
     """
 
     node: int | None
+    y: Ball | None
+    w: Ball | None
+    centre: Array
+    angle: Array
+    angle_rad: Array
 
 
 def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | None:
     """What a leaf holds: exactly one root in its box, no root (None), or it is not settled."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         return _Leaf(system, codes).settle()
+
+
+#: y, w, G and dG/dpsi over a box.
+_State = tuple[Ball, Ball, Ball, Ball]
 
 
 class _Leaf:
@@ -133,84 +151,110 @@ class _Leaf:
 
     def settle(self) -> SpaceRoot | Open | None:
         q = len(self.turning)
-        open_leaf = Open(self.turning[int(np.argmax(self.half))] if q else None)
         reach = (1.0 + 2.0 * _WIDENED) * self.half
         angle, radius = np.zeros(q), reach.copy()
+        state, rough = None, False
         for _ in range(_CONTRACTIONS):
-            state = self._state(angle, radius)
+            state = self._state(angle, radius) or state
             if state is None:
-                return open_leaf
-            y, w, _, J = state
-            if self._broken(y, w, angle, radius):
+                break
+            if self._broken(state[0], state[1], angle, radius) or np.any(self._outside(angle, radius)):
                 return None
             if not q:
-                return self._root(y, w, angle, radius, reach, None, open_leaf)
-            move = self._move(angle, radius, J)
-            if move is None:
-                return open_leaf
-            if np.any(np.abs(move.mid) > (move.rad + radius) * SAFE):
-                return None
-            # the box holds exactly one zero
-            inside = np.all(move.size < radius)
-            new_angle, new_radius = _cut(angle, radius, reach, move)
-            if inside:
-                return self._refined(new_angle, new_radius, reach, open_leaf)
-            if np.all(new_radius > 0.9 * radius):
-                return open_leaf
-            angle, radius = new_angle, new_radius
-        return open_leaf
+                return self._root(state, angle, radius, reach)
+            new_angle, new_radius = angle, radius
+            move = self._move(angle, radius, state[3], rough=rough)
+            if move is not None:
+                if np.any(np.abs(move.mid) > (move.rad + radius) * SAFE):
+                    return None
+                new_angle, new_radius = _cut(angle, radius, reach, move)
+                # the box holds exactly one zero
+                if np.all(move.size < radius):
+                    return self._refined(new_angle, new_radius, reach)
+            if np.any(new_radius <= 0.9 * radius):
+                angle, radius = new_angle, new_radius
+            elif rough or (move is not None and not nearly_singular(state[3].mid)):
+                break
+            else:
+                rough = True
+        return self._left_open(angle, radius, state)
 
-    def _move(self, angle: Array, radius: Array, J: Ball) -> Ball | None:
-        """Krawczyk's operator: a ball of psi - angle for all zeros psi in a box over which J holds dG/dpsi."""
+    def _move(self, angle: Array, radius: Array, J: Ball, *, rough: bool = False) -> Ball | None:
+        """Krawczyk's operator: a ball of psi - angle for all zeros psi in a box over which J holds dG/dpsi.
+
+        ``rough``: only in the directions in which J is surely not singular, so that those of other nodes are cut.
+        """
         point = self._state(angle, np.zeros(len(angle)))
         if point is None:
             return None
         try:
-            Y = Ball.exact(np.asarray(np.linalg.inv(J.mid), dtype=np.float64))
+            Y = rough_inverse(J) if rough else np.linalg.inv(J.mid)
         except np.linalg.LinAlgError:
             return None
-        return (Ball.exact(np.eye(len(angle))) - Y @ J) @ Ball(np.zeros(len(angle)), radius) - Y @ point[2]
+        inverse, span = Ball.exact(np.asarray(Y, dtype=np.float64)), Ball(np.zeros(len(angle)), radius)
+        return (Ball.exact(np.eye(len(angle))) - inverse @ J) @ span - inverse @ point[2]
 
-    def _refined(self, angle: Array, radius: Array, reach: Array, open_leaf: Open) -> SpaceRoot | Open | None:
+    def _refined(self, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open | None:
         """The one zero of a box, enclosed as closely as floats can."""
+        state = None
         for _ in range(_REFINEMENTS):
             if np.any(self._outside(angle, radius)):
                 return None
             state = self._state(angle, radius)
             move = None if state is None else self._move(angle, radius, state[3])
             if move is None:
-                return open_leaf
+                return self._left_open(angle, radius, state)
             new_angle, new_radius = _cut(angle, radius, reach, move)
             if not np.all(new_radius <= radius + 8 * UNIT * reach):
-                return open_leaf
+                return self._left_open(angle, radius, state)
             done = np.all(new_radius > 0.9 * radius)
             angle, radius = new_angle, new_radius
             if done:
                 break
         state = self._state(angle, radius)
         if state is None:
-            return open_leaf
-        y, w, _, J = state
-        if self._broken(y, w, angle, radius) or np.any(self._outside(angle, radius)):
+            return self._left_open(angle, radius, None)
+        if self._broken(state[0], state[1], angle, radius) or np.any(self._outside(angle, radius)):
             return None
-        return self._root(y, w, angle, radius, reach, J, open_leaf)
+        return self._root(state, angle, radius, reach)
+
+    def _left_open(self, angle: Array, radius: Array, state: _State | None) -> Open:
+        """What is known of a leaf that is not settled."""
+        node = None
+        # what is proven does not depend on which sector is halved, and whether any is
+        if len(angle) and (state is None or not np.all(radius < _POINT)):
+            worth = self._worth_halving(angle, radius, state)
+            node = self.turning[int(np.argmax(worth))] if np.any(worth) else None
+        y, w = (None, None) if state is None else state[:2]
+        low, high = np.maximum(angle - radius, -self.half), np.minimum(angle + radius, self.half)
+        return Open(node, y, w, self.centre, 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT)
+
+    def _worth_halving(self, angle: Array, radius: Array, state: _State | None) -> Array:
+        """What is expected of halving each sector; 0 where smaller ones would be left open, too."""
+        point = self._state(angle, np.zeros(len(angle)))
+        if state is not None and point is not None and np.all(point[0].rad <= _POINT):
+            # the width, where it changes more than what is not known anyway
+            known = np.maximum(_NEGLIGIBLE, point[2].rad)[:, None]
+            return np.where(np.any(state[3].size * radius > known, axis=0), self.half, 0.0)
+        # the change of the linear system, where it keeps that from being regular
+        E, d, _ = self._directions(angle, radius)
+        left, sizes, right = np.linalg.svd(self.S.mid[self.rows] @ E.mid)
+        inverse = np.abs(right.T / np.maximum(sizes, UNIT * sizes[0]) @ left.T)
+        changes = [np.abs(self.S.mid[self.rows][:, t]) @ rad for t, rad in zip(self.t, d.rad, strict=True)]
+        worth = np.array([np.max(inverse @ change) for change in changes])
+        return worth if np.max(changes[int(np.argmax(worth))]) > _SINGULAR else np.zeros_like(worth)
 
     def _outside(self, angle: Array, radius: Array) -> NDArray[np.bool_]:
         """Which directions are outside of their sectors for certain; what lies there belongs to another leaf."""
         return np.abs(angle) - radius > self.half * (1.0 + 1e-9)
 
-    def _root(
-        self, y: Ball, w: Ball, angle: Array, radius: Array, reach: Array, J: Ball | None, open_leaf: Open
-    ) -> SpaceRoot | Open:
+    def _root(self, state: _State, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open:
+        y, w, _, J = state
         slack = self._slacks(y, w, angle, radius)
-        if not np.all(slack > 0):
-            return open_leaf if len(angle) else Open(None)
         E = self._directions(angle, radius)[0]
-        sign = determinant_sign(self.S[self.rows] @ E)
-        if J is not None:
-            sign *= determinant_sign(J)
+        sign = determinant_sign(self.S[self.rows] @ E) * determinant_sign(J) if np.all(slack > 0) else 0
         if not sign:
-            return open_leaf
+            return self._left_open(angle, radius, state)
         least = float(np.min(slack)) if len(slack) else np.inf
         return SpaceRoot(y, w, self.centre, angle, radius, reach, sign, least)
 
@@ -220,16 +264,18 @@ class _Leaf:
         """E, d (q, 2) and d' (q, 2) over a box of angles."""
         c, across = self.centre, np.stack([-self.centre[:, 1], self.centre[:, 0]], axis=1)
         cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        # what is known of cos and sin is their derivatives; floats of a library are off by a few units
-        spread = (np.minimum(radius, 2.0) * SAFE + 64 * UNIT)[:, None] * np.ones((1, 2))
-        d = Ball(cos * c + sin * across, spread)
-        turned = Ball(cos * across - sin * c, spread)
+        mid_d, mid_turned = cos * c + sin * across, cos * across - sin * c
+        # |d(psi + r) - d(psi)| <= min(|d'(psi)| r + r^2 / 2, r), and d' likewise; libraries are off by a few units
+        r = np.minimum(radius, 2.0)[:, None]
+        bent = 0.5 * r * r
+        d = Ball(mid_d, np.minimum(np.abs(mid_turned) * r + bent, r) * SAFE + 64 * UNIT)
+        turned = Ball(mid_turned, np.minimum(np.abs(mid_d) * r + bent, r) * SAFE + 64 * UNIT)
         mid, rad = self.E0.copy(), np.zeros_like(self.E0)
         for k, column in enumerate(self.column):
             mid[self.t[k], column], rad[self.t[k], column] = d.mid[k], d.rad[k]
         return Ball(mid, rad), d, turned
 
-    def _state(self, angle: Array, radius: Array) -> tuple[Ball, Ball, Ball, Ball] | None:
+    def _state(self, angle: Array, radius: Array) -> _State | None:
         """y, w, G and dG/dpsi over a box; None where the linear system is not proven regular in it."""
         q, m = len(angle), len(self.g.mid)
         E, d, turned = self._directions(angle, radius)

@@ -206,9 +206,11 @@ cdef class QPState:
     cdef double *normal
     cdef double *w
     cdef int *active            # rows in the order in which they are active (n)
-    cdef int *position          # row -> place in active, or -1 (m)
+    cdef int *on                # rows that are switched on (m)
+    cdef int *position          # row that is on -> place in active, or -1 (m)
     cdef signed char *mode      # row -> 0 off, 1 inequality, 2 equality (m)
     cdef signed char *sign      # row -> orientation of an active equality (m)
+    cdef Py_ssize_t ons
     cdef Py_ssize_t q
     cdef int pending            # row with a multiplier that is not active yet, or -1
     cdef double pending_u
@@ -224,7 +226,7 @@ cdef class QPState:
             self.block = data.spare[data.spares]
         else:
             self.block = <double *> malloc((2 * n * n + 6 * n + data.k) * sizeof(double))
-        self.active = <int *> malloc((n + data.m) * sizeof(int))
+        self.active = <int *> malloc((n + 2 * data.m) * sizeof(int))
         self.mode = <signed char *> malloc(2 * data.m + 1)
         if self.block == NULL or self.active == NULL or self.mode == NULL:
             raise MemoryError
@@ -237,14 +239,12 @@ cdef class QPState:
         self.z = self.d + n
         self.r = self.z + n
         self.normal = self.r + n
-        self.position = self.active + n
+        self.on = self.active + n
+        self.position = self.on + data.m
         self.sign = self.mode + data.m
+        memset(self.mode, 0, data.m)
 
     def __init__(self, QPData data):
-        cdef Py_ssize_t i
-        memset(self.mode, 0, 2 * data.m)
-        for i in range(data.m):
-            self.position[i] = -1
         self._restart()
         self.iterations = 0
         self.bound = self.f
@@ -280,13 +280,18 @@ cdef class QPState:
     def copy(self):
         """An independent state with the same rows and iterate."""
         cdef Py_ssize_t i, n = self.data.n
+        cdef int row
         cdef QPState other = QPState.__new__(QPState, self.data)
         # of R only the triangle of the active rows means something
         memcpy(other.block, self.block, (2 * n + self.data.k + n * n) * sizeof(double))
         for i in range(self.q):
             memcpy(other.R + i * n + i, self.R + i * n + i, (self.q - i) * sizeof(double))
-        memcpy(other.active, self.active, (self.data.n + self.data.m) * sizeof(int))
-        memcpy(other.mode, self.mode, 2 * self.data.m)
+        memcpy(other.active, self.active, self.q * sizeof(int))
+        memcpy(other.on, self.on, self.ons * sizeof(int))
+        for i in range(self.ons):
+            row = self.on[i]
+            other.mode[row], other.sign[row], other.position[row] = self.mode[row], self.sign[row], self.position[row]
+        other.ons = self.ons
         other.q, other.pending, other.f = self.q, self.pending, self.f
         other.iterations, other.bound = 0, self.bound
         return other
@@ -299,6 +304,10 @@ cdef class QPState:
             row = rows[j]
             if row < 0 or row >= self.data.m:
                 raise IndexError(row)
+            if self.mode[row] == 0:
+                self.on[self.ons] = row
+                self.ons += 1
+                self.position[row] = -1
             self.mode[row] = modes[j]
 
     def mode_of(self, int row):
@@ -399,7 +408,7 @@ cdef class QPState:
         cdef double t, t1, d2, s = self.data.row_at(row, self.x, self.w)
         cdef double sgn = -1.0 if (mode == 2 and s > 0.0) else 1.0
         s = -sgn * s
-        if s <= SATISFIED or self.position[row] >= 0:
+        if s <= SATISFIED or (self.mode[row] != 0 and self.position[row] >= 0):
             return 0.0
         self._project(row, sgn)
         d2 = dot(self.d + self.q, self.d + self.q, n - self.q)
@@ -610,7 +619,7 @@ cdef class QPState:
         return status
 
     cdef int _solve(self, double target, double tolerance, long limit) noexcept nogil:
-        cdef Py_ssize_t i, l, n = self.data.n
+        cdef Py_ssize_t i, k, l, n = self.data.n
         cdef int row, polished = 0
         cdef double value, worst, sgn, d2, t, t1, t2, s
         cdef bint full
@@ -618,13 +627,15 @@ cdef class QPState:
         while True:
             row = -1
             worst = tolerance
-            for i in range(self.data.m):
-                if self.mode[i] == 0 or self.position[i] >= 0:
+            for k in range(self.ons):
+                i = self.on[k]
+                if self.position[i] >= 0:
                     continue
                 value = -self.data.row_at(i, self.x, self.w)
                 if self.mode[i] == 2:
                     value = fabs(value)
-                if value > worst:
+                # of equals the first row, in whatever order they were switched on
+                if value > worst or (value == worst and i < row):
                     worst = value
                     row = <int> i
             if row < 0:

@@ -129,10 +129,6 @@ class ActiveSetRelaxation:
         engine = self._engine
         return self._state.forced(np.array(codes, dtype=np.int8), engine.rule, PRUNE_MARGIN + engine.offset)
 
-    def sector_to_halve(self, codes: Codes) -> int:
-        """In 2D there are no sectors."""
-        return -1
-
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""
         return ActiveSetRelaxation(self._engine, self._state if last else self._state.copy(), rows, modes)

@@ -47,9 +47,6 @@ class Relaxation(Protocol):
     def forced(self, codes: Codes) -> tuple[int, ...]:
         """Undecided contact nodes with at most one child that no known bound excludes."""
 
-    def sector_to_halve(self, codes: Codes) -> int:
-        """Of nodes in sectors of slip directions the one to be halved, -1 where there is none, as in 2D."""
-
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""
 

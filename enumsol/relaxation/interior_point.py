@@ -122,11 +122,6 @@ class _InteriorPointRelaxation:
         del codes
         return ()
 
-    def sector_to_halve(self, codes: Codes) -> int:
-        """In 2D there are no sectors."""
-        del codes
-        return -1
-
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on, solved from scratch."""
         del last

@@ -4,7 +4,7 @@ The cone of a status is the union of its cones over the interval: |lambda_t| <= 
 lambda_t between F_lo lambda_n and F_hi lambda_n. On a loading path alpha = middle + tau half is a further unknown,
 and the concave part of the energy is replaced by its secant: with q = g1' S^-1 g1 half^2 the form
 
-    e(lambda, tau) + (q / 4 + RIDGE) (tau^2 - 1)
+    e(lambda, tau) + (1 + RIDGE) q / 4 (tau^2 - 1)
 
 is convex, is a lower bound on [-1, 1] and equals e at both ends. Multipliers that prove it positive therefore prove the
 leaf empty on the whole interval by the dual bounds at its two ends, which is all that a checker needs.
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from enumsol.checks import Alpha
     from enumsol.condensation.condensed import CondensedProblem
 
-#: Part of the energy's unit (g' S^-1 g lies in [1, 4) at its larger end) that makes the form in (lambda, tau) definite.
-RIDGE = 1e-3
+#: Part of the secant's slope that makes the form in (lambda, tau) definite: what it costs vanishes with the interval.
+RIDGE = 1e-2
 
 
 class IntervalRowKind(enum.IntEnum):
@@ -162,7 +162,9 @@ class IntervalEngine(CompiledEngine):
 def _form(system: IntervalSystem) -> NDArray[np.float64]:
     """Matrix of the convex form in (lambda, tau), shape (2p + 1, 2p + 1)."""
     # half' S^-1 half by the factor that is known to exist
-    curvature = 0.25 * float(np.linalg.norm(np.linalg.solve(system.scaled.cholesky, system.half))) ** 2 + RIDGE
+    q = float(np.linalg.norm(np.linalg.solve(system.scaled.cholesky, system.half))) ** 2
+    # a load that hardly varies: its q may underflow
+    curvature = 0.25 * (q + RIDGE * max(q, 1e-12))
     across = -0.5 * system.half[:, None]
     return np.block([[system.S, across], [across.T, np.array([[curvature]])]])
 

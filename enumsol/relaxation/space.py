@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.kernel.space import ALONG, CHORD, END, FORCE, GAP, LEFT, RIGHT, SLIP, TANGENT, TAU, row_terms
+from enumsol.kernel.space import ALONG, CHORD, END, FORCE, GAP, LEFT, RIGHT, SLIP, TANGENT, TAU, children_of, row_terms
 from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
 from enumsol.relaxation.rows import EQUALITY, INEQUALITY
-from enumsol.sectors import SECTORS, end_number, nearest
+from enumsol.sectors import SECTORS, end_number, level_of, nearest
 from enumsol.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
@@ -22,14 +22,19 @@ if TYPE_CHECKING:
     from enumsol.relaxation._active_set import QPState
     from enumsol.selections.solution import Codes
 
+    Array = NDArray[np.float64]
+    Children = dict[tuple[int, ...], "SpaceRelaxation"]
+
 #: Level of the directions on which tangents are put where the minimiser leaves the disc, and of those put anyway.
-_FINE, _COARSE = 10, 3
+_FINE, COARSE = 10, 3
 #: Rounds of tangents, and how far outside the disc the minimiser must lie.
-_ROUNDS, _OUTSIDE = 4, 1e-3
+ROUNDS, _OUTSIDE = 4, 1e-3
 #: Sectors of this level and below are halved only where nothing else helps.
 _DEEP = 12
 #: Violations of maximum dissipation below this do not tell which sector to halve.
 _DISSIPATION = 1e-7
+#: How much a violation, and a child's share of the gap to the pruning bound, count in the choice of a node.
+_WEIGHT, _CLOSED = 0.3, 4.0
 #: Rows of a program, and entries of a row.
 _ROWS, _ENTRIES = 24576, 3
 
@@ -72,6 +77,8 @@ class SpaceEngine:
             zeros[:rows],
         )
         self._known: list[dict[tuple[int, int], int]] = [{} for _ in range(p)]
+        self._imposed: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
+        self._tangents = np.sum(system.tau >= 0, axis=1).tolist()
         #: Row by number, for multipliers.
         self.rows: dict[int, Row] = {}
         self.limit = 400 + 20 * len(system.g)
@@ -90,6 +97,19 @@ class SpaceEngine:
             self.data.put_row(slot * self.system.p + node, *row_terms(row, self.system.tau, len(self.system.g)))
         return known[kind, number]
 
+    def imposed(self, node: int, code: int) -> tuple[list[int], list[int]]:
+        """Numbers and modes of the rows that a node imposes in a (partial) status."""
+        found = self._imposed.get((node, code))
+        if found is None:
+            pairs = [(self.slot(row), mode) for row, mode in imposed(self.system.tau, node, code)]
+            kept = [(slot * self.system.p + node, mode) for slot, mode in pairs if slot is not None]
+            found = self._imposed[node, code] = [row for row, _ in kept], [mode for _, mode in kept]
+        return found
+
+    def children(self, node: int, code: int) -> tuple[int, ...]:
+        """Codes that together cover a partial status of a node."""
+        return children_of(code, self._tangents[node])
+
     def root(self, rows: list[int], modes: list[int]) -> SpaceRelaxation:
         """The relaxation with the given rows on."""
         return SpaceRelaxation(self, self._state(self.data), rows, modes)
@@ -107,7 +127,7 @@ def imposed(tau: NDArray[np.intp], node: int, code: int) -> list[tuple[Row, int]
             *_with([(FORCE, node, 0), *((TAU, node, k) for k in axes)], EQUALITY),
         ]
     if len(axes) == 2:
-        inequalities += [(TANGENT, node, (1 << _COARSE) + k) for k in range(1 << _COARSE)]
+        inequalities += [(TANGENT, node, (1 << COARSE) + k) for k in range(1 << COARSE)]
     elif axes:
         forward = 1 if code == SLIP_PLUS else -1 if code == SLIP_MINUS else 0
         inequalities += [(END, node, sign) for sign in (1, -1) if sign != forward]
@@ -130,12 +150,15 @@ def _with(rows: Iterable[Row], mode: int) -> list[tuple[Row, int]]:
 class SpaceRelaxation:
     """A solved relaxation, with tangents put where its minimiser left the disc."""
 
-    __slots__ = ("_engine", "_state", "bound", "pruned", "stalled")
+    __slots__ = ("_engine", "_found", "_kept", "_state", "bound", "pruned", "stalled")
 
     def __init__(self, engine: SpaceEngine, state: QPState, rows: list[int], modes: list[int]) -> None:
         self._engine, self._state = engine, state
+        #: Children solved already, by their rows.
+        self._found: Children = {}
+        self._kept: tuple[Array, Array, tuple[NDArray[np.intp], Array]] | None = None
         self._solve(rows, modes)
-        for _ in range(_ROUNDS):
+        for _ in range(ROUNDS):
             if self.pruned or self.stalled:
                 break
             rows = self._cuts()
@@ -165,40 +188,84 @@ class SpaceRelaxation:
         return rows
 
     @property
-    def forces(self) -> NDArray[np.float64]:
+    def forces(self) -> Array:
         """y at the minimiser, shape (m,), scaled."""
-        return self._state.x_array
+        return self._state.x_array if self._kept is None else self._kept[0]
 
     @property
-    def displacements(self) -> NDArray[np.float64]:
+    def displacements(self) -> Array:
         """w at the minimiser, shape (m,), scaled."""
-        return self._state.w_array
+        return self._state.w_array if self._kept is None else self._kept[1]
 
-    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def multipliers(self) -> tuple[NDArray[np.intp], Array]:
         """Rows and their multipliers, which prove ``bound``."""
-        return self._state.multipliers()
+        return self._state.multipliers() if self._kept is None else self._kept[2]
+
+    def _released(self) -> SpaceRelaxation:
+        """Give away the state that children would start from; what was found is kept."""
+        self._kept = self.forces, self.displacements, self.multipliers()
+        del self._state
+        return self
 
     def choose(self, codes: Codes) -> int:
-        """The undecided node at which complementarity is violated most; -1 when all are open, stick or in a sector."""
-        system, y, w = self._engine.system, self.forces, self.displacements
-        p = system.p
-        tau, v = system.tangential(y), system.tangential(w)
-        slip = y[:p] * np.linalg.norm(v, axis=1) - np.sum(tau * v, axis=1)
-        array = np.array(codes)
-        score = slip + np.where(array == UNDECIDED, slip - y[:p] * w[:p], 0.0)
-        score = np.where((array == CONTACT) | (array == UNDECIDED), score, -np.inf)
-        best = int(np.argmax(score))
-        return best if score[best] > -np.inf else -1
+        """The node to branch on; -1 when all are decided and no sector is worth halving before the leaf is tested.
 
-    def sector_to_halve(self, codes: Codes) -> int:
-        """The node in a sector at which maximum dissipation is violated most; -1 where it is nowhere."""
+        All children of a candidate are solved, where complementarity is violated most first. The first candidate with
+        at most one child that is not excluded is taken, or else the one that promises the smallest tree. Where none is
+        violated, sectors wider than others are halved if that excludes one half.
+        """
+        score = self.violations(codes)
+        best, most = -1, 0.0
+        for node in np.argsort(-score, kind="stable").tolist():
+            if not score[node] > 0.0:
+                break
+            children = self.solved_children(node, codes[node])
+            left = np.array([child.bound for child in children.values() if not child.pruned])
+            if len(left) <= 1:
+                return self._chosen(node, children)
+            closed = np.clip((left - self.bound) / max(PRUNE_MARGIN - self.bound, 1e-300), 0.0, 1.0)
+            promise = float(score[node] ** _WEIGHT / np.sum(np.exp(-_CLOSED * closed)))
+            if not most >= promise:
+                best, most = node, promise
+                self._found = {rows: child._released() for rows, child in children.items() if child.pruned}
+        return best if best >= 0 else self.contracted(codes)
+
+    def contracted(self, codes: Codes) -> int:
+        """A node whose sector is wider than another's and of which one half is excluded, or -1."""
+        levels = {node: level_of(code - SECTORS) for node, code in enumerate(codes) if code > SECTORS}
+        deepest = min(max(levels.values(), default=0), _DEEP)
+        for node in sorted((node for node, level in levels.items() if level < deepest), key=levels.__getitem__):
+            children = self.solved_children(node, codes[node])
+            if sum(not child.pruned for child in children.values()) <= 1:
+                return self._chosen(node, children)
+        return -1
+
+    def _chosen(self, node: int, children: Children) -> int:
+        """Keep the children of a node with at most one that is not excluded."""
+        self._found = {rows: child._released() if child.pruned else child for rows, child in children.items()}
+        return node
+
+    def solved_children(self, node: int, code: int) -> Children:
+        """The relaxations of all children of a node, by their rows."""
+        parts = [self._engine.imposed(node, child) for child in self._engine.children(node, code)]
+        return {tuple(rows): self.child(rows, modes, last=False) for rows, modes in parts}
+
+    def violations(self, codes: Codes) -> Array:
+        """How much complementarity is violated at every node that can be branched on; -inf at the others."""
+        system, y, w = self._engine.system, self.forces, self.displacements
+        array, p = np.array(codes), system.p
+        slip = self._dissipation()
+        # an undecided node's slip counts double: deciding it now saves the slack that it leaves in the energy
+        score = slip + np.where(array == UNDECIDED, slip - y[:p] * w[:p], 0.0)
+        wide = (array > SECTORS) & (array < SECTORS + (1 << _DEEP)) & (slip > _DISSIPATION)
+        undecided = (array == CONTACT) | (array == UNDECIDED)
+        return np.where(undecided, np.maximum(score, _DISSIPATION * _DISSIPATION), np.where(wide, score, -np.inf))
+
+    def _dissipation(self) -> Array:
+        """By how much maximum dissipation is violated at every node: lambda_n |v| - tau . v."""
         system, y = self._engine.system, self.forces
         tau, v = system.tangential(y), system.tangential(self.displacements)
-        slip = y[: system.p] * np.linalg.norm(v, axis=1) - np.sum(tau * v, axis=1)
-        array = np.array(codes)
-        slip[(array <= SECTORS) | (array >= SECTORS + (1 << _DEEP))] = 0.0
-        best = int(np.argmax(slip))
-        return best if slip[best] > _DISSIPATION else -1
+        return np.asarray(y[: system.p] * np.linalg.norm(v, axis=1) - np.sum(tau * v, axis=1))
 
     def forced(self, codes: Codes) -> tuple[int, ...]:
         """No node is forced here."""
@@ -206,4 +273,7 @@ class SpaceRelaxation:
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> SpaceRelaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""
-        return SpaceRelaxation(self._engine, self._state if last else self._state.copy(), rows, modes)
+        found = self._found.pop(tuple(rows), None)
+        if found is not None:
+            return found
+        return type(self)(self._engine, self._state if last else self._state.copy(), rows, modes)

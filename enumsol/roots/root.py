@@ -275,14 +275,15 @@ def node_line(state: ContactState, i: int, label: object, width: int) -> str:
     return f"{label!s:>{width}} {state.statuses[i].value:<7} {text}"
 
 
-def summary(statuses: Sequence[ContactStatus]) -> str:
-    """Runs of equal statuses as text: ``3 open, 2 stick, 1 slip+``."""
+def summary(statuses: Sequence[ContactStatus | str | None]) -> str:
+    """Runs of equal statuses as text: ``3 open, 2 stick, 1 slip+``; of nodes of which nothing is known ``1 any``."""
+    names = ["any" if status is None else status if isinstance(status, str) else status.value for status in statuses]
     parts: list[str] = []
     run = 0
-    for k, status in enumerate(statuses):
+    for k, name in enumerate(names):
         run += 1
-        if k + 1 == len(statuses) or statuses[k + 1] is not status:
-            parts.append(f"{run} {status.value}" if len(statuses) > 1 else status.value)
+        if k + 1 == len(names) or names[k + 1] != name:
+            parts.append(f"{run} {name}" if len(names) > 1 else name)
             run = 0
     text = ", ".join(parts)
     return text if len(text) <= 60 else text[:57] + "..."

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
 from enumsol.roots.root import Root, summary
-from enumsol.sealed import Immutable
+from enumsol.sealed import Immutable, Sealed
 from enumsol.texts import counted
 
 if TYPE_CHECKING:
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
     from enumsol.checks import Alpha
     from enumsol.proof.proof_file import Proof
-    from enumsol.roots.root import RootFamily
+    from enumsol.roots.root import Enclosure, RootFamily
     from enumsol.search.certifiers.protocol import Escalations
     from enumsol.statuses import ContactStatus
 
-_PRINTED_ROOTS = 20
+_PRINTED_ROOTS, _PRINTED_REGIONS = 20, 5
 
 
 @dataclass(frozen=True)
-class Undecided:
-    """A part of the selections about which nothing was proven.
+class Undecided(Sealed):
+    """A part of the selections about which it is not known whether it holds roots; in 3D, a region.
 
     Attributes
     ----------
@@ -38,6 +38,14 @@ class Undecided:
         What could not be decided.
     hint : str
         What may help.
+    leaves : int
+        Parts of the search tree that this is. In 3D those that touch are one region: the root that it may hold, or the
+        continuum of them, may belong to any (theory, section 12.5).
+    slip_angle : (p, 2) array or None
+        In 3D: bounds of the angles of F u_t that a root in it has, as in Root3D; nan where it does not slip.
+    bounds : Enclosure or None
+        In 3D, arithmetic "verified": proven bounds of the forces and displacements of every root in it, with the shapes
+        of Root3D. None where the search did not get there.
 
     Examples
     --------
@@ -45,11 +53,22 @@ class Undecided:
     >>> roots = enumsol.enumerate_roots(enumsol.gallery.two_node_square(), alpha=3.5, max_nodes=2)
     >>> roots.undecided[0].reason
     'the search was stopped before it got here'
+
+    A node in 3D that sticks at its limit:
+
+    >>> import numpy as np
+    >>> problem = enumsol.ContactProblem3D(np.eye(3), *np.eye(3)[:, None], [5, 4, 3], friction=1)
+    >>> region = enumsol.enumerate_roots(problem, alpha=0).undecided[0]
+    >>> region.statuses, region.leaves, region.bounds.lambda_n.round(9).tolist()
+    (('contact',), 2, [[5.0, 5.0]])
     """
 
     statuses: tuple[ContactStatus | str | None, ...]
     reason: str
     hint: str
+    leaves: int = 1
+    slip_angle: NDArray[np.float64] | None = field(default=None, compare=False)
+    bounds: Enclosure | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -99,6 +118,7 @@ class RootSet(Sequence[Root], Immutable):
     alpha : float or Fraction
     families : tuple of RootFamily
     undecided : tuple of Undecided
+        Parts of the search without an answer; in 3D regions of leaves that touch.
     complete : bool
         True only when it is proven that nothing else solves the problem.
     arithmetic, method : str
@@ -241,12 +261,25 @@ class RootSet(Sequence[Root], Immutable):
         # a search that was cut short leaves many alike
         alike = Counter((item.reason, item.hint) for item in self.undecided)
         lines += [f"undecided, {count} times: {reason} ({hint})" for (reason, hint), count in alike.most_common(5)]
+        regions = [item for item in self.undecided if item.slip_angle is not None]
+        lines += [f"undecided region {k}: {_region(item)}" for k, item in enumerate(regions[:_PRINTED_REGIONS])]
+        if len(regions) > _PRINTED_REGIONS:
+            lines.append(f"   ... {len(regions) - _PRINTED_REGIONS} more")
         total = self.index_sum
         # a sum other than +1 proves that something is missing or wrong
         note = "unknown" if total is None else f"{total:+d}" if total == 1 else f"{total:+d} (not +1!)"
         lines.append(f"index sum: {note}")
         lines.append(self.completeness())
         return "\n".join(lines)
+
+
+def _region(item: Undecided) -> str:
+    """A region of leaves in 3D in words."""
+    text = f"{summary(item.statuses)} ({counted(item.leaves, 'leaf', 'leaves')} of the tree)"
+    if item.bounds is None:
+        return text
+    low, high = np.max(item.bounds.lambda_n, axis=0)
+    return f"{text}; a root in it has max lambda_n from {low:.5g} to {high:.5g}"
 
 
 def _columns(name: str, arrays: list[NDArray[np.float64]]) -> list[tuple[str, NDArray[np.float64]]]:

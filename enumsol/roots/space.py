@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE
+from enumsol.arithmetic.balls import SAFE, UNIT
 from enumsol.errors import InvalidArgumentError
 from enumsol.kernel.ball_arrays import Ball
 from enumsol.kernel.leaves import distinct_roots
@@ -15,19 +15,20 @@ from enumsol.roots.enumeration import Enumeration
 from enumsol.roots.root import Enclosure
 from enumsol.roots.root3d import Root3D
 from enumsol.roots.root_set import RootSet, Undecided
+from enumsol.roots.space_regions import regions_of, slip_angles, with_zeros
 from enumsol.sealed import sealed
-from enumsol.search.certifiers.protocol import UndecidedPart
+from enumsol.search.space import DEGENERATE
 from enumsol.search.space_solvers import SpaceSolvers
-from enumsol.sectors import SECTORS, direction, end_number
 from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from enumsol.kernel.leaves import SpaceRoot
+    from enumsol.search.certifiers.protocol import UndecidedPart
     from enumsol.search.tree import SearchProgress
     from enumsol.selections.solution import Codes
 
@@ -60,8 +61,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         if self.unloaded:
             roots = [self._rest()]
         roots.sort(key=lambda root: (-float(np.sum(root.lambda_n)), root.lambda_n.tolist(), root.lambda_t.tolist()))
-        undecided = [self._named(part) for part in outcome.undecided]
-        undecided += [Undecided(self._names(codes), _DOUBTFUL, "perturb the load") for codes in doubtful]
+        undecided = [*self._undecided(outcome.undecided), *(self._doubtful(codes) for codes in doubtful)]
         whole = outcome.stopped is None and not undecided
         return RootSet(
             alpha=self.alpha,
@@ -100,7 +100,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             index=found.index,
             regular=True,
             margin=found.slack,
-            enclosure=self._enclosure(codes, found) if self.arithmetic == "verified" else None,
+            enclosure=self._root_enclosure(codes, found),
             _condensed=self.problem.condensed,
         )
 
@@ -112,42 +112,38 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
     def _angles(self, codes: Codes, found: SpaceRoot) -> Array:
         """Bounds of the directions of v."""
-        angles = np.full((len(codes), 2), np.nan)
-        turning = [i for i, code in enumerate(codes) if code > SECTORS]
-        for k, i in enumerate(turning):
-            middle = float(np.arctan2(found.centre[k, 1], found.centre[k, 0])) + found.angle[k]
-            angles[i] = _around(middle, float(found.angle_rad[k]) * SAFE + 1e-14)
-        for i, code in enumerate(codes):
-            if code in (2, 3):
-                axis = int(np.argmax(self.system.tau[i]))
-                angles[i] = _around((0.0 if code == 2 else np.pi) + (0.0 if axis == 0 else 0.5 * np.pi), 1e-15)
-        return angles
+        pairs = zip(*slip_angles(self.enclosed, codes, found), strict=True)
+        return np.array([_around(middle, radius) for middle, radius in pairs])
 
-    def _enclosure(self, codes: Codes, found: SpaceRoot) -> Enclosure:
-        """Bounds of forces and displacements in the problem's units."""
-        problem, system, p = self.problem, self.system, self.problem.p
-        exact = self.enclosed
+    def _enclosure(self, y: Ball, w: Ball) -> Enclosure:
+        """Bounds in the problem's units, for scaled forces and displacements in balls."""
+        problem, system, exact, p = self.problem, self.system, self.enclosed, self.problem.p
         S, S_rad, g, g_rad = problem.enclosure.in_units(Fraction(self.alpha), np.ones(3 * p), np.ones(3 * p))
-        forces = Ball(np.zeros(3 * p), np.zeros(3 * p))
-        forces.mid[:p], forces.rad[:p] = found.y.mid[:p] * system.force, found.y.rad[:p] * system.force
-        for k in range(2):
-            occurs = system.tau[:, k] >= 0
-            t = system.tau[occurs, k]
-            part = Ball(found.y.mid[t], found.y.rad[t]) * Ball(exact.F[occurs, k], exact.F_rad[occurs, k])
-            place = (1 + k) * p + np.flatnonzero(occurs)
-            forces.mid[place], forces.rad[place] = part.mid * system.force[occurs], part.rad * system.force[occurs]
-        w = Ball(g, g_rad) - (Ball(S, S_rad) @ Ball(forces.mid[:, None], forces.rad[:, None]))[:, 0]
-        for i, code in enumerate(codes):
-            if code == OPEN:
-                forces.mid[i::p] = forces.rad[i::p] = 0.0
-            else:
-                w.mid[i] = w.rad[i] = 0.0
-            for k in range(2):
-                if code == STICK and system.tau[i, k] >= 0:
-                    w.mid[(1 + k) * p + i] = w.rad[(1 + k) * p + i] = 0.0
-        bounds = [np.stack([b.mid - b.rad * SAFE, b.mid + b.rad * SAFE], axis=-1) for b in (forces, w)]
-        low_high = [(b[:p], np.stack([b[p : 2 * p], b[2 * p :]], axis=1)) for b in bounds]
-        return Enclosure(*low_high[0], *low_high[1])
+        forces, known = (Ball(np.zeros(3 * p), np.full(3 * p, radius)) for radius in (0.0, np.inf))
+        for k in range(3):
+            occurs = np.arange(p) if k == 0 else np.flatnonzero(system.tau[:, k - 1] >= 0)
+            part = occurs if k == 0 else system.tau[occurs, k - 1]
+            F = Ball.exact(np.ones(p)) if k == 0 else Ball(exact.F[occurs, k - 1], exact.F_rad[occurs, k - 1])
+            inverse = Ball(1.0 / F.mid, (2.0 * F.rad / F.mid + 2 * UNIT) / F.mid * SAFE)
+            for ball, scaled, factor, unit in ((forces, y, F, system.force), (known, w, inverse, system.length)):
+                product = scaled[part] * factor
+                zero = (scaled.mid[part] == 0) & (scaled.rad[part] == 0)
+                ball.mid[k * p + occurs] = product.mid * unit[occurs]
+                ball.rad[k * p + occurs] = np.where(zero, 0.0, product.rad * unit[occurs])
+        computed = Ball(g, g_rad) - (Ball(S, S_rad) @ Ball(forces.mid[:, None], forces.rad[:, None]))[:, 0]
+        bounds = [(b.mid - b.rad * SAFE, b.mid + b.rad * SAFE) for b in (forces, known, computed)]
+        low, high = np.maximum(bounds[1][0], bounds[2][0]), np.minimum(bounds[1][1], bounds[2][1])
+        bounds[0][0][:p], high[:p] = np.maximum(bounds[0][0][:p], 0.0), np.minimum(high[:p], 0.0)
+        pairs = [np.stack(pair, axis=-1) for pair in (bounds[0], (low, high))]
+        parts = [(b[:p], np.stack([b[p : 2 * p], b[2 * p :]], axis=1)) for b in pairs]
+        return Enclosure(*parts[0], *parts[1])
+
+    def _root_enclosure(self, codes: Codes, found: SpaceRoot) -> Enclosure | None:
+        if self.arithmetic != "verified":
+            return None
+        y, w = with_zeros(self.enclosed, codes, found.y, found.w)
+        # displacements are those of the forces
+        return self._enclosure(y, Ball(w.mid, np.where(w.rad > 0, np.inf, 0.0)))
 
     def _rest(self) -> Root3D:
         """The unloaded body: nothing moves, and every status holds."""
@@ -171,26 +167,44 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             _condensed=self.problem.condensed,
         )
 
-    def _names(self, codes: Codes) -> tuple[ContactStatus | str | None, ...]:
-        special: dict[int, ContactStatus | str | None] = {UNDECIDED: None, CONTACT: "contact", FRICTIONLESS: "contact"}
-        special |= {OPEN: ContactStatus.OPEN, STICK: ContactStatus.STICK}
-        return tuple(special.get(code, ContactStatus.SLIP) for code in codes)
+    # -- what stayed undecided -------------------------------------------------------------------------------------
 
-    def _named(self, part: UndecidedPart) -> Undecided:
-        """An undecided leaf, with the directions that it leaves open."""
-        boxes: list[str] = []
-        for label, code in zip(self.problem.node_ids, part.codes, strict=True):
-            if code > SECTORS and len(boxes) < _SHOWN_BOXES:
-                ends = (direction(n) for n in (code - SECTORS, end_number(code - SECTORS)))
-                low, high = (np.degrees(np.arctan2(y, x)) for x, y in ends)
-                boxes.append(f"{low:.6g} to {high:.6g} degrees at node {label}")
-        where = f" (slip directions {', '.join(boxes)})" if boxes else ""
-        return Undecided(self._names(part.codes), part.reason + where, part.hint)
+    def _undecided(self, parts: Sequence[UndecidedPart]) -> list[Undecided]:
+        """Leaves as regions, then the parts that were not searched."""
+        leaves = [part for part in parts if part.reason == DEGENERATE]
+        regions = regions_of(self.enclosed, [part.codes for part in leaves]) if leaves else []
+        found = [
+            Undecided(
+                statuses=_common([_names(codes) for codes in region.codes]),
+                reason=DEGENERATE,
+                hint=leaves[0].hint,
+                leaves=len(region.codes),
+                slip_angle=region.slip_angle,
+                bounds=self._enclosure(region.y, region.w) if self.arithmetic == "verified" else None,
+            )
+            for region in regions
+        ]
+        return found + [Undecided(_names(part.codes), part.reason, part.hint) for part in parts if part not in leaves]
+
+    def _doubtful(self, codes: Codes) -> Undecided:
+        root = self.certifier.certified.verified[codes]
+        angles, bounds = self._angles(codes, root), self._root_enclosure(codes, root)
+        return Undecided(_names(codes), _DOUBTFUL, "perturb the load", slip_angle=angles, bounds=bounds)
+
+
+def _names(codes: Codes) -> tuple[ContactStatus | str | None, ...]:
+    special: dict[int, ContactStatus | str | None] = {UNDECIDED: None, CONTACT: "contact", FRICTIONLESS: "contact"}
+    special |= {OPEN: ContactStatus.OPEN, STICK: ContactStatus.STICK}
+    return tuple(special.get(code, ContactStatus.SLIP) for code in codes)
+
+
+def _common(leaves: Sequence[tuple[ContactStatus | str | None, ...]]) -> tuple[ContactStatus | str | None, ...]:
+    """What is known of every node in all leaves."""
+    nodes = [set(names) for names in zip(*leaves, strict=True)]
+    return tuple(node.pop() if len(node) == 1 else None if ContactStatus.OPEN in node else "contact" for node in nodes)
 
 
 _DOUBTFUL = "two leaves hold roots that could not be told apart"
-#: Boxes of directions that the reason of an undecided leaf names.
-_SHOWN_BOXES = 3
 
 
 def _status(code: int, u_t: Array) -> ContactStatus:

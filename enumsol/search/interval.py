@@ -1,45 +1,33 @@
 """Which selections may hold somewhere in an interval of alpha: the tree search on pieces of it (theory, section 7.8).
 
-Every piece is a tree of its own whose leaves cover all selections: a leaf is either proven empty on the whole piece
-or a complete selection that is handed on. A piece whose tree grows too large is cut in two; both halves go on with
-the subtrees that are left, and what was proven for the whole piece is proven for them too.
+Every piece is searched by trees whose leaves cover all selections: a leaf is either proven empty on the whole piece or
+a complete selection that is handed on, or it is left to both halves of the piece. What was proven for the whole piece
+is proven for them too.
 """
 
 from __future__ import annotations
 
 import itertools
 import time
-from collections import deque
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Protocol
 
-from enumsol.relaxation.interval import IntervalEngine, IntervalSystem, interval_rows
-from enumsol.search.certifiers.protocol import WithoutProof
-from enumsol.search.splitting import PlaneSplitting
+from enumsol.relaxation.interval import IntervalSystem
+from enumsol.search.interval_tree import LARGEST_TREE, EmptyLeaf, PieceTree, Subtree, TreeResult
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.search.tree import SearchLimits, TreeSearch
 from enumsol.statuses import UNDECIDED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    import numpy as np
-    from numpy.typing import NDArray
+    from collections.abc import Callable, Mapping, Sequence
 
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.certifiers.protocol import Certifier
     from enumsol.selections.solution import Codes
 
-#: Nodes of a piece's tree, per contact node, after which the tree at its middle is computed for comparison.
-NODES_PER_CONTACT = 20
-#: A piece whose tree grows beyond this multiple of the tree at its middle alone is cut in two.
-WORTH_CUTTING = 3
-#: New complete selections in one piece beyond which it is cut in two (an exact arc costs some hundred tree nodes).
-NEW_SELECTIONS = 16
 #: Pieces are not cut below this part of the interval.
 SMALLEST_PIECE = 2.0**-40
+#: Into how many trees what a tree of the largest size left is divided.
+FURTHER_TREES = 8
 
 
 @dataclass(frozen=True)
@@ -53,22 +41,6 @@ class Piece:
     def middle(self) -> Fraction:
         """(a + b) / 2."""
         return (self.a + self.b) / 2
-
-
-@dataclass(frozen=True)
-class EmptyLeaf:
-    """A partial assignment that holds no solution on a piece, with the multipliers that prove it.
-
-    Attributes
-    ----------
-    codes : status codes, CONTACT and UNDECIDED included
-    rows : int array, kind * p + node with the kinds of RowKind and IntervalRowKind
-    values : float array, multipliers in the scaling of the piece's IntervalSystem
-    """
-
-    codes: Codes
-    rows: NDArray[np.intp]
-    values: NDArray[np.float64]
 
 
 @dataclass
@@ -86,7 +58,7 @@ class SearchedPiece:
     selections : list of codes
         Complete selections, handed on.
     cut : list of codes
-        Subtrees (and complete selections) that both halves of the piece take over as their roots.
+        Subtrees that both halves of the piece take over as their roots; or that a search stopped early left.
     """
 
     piece: Piece
@@ -119,70 +91,77 @@ class FastIntervalCertifier:
         return True
 
 
-class _Collector(WithoutProof):
-    """The certifier of one piece's tree: keeps the leaves, and counts the selections not known before.
+@dataclass(frozen=True)
+class Task:
+    """One tree: what it comes to depends on nothing but this and the problem.
 
-    Branchings and subtrees left over need no note: the leaves cover everything, with those in SearchedPiece.cut.
+    Attributes
+    ----------
+    piece : Piece
+    roots : tuple of Subtree
     """
 
-    def __init__(self, found: SearchedPiece, leaves: IntervalCertifier, known: set[Codes]) -> None:
-        self._found, self._leaves, self._known = found, leaves, known
-        self.new = 0
+    piece: Piece
+    roots: tuple[Subtree, ...]
 
-    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
-        leaf = EmptyLeaf(codes, *relaxation.multipliers())
-        if not self._leaves.excluded(self._found.piece, self._found.system, leaf):
-            return False
-        self._found.empty.append(leaf)
-        return True
+    def further(self, result: TreeResult) -> list[Task]:
+        """The trees over the same piece for what this one did not examine."""
+        size = -(-len(result.rest) // FURTHER_TREES) or 1
+        return [Task(self.piece, tuple(result.rest[k : k + size])) for k in range(0, len(result.rest), size)]
 
-    def selection(self, codes: Codes) -> None:
-        self._found.selections.append(codes)
-        self.new += codes not in self._known
-
-
-class _SizeOnly(_Collector):
-    """The certifier of a tree of which only the size matters."""
-
-    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
-        del codes, relaxation
-        return True
+    @staticmethod
+    def halves(piece: Piece, cut: Sequence[Subtree]) -> list[Task]:
+        """Both halves of a piece with what its trees left to them; none if that is nothing."""
+        ends = (piece.a, piece.middle, piece.b)
+        return [Task(Piece(*half), tuple(cut)) for half in itertools.pairwise(ends)] if cut else []
 
 
-class IntervalSplitting(PlaneSplitting):
-    """Two dimensions over an interval of alpha.
+class Worker:
+    """Searches trees over pieces of an interval.
 
     Parameters
     ----------
-    system : IntervalSystem
+    condensed : CondensedProblem
+    interval : (Fraction, Fraction)
+    origin : Fraction or None
+        The alpha at which g vanishes.
+    leaves : IntervalCertifier
     """
 
-    def __init__(self, system: IntervalSystem) -> None:
-        super().__init__(system.F)
-        self._constant = [bool(v) for v in system.F_lo == system.F]
+    def __init__(
+        self,
+        condensed: CondensedProblem,
+        interval: tuple[Fraction, Fraction],
+        origin: Fraction | None,
+        leaves: IntervalCertifier,
+    ) -> None:
+        self._condensed, self._origin, self.leaves = condensed, origin, leaves
+        self._smallest = SMALLEST_PIECE * float(interval[1] - interval[0])
+        self._trees: tuple[Piece, IntervalSystem, PieceTree] | None = None
 
-    def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
-        """(kind, mode) of the rows that a contact node imposes in a status over the interval."""
-        return interval_rows(code, friction=self.friction[node], constant=self._constant[node])
+    def run(self, task: Task, max_nodes: int | None = None, deadline: float | None = None) -> TreeResult:
+        """Search the tree of a task."""
+        trees = self._on(task.piece)[2]
+        result = trees.run(task.roots, LARGEST_TREE if max_nodes is None else min(LARGEST_TREE, max_nodes), deadline)
+        result.checkable = self.leaves.checkable
+        return result
 
+    def system(self, piece: Piece) -> IntervalSystem:
+        """The system of a piece."""
+        return self._on(piece)[1]
 
-class IntervalTreeSearch(TreeSearch):
-    """The tree search with the rows of an interval; a relaxation that stalls is branched on.
+    def _on(self, piece: Piece) -> tuple[Piece, IntervalSystem, PieceTree]:
+        if self._trees is None or self._trees[0] != piece:
+            system, middle = self._make(piece), None
+            if float(piece.b - piece.a) > self._smallest:
+                middle = self._make(Piece(piece.middle, piece.middle))
+            trees = PieceTree(system, middle, lambda leaf: self.leaves.excluded(piece, system, leaf))
+            self._trees = (piece, system, trees)
+        return self._trees
 
-    Parameters
-    ----------
-    system : IntervalSystem
-    certifier : Certifier
-    limits : SearchLimits
-    """
-
-    def __init__(self, system: IntervalSystem, certifier: Certifier, limits: SearchLimits) -> None:
-        splitting = IntervalSplitting(system)
-        super().__init__(system.scaled, certifier, engine=IntervalEngine(system), splitting=splitting, limits=limits)
-
-    def _fall_back(self, codes: Codes) -> None:
-        """No other engine handles intervals: the partial assignment is branched on."""
-        del codes
+    def _make(self, piece: Piece) -> IntervalSystem:
+        origin = self._origin if self._origin in (piece.a, piece.b) else None
+        return IntervalSystem.from_problem(self._condensed, piece.a, piece.b, origin)
 
 
 class IntervalSearch:
@@ -203,11 +182,15 @@ class IntervalSearch:
     Attributes
     ----------
     interval : (Fraction, Fraction)
+    worker : Worker
     pieces : list of SearchedPiece
+        In the order of their trees: the halves come directly after what was cut.
     nodes : int
     stopped : Stop or None
     selections : set of codes
         All complete selections that the trees could not exclude.
+    checkable : bool
+        Whether a checker can repeat what was excluded.
     """
 
     def __init__(
@@ -221,86 +204,73 @@ class IntervalSearch:
         deadline: float | None = None,
         progress: Callable[[float], object] | None = None,
     ) -> None:
-        self._condensed, self._origin, self._leaves = condensed, origin, leaves
-        self.interval = interval
-        self._max_nodes, self._deadline, self._progress = max_nodes, deadline, progress
+        self.worker = Worker(condensed, interval, origin, leaves)
+        self._p, self._origin = len(condensed.F0), origin
+        self.interval, self.progress = interval, progress
+        self.max_nodes, self.deadline = max_nodes, deadline
         self.pieces: list[SearchedPiece] = []
         self.nodes = 0
         self.stopped: Stop | None = None
         self.selections: set[Codes] = set()
+        self.checkable = leaves.checkable
 
-    def run(self) -> None:
-        """Search all pieces, cutting those whose trees grow too large."""
+    def first(self) -> list[Task]:
+        """The whole tree over the whole interval, or over both sides of the alpha at which g vanishes."""
         a, b = self.interval
-        ends = [a, b]
-        if self._origin is not None and a < self._origin < b:
-            ends.insert(1, self._origin)
-        everything = [(UNDECIDED,) * len(self._condensed.F0)]
-        waiting = deque((Piece(x, y), everything) for x, y in itertools.pairwise(ends))
+        ends = [a, self._origin, b] if self._origin is not None and a < self._origin < b else [a, b]
+        everything = (Subtree((UNDECIDED,) * self._p),)
+        return [Task(Piece(x, y), everything) for x, y in itertools.pairwise(ends)]
+
+    def run(self, known: Mapping[Task, TreeResult] | None = None) -> None:
+        """Search all pieces; ``known`` holds the results of tasks that were searched elsewhere.
+
+        With ``stopped`` set before, nothing but these results counts.
+        """
+        known = {} if known is None else known
+        go_on = self.stopped is not None
+        waiting = self.first()[::-1]
         while waiting:
-            piece, roots = waiting.popleft()
-            found = self._search(piece, roots)
+            task = waiting.pop()
+            found = SearchedPiece(task.piece, self.worker.system(task.piece), [root.codes for root in task.roots])
             self.pieces.append(found)
-            self.selections.update(found.selections)
-            if self.stopped is not None:
-                return
-            if found.cut:
-                halves = (Piece(piece.middle, piece.b), Piece(piece.a, piece.middle))
-                waiting.extendleft((half, found.cut) for half in halves)
-            elif self._progress is not None:
-                self._progress(float((piece.b - a) / (b - a)))
+            cut = self._search(task, found, known)
+            if self.stopped is not None and found.cut:
+                if not go_on:
+                    return
+                continue
+            found.cut = [subtree.codes for subtree in cut]
+            waiting += Task.halves(task.piece, cut)[::-1]
+            if not cut and not known and self.progress is not None:
+                a, b = self.interval
+                self.progress(float((task.piece.b - a) / (b - a)))
 
-    def _search(self, piece: Piece, roots: list[Codes]) -> SearchedPiece:
-        """The trees over a piece; what is left over when cutting it is better, or a limit is reached, is in ``cut``."""
-        system = self._system(piece)
-        found = SearchedPiece(piece, system, roots)
-        certifier = _Collector(found, self._leaves, self.selections)
-        whole = float(piece.b - piece.a) <= SMALLEST_PIECE * float(self.interval[1] - self.interval[0])
-        limit: int | None = None if whole else NODES_PER_CONTACT * (system.p + 2)
-        spent, left = 0, roots
-        while True:
-            allowed = None if limit is None else max(limit - spent, 1)
-            if self._max_nodes is not None:
-                rest = max(self._max_nodes - self.nodes, 1)
-                allowed = rest if allowed is None else min(allowed, rest)
-            enough = None if whole else (lambda _: certifier.new > NEW_SELECTIONS)
-            outcome = IntervalTreeSearch(system, certifier, SearchLimits(enough, allowed, self._deadline)).run(left)
-            self.nodes += outcome.nodes
-            spent += outcome.nodes
-            if outcome.stopped is None:
-                return found
-            left = [item.codes for item in outcome.undecided]
-            if self._must_stop():
-                found.cut = left
-                return found
-            if certifier.new > NEW_SELECTIONS:
-                found.cut = left + [codes for codes in found.selections if codes not in self.selections]
-                found.selections = [codes for codes in found.selections if codes in self.selections]
-                return found
-            assert limit is not None
-            raised = WORTH_CUTTING * self._size_at(piece.middle)
-            if raised <= spent:
-                found.cut = left
-                return found
-            limit = raised
+    def _search(self, first: Task, found: SearchedPiece, known: Mapping[Task, TreeResult]) -> list[Subtree]:
+        """All trees over a piece; gives what they leave to its halves. A limit leaves the rest in ``found.cut``."""
+        waiting, cut = [first], list[Subtree]()
+        while waiting:
+            task = waiting.pop()
+            result = self._result(task, known.get(task))
+            if result is None:
+                left = [*cut, *(root for other in [task, *waiting[::-1]] for root in other.roots)]
+                found.cut = [subtree.codes for subtree in left]
+                return []
+            self.nodes += result.nodes
+            self.checkable = self.checkable and result.checkable
+            found.empty += result.empty
+            found.selections += result.selections
+            self.selections.update(result.selections)
+            cut += result.cut
+            waiting += task.further(result)[::-1]
+        return cut
 
-    def _must_stop(self) -> bool:
-        if self._max_nodes is not None and self.nodes >= self._max_nodes:
-            self.stopped = Stop(StopReason.NODE_LIMIT, self._max_nodes)
-        elif self._deadline is not None and time.perf_counter() > self._deadline:
+    def _result(self, task: Task, known: TreeResult | None) -> TreeResult | None:
+        """What the tree of a task comes to; None once a limit is reached."""
+        rest = None if self.max_nodes is None else self.max_nodes - self.nodes
+        # near the limit a tree is smaller than it was without it
+        if known is not None and (rest is None or rest >= LARGEST_TREE):
+            return known
+        if self.stopped is None and rest is not None and rest <= 0:
+            self.stopped = Stop(StopReason.NODE_LIMIT, self.max_nodes)
+        elif self.stopped is None and self.deadline is not None and time.perf_counter() > self.deadline:
             self.stopped = Stop(StopReason.TIME_LIMIT)
-        return self.stopped is not None
-
-    def _system(self, piece: Piece) -> IntervalSystem:
-        origin = self._origin if self._origin in (piece.a, piece.b) else None
-        return IntervalSystem.from_problem(self._condensed, piece.a, piece.b, origin)
-
-    def _size_at(self, alpha: Fraction) -> int:
-        """Nodes of the tree at one alpha."""
-        piece = Piece(alpha, alpha)
-        system = self._system(piece)
-        certifier = _SizeOnly(SearchedPiece(piece, system, []), self._leaves, set())
-        limits = SearchLimits(max_nodes=self._max_nodes, deadline=self._deadline)
-        outcome = IntervalTreeSearch(system, certifier, limits).run()
-        self.nodes += outcome.nodes
-        return outcome.nodes
+        return None if self.stopped is not None else self.worker.run(task, rest, self.deadline)

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from enumsol.relaxation.engine import Relaxation
     from enumsol.selections.solution import Codes
 
-_DEGENERATE = "a condition holds with equality, or nearly so, at what may be a root"
+#: Why a leaf stays open.
+DEGENERATE = "a condition holds with equality, or nearly so, at what may be a root"
 
 
 class SpaceSplitting:
@@ -109,8 +110,8 @@ class SpaceCertifier:
         elif isinstance(answer, Open):
             if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
                 return Refine(answer.node)
-            self._leaf("u", _DEGENERATE)
-            return UndecidedPart(codes, _DEGENERATE, "perturb the load or the friction coefficients")
+            self._leaf("u", DEGENERATE)
+            return UndecidedPart(codes, DEGENERATE, "perturb the load or the friction coefficients")
         else:
             self._roots[codes] = answer
             self._leaf("r", answer.y.mid.tolist(), (4.0 * answer.y.rad).tolist(), answer.index)

@@ -224,9 +224,6 @@ class TreeSearch:
         node, forced = self._choose(item, relaxation)
         if node < 0:
             node = self._settle(codes)
-            if node >= 0 and relaxation is not None and not relaxation.pruned:
-                better = relaxation.sector_to_halve(codes)
-                node = better if better >= 0 else node
         if node < 0:
             self._covered += item.weight
             return

@@ -46,7 +46,7 @@ SHARED = {
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
     "condensation.space": {"EnclosedSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "vanishing_alpha"},
-    "kernel.interval": {"EnclosedPiece", "as_computed", "interval_exclusion_margins"},
+    "kernel.interval": {"EnclosedPiece", "as_computed", "interval_exclusion_margin"},
     "kernel.point": {"VerifiedSelection", "exclusion_margin", "holds_no_root", "solve_selection"},
     "kernel.rows": None,
     "kernel.space": None,

@@ -159,11 +159,22 @@ def test_graph_cut_short_is_status_3(capsys):
     assert out.splitlines()[-1].startswith("complete: no (")
 
 
+def test_graph_with_jobs(capsys, tmp_path):
+    outputs = []
+    for jobs in (1, 2):
+        graph, proof = tmp_path / f"{jobs}.graph", tmp_path / f"{jobs}.proof"
+        arguments = ("--from", 0, "--to", 5, "--jobs", jobs, "--save", graph, "--proof", proof)
+        status, out, _ = run(capsys, "graph", "gallery:two-node-6.4", *arguments)
+        assert status == 0
+        outputs.append((out, proof.read_bytes()))
+    assert outputs[0] == outputs[1]
+    assert run(capsys, "verify", "gallery:two-node-6.4", proof)[0] == 0
+
+
 @pytest.mark.slow
-def test_ctrl_c_stops_a_graph(tmp_path):
-    file = tmp_path / "chain.npz"
-    write_problem(gallery.chain(8, 0.05), file)
-    with on_terminal("graph", file, "--from", 0, "--to", 5) as (process, wait_for):
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_ctrl_c_stops_a_graph(jobs):
+    with on_terminal("graph", "gallery:wedge-20-5", "--from", 0, "--to", 5, "--jobs", jobs) as (process, wait_for):
         wait_for(b"search")
         process.send_signal(2)
         process.communicate(timeout=120)
@@ -173,7 +184,7 @@ def test_ctrl_c_stops_a_graph(tmp_path):
 def test_help_of_the_commands(capsys):
     for command, words in (
         ("table", ("--from", "--alphas", "--samples", "--jobs")),
-        ("graph", ("--plot", "--save", "--graphml", "--time-limit")),
+        ("graph", ("--plot", "--save", "--graphml", "--time-limit", "--jobs")),
     ):
         status, out, _ = run(capsys, command, "--help")
         assert status == 0

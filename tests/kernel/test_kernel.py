@@ -75,7 +75,7 @@ def test_margins_agree_with_rationals():
         p = int(rng.integers(1, 4))
         problem = random_problem(rng, p)
         system, judge = system_of(problem), judge_of(problem)
-        compiled = Margins(system)
+        compiled = Margins((system,), system.F, system.F)
         for _ in range(30):
             codes = tuple(int(c) for c in rng.choice(CODES, size=p))
             rows, values = random_multipliers(rng, codes, system.F, bad=rng.random() < 0.3)
@@ -141,7 +141,7 @@ def test_sign_of_the_margin_where_the_bound_is_next_to_zero():
                 bound = exact_bound(judge, rows, stretched)
                 for margin in (
                     exclusion_margin(system, codes, rows, stretched),
-                    Margins(system).margin(codes, rows.astype(np.intp), stretched),
+                    Margins((system,), system.F, system.F).margin(codes, rows.astype(np.intp), stretched),
                 ):
                     assert Fraction(float(margin)) <= bound / size
                     assert margin > 0 or bound / size < 1e-9
@@ -170,7 +170,7 @@ def test_absurd_multipliers_prove_nothing(value):
     rows = np.array([0, 8, 9], dtype=np.intp)
     values = np.array([1.0, value, value])
     assert not exclusion_margin(system, (1, 1), rows, values) > 0
-    assert not Margins(system).margin((1, 1), rows, values) > 0
+    assert not Margins((system,), system.F, system.F).margin((1, 1), rows, values) > 0
 
 
 @pytest.mark.parametrize("row", [-1, 14, 10**9])
@@ -178,7 +178,7 @@ def test_rows_that_do_not_exist(row):
     system = system_of(gallery.two_node_square(), 2.0)
     rows, values = np.array([row], dtype=np.intp), np.array([1.0])
     assert exclusion_margin(system, (6, 6), rows, values) == -np.inf
-    assert Margins(system).margin((6, 6), rows, values) == -np.inf
+    assert Margins((system,), system.F, system.F).margin((6, 6), rows, values) == -np.inf
 
 
 def test_batches_equal_single_leaves():

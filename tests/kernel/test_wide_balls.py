@@ -68,7 +68,7 @@ def test_margins_hold_for_every_corner(width):
         system = wide_system(rng, p, width)
         if np.linalg.eigvalsh(system.S)[0] < 10 * np.linalg.norm(system.S_rad):
             continue
-        compiled = Margins(system)
+        compiled = Margins((system,), system.F, system.F)
         for _ in range(4):
             codes = tuple(int(c) for c in rng.choice((0, 1, 2, 3, 5, 6), size=p))
             signs = row_signs(np.array(codes), system.F)
@@ -150,4 +150,7 @@ def test_friction_balls_count_for_cones():
     wide = replace(system, F_rad=np.array([0.25]))
     rows, values = np.array([2, 4], dtype=np.intp), np.array([1.0, 0.5])
     assert exclusion_margin(wide, (2,), rows, values) < exclusion_margin(system, (2,), rows, values) - 1e-3
-    assert Margins(wide).margin((2,), rows, values) < Margins(system).margin((2,), rows, values) - 1e-3
+    assert (
+        Margins((wide,), wide.F, wide.F).margin((2,), rows, values)
+        < Margins((system,), system.F, system.F).margin((2,), rows, values) - 1e-3
+    )

@@ -257,3 +257,18 @@ def test_memory_of_dropped_states_is_used_again():
     others = [root.child(*rows_of((CONTACT,) * 7, system.F), last=False) for _ in range(100)]
     assert np.array_equal(kept[0].forces, x)
     assert all(np.array_equal(other.forces, others[0].forces) for other in others)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_order_in_which_rows_are_switched_on_does_not_matter(seed):
+    rng = np.random.default_rng(seed)
+    system = random_system(rng, 6)
+    rows, modes = rows_of([UNDECIDED, CONTACT, STICK, UNDECIDED, OPEN, SLIP_PLUS], np.ones(6))
+    engine = ActiveSetEngine(system)
+    order = rng.permutation(len(rows))
+    one = engine.root(rows, modes)
+    other = engine.root([rows[k] for k in order], [modes[k] for k in order])
+    assert one.bound == other.bound
+    assert np.array_equal(one.forces, other.forces)
+    for a, b in zip(one.multipliers(), other.multipliers(), strict=True):
+        assert np.array_equal(a, b)

@@ -8,14 +8,17 @@ import pytest
 from branches.problems import generic_problem, one_node
 from flint import fmpq
 
-from enumsol import gallery
+from enumsol import ContactProblem, gallery
 from enumsol.branches import branch_graph
 from enumsol.branches.gluing import glue
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError, Interrupted, InvalidArgumentError, TooLargeError
 from enumsol.relaxation.interval import IntervalEngine, IntervalSystem
+from enumsol.search import interval as interval_search
+from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
-from enumsol.search.interval import EmptyLeaf, FastIntervalCertifier, IntervalSearch, Piece
+from enumsol.search.interval import FastIntervalCertifier, IntervalSearch, Piece
+from enumsol.search.interval_tree import EmptyLeaf
 from enumsol.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 BELOW = {UNDECIDED: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), CONTACT: (STICK, SLIP_PLUS, SLIP_MINUS)}
@@ -26,8 +29,10 @@ def below(codes):
     return set(product(*(BELOW.get(code, (code,)) for code in codes)))
 
 
+@pytest.mark.parametrize("largest", [3, 2048])
 @pytest.mark.parametrize("kind", ["friction", "load", "both"])
-def test_leaves_cover_all_selections_over_the_whole_interval(kind):
+def test_leaves_cover_all_selections_over_the_whole_interval(kind, largest, monkeypatch):
+    monkeypatch.setattr(interval_search, "LARGEST_TREE", largest)
     rng = np.random.default_rng(7)
     for _ in range(6):
         problem = generic_problem(rng, 3, kind)
@@ -53,6 +58,31 @@ def test_every_leaf_the_engine_prunes_is_proven_in_rationals(kind):
         for part in search.pieces:
             for leaf in part.empty:
                 assert certifier.excluded(part.piece, part.system, leaf)
+
+
+def test_many_selections_at_one_alpha_are_handed_on_once():
+    """Seven nodes of a wedge that slides in lift off at one alpha: 128 selections hold there and nowhere else."""
+    w = gallery.wedge(4, 7, (4e-4, 1e-3))
+    problem = ContactProblem(w.A, w.Bn, w.Bt, 0 * w.f, gap=w.gap, friction=2.2, load_slope=w.f)
+    certifier = VerifiedIntervalCertifier(problem, ExactCondensed.from_condensed(problem), None)
+    search = IntervalSearch(problem.condensed, (Fraction(0), Fraction(1)), None, certifier)
+    search.run()
+    assert len(search.selections) >= 128
+    assert sum(len(part.selections) for part in search.pieces) <= 1.2 * len(search.selections)
+    assert len(search.pieces) < 40
+
+
+def test_a_limit_on_nodes_is_kept_to():
+    problem = gallery.get("wedge-8-5").build()
+    for most in (1, 10, 100, 500):
+        search = IntervalSearch(
+            problem.condensed, (Fraction(0), Fraction(5)), None, FastIntervalCertifier(), max_nodes=most
+        )
+        search.run()
+        assert search.stopped
+        assert most <= search.nodes <= most + 4
+        # what was not examined is still there
+        assert search.pieces[-1].cut
 
 
 def test_a_leaf_that_holds_a_solution_cannot_be_excluded(rng):

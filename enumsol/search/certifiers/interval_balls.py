@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.problem import ContactProblem
     from enumsol.relaxation.interval import IntervalSystem
-    from enumsol.search.interval import EmptyLeaf, Piece
+    from enumsol.search.interval import Piece
+    from enumsol.search.interval_tree import EmptyLeaf
     from enumsol.selections.solution import Codes
 
     Margin = Callable[[Codes, NDArray[np.intp], NDArray[np.float64]], float]

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.relaxation.interval import IntervalSystem
-    from enumsol.search.interval import EmptyLeaf, Piece
+    from enumsol.search.interval import Piece
+    from enumsol.search.interval_tree import EmptyLeaf
 
 _CONES: dict[int, RowKind] = {
     IntervalRowKind.SLIP_AT_LEAST_PLUS: RowKind.CONE_PLUS,
