@@ -72,14 +72,14 @@ def branch_graph(
         First and last alpha, in increasing order: float, Fraction or whatever enumerate_roots accepts as alpha.
     arithmetic : {"verified", "fast", "exact"}
         "verified": every leaf of the search is proven empty over its whole piece of the interval, and every selection
-        handed on is followed, by rigorous error bounds for the problem's own matrices (theory, section 7.14). The
-        graph is made of these arcs; up to 24 degrees of freedom, and up to 250 if bounds left something open, it is
-        made by exact algebra instead (``graph.data.arcs_by`` says which). Beyond 250 what is left open is a vertex of
-        kind "unsettled", and the graph is not complete. Only where A is positive definite within rounding are more
-        than 24 degrees of freedom about S and g as computed in floats (``graph.certified_data``). "fast": exact
-        algebra, but the search trusts floats; never claimed to be complete; S and g as computed beyond 24 degrees of
-        freedom. "exact": everything in rationals, for the problem's own matrices of up to 250 degrees of freedom, and
-        slow beyond some ten contact nodes.
+        handed on is followed, by rigorous error bounds for the problem's own matrices (theory, section 7.14). The graph
+        is made of these arcs; up to 24 degrees of freedom, and up to 250 if bounds left something open, it is made by
+        exact algebra instead, for the same matrices (``graph.data.arcs_by`` says which). Beyond 250 what is left open
+        is a vertex of kind "unsettled", and the graph is not complete. Only where A is positive definite within
+        rounding are more than 24 degrees of freedom about S and g as computed in floats (``graph.certified_data``).
+        "fast": exact algebra, but the search trusts floats; never claimed to be complete; S and g as computed beyond 24
+        degrees of freedom. "exact": everything in rationals, for the problem's own matrices of up to 250 degrees of
+        freedom, and slow beyond some ten contact nodes.
     progress : callable, optional
         Called with the name of the stage ("search", "arcs") and the share of it that is done.
     max_nodes : int, optional
