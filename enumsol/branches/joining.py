@@ -89,6 +89,9 @@ class JoinedArc:
     ----------
     trace : Trace
     tail, head : Place
+    low, high : Fraction
+        It holds between them at least. Beside an open place, which may stand for many parts, that is more than between
+        the places.
     index : int
         Sign of the determinant.
     """
@@ -96,6 +99,8 @@ class JoinedArc:
     trace: Trace
     tail: Place
     head: Place
+    low: Fraction
+    high: Fraction
     index: int = 0
 
     @property
@@ -207,6 +212,8 @@ class _Joining:
         places = self._joined.places
         if self._origin is not None:
             self._origin.members = sorted({trace.selection.rows.codes for trace in self._traces})
+            if any(place.low <= self._origin.low <= place.high for place in self._joined.open):
+                self._origin.kind = PlaceKind.OPEN  # unknown arcs may end there
             places.append(self._origin)
         places.sort(key=lambda place: (place.low, place.high, place.members))
         self._check_order()
@@ -310,7 +317,7 @@ class _Joining:
             if part.kind is PartKind.OPEN:
                 place = self._found[id(part)].place
                 if arc is not None and place is not None:
-                    self._end(arc, place)
+                    self._end(arc, place, Fraction(part.low))
                 arc, before = None, place
             elif part.kind is PartKind.NONE:
                 if arc is not None:
@@ -323,7 +330,7 @@ class _Joining:
                     if start is None:
                         self._contradiction(trace, part)
                     else:
-                        arc = JoinedArc(trace, start, start, part.index)
+                        arc = _begun(trace, start, part)
                 elif arc is not None and rises:
                     self._contradiction(trace, part)
                 before = None
@@ -331,9 +338,10 @@ class _Joining:
                     place = self._found[id(part)].place
                     assert place is not None
                     if rises:
-                        arc = JoinedArc(trace, place, place, part.index)
+                        arc = _begun(trace, place, part)
                     elif arc is not None:
-                        self._end(arc, place)
+                        unpaired = place.kind is PlaceKind.OPEN
+                        self._end(arc, place, Fraction(part.zero[0]) if unpaired else place.low)
                         arc = None
             first = False
         if arc is not None:
@@ -341,10 +349,10 @@ class _Joining:
             if end is None:
                 self._contradiction(trace, part)
             else:
-                self._end(arc, end)
+                self._end(arc, end, end.low)
 
-    def _end(self, arc: JoinedArc, place: Place) -> None:
-        arc.head = place
+    def _end(self, arc: JoinedArc, place: Place, alpha: Fraction) -> None:
+        arc.head, arc.high = place, alpha
         self._joined.arcs.append(arc)
 
     def _contradiction(self, trace: Trace, part: Part) -> None:
@@ -354,6 +362,14 @@ class _Joining:
     def _complain(self, reason: str) -> None:
         if reason not in self._joined.reasons:
             self._joined.reasons.append(reason)
+
+
+def _begun(trace: Trace, place: Place, part: Part) -> JoinedArc:
+    """An arc that begins at a place, with this part."""
+    low = place.high
+    if place.kind is PlaceKind.OPEN:
+        low = Fraction(part.zero[1] if part.kind is PartKind.EVENT and part.rising else part.low)
+    return JoinedArc(trace, place, place, low, low, part.index)
 
 
 def _connected(one: _Found, other: _Found) -> bool:

@@ -42,14 +42,17 @@ def make_traced(traced: TracedProblem, joined: Joined) -> tuple[list[Vertex], li
 def _arc(
     traced: TracedProblem, number: int, arc: JoinedArc, ends: tuple[int, int], exact: Sequence[EnclosedAlpha]
 ) -> Arc:
-    sample = (arc.tail.high + arc.head.low) / 2
+    sample = (arc.low + arc.high) / 2
+    # beside what was left open only inner bounds are known
+    lo = float(arc.low if arc.tail.kind is PlaceKind.OPEN else exact[ends[0]])
+    hi = float(arc.high if arc.head.kind is PlaceKind.OPEN else exact[ends[1]])
     still = [i for i, code in enumerate(arc.codes) if code == FRICTIONLESS]
     signs = traced.slip_signs(arc.codes, sample, still) if still else {}
     return Arc(
         number=number,
         statuses=tuple(shown_status(code, signs.get(i, 0)) for i, code in enumerate(arc.codes)),
-        lo=float(exact[ends[0]]),
-        hi=float(exact[ends[1]]),
+        lo=lo,
+        hi=hi,
         tail=ends[0],
         head=ends[1],
         index=arc.index or None,

@@ -209,9 +209,9 @@ class _Tracing:
                 flat = share < _FLAT_BOX and precise is None
                 tried.append(_Cutting(rows, expansion, whole=whole, flat=flat).run())
         if precise is not None and not (tried and _decides(*tried[0])):
-            fine = precise.expansion(first, last)
-            if fine is not None:
-                tried.insert(0, _Cutting(rows, fine, whole=whole, flat=share < _PRECISE_BOX).run())
+            found = precise.expansion(first, last)
+            if found is not None:
+                tried.insert(0, _Cutting(rows, found, whole=whole, flat=share < _PRECISE_BOX).run())
         if not tried and share < _SINGULAR:
             whole = True
         if tried:
@@ -221,7 +221,9 @@ class _Tracing:
             return rest
         if whole:
             everywhere = frozenset(range(len(rows.codes)))
-            self._found.boxes.append(Box(first, last, (Part(PartKind.OPEN, first, last, doubtful=everywhere),)))
+            part = Part(PartKind.OPEN, first, last, doubtful=everywhere)
+            fine = not isinstance(first, float) or not isinstance(last, float)
+            self._found.boxes.append(Box(first, last, (part,), fine))
             return []
         middle = _between(first, last)
         return [(first, middle), (middle, last)]

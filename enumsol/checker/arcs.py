@@ -17,6 +17,8 @@ from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from enumsol.kernel.arcs import ArcSelection, ArcSystem
 from enumsol.kernel.rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.kernel.selection_rows import (
@@ -162,7 +164,8 @@ class ArcChecker:
             raise ValueError(f"{shown(record)} begins no trace")
         codes = tuple(codes_from([record[1]], self._problem.p)[0].tolist())
         low, high, side = _number(record[2]), _number(record[3]), int(record[4])
-        due = next((d for d in self._due if d[0] == codes and d[3] == side and low <= d[1] < d[2] <= high), None)
+        spans = (d for d in self._due if d[0] == codes and d[3] == side)
+        due = next((d for d in spans if _is_next(-low, -d[1]) and _is_next(high, d[2])), None)
         if due is None:
             raise ValueError("it is about no selection that was handed on there, or repeated")
         self._due.remove(due)
@@ -402,6 +405,11 @@ def _check_entries(part: list[Any], conditions: int) -> None:
         type(part[3]) is int and 0 <= part[3] < conditions and type(part[4]) is int and part[4] in (0, 1)
     ):
         raise ValueError("an event names no condition")
+
+
+def _is_next(value: Fraction, end: Fraction) -> bool:
+    """Whether it is the smallest float that is not smaller than ``end``: what is beyond would not be about it."""
+    return value == end or (value > end and Fraction(np.nextafter(float(value), -np.inf)) < end)
 
 
 def _inside(zero: tuple[Fraction, Fraction], part: tuple[Fraction, Fraction]) -> bool:

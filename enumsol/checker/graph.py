@@ -34,7 +34,7 @@ from enumsol.kernel.interval import (
     as_computed,
     interval_exclusion_margins,
 )
-from enumsol.kernel.rows import CONTACT, SLIP_MINUS, STICK, UNDECIDED, children_of
+from enumsol.kernel.rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, STICK, UNDECIDED, children_of
 from enumsol.proof.reading import (
     RefusedError,
     codes_from,
@@ -209,6 +209,8 @@ class GraphChecker:
         handed = piece.leaves("s")
         if np.any(handed >= CONTACT):
             self._fail(f"piece {number}: a selection handed on is not complete")
+        elif np.any((handed != OPEN) & ((handed == FRICTIONLESS) == np.array(self._friction))):
+            self._fail(f"piece {number}: a selection handed on has a status that a node cannot have")
         if not covers(piece.roots, piece.leaves(), self._friction):
             self._fail(f"piece {number}: its leaves do not cover all selections")
         self.selections.update(row.tobytes() for row in handed)

@@ -80,3 +80,84 @@ def assert_same_roots(ours, theirs):
     assert [(f.dimension, f.index) for f in ours.families] == [(f.dimension, f.index) for f in theirs.families]
     for a, b in zip(ours.families, theirs.families, strict=True):
         np.testing.assert_allclose(a.vertices, b.vertices, atol=1e-9)
+
+
+def planted_corner(rng, p, kind, *, at=None):
+    """Small integers, and at a dyadic alpha in (0, 4), or at ``at``, a root with one or more conditions that vanish."""
+    G = rng.integers(-1, 2, size=(2 * p, 2 * p))
+    A = G @ G.T + np.eye(2 * p) * int(rng.integers(1, 3))
+    if rng.random() < 0.3:  # nodes that do not feel each other
+        A = A * np.kron(np.ones((2, 2)), np.eye(p))
+    alpha = at if at is not None else float(rng.integers(1, 16)) / 4
+    steps = rng.integers(0, 3, size=p) / 4 if kind != "load" else np.zeros(p)
+    F = np.maximum(rng.integers(0, 5, size=p), alpha * steps)
+    degenerate = set(rng.permutation(p)[: int(rng.integers(1, p + 1))].tolist())
+    lam, w = np.zeros((2, p)), np.zeros((2, p))
+    for i in range(p):
+        sign, state = int(rng.choice((-1, 1))), rng.integers(3)
+        w[1, i] = int(rng.integers(-2, 3))
+        if i in degenerate and state == 0:  # it just touches
+            continue
+        if i in degenerate:  # it is about to slip
+            lam[:, i], w[1, i] = (n := int(rng.integers(1, 3)), sign * F[i] * n), 0
+        elif state == 0:
+            w[0, i] = -int(rng.integers(1, 3))
+        elif state == 1:
+            lam[:, i], w[1, i] = (n := int(rng.integers(1, 3)), 0.5 * sign * F[i] * n), 0
+        else:
+            lam[:, i], w[1, i] = (n := int(rng.integers(1, 3)), sign * F[i] * n), sign * int(rng.integers(1, 3))
+    slope = np.zeros(2 * p) if kind == "friction" else rng.integers(-2, 3, size=2 * p).astype(float)
+    f = A @ w.ravel() + lam.ravel() - alpha * slope
+    B = np.eye(2 * p)
+    load = {} if kind == "friction" else {"load_slope": slope}
+    return ContactProblem(A, B[:p], B[p:], f, friction=(F - alpha * steps, steps), **load)
+
+
+def together(rng, *, push=0.0, nodes=2):
+    """Nodes that do not feel each other, with a fold of one and a transition or fold of another at the same alpha.
+
+    ``push`` moves the second event away by about as much.
+    """
+    S = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    first = float(rng.choice((2.5, 3.0, 3.5, 4.0)))
+    loads, F0, F1 = [(1.0, -first)], [0.0], [1.0]
+    for _ in range(nodes - 1):
+        event = float(rng.choice((0.75, 1.0, 1.5, 2.25, 2.5, 3.0)))
+        slope = float(rng.choice((0.125, 0.25, 0.5)))
+        if event < slope * first:
+            slope = 0.125
+        scale, sign = 2.0 ** int(rng.integers(-3, 4)), int(rng.choice((-1, 1)))
+        loads.append((scale, sign * scale * event * (1.0 + push)))
+        F0.append(event - slope * first)
+        F1.append(slope)
+    B = np.eye(2 * nodes)
+    order = rng.permutation(nodes)
+    data = (np.array(part)[order] for part in (loads, F0, F1))
+    f, *friction = data
+    return ContactProblem(np.kron(np.eye(nodes), S), B[0::2], B[1::2], f.ravel(), friction=tuple(friction))
+
+
+def grazing_problem(rng, p):
+    """A node touches at every alpha without a force, while friction varies elsewhere."""
+    G = rng.integers(-1, 2, size=(2 * p, 2 * p))
+    A = G @ G.T + np.eye(2 * p) * int(rng.integers(1, 3))
+    codes = rng.permutation([0, *rng.integers(0, 3, size=p - 1).tolist()])  # touching, open or sticking
+    lam, w = np.zeros((2, p)), np.zeros((2, p))
+    for i, code in enumerate(codes.tolist()):
+        w[1, i] = 0.0 if code == 2 else int(rng.integers(-2, 3))
+        w[0, i] = -1.0 if code == 1 else 0.0
+        lam[:, i] = (1.0, int(rng.integers(-2, 3)) / 2) if code == 2 else (0.0, 0.0)
+    B = np.eye(2 * p)
+    return ContactProblem(A, B[:p], B[p:], A @ w.ravel() + lam.ravel(), friction=(0.0, 1.0))
+
+
+def without_friction_somewhere(rng, p, kind):
+    """A generic problem in which nodes have F = 0 throughout, or at alpha = 0."""
+    problem = generic_problem(rng, p, kind)
+    F0, F1 = (part.copy() for part in problem.friction)
+    F0[rng.random(p) < 0.6] = 0.0
+    F1[(F0 == 0.0) & (rng.random(p) < 0.5)] = 0.0
+    data = {"gap": problem.gap, "friction": (F0, F1)}
+    if problem.load_slope is not None:
+        data["load_slope"] = problem.load_slope
+    return ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f, **data)

@@ -1,0 +1,183 @@
+"""The graph from balls is that from exact algebra, or says where it is not decided."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from branches.problems import (
+    generic_problem,
+    grazing_problem,
+    integer_problem,
+    mirrored_problem,
+    planted_corner,
+    together,
+    without_friction_somewhere,
+)
+from branches.test_degenerate import pair, uncoupled
+from branches.two_graphs import differences, steps, two_graphs
+from generators import through_the_unloaded_state, vanishing_problem
+
+from enumsol import ContactProblem, branch_graph, verify
+from enumsol.branches import tracing
+
+KINDS = ("friction", "load", "both")
+
+
+def generic(rng, p, kind):
+    return generic_problem(rng, p, kind), (0.0, 6.0)
+
+
+def between_fractions(rng, p, kind):
+    return generic_problem(rng, p, kind), (Fraction(1, 3), Fraction(22, 7))
+
+
+def over_a_short_interval(rng, p, kind):
+    start = float(rng.uniform(0.0, 6.0))
+    return generic_problem(rng, p, kind), (start, start + 10.0 ** -int(rng.integers(2, 13)))
+
+
+def over_a_long_interval(rng, p, kind):
+    return generic_problem(rng, p, kind), (0.0, 10.0 ** int(rng.integers(2, 9)))
+
+
+def in_other_units(rng, p, kind):
+    problem = generic_problem(rng, p, kind)
+    stiff, load = (2.0 ** int(rng.integers(-150, 151)) for _ in range(2))
+    data = {"gap": load / stiff * problem.gap, "friction": problem.friction}
+    if problem.load_slope is not None:
+        data["load_slope"] = load * problem.load_slope
+    A = stiff * problem.A.toarray()
+    return ContactProblem(A, problem.Bn, problem.Bt, load * problem.f, **data), (0.0, 6.0)
+
+
+def partly_without_friction(rng, p, kind):
+    return without_friction_somewhere(rng, p, kind), (0.0, 5.0)
+
+
+def unloaded_somewhere(rng, p, kind):
+    """Load and gap vanish together inside the interval or at one of its ends."""
+    zero = Fraction(int(rng.integers(-3, 4)), int(rng.choice((1, 2, 3, 5))))
+    ends = ((0, 2), (-2, 0), (-2, 2), (-1, Fraction(7, 3)))[int(rng.integers(4))]
+    friction = float(rng.integers(0, 4)) if kind == "load" else (6.0, float(rng.choice((-0.5, 1.0))))
+    problem = vanishing_problem(rng, p, zero, inner=int(rng.integers(0, 3)), friction=friction)
+    return problem, tuple(zero + end for end in ends)
+
+
+def small_integers(rng, p, kind):
+    return integer_problem(rng, p, kind), (-3, 3) if kind == "load" else (0, 4)
+
+
+def mirrored(rng, p, kind):
+    return mirrored_problem(rng, load=kind != "friction"), (0, 6)
+
+
+def corner(rng, p, kind):
+    return planted_corner(rng, p, kind), (0, 4)
+
+
+def corner_at_an_end(rng, p, kind):
+    end = int(rng.integers(1, 5))
+    problem = planted_corner(rng, p, kind, at=float(end))
+    return problem, (end, end + 2) if rng.random() < 0.5 else (0, end)
+
+
+def at_the_same_alpha(rng, p, kind):
+    return together(rng, nodes=max(p, 2)), (0, 6)
+
+
+def nearly_at_the_same_alpha(rng, p, kind):
+    push = float(rng.choice((-1, 1))) * 10.0 ** -int(rng.integers(3, 18))
+    return together(rng, nodes=max(p, 2), push=push), (0, 6)
+
+
+def grazing(rng, p, kind):
+    return grazing_problem(rng, p), (0, 4)
+
+
+#: Families of problems, numbers of them, whether all are decided (None: some are), and most boxes of a trace. What
+#: stays open stays so for any number of boxes, and takes most of the time.
+FAMILIES = {
+    generic: (80, True, 200),
+    between_fractions: (50, True, 200),
+    over_a_short_interval: (60, True, 200),
+    over_a_long_interval: (15, None, 40),
+    in_other_units: (50, True, 200),
+    partly_without_friction: (60, True, 200),
+    unloaded_somewhere: (120, None, 20),
+    small_integers: (50, None, 12),
+    mirrored: (20, None, 12),
+    corner: (30, None, 12),
+    corner_at_an_end: (20, False, 12),
+    at_the_same_alpha: (8, False, 12),
+    nearly_at_the_same_alpha: (10, None, 20),
+    grazing: (5, False, 6),
+}
+
+
+@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
+def test_graphs_from_balls_are_those_from_exact_algebra(family, monkeypatch):
+    count, decided, boxes = FAMILIES[family]
+    assert {graphs.doubts == [] for graphs in _compared(family, range(count), boxes, monkeypatch)} == (
+        {True, False} if decided is None else {decided}
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", range(10))
+@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
+def test_many_graphs(family, block, monkeypatch):
+    count, _, boxes = FAMILIES[family]
+    for _ in _compared(family, range((block + 1) * count, (block + 2) * count), boxes, monkeypatch):
+        pass
+
+
+def _compared(family, seeds, boxes, monkeypatch):
+    monkeypatch.setattr(tracing, "_MOST_BOXES", boxes)
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        problem, interval = family(rng, int(rng.integers(1, 4)), KINDS[seed % 3])
+        graphs = two_graphs(problem, interval)
+        assert differences(graphs) == [], seed
+        if not graphs.doubts:
+            ours, theirs = steps(graphs)
+            assert ours == theirs, seed
+            assert len(graphs.exact[0]) == len(graphs.traced[0])
+            assert len(graphs.exact[1]) == len(graphs.traced[1])
+        yield graphs
+
+
+@pytest.mark.parametrize("push", [0.0, 1e-16, 1e-12, 1e-6, 1e-3])
+def test_a_pitchfork_is_left_open(push):
+    graphs = two_graphs(pair(push), (0, 6))
+    assert differences(graphs) == []
+    # a determinant vanishes there together with a condition, whatever the load
+    assert any(low <= 3 <= high for low, high, _ in graphs.open)
+    assert 1.0 + push == 1.0 or all(abs(low - 3) < 1e-6 and abs(high - 3) < 1e-6 for low, high, _ in graphs.open)
+
+
+def test_families_and_sheets_are_left_open(monkeypatch):
+    monkeypatch.setattr(tracing, "_MOST_BOXES", 12)
+    for loads in ([1.0, -2.0], [1.0, -2.0]), ([1.0, -2.0], [1.5, -4.0]):
+        graphs = two_graphs(uncoupled(*loads), (0.0, 4.0))
+        assert differences(graphs) == []
+        assert any(low <= 2 <= high for low, high, _ in graphs.open)
+    sheet = uncoupled([0.0, 0.0], friction=2.0, load_slope=[1.0, -2.0])
+    graphs = two_graphs(sheet, (0.25, 1.0))
+    assert differences(graphs) == []
+    assert any(low <= 0.25 and high >= 1 for low, high, _ in graphs.open)
+
+
+def test_the_unloaded_state_joins_both_sides():
+    graphs = two_graphs(*through_the_unloaded_state())
+    assert differences(graphs) == []
+    assert graphs.doubts == []
+    assert 0.0 in [v.alpha for v in graphs.traced[0]]
+
+
+def test_without_any_load_there_is_nothing_to_trace():
+    problem = uncoupled([0.0, 0.0], [0.0, 0.0])
+    graph = branch_graph(problem, (0.0, 2.0))
+    assert graph.complete
+    assert len(graph.arcs) == 1
+    # a load inside the body alone, which cancels on the way to the contact nodes, gives no proof that is not whole
+    assert graph.proof is None or verify(problem, graph.proof).ok

@@ -1,0 +1,396 @@
+"""Mutation testing of what graph proofs say of arcs: a mutant that is accepted as a whole is true."""
+
+import functools
+import random
+from contextlib import suppress
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from branches.problems import one_node, planted_corner, together
+from branches.test_degenerate import pair
+from checker.arc_oracle import ArcOracle, arc_count, claims
+from checker.test_graph_mutants import PATHS
+from proof_tools import copied, proof_of, records_of
+
+from enumsol import branch_graph, gallery, verify
+
+ORIGINALS = {
+    "triangle": lambda: (gallery.one_node_triangle(), (0.0, 10.0)),
+    "fold": lambda: (one_node((1.5, -4.0)), (0.0, 9.0)),
+    "loading": PATHS["loading"],
+    "unloaded": PATHS["unloaded"],
+    "both": PATHS["both"],
+    "many digits": lambda: (together(np.random.default_rng(2), push=1e-13), (0.0, 6.0)),
+    "open": lambda: (planted_corner(np.random.default_rng(5), 1, "both"), (0.0, 4.0)),
+}
+#: Mutants of every original in the suite.
+MUTANTS = 220
+
+
+@functools.cache
+def original(name):
+    """Problem, records, what the checker says of them, and the oracle."""
+    problem, interval = ORIGINALS[name]()
+    records = records_of(branch_graph(problem, interval).proof)
+    return problem, records, verify(problem, proof_of(records)), ArcOracle(problem)
+
+
+# -- mutations ---------------------------------------------------------------------------------------------------------
+
+
+def _traces(records):
+    return [k for k, record in enumerate(records) if isinstance(record, list) and record and record[0] == "t"]
+
+
+def _boxes(records):
+    return [k for k, record in enumerate(records) if isinstance(record, list) and record and record[0] == "b"]
+
+
+def _moved(rng, value):
+    """An alpha beside another."""
+    if isinstance(value, str):
+        return str(np.float64(0.5)) if rng.random() < 0.1 else _shifted(rng, value)
+    how = rng.randrange(5)
+    if how == 0:
+        return float(np.nextafter(value, rng.choice((-np.inf, np.inf))))
+    if how == 1:
+        return value + rng.choice((-1, 1)) * 10.0 ** -rng.randrange(1, 15)
+    if how == 2:
+        return value * rng.choice((0.5, 0.9, 1.1, 2.0, -1.0))
+    return rng.uniform(-1.0, 10.0) if how == 3 else str(value)
+
+
+def _shifted(rng, text):
+    return str(Fraction(text) + Fraction(rng.choice((-1, 1)), 10 ** rng.randrange(1, 70)))
+
+
+def _part(rng, records):
+    boxes = [k for k in _boxes(records) if records[k][4]]
+    if boxes:
+        parts = records[rng.choice(boxes)][4]
+        yield parts, rng.randrange(len(parts))
+
+
+def change_kind(rng, records):
+    for parts, k in _part(rng, records):
+        part, kind = parts[k], rng.choice("hneu")
+        fitted = {"h": [rng.choice((-1, 1))], "n": [], "u": []}
+        if kind == "e":
+            fitted["e"] = [rng.choice((-1, 1)), rng.randrange(3), rng.randrange(2), part[1], part[1]]
+        parts[k] = [kind, part[1], *fitted[kind]]
+
+
+def change_entry(rng, records):
+    for parts, k in _part(rng, records):
+        part = parts[k]
+        place = rng.randrange(1, len(part))
+        if place in (1, 5, 6):
+            part[place] = _moved(rng, part[place])
+        elif place == 2:
+            part[place] = -part[place]
+        else:
+            part[place] = rng.randrange(4) if place == 3 else 1 - part[place]
+
+
+def drop_part(rng, records):
+    for parts, k in _part(rng, records):
+        del parts[k]
+
+
+def repeat_part(rng, records):
+    for parts, k in _part(rng, records):
+        parts.insert(k, copied(parts[k]))
+
+
+def swap_parts(rng, records):
+    for parts, k in _part(rng, records):
+        j = rng.randrange(len(parts))
+        parts[k], parts[j] = parts[j], parts[k]
+
+
+def join_parts(rng, records):
+    """One part, of the kind of one of two, for both."""
+    for parts, k in _part(rng, records):
+        if k:
+            kept = parts[k - 1] if rng.random() < 0.5 else parts[k]
+            parts[k - 1 : k + 1] = [[kept[0], parts[k][1], *kept[2:]]]
+
+
+def change_box(rng, records):
+    boxes = _boxes(records)
+    k = rng.choice(boxes)
+    how = rng.randrange(6)
+    if how == 0:
+        del records[k]
+    elif how == 1:
+        records.insert(k, copied(records[k]))
+    elif how == 2:
+        j = rng.choice(boxes)
+        records[k], records[j] = records[j], records[k]
+    elif how == 3:
+        records[k][3] = 1 - records[k][3]
+        if records[k][3] == 1 and rng.random() < 0.5:
+            records[k][1:3] = [str(Fraction(x)) for x in records[k][1:3]]
+    elif how == 4:
+        place = rng.choice((1, 2))
+        records[k][place] = _moved(rng, records[k][place])
+    elif k + 1 in boxes and records[k][4]:  # one box for two
+        records[k][2] = records[k + 1][2]
+        records[k][4] += records[k + 1][4]
+        del records[k + 1]
+
+
+def _block(records, k):
+    """A trace with its boxes."""
+    last = k + 1
+    while isinstance(records[last], list) and records[last] and records[last][0] == "b":
+        last += 1
+    return k, last
+
+
+def change_trace(rng, records):
+    k = rng.choice(_traces(records))
+    first, last = _block(records, k)
+    how = rng.randrange(7)
+    if how == 0:
+        del records[first:last]
+    elif how == 1:
+        records[last:last] = copied(records[first:last])
+    elif how == 2:
+        j = rng.randrange(len(records[k][1]))
+        records[k][1] = records[k][1][:j] + str(rng.randrange(7)) + records[k][1][j + 1 :]
+    elif how == 3:
+        records[k][4] = rng.choice((-1, 0, 1))
+    elif how == 4:
+        place = rng.choice((2, 3))
+        records[k][place] = _moved(rng, records[k][place])
+    elif how == 5:  # too short, or too long, with its first or last box
+        place = rng.choice((0, -1))
+        box = records[first + 1 if place == 0 else last - 1]
+        if box[0] == "b" and box[4]:
+            value = _moved(rng, records[k][2 if place == 0 else 3])
+            records[k][2 if place == 0 else 3] = value
+            box[1 if place == 0 else 2] = value
+            if place == -1:
+                box[4][-1][1] = value
+    else:
+        other = rng.choice(_traces(records))
+        records[k][1], records[other][1] = records[other][1], records[k][1]
+
+
+def remove_arc(rng, records):
+    """An arc and its events are nowhere; the partners of the events may be removed as well."""
+    k = rng.choice(_traces(records))
+    codes = {records[k][1]}
+    if rng.random() < 0.6:
+        codes.add(rng.choice([records[j][1] for j in _traces(records)]))
+    for j in _traces(records):
+        if records[j][1] in codes:
+            first, last = _block(records, j)
+            for box in records[first + 1 : last]:
+                box[4] = [["n", part[1]] if part[0] in "he" else part for part in box[4]]
+
+
+def hide_selection(rng, records):
+    """A selection that was handed on is not, or is left to halves that do not come; its trace may vanish too."""
+    handed = [k for k, record in enumerate(records) if isinstance(record, list) and record and record[0] == "s"]
+    if not handed:
+        return
+    k = rng.choice(handed)
+    codes = records[k][1]
+    if rng.random() < 0.3:
+        records[k][0] = rng.choice("cx")
+    elif rng.random() < 0.3:
+        digits = list(codes)
+        digits[rng.randrange(len(digits))] = str(rng.randrange(7))
+        records[k][1] = "".join(digits)
+    else:
+        del records[k]
+    if rng.random() < 0.7:
+        for j in reversed(_traces(records)):
+            if records[j][1] == codes:
+                first, last = _block(records, j)
+                del records[first:last]
+
+
+def add_selection(rng, records):
+    """A selection that is no leaf of the tree, with the trace of another or none."""
+    handed = [k for k, record in enumerate(records) if isinstance(record, list) and record and record[0] == "s"]
+    traces = _traces(records)
+    if not handed or not traces:
+        return
+    codes = "".join(rng.choice("01234") for _ in records[handed[0]][1])
+    records.insert(rng.choice(handed), ["s", codes])
+    first, last = _block(records, rng.choice(_traces(records)))
+    block = copied(records[first:last])
+    block[0][1] = codes
+    if rng.random() < 0.5:
+        for box in block[1:]:
+            box[4] = [["n", part[1]] for part in box[4]]
+    if rng.random() < 0.8:
+        records[last:last] = block
+
+
+def change_head(rng, records):
+    heads = [record for record in records if isinstance(record, dict)]
+    record = rng.choice(heads)
+    key = rng.choice(sorted(record))
+    value = record[key]
+    if key == "interval":
+        place = rng.randrange(2)
+        record[key][place] = str(Fraction(value[place]) + rng.choice((-1, 1)))
+    elif key in ("force", "length"):
+        shift = rng.choice((-300, -3, -1, 1, 3, 300))
+        record["force"] = [x + shift for x in record["force"]]
+        record["length"] = [x - shift * rng.randrange(2) for x in record["length"]]
+    elif isinstance(value, int):
+        record[key] = value + rng.choice((-1, 1))
+
+
+def change_type(rng, records):
+    """Something of another type where a number, text or list is expected."""
+    junk = rng.choice((None, True, "x", "1/0", -1, 10**17, 1e308, -1e308, 5e-324, [], {}, [[]], "9" * 3000, 0.1))
+    k = rng.choice(_boxes(records) + _traces(records))
+    target = records[k]
+    if target[0] == "b" and target[4] and rng.random() < 0.7:
+        target = rng.choice(target[4])
+    if target:
+        target[rng.randrange(len(target))] = junk
+
+
+MUTATIONS = (
+    *(change_kind, change_entry, change_entry, drop_part, repeat_part, swap_parts, join_parts, change_box, change_box),
+    *(change_trace, change_trace, remove_arc, hide_selection, add_selection, change_head, change_type),
+)
+
+
+def recount(records):
+    """Make the counts fit, as somebody would who wants to be believed."""
+    lists = [record for record in records if isinstance(record, list) and record]
+    head = next((r for r in records if isinstance(r, dict) and "traces" in r and "pieces" not in r), None)
+    traces = sum(record[0] == "t" for record in lists)
+    if head is not None:
+        head["traces"] = traces
+    if isinstance(records[-1], dict) and "pieces" in records[-1]:
+        records[-1] = {
+            "pieces": sum(isinstance(record, dict) and "piece" in record for record in records),
+            "leaves": sum(record[0] == "x" for record in lists),
+            "selections": len({record[1] for record in lists if record[0] == "s"}),
+            "traces": traces,
+            "arcs": arc_count(records),
+        }
+
+
+def mutant(rng, records):
+    """Records with one to three changes."""
+    records = copied(records)
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        try:
+            rng.choice(MUTATIONS)(rng, records)
+        except (IndexError, TypeError, AttributeError, KeyError, ValueError, OverflowError):
+            continue  # it does not apply to what is left
+    if rng.random() < 0.8:
+        with suppress(IndexError, TypeError, KeyError):
+            recount(records)
+    return records
+
+
+def judge(name, records):
+    """Check a mutant; whether it was accepted as a whole."""
+    problem, true, report, oracle = original(name)
+    found = verify(problem, proof_of(records))
+    assert found.ok == (not found.failures)
+    if not found.whole:
+        return False
+    for codes, side, part, low in claims(records):
+        assert oracle.is_true(codes, side, part, low), (codes, side, part, low)
+    # nothing is missing and nothing is there twice; selections that hold nowhere may be added
+    assert found.selections >= {codes for codes, _, part, _ in claims(true) if part[0] in "he"}
+    assert found.interval == report.interval
+    assert not report.whole or found.arcs == report.arcs
+    return True
+
+
+# -- tests -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ORIGINALS)
+def test_the_oracle_agrees_with_the_originals(name):
+    _, records, report, oracle = original(name)
+    assert report.ok
+    assert report.whole == (name != "open")
+    said = list(claims(records))
+    assert all(oracle.is_true(*claim) for claim in said)
+    # and disagrees with their opposites
+    for codes, side, part, low in said:
+        if part[0] in "he":
+            assert not oracle.is_true(codes, side, ["n", part[1]], low)
+            assert not oracle.is_true(codes, side, [*part[:2], -part[2], *part[3:]], low)
+        if part[0] == "n":
+            assert not oracle.is_true(codes, side, ["h", part[1], 1], low)
+
+
+@pytest.mark.parametrize("name", ORIGINALS)
+def test_mutants_accepted_as_a_whole_are_true(name):
+    rng = random.Random(name)
+    _, records, report, _ = original(name)
+    accepted = [judge(name, mutant(rng, records)) for _ in range(MUTANTS)]
+    assert sum(accepted) < MUTANTS / 2
+    if report.whole:
+        assert any(accepted)
+
+
+@pytest.mark.parametrize("name", [name for name in ORIGINALS if name != "open"])
+def test_an_arc_removed_with_its_events_is_refused(name):
+    _, records, *_ = original(name)
+    for k in _traces(records):
+        for j in _traces(records):
+            changed = copied(records)
+            removed = 0
+            for place in {k, j}:
+                first, last = _block(changed, place)
+                for box in changed[first + 1 : last]:
+                    removed += sum(part[0] in "he" for part in box[4])
+                    box[4] = [["n", part[1]] for part in box[4]]
+            recount(changed)
+            assert judge(name, changed) == (removed == 0)
+
+
+def test_proofs_of_degenerate_graphs_are_accepted():
+    for push in (0.0, 1e-12):
+        problem = pair(push)
+        report = verify(problem, branch_graph(problem, (0.0, 6.0)).proof)
+        assert report.ok
+        assert not report.whole
+
+
+def _with_selection(records, codes, like):
+    """Records with a selection that is no leaf of the tree, and with the trace of another as its own."""
+    records = copied(records)
+    handed = next(k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "s")
+    records.insert(handed, ["s", codes])
+    first, last = _block(records, next(k for k in _traces(records) if records[k][1] == like))
+    records[last:last] = [["t", codes, *records[first][2:]], *copied(records[first + 1 : last])]
+    recount(records)
+    return records
+
+
+def test_a_status_that_a_node_cannot_have_is_refused():
+    problem, records, *_ = original("triangle")
+    report = verify(problem, proof_of(_with_selection(records, "4", "0")))
+    assert any("cannot have" in failure for failure in report.failures)
+
+
+@pytest.mark.parametrize(("place", "beyond"), [(2, -1.0), (3, 11.0), (2, -5e-324), (3, 10.000000000000002)])
+def test_traces_that_reach_beyond_their_pieces_are_refused(place, beyond):
+    problem, records, *_ = original("triangle")
+    records = copied(records)
+    k = next(k for k in _traces(records) if records[k][1] == "0")
+    records[k][place] = beyond
+    if place == 2:
+        records[k + 1][1] = beyond
+    else:
+        records[k + 1][2] = records[k + 1][4][-1][1] = beyond
+    report = verify(problem, proof_of(records))
+    assert any("no selection that was handed on there" in failure for failure in report.failures)
