@@ -203,11 +203,11 @@ def _make(
         made.followed = follow(traced, search.pieces, tick, cut_short=bool(made.stops))
         joined, interrupted = made.followed.joined, made.followed.interrupted
         made.stops += [] if interrupted is None else [interrupted]
-        if not joined.open or made.stops or problem.n > EXACT_DOF_LIMIT:
+        if (joined.ordered and not joined.open) or made.stops or problem.n > EXACT_DOF_LIMIT:
             made.vertices, made.arcs = make_traced(traced, joined)
             made.reasons = made.followed.reasons
             return made
-        # several conditions vanish at once, or a selection is singular
+        # several conditions vanish at one alpha, or a selection is singular
         made.exact = ExactCondensed.from_problem(problem)
     assert made.exact is not None
     a, b = (rational(end) for end in search.interval)

@@ -119,11 +119,14 @@ class Joined:
     arcs : list of JoinedArc
     reasons : list of str
         What contradicts completeness.
+    ordered : bool
+        The order of all places is known.
     """
 
     places: list[Place] = field(default_factory=list)
     arcs: list[JoinedArc] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
+    ordered: bool = True
 
     @property
     def open(self) -> list[Place]:
@@ -302,6 +305,7 @@ class _Joining:
         for place in places:
             if last is not None and place.low <= last.high and not place.low == place.high == last.low == last.high:
                 alpha = float(place.low)
+                self._joined.ordered = False
                 self._complain(f"the order of two critical alphas near {alpha:.17g} is not known")
             if last is None or place.high > last.high:
                 last = place

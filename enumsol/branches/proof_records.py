@@ -13,7 +13,7 @@ from enumsol.proof.proof_file import Proof, ProofWriter, packed
 from enumsol.proof.reading import fits
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from enumsol.branches.following import Followed
     from enumsol.branches.tracing import Part
@@ -76,10 +76,21 @@ def write_graph_proof(
         leaves += len(found.empty)
         selections |= set(found.selections)
     counts = {"pieces": len(pieces), "leaves": leaves, "selections": len(selections)}
-    if followed is not None:
+    if followed is not None and all(fits(Fraction(end)) for end in _ends(followed)):
         counts |= _write_arcs(writer, followed)
     writer.write(counts)
     return writer.close()
+
+
+def _ends(followed: Followed) -> Iterator[float | Fraction]:
+    """All alphas of the traces."""
+    for trace in followed.traces:
+        for box in trace.boxes:
+            yield from (box.low, box.high)
+            for part in box.parts:
+                yield part.high
+                if part.kind is PartKind.EVENT:
+                    yield from part.zero
 
 
 def _write_arcs(writer: ProofWriter, followed: Followed) -> dict[str, int]:

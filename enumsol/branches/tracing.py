@@ -198,6 +198,7 @@ class _Tracing:
 
     def _box(self, first: Number, last: Number) -> list[Interval]:
         """Add a box, or as much of it as is decided; what is left."""
+        first, last = _as_float(first), _as_float(last)
         rows, share = self._selection.rows, float(last - first) / self._length
         precise = self._precise() if share < _PRECISE_BOX and self._count <= _MOST_BOXES else None
         smallest = share < _SMALLEST_PRECISE if precise is not None else float(last - first) <= self._spacing
@@ -311,7 +312,8 @@ class _Cutting:
     def _rest(self, low: Number, high: Number) -> list[Interval]:
         """What is left when a part cannot be decided: the part and what lies behind it, or two halves."""
         middle = _between(low, self.high)
-        if self._expansion.rough or (low, high) == (self.low, self.high):
+        # had the part come off the box's beginning, the rest would be as long as the box, again and again
+        if self._expansion.rough or low == self.low:
             return [(low, middle), (middle, self.high)]
         return [(low, high), *([(high, self.high)] if high < self.high else [])]
 
@@ -330,7 +332,7 @@ class _Cutting:
             before, after = (first - borders[2 * k]) / 4, (borders[2 * k + 3] - last) / 4
             if first < last:
                 before, after = min(before, 4 * reach), min(after, 4 * reach)
-            ends += [first - before, last + after]
+            ends += [_simple(first - before, first - before / 2), _simple(last + after / 2, last + after)]
         ends.append(self.high)
         return [x for k, x in enumerate(ends) if not k or x > ends[k - 1]]
 
@@ -384,6 +386,26 @@ class _Cutting:
 
 
 def _between(low: Number, high: Number) -> Number:
-    """The middle; as a fraction where no float lies between."""
+    """The middle; as a fraction where no float lies between, then only roughly."""
     middle = (low + high) / 2
-    return middle if low < middle < high else (Fraction(low) + Fraction(high)) / 2
+    if isinstance(middle, float) and low < middle < high:
+        return middle
+    first, last = Fraction(low), Fraction(high)
+    roughly: Fraction = _simple((5 * first + 3 * last) / 8, (3 * first + 5 * last) / 8)
+    return roughly
+
+
+def _simple(low: Any, high: Any) -> Any:
+    """A fraction of few bits in [low, high]; of floats the first."""
+    if isinstance(low, float) or not low < high:
+        return low
+    # of the form k / 2^e or k 2^e, with 2^e nearly as large as the interval is long
+    length = high - low
+    unit = Fraction(2) ** (length.numerator.bit_length() - length.denominator.bit_length() - 1)
+    return -((-low) // unit) * unit
+
+
+def _as_float(alpha: Number) -> Number:
+    """A float where the number is one."""
+    value = float(alpha)
+    return value if value == alpha else alpha

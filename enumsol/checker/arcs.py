@@ -115,7 +115,11 @@ class ArcChecker:
         self._systems: dict[int, ArcSystem] = {}
         self._events: list[_Event] = []
         self._count = ArcCount()
-        self._border = self.traces = 0
+        self.traces = 0
+        # sums of the indices of arcs that begin there
+        self._degrees = {"first": 0}
+        if origin is not None and interval[0] < origin < interval[1]:
+            self._degrees["unloaded"] = 0
 
     def run(self, head: dict[str, Any], records: Iterator[Any]) -> tuple[ArcCount, Any]:
         """Check all traces; what they show, and the record after them."""
@@ -137,8 +141,9 @@ class ArcChecker:
         if self._due:
             self._fail(f"{len(self._due)} of the selections handed on are not traced")
         self._pair()
-        if not self._count.open and self._border != 1:
-            self._fail(f"the indices at the first alpha add up to {self._border}; expected 1")
+        for place, total in self._degrees.items():
+            if not self._count.open and total != 1:
+                self._fail(f"the indices at the {place} alpha add up to {total}; expected 1")
         return self._count, record
 
     def _spans(self, pieces: list[tuple[Fraction, Fraction]]) -> Iterator[Span]:
@@ -221,8 +226,8 @@ class ArcChecker:
     def arc(self, index: int, starts: int | None) -> None:
         """Count an arc; one that begins at an end of the interval, or where g vanishes, with its side."""
         self._count.arcs += 1
-        if starts is not None and (starts != 1 or self._origin == self._interval[0]):
-            self._border += index
+        if starts is not None:
+            self._degrees["unloaded" if starts == 1 and "unloaded" in self._degrees else "first"] += index
 
     def left_open(self) -> None:
         """Count a part that was left open."""
@@ -270,10 +275,11 @@ class ArcChecker:
                 same = event.rising != partner.rising
                 if event.index != (partner.index if same else -partner.index):
                     self._fail(f"indices do not balance at {float(event.zero[0])}")
-            elif event.partners or not self._count.open:
-                self._fail(f"an event of selection {_text(event.codes)} at {float(event.zero[0])} has no partner")
+            elif event.partners:
+                where = f"selection {_text(event.codes)} at {float(event.zero[0])}"
+                self._fail(f"an event of {where} has {len(event.partners)} partners")
             else:
-                self._count.open += 1
+                self._count.open += 1  # bounds too wide to find the partner, or it was left open
 
 
 class _Selection:
