@@ -162,11 +162,13 @@ class CondensedEnclosure(Sealed):
             # scaling rounds nothing but what underflows
             pair = force[:, None] / length[None, :]
             arrays = (self.S * pair, self.S_rad * pair + TINY, g / length, g_rad / length + TINY)
-        if not all(np.all(np.isfinite(array)) for array in arrays):
+        if not np.all(pair >= _LEAST_PAIR) or not all(np.all(np.isfinite(array)) for array in arrays):
             raise NotEnclosedError(_OVERFLOW)
         return arrays
 
 
+#: Smallest quotient of units, far above underflow.
+_LEAST_PAIR = 2.0**-1000
 _OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_sum
+from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.kernel.ball_arrays import Ball, Inverse, determinant_sign, solution
 from enumsol.kernel.selection_rows import SelectionRows
 
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 #: Terms of the series of z, squarings of its resolvent's bound, and the largest such bound.
 _TERMS, _SQUARINGS, _LARGEST_GROWTH = 16, 6, 1e6
+#: Smallest quotient of units, far above underflow.
+_LEAST_PAIR = 2.0**-1000
 #: Imaginary parts (tau) of what counts as a zero, and sizes by error bounds of what counts as flat, and errors
 #: of what counts as rough; for guesses.
 _NEAR_REAL, _FLAT, _ROUGH = 1e-2, 32.0, 1e-9
@@ -60,6 +63,8 @@ class ArcSystem:
     def of(cls, enclosure: CondensedEnclosure, force: Array, length: Array, side: float = 0.0) -> ArcSystem:
         """An enclosed problem; with ``side`` 1 or -1 for the constant load +-g1 (see kernel.interval)."""
         pair = force[:, None] / length[None, :]
+        if not np.all(pair >= _LEAST_PAIR):
+            raise NotEnclosedError("the units of the arcs underflow float64; expected data in other units")
         F0, F1 = (np.asarray(part, dtype=np.float64) for part in enclosure.problem.friction)
 
         def in_units(value: Array, radius: Array) -> Ball:
@@ -493,8 +498,12 @@ def _to_bernstein(degree: int, low: float, high: float) -> Array:
     are high: a sum of terms whose sizes add up to at most one, for |low|, |high| <= 1.
     """
     powers = np.arange(degree + 1)
-    lows = np.where(powers[:, None] >= powers, low ** np.maximum(powers[:, None] - powers, 0.0), 0.0)
-    return np.asarray(np.einsum("jki,ki,i->kj", _weights(degree), lows, high**powers))
+    # by products, whose rounding is known
+    factors = np.ones((2, degree + 1))
+    factors[0, 1:], factors[1, 1:] = low, high
+    of_low, of_high = np.multiply.accumulate(factors, axis=1)
+    lows = np.where(powers[:, None] >= powers, of_low[np.maximum(powers[:, None] - powers, 0)], 0.0)
+    return np.asarray(np.einsum("jki,ki,i->kj", _weights(degree), lows, of_high))
 
 
 @cache

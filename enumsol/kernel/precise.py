@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import arb, arb_mat, ctx, fmpq
 
-from enumsol.arithmetic.balls import SAFE, UNIT, upper_sum
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_sum
 from enumsol.kernel.arcs import OverInterval
 from enumsol.kernel.rows import SLIP_MINUS, SLIP_PLUS
 from enumsol.kernel.selection_rows import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, SelectionRows
@@ -329,7 +329,7 @@ def _around(y: Any, rise: Any, P: Any) -> tuple[Any, Any] | None:
     if not k < _LARGEST_SHIFT:
         return None
     norm = float(np.max(size / u)) * SAFE
-    first, second = (u * (norm * (1.0 / (1.0 - k) ** power - 1.0 + 8 * UNIT) * SAFE) for power in (1, 2))
+    first, second = (u * (norm * (1.0 / (1.0 - k) ** power - 1.0 + 8 * UNIT) * SAFE) + TINY for power in (1, 2))
     values = [y[i, 0] + arb(0, 1) * rise[i, 0] + arb(0, float(e)) for i, e in enumerate(first)]
     return _column(values), _column([rise[i, 0] + arb(0, float(e)) for i, e in enumerate(second)])
 
