@@ -63,7 +63,7 @@ ERRORS = 2.0
 #: Boxes are not cut below so many units in the last place of alpha, or in many digits below this share of the interval.
 _SMALLEST_UNITS, _SMALLEST_PRECISE = 64.0, 2.0**-60
 #: Boxes shorter than this share of the interval are traced in many digits.
-_PRECISE_BOX = 2.0**-10
+_PRECISE_BOX, _PRECISE_ANYWHERE = 2.0**-10, 2.0**-40
 #: Boxes on which a selection seems to be singular are not cut below this share.
 _SINGULAR = 2.0**-26
 #: Expansions of one selection, after which what is left stays open.
@@ -200,14 +200,18 @@ class _Tracing:
         """Add a box, or as much of it as is decided; what is left."""
         first, last = _as_float(first), _as_float(last)
         rows, share = self._selection.rows, float(last - first) / self._length
-        precise = self._precise() if share < _PRECISE_BOX and self._count <= _MOST_BOXES else None
+        # short beside alpha too, or so short that this does not matter
+        short = share < _PRECISE_BOX and (
+            share < _PRECISE_ANYWHERE or float(last - first) < _PRECISE_BOX * max(abs(float(first)), abs(float(last)))
+        )
+        precise = self._precise() if short and self._count <= _MOST_BOXES else None
         smallest = share < _SMALLEST_PRECISE if precise is not None else float(last - first) <= self._spacing
         whole = self._count > _MOST_BOXES or smallest
         tried: list[tuple[Box, list[Interval]]] = []
         if self._count <= _MOST_BOXES and isinstance(first, float) and isinstance(last, float):
             expansion = self._selection.expansion(first, last, ERRORS)
             if expansion is not None:
-                flat = share < _FLAT_BOX and precise is None
+                flat = short and share < _FLAT_BOX and precise is None
                 tried.append(_Cutting(rows, expansion, whole=whole, flat=flat).run())
         if precise is not None and not (tried and _decides(*tried[0])):
             found = precise.expansion(first, last)

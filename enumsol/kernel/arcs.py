@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 _TERMS, _SQUARINGS, _LARGEST_GROWTH = 16, 6, 1e6
 #: Smallest quotient of units, far above underflow.
 _LEAST_PAIR = 2.0**-1000
+#: Largest coefficients with which sums do not overflow.
+_LARGEST = 2.0**1000
 #: Imaginary parts (tau) of what counts as a zero, and sizes by error bounds of what counts as flat, and errors
 #: of what counts as rough; for guesses.
 _NEAR_REAL, _FLAT, _ROUGH = 1e-2, 32.0, 1e-9
@@ -377,6 +379,8 @@ class ArcSelection:
         slope_error = growth * (float(upper_sum(defect * powers)) + norm * error) * SAFE * SAFE
         F1 = Ball.exact(self.system.F1) * step
         coefficients, off, off_slope = self._polynomials((W, W1), (g, g1), (F, F1), Z, u, (error, slope_error))
+        if not np.max(np.abs(coefficients)) < _LARGEST:
+            return None
         return Expansion(ends, (middle, radius), coefficients, errors * off, errors * off_slope, N, self)
 
     def _slope(self) -> Ball:

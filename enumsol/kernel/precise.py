@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import arb, arb_mat, ctx, fmpq
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_sum
+from enumsol.arithmetic.balls import SAFE, UNIT, upper_sum
 from enumsol.kernel.arcs import OverInterval
 from enumsol.kernel.rows import SLIP_MINUS, SLIP_PLUS
 from enumsol.kernel.selection_rows import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, SelectionRows
@@ -34,6 +34,8 @@ PRECISION, _ZERO_BITS = 320, 200
 #: Steps of Newton's method from the middle of an interval, enlargements of a zero's bounds, bound of how much M may
 #: change over an interval, and of rises that count as none where norms are chosen.
 _STEPS, _WIDENINGS, _LARGEST_SHIFT, _NO_RISE = 8, 6, 0.5, 1e-250
+#: Covers underflow of some products.
+_SUBNORMAL = 2.0**-1070
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,7 +331,8 @@ def _around(y: Any, rise: Any, P: Any) -> tuple[Any, Any] | None:
     if not k < _LARGEST_SHIFT:
         return None
     norm = float(np.max(size / u)) * SAFE
-    first, second = (u * (norm * (1.0 / (1.0 - k) ** power - 1.0 + 8 * UNIT) * SAFE) + TINY for power in (1, 2))
+    growths = (1.0 / (1.0 - k) ** power - 1.0 + 8 * UNIT for power in (1, 2))
+    first, second = (u * (norm * growth * SAFE) + _SUBNORMAL for growth in growths)
     values = [y[i, 0] + arb(0, 1) * rise[i, 0] + arb(0, float(e)) for i, e in enumerate(first)]
     return _column(values), _column([rise[i, 0] + arb(0, float(e)) for i, e in enumerate(second)])
 

@@ -181,3 +181,12 @@ def test_without_any_load_there_is_nothing_to_trace():
     assert len(graph.arcs) == 1
     # a load inside the body alone, which cancels on the way to the contact nodes, gives no proof that is not whole
     assert graph.proof is None or verify(problem, graph.proof).ok
+
+
+@pytest.mark.parametrize("seed", [3, 17, 39])
+def test_boxes_far_from_zero_may_be_long(seed):
+    rng = np.random.default_rng(seed)
+    problem, interval = over_a_long_interval(rng, int(rng.integers(1, 4)), KINDS[seed % 3])
+    graphs = two_graphs(problem, interval)
+    assert graphs.doubts == []
+    assert differences(graphs) == []

@@ -1,0 +1,162 @@
+"""What the kernel says of a selection over alpha is true: against rationals at points, and isolated roots."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from kernel.exact_arcs import Truth, arc_system, exact_of, interval_at, random_data, widened
+
+from enumsol.arithmetic.rationals import rational
+from enumsol.kernel.arcs import ArcSelection, _bernstein_signs, _to_bernstein
+from enumsol.kernel.rows import FRICTIONLESS
+
+
+def selections(count, start=0):
+    """Random selections in balls, and the truth about them."""
+    for seed in range(start, start + count):
+        rng = np.random.default_rng(seed)
+        p = int(rng.integers(1, 4))
+        scale = int(rng.choice((0, 0, 0, -200, 200)))
+        data = random_data(rng, p, integers=rng.random() < 0.3, scale=scale, ill=int(rng.choice((0, 0, 4, 9))))
+        codes = rng.integers(0, 4, size=p)
+        codes[rng.random(p) < 0.1] = FRICTIONLESS
+        if rng.random() < 0.4:
+            system, exact = widened(rng, data, 10.0 ** -int(rng.integers(2, 14)))
+        else:
+            system, exact = arc_system(data), exact_of(data)
+        yield rng, ArcSelection(system, codes.tolist()), Truth(exact, tuple(codes.tolist()))
+
+
+def parts(rng, low, high, count=4):
+    """Some parts of an interval, the whole one and points among them."""
+    yield low, high
+    yield (low, low) if rng.random() < 0.5 else (high, high)
+    for _ in range(count):
+        ends = sorted(float(np.clip(x, low, high)) for x in low + (high - low) * rng.random(2))
+        yield ends[0], ends[1]
+
+
+def check_claims(count, start=0):
+    """Numbers of claims of every kind that were made; all are true."""
+    made = dict.fromkeys(("conditions", "regular", "none", "slopes", "index", "zeros"), 0)
+    for rng, selection, truth in selections(count, start):
+        low, high = interval_at(rng, truth)
+        expansion = selection.expansion(low, high)
+        if expansion is None:
+            continue
+        for a, b in parts(rng, low, high):
+            known = expansion.over(a, b)
+            assert truth.is_true(known, a, b), (selection.rows.codes, a, b, known)
+            made["regular"] += known.regular
+            made["none"] += known.none
+            made["conditions"] += int(known.regular) * int(np.count_nonzero(known.conditions))
+            index = expansion.index(a, b)
+            if index:
+                made["index"] += 1
+                assert truth.signs(truth.det, a, b) == {index}
+            if not known.regular:
+                continue
+            slopes = expansion.slopes(a, b)
+            for k in np.flatnonzero(slopes).tolist():
+                made["slopes"] += 1
+                assert truth.only_zero(k, int(slopes[k]), a, b)
+                signs = [int(expansion.over(end, end).conditions[k]) for end in (a, b)]
+                if a < b and signs == [-slopes[k], slopes[k]]:
+                    made["zeros"] += 1
+                    first, last = expansion.zero_bounds(k, int(slopes[k]), a, b)
+                    assert a <= first < last <= b
+                    assert truth.signs(truth.conditions[k], first, last) == {-1, 0, 1}
+    return made
+
+
+def test_claims_over_parts_are_true():
+    made = check_claims(300)
+    assert min(made.values()) > 20, made
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", range(10))
+def test_many_claims(block):
+    check_claims(2000, 1000 + 2000 * block)
+
+
+def check_errors(count, start=0):
+    """Number of series whose errors lie within their bounds."""
+    compared = 0
+    for rng, selection, truth in selections(count, start):
+        low, high = interval_at(rng, truth)
+        expansion = selection.expansion(low, high)
+        if expansion is None:
+            continue
+        v = expansion._bordered.mid[-1]
+        middle, radius = Fraction(expansion._middle), Fraction(expansion._radius)
+        for tau in (Fraction(-1), Fraction(1), Fraction(float(rng.uniform(-1, 1)))):
+            found = truth.conditions_at(rational(middle + tau * radius), v)
+            assert found is not None  # N is regular throughout
+            compared += 1
+            values, slopes = ([Fraction(int(x.p), int(x.q)) for x in part] for part in found)
+            for k, row in enumerate(expansion._coefficients.tolist()):
+                series = [Fraction(x) for x in row]
+                near = sum(c * tau**j for j, c in enumerate(series))
+                rise = sum(j * c * tau ** (j - 1) for j, c in enumerate(series) if j)
+                assert abs(near - values[k]) <= Fraction(float(expansion._error[k]))
+                assert abs(rise - slopes[k] * radius) <= Fraction(float(expansion._slope_error[k]))
+    return compared
+
+
+def test_series_and_their_slopes_lie_within_their_errors():
+    assert check_errors(300) > 400
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", range(10))
+def test_many_series(block):
+    check_errors(1500, 1000 + 1500 * block)
+
+
+def test_signs_from_bernstein_polynomials_are_right_to_the_last_bit():
+    proven = 0
+    for seed in range(250):
+        rng = np.random.default_rng(seed)
+        coefficients = rng.normal(size=17) * 10.0 ** rng.uniform(-18, 0, size=17)
+        low, high = np.sort(rng.uniform(-1, 1, size=2)) if seed % 3 else np.repeat(rng.uniform(-1, 1), 2)
+        at = Fraction(float(low)) + (Fraction(float(high)) - Fraction(float(low))) * Fraction(seed % 7, 6)
+        # zero within rounding at one point
+        coefficients[0] -= float(sum(Fraction(float(c)) * at**k for k, c in enumerate(coefficients)))
+        exact = [Fraction(float(c)) for c in coefficients]
+        error = np.array([136 * 2.0**-53 * np.sum(np.abs(coefficients)) * 1.001])
+        sign = int(_bernstein_signs(coefficients[None], error, float(low), float(high))[0])
+        proven += sign != 0
+        values = _to_bernstein(16, float(low), float(high))
+        for j in range(17):
+            x = Fraction(float(low)) + (Fraction(float(high)) - Fraction(float(low))) * Fraction(j, 16)
+            value = sum(c * x**k for k, c in enumerate(exact))
+            assert not sign or value * sign > 0
+            # numbers of Bernstein polynomials of tau are those of low + (high - low) j / degree
+            assert abs(Fraction(float(values[1, j])) - x) <= Fraction(2) ** -48
+    assert proven < 250
+
+
+def test_single_alphas():
+    regular = 0
+    for rng, selection, truth in selections(300):
+        low, high = interval_at(rng, truth)
+        alpha = float(rng.choice((low, high, 0.5 * (low + high))))
+        found = selection.at(alpha)
+        if found is None:
+            continue
+        regular += 1
+        (index,) = truth.signs(truth.det, alpha, alpha)
+        assert index != 0
+        for k in range(len(truth.conditions)):
+            sign = selection.sign_at(alpha, k)
+            assert not sign or truth.signs(truth.conditions[k], alpha, alpha) == {sign * index}
+    assert regular > 150
+
+
+def test_an_interval_of_two_neighbouring_floats_and_one_of_any_length():
+    for _, selection, truth in selections(60):
+        for low, high in ((1.0, float(np.nextafter(1.0, 2.0))), (-1e6, 1e9), (0.0, 5e-324), (1e300, 1.7e308)):
+            expansion = selection.expansion(low, high)
+            if expansion is not None:
+                assert truth.is_true(expansion.over(low, high), low, high)

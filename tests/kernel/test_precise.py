@@ -1,0 +1,143 @@
+"""What the kernel says of a selection in many digits is true: against isolated roots of exact polynomials."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from branches.problems import generic_problem
+from flint import arb, arb_mat
+from kernel.exact_arcs import Truth, exact_of, interval_at, precise_system, random_data
+
+from enumsol.condensation.exact import ExactCondensed
+from enumsol.kernel.precise import PreciseSelection, PreciseSystem, _around, _ball, _precision, _upper
+from enumsol.kernel.rows import FRICTIONLESS
+
+
+def selections(count, start=0):
+    """Random selections of exact data in any units, and the truth about them."""
+    for seed in range(start, start + count):
+        rng = np.random.default_rng(seed)
+        p = int(rng.integers(1, 4))
+        scale = int(rng.choice((0, 0, -900, 900, -300)))
+        data = random_data(rng, p, integers=rng.random() < 0.4, scale=scale, ill=int(rng.choice((0, 4, 9))))
+        codes = rng.integers(0, 4, size=p)
+        codes[rng.random(p) < 0.1] = FRICTIONLESS
+        codes = codes.tolist()
+        yield rng, PreciseSelection(precise_system(data), codes), Truth(exact_of(data), tuple(codes))
+
+
+def short_interval(rng, truth):
+    """An interval about some place of interest, down to 10^-60 long."""
+    low, high = interval_at(rng, truth)
+    middle = Fraction(low) + (Fraction(high) - Fraction(low)) * Fraction(int(rng.integers(0, 9)), 8)
+    if rng.random() < 0.5:
+        width = Fraction(1, 10 ** int(rng.integers(1, 60)))
+        return middle - width, middle + width * int(rng.integers(1, 5))
+    return Fraction(low), Fraction(high)
+
+
+def check_claims(count, start=0):
+    """Numbers of claims of every kind that were made; all are true."""
+    made = dict.fromkeys(("conditions", "none", "slopes", "index", "zeros"), 0)
+    for rng, selection, truth in selections(count, start):
+        low, high = short_interval(rng, truth)
+        expansion = selection.expansion(low, high)
+        if expansion is None:
+            continue
+        cuts = sorted(low + (high - low) * Fraction(int(rng.integers(0, 1025)), 1024) for _ in range(4))
+        for a, b in ((low, high), (low, low), (cuts[0], cuts[1]), (cuts[2], cuts[3])):
+            known = expansion.over(a, b)
+            assert truth.is_true(known, a, b), (selection.rows.codes, a, b, known)
+            made["none"] += known.none
+            made["conditions"] += int(known.regular) * int(np.count_nonzero(known.conditions))
+            index = expansion.index(a, b)
+            if not index:
+                continue
+            made["index"] += 1
+            assert truth.signs(truth.det, a, b) == {index}
+            slopes = expansion.slopes(a, b)
+            for k in np.flatnonzero(slopes).tolist():
+                made["slopes"] += 1
+                assert truth.only_zero(k, int(slopes[k]), a, b)
+                signs = [int(expansion.over(end, end).conditions[k]) for end in (a, b)]
+                if a < b and signs == [-slopes[k], slopes[k]]:
+                    made["zeros"] += 1
+                    first, last = expansion.zero_bounds(k, int(slopes[k]), a, b)
+                    assert a <= first < last <= b
+                    assert truth.signs(truth.conditions[k], first, last) == {-1, 0, 1}
+    return made
+
+
+def test_claims_over_parts_are_true():
+    made = check_claims(300)
+    assert min(made.values()) > 20, made
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", range(10))
+def test_many_claims(block):
+    check_claims(2000, 1000 + 2000 * block)
+
+
+def test_balls_over_an_interval_hold_the_unknowns_and_their_slopes():
+    compared = 0
+    for rng, selection, truth in selections(250):
+        low, high = short_interval(rng, truth)
+        with _precision():
+            middle, radius = (low + high) / 2, (high - low) / 2
+            solved = selection.solve(_ball(middle))
+            if solved is None or not solved[1].nrows():
+                continue
+            y, M = solved
+            rise = M.solve((selection._g[1] - selection._M[1] * y) * _ball(radius))
+            found = _around(y, rise, M.solve(selection._M[1] * _ball(radius)))
+            if found is None:
+                continue
+            for tau in (Fraction(-1), Fraction(1), Fraction(int(rng.integers(-99, 100)), 100)):
+                alpha = middle + tau * radius
+                there = selection.solve(_ball(alpha))
+                slope = there[1].solve(selection._g[1] - selection._M[1] * there[0]) * _ball(radius)
+                compared += 1
+                for ours, exact in zip(found, (there[0], slope), strict=True):
+                    for i in range(ours.nrows()):
+                        # the value at one alpha is known to some ninety digits
+                        assert ours[i, 0].overlaps(exact[i, 0])
+    assert compared > 100
+
+
+def test_balls_around_the_smallest_and_largest_numbers():
+    with _precision():
+        for exponent in (-2000, -1074, -1000, 0, 1000):
+            size = arb(2) ** exponent
+            for rate in (arb(1) / 4, arb(2) ** -30, arb(2) ** -300):
+                found = _around(arb_mat([[arb(0)]]), arb_mat([[size]]), arb_mat([[rate]]))
+                assert found is not None
+                for tau in (-1, 1):
+                    assert found[0][0, 0].contains((tau * size / (1 + tau * rate)).mid())
+                    assert found[1][0, 0].contains((size / (1 + tau * rate) ** 2).mid())
+
+
+def test_floats_are_upper_bounds():
+    with _precision():
+        for mid, rad in ((1, 0), (-1, 0.5), (0, 0), (arb(1) / 3, 1e-30), (arb(2) ** -2000, 0), (arb(2) ** 900, 1.0)):
+            ball = arb(mid, rad)
+            assert arb(_upper(ball)) >= abs(ball).upper()
+        assert _upper(arb(2) ** 2000) == np.inf
+        assert not _upper(arb("nan")) < np.inf
+
+
+def test_condensed_data_lie_in_their_balls():
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        problem = generic_problem(rng, int(rng.integers(1, 4)), ("friction", "load", "both")[seed % 3])
+        ours, exact = PreciseSystem.of(problem), ExactCondensed.from_problem(problem)
+        assert ours is not None
+        with _precision():
+            for r, row in enumerate(exact.rows):
+                pairs = [(ours.S[r, k], x) for k, x in enumerate(row)]
+                pairs += [(ours.g0[r], exact.g0[r]), (ours.g1[r], exact.g1[r])]
+                for ball, value in pairs:
+                    assert ball.contains(arb(value))
+                    assert float(ball.rad()) <= 1e-80 * max(1.0, abs(float(arb(value))))
+            for parts in ((ours.F0, exact.F0), (ours.F1, exact.F1)):
+                assert all(ball.contains(arb(value)) for ball, value in zip(*parts, strict=True))
