@@ -79,7 +79,7 @@ def test_a_problem_in_2d_loads_nothing_of_3d():
     code += "assert enumsol.verify(problem, roots.proof).complete and len(enumsol.multiplicity_table(problem, [1]))\n0"
     modules = {name.removeprefix("enumsol.") for name in modules_after(code) if name.startswith("enumsol.")}
     assert {"search.parallel", "search.solvers", "roots.enumeration"} <= modules
-    of_space = {"sectors", "friction", "body3d", "problem3d", "kernel.leaves", "kernel.ball_arrays", "roots.root3d"}
+    of_space = {"sectors", "friction", "body3d", "problem3d", "kernel.leaves", "roots.root3d"}
     assert not modules & of_space
     assert not [name for name in modules if "space" in name]
 

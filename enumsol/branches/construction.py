@@ -69,9 +69,9 @@ def branch_graph(
 ) -> BranchGraph:
     """All solutions over an interval of alpha, as arcs glued at vertices (theory, section 7).
 
-    A tree search over the interval gives the selections that may hold somewhere in it. For each of them all alpha at
-    which a condition or the determinant vanishes are isolated as roots of integer polynomials; where it holds between
-    them is an arc. Arcs are glued by the statuses that hold at their ends, decided without rounding.
+    A tree search over the interval gives the selections that may hold somewhere in it. Each of them is followed over
+    alpha, in ball arithmetic or by the roots of integer polynomials; an arc is where it holds. Arcs are glued by the
+    statuses that hold at their ends, never by comparing numbers.
 
     Parameters
     ----------
@@ -79,11 +79,15 @@ def branch_graph(
     interval : pair of alphas
         First and last alpha, in increasing order: float, Fraction or whatever enumerate_roots accepts as alpha.
     arithmetic : {"verified", "fast", "exact"}
-        "verified": every leaf of the search is proven empty over its whole piece of the interval by rigorous error
-        bounds, and what follows is exact. Up to 24 degrees of freedom this concerns the problem's own matrices, above
-        that S and g as computed in floats (``graph.certified_data`` says which). "fast": the same, but the search
-        trusts floats; never claimed to be complete. "exact": everything in rationals, for the problem's own
-        matrices of up to 250 degrees of freedom, and slow beyond some ten contact nodes.
+        "verified": every leaf of the search is proven empty over its whole piece of the interval, and every selection
+        handed on is followed, by rigorous error bounds for the problem's own matrices (theory, section 7.14). The graph
+        is made of these arcs; up to 24 degrees of freedom, and up to 250 if bounds left something open, it is made by
+        exact algebra instead, for the same matrices (``graph.data.arcs_by`` says which). Beyond 250 what is left open
+        is a vertex of kind "unsettled", and the graph is not complete. Only where A is positive definite within
+        rounding are more than 24 degrees of freedom about S and g as computed in floats (``graph.certified_data``).
+        "fast": exact algebra, but the search trusts floats; never claimed to be complete; S and g as computed beyond 24
+        degrees of freedom. "exact": everything in rationals, for the problem's own matrices of up to 250 degrees of
+        freedom, and slow beyond some ten contact nodes.
     progress : callable, optional
         Called with the name of the stage ("search", "arcs") and the share of it that is done.
     max_nodes : int, optional

@@ -1,4 +1,4 @@
-"""The proof of a branch graph's search as a file (see enumsol.checker.graph for its records)."""
+"""The proof of a branch graph as a file (see enumsol.checker.graph and enumsol.checker.arcs for its records)."""
 
 from __future__ import annotations
 

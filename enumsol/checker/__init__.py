@@ -3,11 +3,13 @@
 What a verified proof says
     For the problem's own A, Bn, Bt, f, gap, slip offset and friction, read as exact numbers (or, where the report says
     "S and g as computed", for the condensed data), and for alpha as an exact fraction: the listed roots and families
-    solve the problem, and nothing else does. It rests on the energy bound (theory, (5.2)), on branchings that cover
-    (``kernel.rows.children_of``), on the a-priori error bounds of IEEE double arithmetic with rounding to nearest in
-    ``arithmetic.balls``, ``condensation.enclosure`` and ``kernel``, and on rational arithmetic in ``checker.rational``
-    and ``checker.hull``. Linear algebra kernels may sum in any order and fuse multiplications and additions; fast
-    matrix multiplication of Strassen's kind and changed rounding modes are excluded.
+    solve the problem, and nothing else does. The proof of a branch graph says that every solution for every alpha of an
+    interval lies in the selections handed on and, if it holds arcs, what each of them does along the interval, except
+    for short intervals that it leaves open. All this rests on the energy bound (theory, (5.2)), on branchings that
+    cover (``kernel.rows.children_of``), on the a-priori error bounds of IEEE double arithmetic with rounding to nearest
+    in ``arithmetic.balls``, ``condensation.enclosure`` and ``kernel``, and on rational arithmetic in
+    ``checker.rational`` and ``checker.hull``. Linear algebra kernels may sum in any order and fuse multiplications and
+    additions; fast matrix multiplication of Strassen's kind and changed rounding modes are excluded.
 
 What checker and search share
     ``checker.verify``, ``checker.graph`` and ``checker.space`` import nothing of the search, neither its trees and
@@ -19,12 +21,14 @@ What checker and search share
       positive definite;
     - ``kernel.point`` and ``kernel.interval``: the exclusion inequality, the verified solve of a selection and the
       contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled copy of
-      the inequality at one alpha);
+      the inequality);
+    - for the arcs of branch graphs: ``kernel.selection_rows``, the numbers of unknowns and conditions; ``kernel.arcs``,
+      a selection over an interval as a series with bounds of its error; ``kernel.precise``, the same with many digits,
+      loaded only where a box asks for it; ``kernel.ball_arrays``, linear systems of balls (in 3D, too);
     - for problems in 3D, and loaded for their proofs only: ``kernel.space``, the rows and branchings and the
       exclusion inequality; ``kernel.leaves``, what a complete assignment holds and which leaves share a root;
-      ``kernel.ball_arrays``, linear systems of balls; ``sectors``, the ends of sectors;
-      ``condensation.space``, balls for S and g in the variables in which friction is isotropic; ``problem3d``,
-      ``body3d`` and ``friction``, the data and their checks;
+      ``sectors``, the ends of sectors; ``condensation.space``, balls for S and g in the variables in which friction is
+      isotropic; ``problem3d``, ``body3d`` and ``friction``, the data and their checks;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes;
       ``condensation.affine``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
       definite matrix, and floats as rationals;
@@ -38,8 +42,9 @@ What checker and search share
     set of bounds, right but not the same, would refuse true proofs near a degeneracy; whether a number is zero has to
     be decided alike. What is shared knows nothing of a search, and the tests hold it against rational arithmetic that
     uses none of it. The checker's own are what a search gets wrong: the strict reading of the file, that the leaves
-    cover all selections and the pieces the interval, which leaf proves what, the counts, the joining of root sets, and
-    for degenerate leaves the condensation and the root sets in rationals.
+    cover all selections and the pieces the interval, which leaf or part of an arc proves what, which events are the
+    same point, the counts, the joining of root sets, and for degenerate leaves the condensation and the root sets in
+    rationals.
 
 What counts as one root
     A root at which every condition holds strictly solves one selection only, and so two such roots of two leaves are

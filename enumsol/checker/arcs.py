@@ -1,6 +1,6 @@
 """Checker of the arcs of a branch graph: where every selection handed on holds, and how arcs are joined.
 
-Records (see docs/proof_format.md, section 6.5): ``{"traces", "force", "length"}``; for every selection and every
+Records (see docs/proof_format.md, under Arcs): ``{"traces", "force", "length"}``; for every selection and every
 interval on which it was handed on ``["t", codes, low, high, side]``, then its boxes ``["b", low, high, precise,
 parts]``.
 

@@ -1,10 +1,11 @@
-"""Checker of a branch graph's search: every solution in the interval lies in one of the selections handed on.
+"""Checker of a branch graph: every solution in the interval lies in one of the selections handed on, or on its arcs.
 
 Records (see enumsol.proof.proof_file for the file and the reader): a header ``{"format": "enumsol-proof",
 "version": 1, "kind": "graph", "problem": <fingerprint>, "interval": [a, b], "p": p, "data": "problem" | "condensed"}``;
 for every piece ``{"piece": [a, b], "force", "length", "roots"}``, then its leaves ``["x", codes, rows, multipliers]``
 (no solution anywhere in the piece), ``["s", codes]`` (a selection handed on) and ``["c", codes]`` (left to both halves
-of the piece); at the end ``{"pieces", "leaves", "selections"}``. Codes are strings of p digits; ends of pieces are
+of the piece); then, if the proof holds them, arcs (see enumsol.checker.arcs); at the end ``{"pieces", "leaves",
+"selections"}``, with arcs ``"traces"`` and ``"arcs"``, too. Codes are strings of p digits; ends of pieces are
 fractions ``"a/b"`` in decimal digits.
 
 What is checked: pieces partition the interval (it is cut first where g vanishes, see ``condensation.unloaded``), with

@@ -57,7 +57,7 @@ def graph(
         str | None, node("--nodes", "LABELS", "Contact nodes to draw, such as 0,3; default: up to three.")
     ] = None,
 ) -> None:
-    """Find all solutions of PROBLEM for every alpha of an interval, as branches of exact arcs.
+    """Find all solutions of PROBLEM for every alpha of an interval, as branches of arcs.
 
     Prints branches, folds, bifurcations and continua, and whether the graph is complete.
 

@@ -19,7 +19,6 @@ IN_SPACE = {
     "enumsol.checker.space",
     "enumsol.kernel.space",
     "enumsol.kernel.leaves",
-    "enumsol.kernel.ball_arrays",
     "enumsol.condensation.space",
     "enumsol.sectors",
 }
@@ -46,7 +45,10 @@ SHARED = {
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
     "condensation.space": {"EnclosedSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "vanishing_alpha"},
+    "kernel.arcs": None,
     "kernel.interval": {"EnclosedPiece", "as_computed", "interval_exclusion_margin"},
+    "kernel.precise": None,
+    "kernel.selection_rows": None,
     "kernel.point": {"VerifiedSelection", "exclusion_margin", "holds_no_root", "solve_selection"},
     "kernel.rows": None,
     "kernel.space": None,
