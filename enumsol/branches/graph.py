@@ -63,13 +63,8 @@ class BranchGraph(Immutable):
     pieces : tuple of SearchedPiece
         The search's leaves with their multipliers, piece by piece of the interval (empty after ``load``).
     proof : Proof or None
-<<<<<<< HEAD
-        In verified arithmetic: the search's leaves and the arcs, for ``enumsol.verify`` (None after ``load``, for a
-        search that was cut short, and where rationals had to decide about leaves).
-=======
         In verified arithmetic: the search's leaves and the arcs of the selections handed on, for ``enumsol.verify``
         (None after ``load``, for a search that was cut short, and where rationals had to decide about leaves).
->>>>>>> jdocs
 
     Examples
     --------
