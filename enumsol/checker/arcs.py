@@ -196,7 +196,8 @@ class ArcChecker:
         low, high = _number(record[1]), _number(record[2])
         if not low == start < high or len(record[4]) > _MOST_PARTS:
             raise ValueError("a box does not begin where the one before ends, or has too many parts")
-        expansion = selection.expansion(record[1], record[2], precise=bool(record[3]))
+        nothing = all(isinstance(part, list) and part[:1] == ["u"] for part in record[4])
+        expansion = None if nothing else selection.expansion(record[1], record[2], precise=bool(record[3]))
         end: Any = record[1]
         for part in record[4]:
             kind = part[0] if isinstance(part, list) and part else None

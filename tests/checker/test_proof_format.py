@@ -9,27 +9,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rational_arcs
 import rational_checker
-from generators import integer_problem, random_problem, singular_problem, through_the_unloaded_state
+import rational_forms
+import rational_zeros
+from generators import integer_problem, random_problem, singular_problem
+from graph_proofs import (
+    GRAPHS,
+    accepted,
+    graph,
+    of_kind,
+    refused,
+    replaced,
+    three_with_everything,
+    triangle,
+    without_arcs,
+)
 from proof_tools import MAGIC, bytes_of, copied, leaves_of, multipliers, proof_of, records_of, sealed, with_multipliers
 from rational_checker import Refused, check, check_records, fingerprint
 
-from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
+from enumsol import enumerate_roots, gallery, verify
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "proof_format.md"
-
-
-def triangle(**data):
-    body = gallery.one_node_triangle()
-    return ContactProblem(body.A, body.Bn, body.Bt, data.pop("f", body.f), **data)
-
-
-def three_with_everything():
-    """Gap, press fit, slip offset, a node without friction, load and friction that vary."""
-    block = gallery.clamped_block(3, 1)
-    rng = np.random.default_rng(5)
-    path = {"friction": ([0.0, 0.2, 0.3], [0.0, 0.5, 1.0]), "load_slope": 0.1 * rng.normal(size=block.n)}
-    return ContactProblem(block.A, block.Bn, block.Bt, block.f, [1e-3, -2e-3, 0.0], slip_offset=1e-3, **path)
 
 
 POINTS = {
@@ -46,14 +47,6 @@ POINTS = {
     "everything": lambda: (three_with_everything(), Fraction(7, 3)),
     "all statuses": lambda: (integer_problem(np.random.default_rng(20), 2), 0.0),
 }
-GRAPHS = {
-    "friction": lambda: (gallery.get("two-node-6.4").build(), (0.0, 6.0)),
-    "load": lambda: (gallery.get("two-node-6.7-minus").build(), (-3.0, 3.0)),
-    "both": lambda: (triangle(f=[1.0, -2.5], load_slope=[0.2, -0.5], friction=(0.5, 0.7)), (0.0, 6.0)),
-    "unloaded": through_the_unloaded_state,
-    "frictionless": lambda: (triangle(load_slope=[-1.0, 0.5], friction=0.0), (0.0, 4.0)),
-    "everything": lambda: (three_with_everything(), (0.0, 3.0)),
-}
 
 
 @functools.cache
@@ -65,37 +58,17 @@ def point(name):
     return problem, records_of(roots.proof), roots
 
 
-@functools.cache
-def graph(name):
-    problem, interval = GRAPHS[name]()
-    made = branch_graph(problem, interval)
-    assert made.complete
-    return problem, records_of(made.proof), made
-
-
-def accepted(problem, records):
-    try:
-        check_records(problem, records)
-    except Refused:
-        return False
-    return True
-
-
-def refused(problem, records):
-    """Both checkers refuse."""
-    assert not verify(problem, proof_of(records)).ok
-    return not accepted(problem, records)
-
-
 # -- the checker is another program ------------------------------------------------------------------------------------
 
 
 def test_the_checker_imports_nothing_of_the_package():
-    tree = ast.parse(Path(rational_checker.__file__).read_text(encoding="utf-8"))
-    names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
-    names |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    assert not any(name.startswith("enumsol") for name in names)
-    assert {"flint", "zlib", "json", "struct"} <= names
+    modules, names = (rational_checker, rational_arcs, rational_forms, rational_zeros), set()
+    for module in modules:
+        tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
+        names |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+        names |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    standard = {"base64", "fractions", "functools", "hashlib", "itertools", "json", "math", "re", "struct", "zlib"}
+    assert names == standard | {"flint", "numpy", *(module.__name__ for module in modules[1:])}
 
 
 def test_the_document_names_what_the_proofs_hold():
@@ -164,13 +137,14 @@ def test_graph_proofs_in_halves_are_accepted(name):
 
 def cut_in_two(records):
     """The proof of one piece as one that leaves its selections to both halves."""
-    header, piece, *leaves, footer = records
+    arcs = next(k for k, record in enumerate(records) if "traces" in record)
+    header, piece, *leaves = records[:arcs]
     (a, b), selections = (Fraction(end) for end in piece["piece"]), [leaf for leaf in leaves if leaf[0] == "s"]
     middle = str((a + b) / 2)
     changed = [header, piece, *(["c", leaf[1]] if leaf[0] == "s" else leaf for leaf in leaves)]
     for ends in ([piece["piece"][0], middle], [middle, piece["piece"][1]]):
         changed += [{**piece, "piece": ends, "roots": [leaf[1] for leaf in selections]}, *selections]
-    return [*changed, {**footer, "pieces": 3}]
+    return [*changed, *records[arcs:-1], {**records[-1], "pieces": 3}]
 
 
 def test_fingerprints():
@@ -207,16 +181,6 @@ def test_the_example_of_the_document_is_a_proof():
 
 
 # -- refused -----------------------------------------------------------------------------------------------------------
-
-
-def of_kind(records, *kinds):
-    return [k for k, record in enumerate(records) if isinstance(record, list) and record[0] in kinds]
-
-
-def replaced(records, k, record):
-    changed = copied(records)
-    changed[k] = record
-    return changed
 
 
 @pytest.mark.parametrize("name", ["one-node-6.1", "five roots", "everything"])
@@ -325,9 +289,14 @@ def test_another_alpha_makes_other_roots():
     assert refused(problem, [{**records[0], "alpha": "9/2"}, *records[1:]])
 
 
+@pytest.mark.parametrize("arcs", [True, False])
 @pytest.mark.parametrize("name", ["friction", "load", "both", "unloaded", "everything"])
-def test_forged_graph_proofs(name):
+def test_forged_graph_proofs(name, arcs):
     problem, records, _ = graph(name)
+    if not arcs:
+        records = without_arcs(records)
+        assert accepted(problem, records)
+        assert verify(problem, proof_of(records)).ok
     a, b = records[0]["interval"]
     assert refused(problem, [{**records[0], "interval": [a, str(Fraction(b) + 1)]}, *records[1:]])
     pieces = [k for k, record in enumerate(records) if isinstance(record, dict) and "piece" in record]
@@ -356,10 +325,20 @@ def test_halves_out_of_order_or_missing():
     problem, records, _ = graph("friction")
     halves = cut_in_two(records)
     _, second, third = [k for k, record in enumerate(halves) if isinstance(record, dict) and "piece" in record]
-    head, left, right, footer = halves[:second], halves[second:third], halves[third:-1], halves[-1:]
-    assert accepted(problem, head + left + right + footer)
-    assert refused(problem, head + right + left + footer)
-    assert refused(problem, head + left + [{**footer[0], "pieces": 2}])
+    last = next(k for k, record in enumerate(halves) if "traces" in record)
+    head, left, right, arcs, footer = (
+        halves[:second],
+        halves[second:third],
+        halves[third:last],
+        halves[last:-1],
+        halves[-1],
+    )
+    for some in ([], arcs):
+        counts = footer if some else without_arcs(halves)[-1]
+        assert accepted(problem, [*head, *left, *right, *some, counts])
+        assert refused(problem, [*head, *right, *left, *some, counts])
+        assert refused(problem, [*head, *left, *some, {**counts, "pieces": 2}])
+    assert refused(problem, [*head, *left, *arcs, *right, footer])
 
 
 def test_containers():

@@ -1,0 +1,72 @@
+"""Graph proofs for tests of both checkers: the package's and the one in rational arithmetic."""
+
+import functools
+
+import numpy as np
+from generators import through_the_unloaded_state
+from proof_tools import copied, proof_of, records_of
+from rational_checker import Refused, check_records
+
+from enumsol import ContactProblem, branch_graph, gallery, verify
+
+
+def triangle(**data):
+    body = gallery.one_node_triangle()
+    return ContactProblem(body.A, body.Bn, body.Bt, data.pop("f", body.f), **data)
+
+
+def three_with_everything():
+    """Gap, press fit, slip offset, a node without friction, load and friction that vary."""
+    block = gallery.clamped_block(3, 1)
+    rng = np.random.default_rng(5)
+    path = {"friction": ([0.0, 0.2, 0.3], [0.0, 0.5, 1.0]), "load_slope": 0.1 * rng.normal(size=block.n)}
+    return ContactProblem(block.A, block.Bn, block.Bt, block.f, [1e-3, -2e-3, 0.0], slip_offset=1e-3, **path)
+
+
+GRAPHS = {
+    "friction": lambda: (gallery.get("two-node-6.4").build(), (0.0, 6.0)),
+    "load": lambda: (gallery.get("two-node-6.7-minus").build(), (-3.0, 3.0)),
+    "both": lambda: (triangle(f=[1.0, -2.5], load_slope=[0.2, -0.5], friction=(0.5, 0.7)), (0.0, 6.0)),
+    "unloaded": through_the_unloaded_state,
+    "frictionless": lambda: (triangle(load_slope=[-1.0, 0.5], friction=0.0), (0.0, 4.0)),
+    "everything": lambda: (three_with_everything(), (0.0, 3.0)),
+}
+
+
+@functools.cache
+def graph(name):
+    problem, interval = GRAPHS[name]()
+    made = branch_graph(problem, interval)
+    assert made.complete
+    return problem, records_of(made.proof), made
+
+
+def accepted(problem, records):
+    try:
+        check_records(problem, records)
+    except Refused:
+        return False
+    return True
+
+
+def refused(problem, records):
+    """Both checkers refuse."""
+    assert not verify(problem, proof_of(records)).ok
+    return not accepted(problem, records)
+
+
+def without_arcs(records):
+    """The proof of a graph that says only where selections may have solutions."""
+    *_, footer = records
+    first = next(k for k, record in enumerate(records) if "traces" in record)
+    return [*records[:first], {key: footer[key] for key in footer if key not in ("traces", "arcs")}]
+
+
+def of_kind(records, *kinds):
+    return [k for k, record in enumerate(records) if isinstance(record, list) and record[0] in kinds]
+
+
+def replaced(records, k, record):
+    changed = copied(records)
+    changed[k] = record
+    return changed
