@@ -18,6 +18,17 @@ cut at a number of nodes (column "complete" is False then).
 minimiser's slip or force in which the energy bound holds all solutions, without regard to other rows, and by one dual
 step. ``turned`` is the search with every node's axes turned so that the direction in which the relaxation at the root
 of the tree points is the middle of a sector, or on an end of one. There it is in floats.
+
+``early`` has searches, on more bodies, that test by Krawczyk's operator before the product does. ``wasted`` are tests
+that leave a leaf open, ``first root`` is the node of the tree at which a root is found first:
+
+- final, level l: as soon as all statuses are final and no sector is wider than level l (4 sectors are level 2); "widest
+  halved": after a test that failed not until the widest sector is narrower;
+- completions of k: besides, all completions of an assignment with at most k undecided nodes, so as not to branch;
+- suggested, k: where at most k nodes are undecided, the one completion that the minimiser points to, for the order and
+  for leaves in the box of a root that is known.
+
+Seconds there are of one run on a machine with other work. ``below`` counts the nodes that any earlier test could save: those below assignments in which k nodes are undecided.
 """
 
 from __future__ import annotations
@@ -42,6 +53,7 @@ from enumsol.search.space_solvers import SpaceSolvers
 from enumsol.search.tree import SearchLimits
 from enumsol.sectors import DEEPEST, SECTORS, direction, end_number, level_of
 from enumsol.statuses import CONTACT, UNDECIDED
+from search_in_3d_choices.early import early
 
 if TYPE_CHECKING:
     from shared.results import Run
@@ -58,6 +70,15 @@ BODIES = {
 }
 #: For the last two tables only: all choices take as long there, as most of the time goes to leaves.
 MORE = {"wedge3d-4-9": (gallery.get("wedge3d-4-9").build, gallery.get("wedge3d-4-9").alpha)}
+#: And these, for tests of leaves.
+EARLY = {
+    **{
+        f"block {p}, F = 1": (lambda cells=cells: gallery.block3d(*cells), 1.0)
+        for p, cells in ((9, (3, 2, 2)), (12, (4, 2, 2)), (16, (4, 3, 2)))
+    },
+    **{name: (gallery.get(name).build, gallery.get(name).alpha) for name in ("wedge3d-2-3", "wedge3d-4-3")},
+}
+EARLY_RANDOM = 60
 SMOKE_BODIES = {"wedge3d-2-3": (gallery.get("wedge3d-2-3").build, 1.0)}
 
 
@@ -302,6 +323,10 @@ def main(run: Run) -> None:
     others = bodies if run.smoke else bodies | MORE
     bounds(run, others)
     turns(run, others)
+    cases = {name: [body] for name, body in (others if run.smoke else others | EARLY).items()}
+    some = seeds[:EARLY_RANDOM]
+    cases[f"{len(some)} random, p = 3"] = [((lambda seed=seed: random_problem(seed)), 0.0) for seed in some]
+    early(run, cases, MAX_NODES)
 
 
 def report(run: Run, rows) -> None:
