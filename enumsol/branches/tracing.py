@@ -198,7 +198,7 @@ class _Tracing:
         rows, share = self._selection.rows, float(last - first) / self._length
         # short beside alpha too, or so short that this does not matter
         short = share < _PRECISE_BOX and (
-            share < _PRECISE_ANYWHERE or float(last - first) < _PRECISE_BOX * float(max(abs(first), abs(last)))
+            share < _PRECISE_ANYWHERE or float(last - first) < _PRECISE_BOX * max(abs(float(first)), abs(float(last)))
         )
         precise = self._precise() if short and self._count <= _MOST_BOXES else None
         smallest = share < _SMALLEST_PRECISE if precise is not None else float(last - first) <= self._spacing
