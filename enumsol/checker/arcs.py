@@ -194,8 +194,8 @@ class ArcChecker:
         if len(record) != 5 or record[3] not in (0, 1) or not isinstance(record[4], list):
             raise ValueError(f"{shown(record)} is no box")
         low, high = _number(record[1]), _number(record[2])
-        if not low == start < high or len(record[4]) > _MOST_PARTS:
-            raise ValueError("a box does not begin where the one before ends, or has too many parts")
+        if not low == start < high or not 0 < len(record[4]) <= _MOST_PARTS:
+            raise ValueError("a box does not begin where the one before ends, or has no parts or too many")
         nothing = all(isinstance(part, list) and part[:1] == ["u"] for part in record[4])
         expansion = None if nothing else selection.expansion(record[1], record[2], precise=bool(record[3]))
         end: Any = record[1]

@@ -64,6 +64,11 @@ class ArcSystem:
     @classmethod
     def of(cls, enclosure: CondensedEnclosure, force: Array, length: Array, side: float = 0.0) -> ArcSystem:
         """An enclosed problem; with ``side`` 1 or -1 for the constant load +-g1 (see kernel.interval)."""
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows proves nothing
+            return cls._of(enclosure, force, length, side)
+
+    @classmethod
+    def _of(cls, enclosure: CondensedEnclosure, force: Array, length: Array, side: float) -> ArcSystem:
         pair = force[:, None] / length[None, :]
         if not np.all(pair >= _LEAST_PAIR):
             raise NotEnclosedError("the units of the arcs underflow float64; expected data in other units")

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from branches.problems import one_node, planted_corner, together
+from branches.problems import generic_problem, one_node, planted_corner, together
 from branches.test_degenerate import pair
 from checker.arc_oracle import ArcOracle, arc_count, claims
 from checker.test_graph_mutants import PATHS
@@ -394,3 +394,57 @@ def test_traces_that_reach_beyond_their_pieces_are_refused(place, beyond):
         records[k + 1][2] = records[k + 1][4][-1][1] = beyond
     report = verify(problem, proof_of(records))
     assert any("no selection that was handed on there" in failure for failure in report.failures)
+
+
+def _with_boxes(records, boxes):
+    """Records with other boxes in the first trace."""
+    records = copied(records)
+    first, last = _block(records, _traces(records)[0])
+    records[first + 1 : last] = boxes
+    return records
+
+
+EXTREME = (1.7e308, -1.7e308, 5e-324, 1e-300, "1" + 308 * "0", "1/" + 3999 * "9", 3, True, None, "x", [1])
+
+
+@pytest.mark.parametrize("value", EXTREME, ids=lambda value: str(value)[:12])
+def test_extreme_and_senseless_numbers_are_refused(value):
+    _, records, *_ = original("triangle")
+    for boxes in (
+        [["b", 0.0, value, 0, [["h", value, 1]]]],
+        [["b", "0", value, 1, [["h", value, 1]]]],
+        [["b", 0.0, 10.0, 0, [["e", 10.0, 1, 0, 1, value, value]]]],
+        [["b", 0.0, 10.0, 0, [["e", 10.0, 1, 0, 1, 1.0, value]]]],
+    ):
+        assert not judge("triangle", _with_boxes(records, boxes))
+
+
+def test_boxes_without_parts_are_refused():
+    _, records, *_ = original("triangle")
+    last = ["b", 0.0, 10.0, 0, [["h", 10.0, 1]]]
+    assert judge("triangle", _with_boxes(records, [last]))
+    assert not judge("triangle", _with_boxes(records, [["b", 0.0, 10.0, 0, []], last]))
+
+
+@pytest.mark.parametrize("exponents", [(900, -900), (-900, 900), (900, 900), (-900, -900)])
+def test_units_in_which_everything_overflows_prove_nothing(exponents):
+    _, records, *_ = original("triangle")
+    records = copied(records)
+    head = next(record for record in records if isinstance(record, dict) and "traces" in record)
+    head["force"], head["length"] = ([exponent] * 2 for exponent in exponents)
+    assert not judge("triangle", records)
+
+
+def test_whole_proofs_have_the_arcs_of_exact_algebra():
+    whole = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        problem = generic_problem(rng, int(rng.integers(1, 3)), ("friction", "load", "both")[seed % 3])
+        if seed % 4 == 3:
+            problem = planted_corner(rng, 1, "both")
+        graph = branch_graph(problem, (0.0, 4.0))
+        report = verify(problem, graph.proof)
+        assert report.ok
+        whole += report.whole
+        assert not report.whole or report.arcs == len(graph.arcs)
+    assert whole > 20

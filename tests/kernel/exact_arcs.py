@@ -1,5 +1,6 @@
 """Systems over alpha in rationals, and what is true of their selections."""
 
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -92,6 +93,14 @@ class Truth:
             self.conditions = []
             return
         self.conditions = [functions.row(RowKind(kind), node) for node, kind in self.rows.conditions]
+
+    @cached_property
+    def interesting(self):
+        """Where the determinant or a condition vanishes, or a condition has a maximum or minimum, as floats."""
+        det = self.det
+        flat = [row.derivative() * det - row * det.derivative() for row in self.conditions]
+        polynomials = [poly for poly in (det, *self.conditions, *flat) if poly.degree() > 0]
+        return [float(root) for poly in polynomials for root in real_roots(poly, fmpq(-10), fmpq(10))]
 
     def signs(self, polynomial, low, high):
         """All signs of a polynomial over [low, high]."""
@@ -187,13 +196,27 @@ def places(polynomials, low, high):
 
 
 def interval_at(rng, truth, low=-4.0, high=4.0):
-    """An interval of any width, often about a zero of the determinant or of a condition."""
+    """An interval of any width, often about a place of interest."""
     centre = float(rng.uniform(low, high))
-    polynomials = [poly for poly in (truth.det, *truth.conditions) if poly.degree() > 0]
-    if polynomials and rng.random() < 0.6:
-        roots = real_roots(polynomials[int(rng.integers(len(polynomials)))], fmpq(-10), fmpq(10))
-        if roots:
-            centre = float(roots[int(rng.integers(len(roots)))])
+    roots = truth.interesting
+    if roots and rng.random() < 0.7:
+        centre = roots[int(rng.integers(len(roots)))]
     width = 10.0 ** rng.uniform(-14, 1.5)
     first, last = centre - width * rng.random(), centre + width * rng.random()
     return (first, last) if first < last else (centre, float(np.nextafter(centre, np.inf)))
+
+
+def beside(rng, truth, low, high):
+    """Parts of an interval that end close to places of interest inside."""
+    for root in truth.interesting:
+        if low < root < high:
+            end = root + float(rng.choice((-1, 0, 1))) * (high - low) * 10.0 ** -float(rng.uniform(2, 17))
+            if low < end < high:
+                yield low, end
+                yield end, high
+
+
+def two_zeros(gap):
+    """Data of one node that slips, w_t = (alpha - 1)^2 - gap, with the codes and the condition's number."""
+    data = np.eye(2), np.array([2.0, 1.0 - gap]), np.array([-1.0, 0.0]), np.zeros(1), np.ones(1)
+    return data, (2,), 0

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from kernel.exact_arcs import Truth, arc_system, exact_of, interval_at, random_data, widened
+from kernel.exact_arcs import Truth, arc_system, beside, exact_of, interval_at, random_data, two_zeros, widened
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.kernel.arcs import ArcSelection, _bernstein_signs, _to_bernstein
@@ -44,7 +44,7 @@ def check_claims(count, start=0):
         expansion = selection.expansion(low, high)
         if expansion is None:
             continue
-        for a, b in parts(rng, low, high):
+        for a, b in (*parts(rng, low, high), *beside(rng, truth, low, high)):
             known = expansion.over(a, b)
             assert truth.is_true(known, a, b), (selection.rows.codes, a, b, known)
             made["regular"] += known.regular
@@ -160,3 +160,19 @@ def test_an_interval_of_two_neighbouring_floats_and_one_of_any_length():
             expansion = selection.expansion(low, high)
             if expansion is not None:
                 assert truth.is_true(expansion.over(low, high), low, high)
+
+
+@pytest.mark.parametrize("gap", [0.0, 2.0**-52, 2.0**-40, 2.0**-20, 2.0**-4])
+def test_two_zeros_close_together_are_not_missed(gap):
+    data, codes, condition = two_zeros(gap)
+    selection = ArcSelection(arc_system(data), codes)
+    for width in (2.0**-30, 2.0**-20, 2.0**-10, 0.5):
+        expansion = selection.expansion(1.0 - width, 1.0 + width)
+        assert expansion is not None
+        known = expansion.over(1.0 - width, 1.0 + width)
+        assert known.regular
+        assert known.conditions[condition] == (-1 if width**2 < gap > 2.0**-48 else 0)
+        if width**2 > gap:  # else a multiple of the condition may fall
+            assert expansion.slopes(1.0 - width, 1.0 + width)[condition] == 0
+        if width**2 > 16 * gap:
+            assert expansion.slopes(1.0 + width / 2, 1.0 + width)[condition] == 1

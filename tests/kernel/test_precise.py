@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from branches.problems import generic_problem
 from flint import arb, arb_mat
-from kernel.exact_arcs import Truth, exact_of, interval_at, precise_system, random_data
+from kernel.exact_arcs import Truth, beside, exact_of, interval_at, precise_system, random_data, two_zeros
 
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.kernel.precise import PreciseSelection, PreciseSystem, _around, _ball, _precision, _upper
@@ -45,7 +45,8 @@ def check_claims(count, start=0):
         if expansion is None:
             continue
         cuts = sorted(low + (high - low) * Fraction(int(rng.integers(0, 1025)), 1024) for _ in range(4))
-        for a, b in ((low, high), (low, low), (cuts[0], cuts[1]), (cuts[2], cuts[3])):
+        some = ((low, high), (low, low), (cuts[0], cuts[1]), (cuts[2], cuts[3]))
+        for a, b in (*some, *beside(rng, truth, low, high)):
             known = expansion.over(a, b)
             assert truth.is_true(known, a, b), (selection.rows.codes, a, b, known)
             made["none"] += known.none
@@ -141,3 +142,17 @@ def test_condensed_data_lie_in_their_balls():
                     assert float(ball.rad()) <= 1e-80 * max(1.0, abs(float(arb(value))))
             for parts in ((ours.F0, exact.F0), (ours.F1, exact.F1)):
                 assert all(ball.contains(arb(value)) for ball, value in zip(*parts, strict=True))
+
+
+@pytest.mark.parametrize("gap", [0.0, 2.0**-52, 2.0**-40, 2.0**-20, 2.0**-4])
+def test_two_zeros_close_together_are_not_missed(gap):
+    data, codes, condition = two_zeros(gap)
+    selection = PreciseSelection(precise_system(data), codes)
+    for width in (Fraction(1, 2**100), Fraction(1, 2**20), Fraction(1, 2**10)):
+        expansion = selection.expansion(1 - width, 1 + width)
+        assert expansion is not None
+        known = expansion.over(1 - width, 1 + width)
+        assert known.regular
+        assert known.conditions[condition] <= 0
+        assert expansion.slopes(1 - width, 1 + width)[condition] == 0
+        assert expansion.over(1 - width, 1 - width).conditions[condition] == np.sign(float(width**2) - gap)
