@@ -28,7 +28,8 @@ that leave a leaf open, ``first root`` is the node of the tree at which a root i
 - suggested, k: where at most k nodes are undecided, the one completion that the minimiser points to, for the order and
   for leaves in the box of a root that is known.
 
-Seconds there are of one run on a machine with other work. ``below`` counts the nodes that any earlier test could save: those below assignments in which k nodes are undecided.
+Seconds there are of one run on a machine with other work. ``below`` counts the nodes that such tests could save at
+most: those below assignments in which at most k nodes are undecided.
 """
 
 from __future__ import annotations
