@@ -162,7 +162,8 @@ class ArcChecker:
             raise ValueError(f"{shown(record)} begins no trace")
         codes = tuple(codes_from([record[1]], self._problem.p)[0].tolist())
         low, high, side = _number(record[2]), _number(record[3]), int(record[4])
-        due = next((d for d in self._due if d[0] == codes and d[3] == side and low <= d[1] < d[2] <= high), None)
+        found = [d for d in self._due if d[0] == codes and d[3] == side and low <= d[1] < d[2] <= high]
+        due = min(found, default=None)
         if due is None:
             raise ValueError("it is about no selection that was handed on there, or repeated")
         self._due.remove(due)
@@ -186,8 +187,8 @@ class ArcChecker:
         if len(record) != 5 or record[3] not in (0, 1) or not isinstance(record[4], list):
             raise ValueError(f"{shown(record)} is no box")
         low, high = _number(record[1]), _number(record[2])
-        if not low == start < high or len(record[4]) > _MOST_PARTS:
-            raise ValueError("a box does not begin where the one before ends, or has too many parts")
+        if not low == start < high or not 0 < len(record[4]) <= _MOST_PARTS:
+            raise ValueError("a box does not begin where the one before ends, or has no parts or too many")
         nothing = all(isinstance(part, list) and part[:1] == ["u"] for part in record[4])
         expansion = None if nothing else selection.expansion(record[1], record[2], precise=bool(record[3]))
         end: Any = record[1]
