@@ -1,4 +1,4 @@
-"""Arcs of graph proofs in rational arithmetic (docs/proof_format.md, section 6.5), for rational_checker.
+"""Arcs of graph proofs in rational arithmetic (docs/proof_format.md, under Arcs), for rational_checker.
 
 Along a selection det N, its products with lambda, and those with all conditions are polynomials in alpha. They are
 found by interpolation; what a part of a trace says about them is decided by Sturm sequences.
@@ -13,13 +13,14 @@ from rational_forms import Forms, decimal_fraction, exact, integer, need
 from rational_zeros import cells, count, interpolated, one_sign, sign
 
 MOST_SYSTEMS = 2000
-#: Partners at an event: code and kind of row (section 4.3) of one, of the other.
+#: Partners at an event: code and kind of row [4.3] of one, of the other.
 PARTNERS = [((0, 4), (2, 0)), ((0, 4), (3, 0)), ((0, 4), (4, 0)), ((1, 2), (2, 5)), ((1, 3), (3, 6))]
 PARTNERS += [(other, one) for one, other in PARTNERS]
 
 
 def alpha_of(value):
     """[2]"""
+    need(isinstance(value, float | str), f"{value!r} is no alpha")
     return decimal_fraction(value) if isinstance(value, str) else exact(value)
 
 
@@ -130,8 +131,8 @@ class Selection:
     def _has_vertex(self, point, x=None, y=None):
         """Whether N lambda = c, singular at this point or in all of [x, y], has a solution with all conditions.
 
-        The solutions are a polytope, by (3.3). Each of its vertices is the only solution of some equations and some
-        conditions.
+        The solutions hold no line: where no condition changes, lambda does not. So if there are any, there is a vertex,
+        which is the only solution of some equations and some conditions.
         """
         size, number = 2 * self._p, len(self.conditions)
         for extra in range(1, min(size, number) + 1):

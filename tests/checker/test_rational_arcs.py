@@ -1,4 +1,4 @@
-"""Arcs of graph proofs (docs/proof_format.md, section 6.5): both checkers refuse forgeries, and agree at random."""
+"""Arcs of graph proofs (docs/proof_format.md, under Arcs): both checkers refuse forgeries, and agree at random."""
 
 from fractions import Fraction
 from itertools import product
@@ -189,6 +189,7 @@ def test_forged_traces_and_boxes(name):
         ):
             assert refused(problem, replaced(records, k, other)), other
         assert refused(problem, records[: k + 1] + records[k + 2 :])
+        assert refused(problem, [*records[: k + 1], [*records[k + 1][:4], []], *records[k + 1 :]])
         _, low, high, precise, parts = records[k + 1]
         for other in (
             ["b", inside, high, precise, parts],
