@@ -12,7 +12,7 @@ from enumsol.errors import IncompleteGraphError
 
 INTERVAL = (0.0, 10.0)
 #: Nodes after which the search over two-node-6.4 has found nothing, one arc, and two arcs.
-CUTS = {1: 0, 5: 1, 10: 2}
+CUTS = {1: 0, 7: 1, 11: 2}
 
 
 @pytest.fixture(scope="module")
