@@ -19,15 +19,20 @@ def rng():
 UNTRACED = {
     "test_active_set",
     "test_against_enumeration",
+    "test_arc_mutants",
+    "test_arcs",
     "test_cut_short_results",
     "test_defect_07_hostile_proofs",
     "test_degenerate_problems",
     "test_graph_mutants",
+    "test_precise",
     "test_random_problems",
+    "test_rational_arcs",
     "test_root_counts",
     "test_singular_selections",
     "test_space_coupled",
     "test_space_one_node",
+    "test_traced_graphs",
 }
 
 

@@ -201,8 +201,9 @@ class _Tracing:
         first, last = _as_float(first), _as_float(last)
         rows, share = self._selection.rows, float(last - first) / self._length
         # short beside alpha too, or so short that this does not matter
-        short = share < _PRECISE_BOX and (
-            share < _PRECISE_ANYWHERE or float(last - first) < _PRECISE_BOX * max(abs(float(first)), abs(float(last)))
+        beside = float(last - first) / max(abs(float(first)), abs(float(last)))
+        short, tiny = (
+            share < limit and (share < _PRECISE_ANYWHERE or beside < limit) for limit in (_PRECISE_BOX, _SINGULAR)
         )
         precise = self._precise() if short and self._count <= _MOST_BOXES else None
         smallest = share < _SMALLEST_PRECISE if precise is not None else float(last - first) <= self._spacing
@@ -217,8 +218,7 @@ class _Tracing:
             found = precise.expansion(first, last)
             if found is not None:
                 tried.insert(0, _Cutting(rows, found, whole=whole, flat=share < _PRECISE_BOX).run())
-        if not tried and share < _SINGULAR:
-            whole = True
+        whole = whole or (tiny and not tried)
         if tried:
             box, rest = tried[0]
             if box.parts:

@@ -45,7 +45,7 @@ def two_graphs(problem, interval):
     certifier = VerifiedIntervalCertifier(problem, exact, exact.zero)
     search = IntervalSearch(problem.condensed, (a, b), exact.zero, certifier)
     search.run()
-    followed = follow(traced, search, None)
+    followed = follow(traced, search.pieces, cut_short=search.stopped is not None)
     gluing = glue(exact, search.selections, rational(a), rational(b))
     arcs = make_arcs(gluing)
     ours = make_traced(traced, followed.joined)

@@ -42,14 +42,14 @@ class VerifiedIntervalCertifier:
         Its data are certified: those of the problem, or S and g as computed. None: those of the problem, without
         recourse to rationals.
     zero : Fraction or None
-        The alpha at which g vanishes, in the data that are certified.
+        The alpha at which g vanishes, where ``exact`` does not say it.
     """
 
-    def __init__(self, problem: ContactProblem, exact: ExactCondensed | None, zero: Fraction | None) -> None:
+    def __init__(self, problem: ContactProblem, exact: ExactCondensed | None, zero: Fraction | None = None) -> None:
         exactly = exact is None or exact.condensed_exactly
         self._enclosure = certified_enclosure(problem, exactly=exactly)
         self._rationals = ExactIntervalCertifier(exact) if exact is not None and exactly else None
-        self._zero = zero
+        self._zero = zero if exact is None else exact.zero
         self._used_rationals = False
         self._piece: tuple[Piece, Margin | None] | None = None
 
