@@ -30,7 +30,7 @@ def graph(problem):
 @pytest.fixture(scope="module")
 def cut(problem):
     """One arc of three: stopped by max_nodes."""
-    graph = branch_graph(problem, (0.0, 20.0), max_nodes=3)
+    graph = branch_graph(problem, (0.0, 20.0), max_nodes=5)
     assert graph.reasons
     assert len(graph.arcs) == 1
     return graph

@@ -16,7 +16,7 @@ def draw(capsys, tmp_path, name, *options):
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("nodes", [1, 2, 4, 5])
+@pytest.mark.parametrize("nodes", [1, 2, 5, 7])
 def test_after_so_many_nodes(capsys, tmp_path, name, nodes):
     quantity = "lambda_n" if nodes != 2 else "u_t"
     status, out = draw(capsys, tmp_path, name, "--max-nodes", nodes, "--quantity", quantity)
