@@ -5,10 +5,9 @@ from __future__ import annotations
 import enum
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from enumsol.proof.proof_file import Proof, ProofWriter, packed
 from enumsol.proof.reading import fits
+from enumsol.search.proof_header import unit_exponents
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,12 +48,11 @@ def write_graph_proof(
     selections = set()
     leaves = 0
     for found in pieces:
-        units = found.system.scaled
+        units = unit_exponents(found.system.scaled.force, found.system.scaled.length)
         writer.write(
             {
                 "piece": [str(found.piece.a), str(found.piece.b)],
-                "force": (np.frexp(units.force)[1] - 1).tolist(),
-                "length": (np.frexp(units.length)[1] - 1).tolist(),
+                **units,
                 "roots": [_text(codes) for codes in found.roots],
             }
         )
