@@ -6,11 +6,10 @@ import enum
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from enumsol.branches.tracing import PartKind
 from enumsol.proof.proof_file import Proof, ProofWriter, packed
 from enumsol.proof.reading import fits
+from enumsol.search.proof_header import unit_exponents
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -59,12 +58,11 @@ def write_graph_proof(
     selections = set()
     leaves = 0
     for found in pieces:
-        units = found.system.scaled
+        units = unit_exponents(found.system.scaled.force, found.system.scaled.length)
         writer.write(
             {
                 "piece": [str(found.piece.a), str(found.piece.b)],
-                "force": (np.frexp(units.force)[1] - 1).tolist(),
-                "length": (np.frexp(units.length)[1] - 1).tolist(),
+                **units,
                 "roots": [_text(codes) for codes in found.roots],
             }
         )
@@ -95,8 +93,7 @@ def _ends(followed: Followed) -> Iterator[float | Fraction]:
 
 def _write_arcs(writer: ProofWriter, followed: Followed) -> dict[str, int]:
     """Where every selection holds, box by box; the counts for the footer."""
-    force, length = ((np.frexp(units)[1] - 1).tolist() for units in (followed.force, followed.length))
-    writer.write({"traces": len(followed.traces), "force": force, "length": length})
+    writer.write({"traces": len(followed.traces), **unit_exponents(followed.force, followed.length)})
     for trace in followed.traces:
         ends = [_number(end) for end in (trace.low, trace.high)]
         writer.write(["t", _text(trace.selection.rows.codes), *ends, int(trace.side)])

@@ -48,6 +48,11 @@ class SpaceEngine:
     ----------
     system : SpaceSystem
 
+    Attributes
+    ----------
+    tangents : list of int
+        Number of directions with friction of each node, 0 to 2.
+
     Raises
     ------
     ImportError
@@ -78,7 +83,7 @@ class SpaceEngine:
         )
         self._known: list[dict[tuple[int, int], int]] = [{} for _ in range(p)]
         self._imposed: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
-        self._tangents = np.sum(system.tau >= 0, axis=1).tolist()
+        self.tangents = np.sum(system.tau >= 0, axis=1).tolist()
         #: Row by number, for multipliers.
         self.rows: dict[int, Row] = {}
         self.limit = 400 + 20 * len(system.g)
@@ -108,7 +113,7 @@ class SpaceEngine:
 
     def children(self, node: int, code: int) -> tuple[int, ...]:
         """Codes that together cover a partial status of a node."""
-        return children_of(code, self._tangents[node])
+        return children_of(code, self.tangents[node])
 
     def root(self, rows: list[int], modes: list[int]) -> SpaceRelaxation:
         """The relaxation with the given rows on."""

@@ -17,7 +17,6 @@ from enumsol.roots.root3d import Root3D
 from enumsol.roots.root_set import RootSet, Undecided
 from enumsol.roots.space_regions import regions_of, slip_angles, with_zeros
 from enumsol.sealed import sealed
-from enumsol.search.space import DEGENERATE
 from enumsol.search.space_solvers import SpaceSolvers
 from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus
 
@@ -171,12 +170,12 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
     def _undecided(self, parts: Sequence[UndecidedPart]) -> list[Undecided]:
         """Leaves as regions, then the parts that were not searched."""
-        leaves = [part for part in parts if part.reason == DEGENERATE]
+        leaves = [part for part in parts if part.examined]
         regions = regions_of(self.enclosed, [part.codes for part in leaves]) if leaves else []
         found = [
             Undecided(
                 statuses=_common([_names(codes) for codes in region.codes]),
-                reason=DEGENERATE,
+                reason=leaves[0].reason,
                 hint=leaves[0].hint,
                 leaves=len(region.codes),
                 slip_angle=region.slip_angle,
@@ -184,7 +183,8 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             )
             for region in regions
         ]
-        return found + [Undecided(_names(part.codes), part.reason, part.hint) for part in parts if part not in leaves]
+        rest = [part for part in parts if not part.examined]
+        return found + [Undecided(_names(part.codes), part.reason, part.hint) for part in rest]
 
     def _doubtful(self, codes: Codes) -> Undecided:
         root = self.certifier.certified.verified[codes]

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from enumsol.relaxation.interval import IntervalEngine, IntervalSystem, interval_rows
-from enumsol.search.splitting import PlaneSplitting
+from enumsol.search.splitting import ImposedRows, PlaneSplitting, branching_node
 from enumsol.statuses import CONTACT, OPEN, UNDECIDED
 
 if TYPE_CHECKING:
@@ -112,26 +112,13 @@ class _Program:
     def __init__(self, system: IntervalSystem) -> None:
         self.splitting = IntervalSplitting(system)
         self._engine, self._p = IntervalEngine(system), system.p
-        self._rows: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
+        self._rows = ImposedRows(self.splitting, system.p)
 
     def relax(self, item: _Item, parent: Relaxation | None) -> Relaxation:
         """The relaxation of a node, from its parent's if that is there."""
         nodes = range(self._p) if parent is None else item.changed
-        rows: list[int] = []
-        modes: list[int] = []
-        for node in nodes:
-            more = self._rows_of(node, item.codes[node])
-            rows += more[0]
-            modes += more[1]
+        rows, modes = self._rows.over(item.codes, nodes)
         return self._engine.root(rows, modes) if parent is None else parent.child(rows, modes, last=item.last)
-
-    def _rows_of(self, node: int, code: int) -> tuple[list[int], list[int]]:
-        rows = self._rows.get((node, code))
-        if rows is None:
-            pairs = self.splitting.rows(node, code)
-            rows = [kind * self._p + node for kind, _ in pairs], [mode for _, mode in pairs]
-            self._rows[node, code] = rows
-        return rows
 
 
 @dataclass(slots=True)
@@ -245,7 +232,7 @@ class PieceTree:
             yield from _towards_roots(item, over, at_middle)
             return
         guide = over if at_middle is None or at_middle.pruned else at_middle
-        node, forced = _choose(item, guide)
+        node, forced = branching_node(item.codes, item.forced, guide)
         if node < 0:
             result.selections.append(item.codes)
             return
@@ -309,14 +296,3 @@ def _parted(item: _Item) -> list[list[Subtree]]:
         if len(groups) > 1:
             return list(groups.values())
     return [[root] for root in item.roots]
-
-
-def _choose(item: _Item, guide: Relaxation | None) -> tuple[int, tuple[int, ...] | None]:
-    """The contact node to branch on, -1 when all are decided; and the forced ones that the children begin with."""
-    if guide is None:
-        return next((i for i, code in enumerate(item.codes) if code in (CONTACT, UNDECIDED)), -1), item.forced
-    if item.forced is not None:
-        forced = item.forced or guide.forced(item.codes)
-        if forced:
-            return forced[0], forced[1:]
-    return guide.choose(item.codes), None

@@ -12,9 +12,9 @@ from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.proof.reading import rational_text
 from enumsol.search.certifiers.floats import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.search.proof_header import point_header, unit_exponents
 from enumsol.search.tree import TreeSearch
 from enumsol.selections.floats import FloatSelections
 
@@ -174,16 +174,8 @@ class Solvers:
         InvalidArgumentError
             alpha is a fraction of more digits than a proof may hold.
         """
-        return {
-            "format": "enumsol-proof",
-            "version": 1,
-            "problem": self.problem.fingerprint,
-            "alpha": rational_text(Fraction(self.alpha), "alpha"),
-            "p": self.problem.p,
-            "data": self.data,
-            "force": (np.frexp(self.scaled.force)[1] - 1).tolist(),
-            "length": (np.frexp(self.scaled.length)[1] - 1).tolist(),
-        }
+        units = unit_exponents(self.scaled.force, self.scaled.length)
+        return point_header(self.problem, self.alpha, self.data, units)
 
 
 def _positive(system: EnclosedSystem) -> bool:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.kernel.leaves import Open, settle
-from enumsol.kernel.space import children_of, exclusion_margin
+from enumsol.kernel.space import exclusion_margin
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.relaxation.space import SpaceEngine, imposed
+from enumsol.relaxation.space import SpaceEngine
 from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart
 from enumsol.sectors import DEEPEST, SECTORS, direction, end_number, level_of
 from enumsol.statuses import CONTACT, UNDECIDED
@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from enumsol.relaxation.engine import Relaxation
     from enumsol.selections.solution import Codes
 
-#: Why a leaf stays open.
-DEGENERATE = "a condition holds with equality, or nearly so, at what may be a root"
+_DEGENERATE = "a condition holds with equality, or nearly so, at what may be a root"
 
 
 class SpaceSplitting:
@@ -33,21 +32,20 @@ class SpaceSplitting:
 
     def __init__(self, engine: SpaceEngine) -> None:
         self._engine, self._system = engine, engine.system
-        self._tangents = np.sum(self._system.tau >= 0, axis=1)
 
     def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
         """(slot, mode) of the rows that a contact node imposes in a status."""
-        pairs = [(self._engine.slot(row), mode) for row, mode in imposed(self._system.tau, node, code)]
-        return [(slot, mode) for slot, mode in pairs if slot is not None]
+        rows, modes = self._engine.imposed(node, code)
+        return [(row // self._system.p, mode) for row, mode in zip(rows, modes, strict=True)]
 
     def children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
         """Codes of the children, the one nearest to the minimiser first."""
-        children = list(children_of(codes[node], int(self._tangents[node])))
+        children = list(self._engine.children(node, codes[node]))
         if relaxation is None:
             return children
         if codes[node] == UNDECIDED:
             return children[:: -1 if relaxation.forces[node] > -relaxation.displacements[node] else 1]
-        if codes[node] == CONTACT and self._tangents[node] == 1:
+        if codes[node] == CONTACT and self._engine.tangents[node] == 1:
             return children
         tau, v = (self._system.tangential(x)[node] for x in (relaxation.forces, relaxation.displacements))
         towards = tau / (np.linalg.norm(tau) + 1e-300) + v / (np.linalg.norm(v) + 1e-300)
@@ -110,8 +108,8 @@ class SpaceCertifier:
         elif isinstance(answer, Open):
             if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
                 return Refine(answer.node)
-            self._leaf("u", DEGENERATE)
-            return UndecidedPart(codes, DEGENERATE, "perturb the load or the friction coefficients")
+            self._leaf("u", _DEGENERATE)
+            return UndecidedPart(codes, _DEGENERATE, "perturb the load or the friction coefficients", examined=True)
         else:
             self._roots[codes] = answer
             self._leaf("r", answer.y.mid.tolist(), (4.0 * answer.y.rad).tolist(), answer.index)

@@ -6,13 +6,11 @@ from fractions import Fraction
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.space import EnclosedSpace, SpaceSystem
-from enumsol.proof.reading import rational_text
 from enumsol.relaxation.space import SpaceEngine
 from enumsol.search.certifiers.protocol import Unrecorded
+from enumsol.search.proof_header import point_header, unit_exponents
 from enumsol.search.space import SpaceCertifier, SpaceSplitting
 from enumsol.search.tree import TreeSearch
 
@@ -108,14 +106,5 @@ class SpaceSolvers:
         InvalidArgumentError
             alpha is a fraction of more digits than a proof may hold.
         """
-        return {
-            "format": "enumsol-proof",
-            "version": 1,
-            "kind": "space",
-            "problem": self.problem.fingerprint,
-            "alpha": rational_text(Fraction(self.alpha), "alpha"),
-            "p": self.problem.p,
-            "data": "problem",
-            "force": (np.frexp(self.system.force)[1] - 1).tolist(),
-            "length": (np.frexp(self.system.length)[1] - 1).tolist(),
-        }
+        units = unit_exponents(self.system.force, self.system.length)
+        return point_header(self.problem, self.alpha, "problem", units, kind="space")

@@ -13,7 +13,7 @@ from enumsol.relaxation.rows import status_rows
 from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -29,6 +29,54 @@ class Splitting(Protocol):
 
     def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
         """(kind, mode) of the rows that the node imposes in a status; those of a child extend its parent's."""
+
+
+class ImposedRows:
+    """The rows of a splitting as engines number them, kind * p + node, asked for once a node and status.
+
+    Parameters
+    ----------
+    splitting : Splitting
+    p : number of contact nodes
+    """
+
+    def __init__(self, splitting: Splitting, p: int) -> None:
+        self._splitting, self._p = splitting, p
+        self._known: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
+
+    def of(self, node: int, code: int) -> tuple[list[int], list[int]]:
+        """Rows that a node imposes in a status, and their modes."""
+        rows = self._known.get((node, code))
+        if rows is None:
+            pairs = self._splitting.rows(node, code)
+            rows = [kind * self._p + node for kind, _ in pairs], [mode for _, mode in pairs]
+            self._known[node, code] = rows
+        return rows
+
+    def over(self, codes: Codes, nodes: Iterable[int]) -> tuple[list[int], list[int]]:
+        """The rows of some nodes in a partial assignment, and their modes."""
+        parts = [self.of(node, codes[node]) for node in nodes]
+        return [row for rows, _ in parts for row in rows], [mode for _, modes in parts for mode in modes]
+
+
+def branching_node(
+    codes: Codes, forced: tuple[int, ...] | None, relaxation: Relaxation | None
+) -> tuple[int, tuple[int, ...] | None]:
+    """The contact node to branch on, -1 when all are decided; and the forced ones that the children begin with.
+
+    Parameters
+    ----------
+    codes : status codes
+    forced : those of the node of the tree (see TreeNode)
+    relaxation : with its minimiser, or None
+    """
+    if relaxation is None:
+        return next((i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED)), -1), forced
+    if forced is not None:
+        forced = forced or relaxation.forced(codes)
+        if forced:
+            return forced[0], forced[1:]
+    return relaxation.choose(codes), None
 
 
 class PlaneSplitting:

@@ -22,10 +22,10 @@ from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart
-from enumsol.search.splitting import PlaneSplitting, Splitting
+from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting, branching_node
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.selections.solution import Codes, SelectionSolution
-from enumsol.statuses import CONTACT, UNDECIDED
+from enumsol.statuses import UNDECIDED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -182,7 +182,7 @@ class TreeSearch:
         self.outcome = SearchOutcome()
         self._fallback: InteriorPointEngine | None = None
         self.splitting: Splitting = splitting or PlaneSplitting(system.F)
-        self._known_rows: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
+        self._rows = ImposedRows(self.splitting, system.p)
         self._covered = 0.0
         self._start = time.perf_counter()
 
@@ -221,7 +221,8 @@ class TreeSearch:
             outcome.pruned += 1
             self._covered += item.weight
             return
-        node, forced = self._choose(item, relaxation)
+        usable = relaxation if relaxation is not None and not relaxation.pruned else None
+        node, forced = branching_node(codes, item.forced, usable)
         if node < 0:
             node = self._settle(codes)
         if node < 0:
@@ -230,7 +231,6 @@ class TreeSearch:
         children = self.splitting.children(codes, node, relaxation)
         outcome.presolved += forced is not None
         self.certifier.branching(node, children)
-        usable = relaxation if relaxation is not None and not relaxation.pruned else None
         for k, code in enumerate(children):
             child = (*codes[:node], code, *codes[node + 1 :])
             last = k + 1 == len(children)
@@ -270,26 +270,14 @@ class TreeSearch:
 
     # -- relaxations -----------------------------------------------------------------------------------------------
 
-    def _rows_of(self, node: int, code: int) -> tuple[list[int], list[int]]:
-        rows = self._known_rows.get((node, code))
-        if rows is None:
-            pairs = self.splitting.rows(node, code)
-            rows = [kind * self.system.p + node for kind, _ in pairs], [mode for _, mode in pairs]
-            self._known_rows[node, code] = rows
-        return rows
-
-    def _all_rows(self, codes: Codes) -> tuple[list[int], list[int]]:
-        parts = [self._rows_of(i, code) for i, code in enumerate(codes)]
-        return [row for rows, _ in parts for row in rows], [mode for _, modes in parts for mode in modes]
-
     def _relax(self, item: TreeNode) -> Relaxation | None:
         """The solved relaxation; None when no engine has an answer."""
         codes = item.codes
         self.outcome.qps += 1
         if item.parent is not None:
-            relaxation = item.parent.child(*self._rows_of(item.changed, codes[item.changed]), last=item.last)
+            relaxation = item.parent.child(*self._rows.of(item.changed, codes[item.changed]), last=item.last)
         else:
-            relaxation = self.engine.root(*self._all_rows(codes))
+            relaxation = self.engine.root(*self._rows.over(codes, range(len(codes))))
         return self._fall_back(codes) if relaxation.stalled else relaxation
 
     def _fall_back(self, codes: Codes) -> Relaxation | None:
@@ -299,18 +287,5 @@ class TreeSearch:
             return None  # the node is branched on
         if self._fallback is None:
             self._fallback = InteriorPointEngine(self.system)
-        relaxation = self._fallback.root(*self._all_rows(codes))
+        relaxation = self._fallback.root(*self._rows.over(codes, range(len(codes))))
         return None if relaxation.stalled else relaxation
-
-    # -- branching -------------------------------------------------------------------------------------------------
-
-    @staticmethod
-    def _choose(item: TreeNode, relaxation: Relaxation | None) -> tuple[int, tuple[int, ...] | None]:
-        """The contact node to branch on, -1 when all are decided; and the forced ones that the children begin with."""
-        if relaxation is None or relaxation.pruned:
-            return next((i for i, code in enumerate(item.codes) if code in (CONTACT, UNDECIDED)), -1), item.forced
-        if item.forced is not None:
-            forced = item.forced or relaxation.forced(item.codes)
-            if forced:
-                return forced[0], forced[1:]
-        return relaxation.choose(item.codes), None

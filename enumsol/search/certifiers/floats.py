@@ -21,7 +21,7 @@ def solve_or_open(solver: SelectionSolver, codes: Codes) -> SelectionSolution | 
     try:
         return solver.solve(codes)
     except VertexLimitError as error:
-        return UndecidedPart(codes, str(error), "perturb the load or the friction coefficient")
+        return UndecidedPart(codes, str(error), "perturb the load or the friction coefficient", examined=True)
 
 
 class FastCertifier(WithoutProof):

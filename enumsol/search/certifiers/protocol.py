@@ -15,11 +15,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class UndecidedPart:
-    """A part of the selections that the search left undecided."""
+    """A part of the selections that the search left undecided.
+
+    Attributes
+    ----------
+    codes : status codes
+    reason, hint : str
+    examined : bool
+        A leaf that could not be decided; otherwise the search did not come to it.
+    """
 
     codes: Codes
     reason: str
     hint: str
+    examined: bool = False
 
 
 @dataclass(frozen=True)

@@ -174,7 +174,7 @@ class VerifiedCertifier:
     def _undecided(self, codes: Codes, reason: str, hint: str) -> UndecidedPart:
         self._escalations.undecided += 1
         self._leaf(Leaf.UNDECIDED, reason)
-        return UndecidedPart(codes, reason, hint)
+        return UndecidedPart(codes, reason, hint, examined=True)
 
     def _leaf(self, kind: Leaf, *record: Any) -> None:
         self._leaves += 1
