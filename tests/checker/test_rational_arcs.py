@@ -36,7 +36,7 @@ def with_part(records, k, i, *parts):
     return changed
 
 
-def spread(found, most=12):
+def spread(found, most=7):
     """Some of them from all over the proof."""
     found = list(found)
     return found[:: max(1, len(found) // most)]
