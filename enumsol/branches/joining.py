@@ -200,7 +200,7 @@ class _Joining:
         self._joined = Joined()
         self._origin = None if origin is None else Place(PlaceKind.ORIGIN, origin, origin, [])
         self._found = {
-            id(part): _Found(trace, part)
+            part: _Found(trace, part)
             for trace in traces
             for part in trace.parts
             if part.kind in (PartKind.EVENT, PartKind.OPEN)
@@ -220,8 +220,8 @@ class _Joining:
             places.append(self._origin)
         places.sort(key=lambda place: (place.low, place.high, place.members))
         self._check_order()
-        number = {id(place): k for k, place in enumerate(places)}
-        self._joined.arcs.sort(key=lambda arc: (number[id(arc.tail)], number[id(arc.head)], arc.codes))
+        number = {place: k for k, place in enumerate(places)}
+        self._joined.arcs.sort(key=lambda arc: (number[arc.tail], number[arc.head], arc.codes))
         return self._joined
 
     # -- places ----------------------------------------------------------------------------------------------------
@@ -319,7 +319,7 @@ class _Joining:
         first = True
         for part in trace.parts:
             if part.kind is PartKind.OPEN:
-                place = self._found[id(part)].place
+                place = self._found[part].place
                 if arc is not None and place is not None:
                     self._end(arc, place, Fraction(part.low))
                 arc, before = None, place
@@ -339,7 +339,7 @@ class _Joining:
                     self._contradiction(trace, part)
                 before = None
                 if part.kind is PartKind.EVENT:
-                    place = self._found[id(part)].place
+                    place = self._found[part].place
                     assert place is not None
                     if rises:
                         arc = _begun(trace, place, part)

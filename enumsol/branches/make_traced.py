@@ -25,11 +25,9 @@ if TYPE_CHECKING:
 
 def make_traced(traced: TracedProblem, joined: Joined) -> tuple[list[Vertex], list[Arc]]:
     """The vertices and arcs of joined traces."""
-    number = {id(place): k for k, place in enumerate(joined.places)}
+    number = {place: k for k, place in enumerate(joined.places)}
     exact = [EnclosedAlpha(rational(place.low), rational(place.high)) for place in joined.places]
-    arcs = [
-        _arc(traced, k, arc, (number[id(arc.tail)], number[id(arc.head)]), exact) for k, arc in enumerate(joined.arcs)
-    ]
+    arcs = [_arc(traced, k, arc, (number[arc.tail], number[arc.head]), exact) for k, arc in enumerate(joined.arcs)]
     left: list[list[Arc]] = [[] for _ in exact]
     right: list[list[Arc]] = [[] for _ in exact]
     for arc in arcs:

@@ -83,9 +83,9 @@ class PartKind(enum.StrEnum):
     OPEN = "u"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Part:
-    """A part [low, high] of a box.
+    """A part [low, high] of a box; another part with the same content is not the same.
 
     Attributes
     ----------

@@ -139,7 +139,7 @@ class Engine(SpaceEngine):
             code = self.children(node, code)[1] if force > gap else OPEN
         if code == CONTACT and not slips:
             return STICK
-        if code == CONTACT and self._tangents[node] == 1:
+        if code == CONTACT and self.tangents[node] == 1:
             return SLIP_PLUS if np.sum(tau + v) > 0 else SLIP_MINUS
         if code != CONTACT and code <= SECTORS:
             return code

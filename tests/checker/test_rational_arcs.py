@@ -231,7 +231,7 @@ def random_graph(make, seed, p):
     return ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f, friction=(F, F1), **load), (0.0, 2.0)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize(
     ("make", "p"), [(random_problem, 1), (random_problem, 2), (integer_problem, 2), (singular_problem, 2)]
 )
