@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from enumsol import search as search
     from enumsol import selections as selections
     from enumsol import statuses as statuses
+    from enumsol.body2d import PlaneMesh
     from enumsol.body3d import BodyMesh, SlipMean
     from enumsol.branches import BranchGraph, branch_graph, link_samples, multiplicity_table
     from enumsol.checker.reports import VerificationReport
@@ -80,6 +81,7 @@ if TYPE_CHECKING:
 #: Where the public names are at home. A module is loaded when a name of it is first used, so that a program loads what
 #: it works with and no more: sparse matrices come with a problem, networkx and rational arithmetic with a branch graph.
 _HOMES = {
+    "enumsol.body2d": ("PlaneMesh",),
     "enumsol.body3d": ("BodyMesh", "SlipMean"),
     "enumsol.branches": ("BranchGraph", "branch_graph", "link_samples", "multiplicity_table"),
     "enumsol.checker.verify": ("verify",),
@@ -177,6 +179,7 @@ __all__ = [
     "OutputError",
     "Path",
     "PiecewiseSmoothEquation",
+    "PlaneMesh",
     "Polytope",
     "Proof",
     "ProofFormatError",

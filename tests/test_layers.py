@@ -19,7 +19,7 @@ LAYERS = (
     ("array_checks", "statuses", "sectors"),
     ("condensation",),
     ("contact_body",),
-    ("friction", "body3d"),
+    ("friction", "body2d", "body3d"),
     ("problem", "problem3d"),
     ("equation", "kernel", "selections"),
     ("relaxation", "proof"),

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from flint import fmpq, fmpz, fmpz_poly
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
+from enumsol.body2d import PlaneMesh
 from enumsol.branches.arc_values import ExactArcValues, TracedArcValues
 from enumsol.branches.elements import Arc, Vertex, VertexKind
 from enumsol.branches.graph_data import GraphData, GraphStats
@@ -125,7 +126,16 @@ def _problem_record(problem: ContactProblem) -> dict[str, Any]:
         "load_slope": None if problem.load_slope is None else problem.load_slope.tolist(),
         "node_ids": list(problem.node_ids),
         "coordinates": None if problem.coordinates is None else problem.coordinates.tolist(),
+        "mesh": _mesh_record(problem.mesh),
     }
+
+
+def _mesh_record(mesh: PlaneMesh | None) -> dict[str, Any] | None:
+    if mesh is None:
+        return None
+    offset = None if mesh.offset is None else mesh.offset.tolist()
+    points, cells = mesh.points.tolist(), mesh.cells.tolist()
+    return {"points": points, "cells": cells, "motion": _matrix_record(mesh.motion), "offset": offset}
 
 
 def _matrix_record(matrix: Any) -> dict[str, Any]:
@@ -150,6 +160,9 @@ def _problem(record: dict[str, Any]) -> ContactProblem:
         slip_offset=record["slip_offset"],
         node_ids=record["node_ids"],
         coordinates=record["coordinates"],
+        mesh=None
+        if (mesh := record.get("mesh")) is None
+        else PlaneMesh(mesh["points"], mesh["cells"], matrix(mesh["motion"]), mesh["offset"]),
     )
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.body2d import PlaneMesh
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.mesh_checks import (
     check_every_node_is_used,
@@ -219,7 +220,7 @@ def contact_problem(
     Returns
     -------
     ContactProblem
-        With ``coordinates`` the positions of the contact nodes.
+        With ``coordinates`` the positions of the contact nodes, and ``mesh``.
 
     Raises
     ------
@@ -258,6 +259,7 @@ def contact_problem(
         slip_offset=slip_offset,
         node_ids=[int(node) for node in touching] if node_ids is None else node_ids,
         coordinates=nodes[touching],
+        mesh=PlaneMesh.of_dofs(nodes, triangles, free),
     )
 
 

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from enumsol import fem
 from enumsol.array_checks import short_vector
+from enumsol.body2d import PlaneMesh
 from enumsol.checks import finite_number, nonnegative_number, positive_integer, positive_number, shown
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.mesh_checks import lame_coefficients
@@ -57,8 +58,9 @@ def one_node_triangle(f: Pair = (1.5, -4.0), lame: Pair = (1.0, 1.0)) -> Contact
     >>> [len(enumsol.enumerate_roots(problem, alpha)) for alpha in (1, 5)]
     [1, 3]
     """
+    load = short_vector(f, "f", 2)
     return ContactProblem(
-        _one_node_stiffness(lame), [[1.0, 0.0]], [[0.0, 1.0]], short_vector(f, "f", 2), coordinates=[[0.0, 0.0]]
+        _one_node_stiffness(lame), [[1.0, 0.0]], [[0.0, 1.0]], load, coordinates=[[0.0, 0.0]], mesh=_triangles(1)
     )
 
 
@@ -129,6 +131,7 @@ def two_node_square(
         friction=friction,
         load_slope=slope,
         coordinates=corners[:2],
+        mesh=PlaneMesh(corners, [[0, 1, 2], [1, 3, 2]], np.vstack([turn.T, np.zeros((4, 4))])),
     )
 
 
@@ -323,10 +326,19 @@ def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.
     join = sp.kron(ends.T @ ends, sp.eye_array(2))
     A = sp.kron(sp.eye_array(count), _one_node_stiffness(lame)) + spring * join
     dofs = sp.csr_array(sp.eye_array(2 * count))
-    # triangles with legs of length one, half a leg apart
-    coordinates = np.stack([1.5 * np.arange(count), np.zeros(count)], axis=1)
+    mesh = _triangles(count)
     load = np.tile(short_vector(f, "f", 2), count)
-    return ContactProblem(sp.csc_array(A), dofs[0::2], dofs[1::2], load, coordinates=coordinates)
+    return ContactProblem(sp.csc_array(A), dofs[0::2], dofs[1::2], load, coordinates=mesh.points[::3], mesh=mesh)
+
+
+def _triangles(count: int) -> PlaneMesh:
+    """Triangles with legs of length one, half a leg apart; only their corners at the right angle move."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    first = np.stack([1.5 * np.arange(count), np.zeros(count)], axis=1)
+    # u_n = -u_y, u_t = u_x
+    turn = sp.csr_array(np.vstack([[[0.0, 1.0], [-1.0, 0.0]], np.zeros((4, 2))]))
+    points = (first[:, None, :] + corners).reshape(-1, 2)
+    return PlaneMesh(points, np.arange(3 * count).reshape(-1, 3), sp.kron(sp.eye_array(count), turn))
 
 
 def _one_node_stiffness(lame: Pair) -> NDArray[np.float64]:

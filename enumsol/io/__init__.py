@@ -16,6 +16,8 @@ The first three hold the arrays of `ContactProblem` or of `ContactProblem3D` by 
       friction1, each a number or a (p,) array, 0 when left out. With none of them F = alpha, as in `ContactProblem`.
     - ``gap``, ``load_slope``, ``slip_offset``, ``coordinates``: as in `ContactProblem`.
     - ``node_ids``: (p,) integers, floats or strings.
+    - ``mesh_points`` (N, 2), ``mesh_cells`` (M, k), ``mesh_motion`` (2 N, n; dense or in sparse parts): a `PlaneMesh`,
+      all or none; with it ``mesh_offset`` (N, 2).
     - ``enumsol_format``: version of this layout, now 1; taken as 1 when left out.
 
     Names that begin with an underscore are ignored; any other name is refused, since it may be a misspelt one.

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from enumsol.io.layouts import LAYOUT_2D, LAYOUT_3D, Layout, constant_friction
+from enumsol.body2d import PlaneMesh
+from enumsol.errors import InvalidProblemError
+from enumsol.io.layouts import LAYOUT_2D, LAYOUT_3D, PLANE_MESH, Layout, constant_friction
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    import numpy as np
-    from numpy.typing import NDArray
 
     from enumsol.problem3d import ContactProblem3D
 
@@ -31,23 +30,38 @@ def problem_from_arrays(arrays: Mapping[str, Any], layout: Layout) -> ContactPro
         options["friction"] = (arrays.get("friction0", 0.0), arrays.get("friction1", 0.0))
     if "node_ids" in arrays:
         options["node_ids"] = arrays["node_ids"]
+    missing = [name for name in PLANE_MESH if name not in arrays]
+    if not missing:
+        options["mesh"] = PlaneMesh(*(arrays[name] for name in PLANE_MESH), arrays.get("mesh_offset"))
+    elif len(missing) < len(PLANE_MESH) or "mesh_offset" in arrays:
+        raise InvalidProblemError(f"{', '.join(missing)} is missing; expected {', '.join(PLANE_MESH)}, all or none")
     return ContactProblem(*(arrays[name] for name in layout.required), **options)
 
 
 def arrays_of(problem: ContactProblem | ContactProblem3D) -> dict[str, Any]:
     """All matrices and arrays of numbers of a problem, by the names they have in files."""
     if isinstance(problem, ContactProblem):
-        return {name: getattr(problem, name) for name in LAYOUT_2D.matrices} | _vectors_of(problem)
+        return {name: getattr(problem, name) for name in LAYOUT_2D.contact} | _vectors_of(problem)
     from enumsol.io.arrays3d import arrays_of_3d  # not for problems in 2D
 
     return arrays_of_3d(problem)
 
 
-def _vectors_of(problem: ContactProblem) -> dict[str, NDArray[np.float64]]:
+def _vectors_of(problem: ContactProblem) -> dict[str, Any]:
     F0, F1 = problem.friction
-    arrays = {"f": problem.f, "gap": problem.gap, "friction0": F0, "friction1": F1, "slip_offset": problem.slip_offset}
+    arrays: dict[str, Any] = {
+        "f": problem.f,
+        "gap": problem.gap,
+        "friction0": F0,
+        "friction1": F1,
+        "slip_offset": problem.slip_offset,
+    }
     if problem.load_slope is not None:
         arrays["load_slope"] = problem.load_slope
     if problem.coordinates is not None:
         arrays["coordinates"] = problem.coordinates
+    if (mesh := problem.mesh) is not None:
+        arrays |= dict(zip(PLANE_MESH, (mesh.points, mesh.cells, mesh.motion), strict=True))
+        if mesh.offset is not None:
+            arrays["mesh_offset"] = mesh.offset
     return arrays

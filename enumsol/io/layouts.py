@@ -77,12 +77,14 @@ _SYNONYMS = {
     "coords": "coordinates",
 }
 _COMMON = ("gap", "friction", "load_slope", "slip_offset", "node_ids", "coordinates")
+#: Names of the required arrays of a PlaneMesh.
+PLANE_MESH = ("mesh_points", "mesh_cells", "mesh_motion")
 LAYOUT_2D = Layout(
     contact=("A", "Bn", "Bt"),
-    matrices=("A", "Bn", "Bt"),
-    tables=("coordinates",),
+    matrices=("A", "Bn", "Bt", PLANE_MESH[2]),
+    tables=("coordinates", *PLANE_MESH[:2], "mesh_offset"),
     broadcast=("gap", "friction", "friction0", "friction1", "slip_offset"),
-    optional=(*_COMMON, "friction0", "friction1"),
+    optional=(*_COMMON, "friction0", "friction1", *PLANE_MESH, "mesh_offset"),
     frictions=(("friction",), ("friction0", "friction1")),
     synonyms=_SYNONYMS
     | {"bt": "Bt", "t": "Bt", "tangential": "Bt"}

@@ -1,0 +1,119 @@
+"""What a problem in 2D keeps of its discretization: the mesh, for pictures and files."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.array_checks import real_array, real_matrix
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.sealed import Immutable, SealedMatrix, sealed
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+
+#: Corners and midside nodes of a cell along its outline, by the number of its nodes, in the order of VTK.
+OUTLINES = {
+    3: (0, 1, 2),
+    4: (0, 1, 2, 3),
+    6: (0, 3, 1, 4, 2, 5),
+    8: (0, 4, 1, 5, 2, 6, 3, 7),
+    9: (0, 4, 1, 5, 2, 6, 3, 7),
+}
+
+
+class PlaneMesh(Immutable):
+    """The mesh a problem in 2D was made of; the displacements of its nodes are ``motion @ u + offset``.
+
+    Parameters
+    ----------
+    points : (N, 2) array_like
+        Positions of the nodes [length].
+    cells : (M, k) array_like of int
+        Triangles (k = 3 or 6) or quadrangles (k = 4, 8 or 9), in the order of VTK.
+    motion : (2 N, n) array_like or sparse
+        Row ``2 node + component`` gives that component of the node's displacement from u, in global axes; its columns
+        are orthonormal, so that its transpose takes nodal forces to the problem's right-hand side.
+    offset : (N, 2) array_like or None
+        Prescribed displacements [length]; None: no node is moved.
+
+    Raises
+    ------
+    InvalidProblemError
+        An array is not of that form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> mesh = enumsol.gallery.clamped_block(2, 1).mesh
+    >>> mesh.points.shape, mesh.cells.shape, mesh.motion.shape
+    ((6, 2), (4, 3), (12, 8))
+    """
+
+    def __init__(
+        self,
+        points: ArrayLike,
+        cells: ArrayLike,
+        motion: ArrayLike | sp.sparray | sp.spmatrix,
+        offset: ArrayLike | None = None,
+    ) -> None:
+        self.points = sealed(real_array(points, "mesh_points"))
+        if self.points.ndim != 2 or self.points.shape[1] != 2:
+            raise InvalidProblemError(f"mesh_points has shape {self.points.shape}; expected (N, 2)")
+        count = len(self.points)
+        numbers = real_array(cells, "mesh_cells")
+        if numbers.ndim != 2 or numbers.shape[1] not in OUTLINES:
+            raise InvalidProblemError(
+                f"mesh_cells has shape {numbers.shape}; expected (M, k) with k among {', '.join(map(str, OUTLINES))}"
+            )
+        if np.any(numbers != np.round(numbers)) or np.any(numbers < 0) or np.any(numbers >= count):
+            raise InvalidProblemError(f"mesh_cells holds other numbers than 0 .. {count - 1}; expected node numbers")
+        self.cells = sealed(numbers.astype(np.int64))
+        self._motion = SealedMatrix.of(sp.csr_array(real_matrix(motion, "mesh_motion")))
+        if self._motion.shape[0] != 2 * count:
+            raise InvalidProblemError(
+                f"mesh_motion has shape {self._motion.shape}; expected 2 N = {2 * count} rows, two a node"
+            )
+        self.offset = None if offset is None else sealed(real_array(offset, "mesh_offset"))
+        if self.offset is not None and self.offset.shape != (count, 2):
+            raise InvalidProblemError(f"mesh_offset has shape {self.offset.shape}; expected (N, 2) = ({count}, 2)")
+        self._freeze()
+
+    @classmethod
+    def of_dofs(cls, points: ArrayLike, cells: ArrayLike, dofs: ArrayLike) -> PlaneMesh:
+        """The mesh of a problem whose entries of u are the components ``2 node + component`` in ``dofs``, (n,)."""
+        columns, size = np.asarray(dofs, dtype=np.int64), 2 * len(np.asarray(points))
+        count = len(columns)
+        return cls(points, cells, sp.csr_array((np.ones(count), (columns, np.arange(count))), shape=(size, count)))
+
+    @property
+    def motion(self) -> sp.csr_array:
+        """Displacements of the nodes from u, sparse (2 N, n); a new object, whose parts are read-only."""
+        return self._motion.matrix()
+
+    def displacements(self, u: ArrayLike) -> Floats:
+        """Displacement of every node, shape (N, 2), for u of shape (n,) [length].
+
+        Raises
+        ------
+        InvalidArgumentError
+            u is not that.
+        """
+        array = real_array(u, "u", error=InvalidArgumentError)
+        if array.shape != (self._motion.shape[1],):
+            raise InvalidArgumentError(f"u has shape {array.shape}; expected ({self._motion.shape[1]},)")
+        moved = np.asarray(self.motion @ array).reshape(-1, 2)
+        return moved if self.offset is None else moved + self.offset
+
+    def check(self, n: int) -> PlaneMesh:
+        """The mesh, which has to be one of a problem with n degrees of freedom."""
+        if self._motion.shape[1] != n:
+            raise InvalidProblemError(f"mesh moves by {self._motion.shape[1]} degrees of freedom; expected n = {n}")
+        return self
+
+    def __repr__(self) -> str:
+        return f"PlaneMesh of {len(self.points)} nodes and {len(self.cells)} cells"
