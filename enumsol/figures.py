@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
-from enumsol.errors import MissingDependencyError
+from enumsol.errors import InvalidArgumentError, MissingDependencyError
 
 
 def new_figure(**options: Any) -> Any:
-    """A figure that pyplot does not keep, with the options of matplotlib.figure.Figure.
+    """A figure that pyplot does not keep, with the options of matplotlib.figure.Figure; notebooks show it.
 
     Raises
     ------
@@ -16,12 +17,42 @@ def new_figure(**options: Any) -> Any:
         matplotlib is not installed.
     """
     try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
+        figure = _figure_class()(layout="constrained", **options)
     except ImportError as error:
         raise MissingDependencyError(
             'plots need matplotlib, which is not installed; install it with: pip install "enumsol[plots]"'
         ) from error
-    figure = Figure(layout="constrained", **options)
-    FigureCanvasAgg(figure)
     return figure
+
+
+@cache
+def _figure_class() -> Any:
+    from io import BytesIO
+
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    class NotebookFigure(Figure):
+        def __init__(self, **options: Any) -> None:
+            super().__init__(**options)
+            FigureCanvasAgg(self)
+
+        def _repr_png_(self) -> bytes:
+            drawn = BytesIO()
+            self.savefig(drawn, format="png", dpi=110)
+            return drawn.getvalue()
+
+    return NotebookFigure
+
+
+def axes_or_none(ax: Any) -> Any:
+    """The axes that a picture is drawn into; None for those of a new figure.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is something else.
+    """
+    if ax is not None and not hasattr(ax, "get_xlim"):
+        raise InvalidArgumentError(f"ax is a {type(ax).__name__}; expected the Axes of a figure, or None")
+    return ax

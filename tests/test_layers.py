@@ -19,7 +19,7 @@ LAYERS = (
     ("array_checks", "statuses", "sectors"),
     ("condensation",),
     ("contact_body",),
-    ("friction", "body2d", "body3d"),
+    ("friction", "body2d", "body3d", "shapes"),
     ("problem", "problem3d"),
     ("equation", "kernel", "selections"),
     ("relaxation", "proof"),

@@ -354,8 +354,8 @@ class BranchGraph(Immutable):
 
         write_graphml(self.data, self.branch_of, file)
 
-    def plot(self, quantity: str = "lambda_n", nodes: Sequence[Any] | None = None, **options: Any) -> Any:
-        """A figure of alpha against lambda_n, lambda_t, u_n or u_t of chosen nodes; see enumsol.branches.plots."""
+    def plot(self, quantity: str | None = None, nodes: Sequence[Any] | None = None, **options: Any) -> Any:
+        """A figure of alpha against an overview, or a quantity of chosen nodes; see enumsol.branches.plots."""
         from enumsol.branches.plots import plot_graph
 
         return plot_graph(self, quantity, nodes, **options)

@@ -1,23 +1,24 @@
-"""Figures of branch graphs: alpha against a quantity of chosen contact nodes, the multiplicity as steps underneath.
-
-Line styles follow the field's habit: solid where the node is open, dashed where it sticks, dash-dotted where it slips.
-"""
+"""Figures of branch graphs: alpha against a quantity, the number of solutions as steps underneath."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.branches.curves import curves as polygons
-from enumsol.branches.elements import VertexKind
-from enumsol.checks import one_of, positive_number, shown
+from enumsol.branches.curves import Curve, Place, curves, side_by_side
+from enumsol.branches.marks import GREY, MARKERS, STATUS_STYLES, colour_of, handles, index_style
+from enumsol.branches.panels import draw_numbers, draw_steps, drawn_range, family_range, sheet_range
+from enumsol.branches.quantities import Quantity, quantity_of, state_columns
+from enumsol.branches.zooms import narrow_changes
+from enumsol.checks import alpha_interval, positive_number, shown
 from enumsol.errors import InvalidArgumentError
-from enumsol.figures import new_figure
-from enumsol.statuses import ContactStatus
+from enumsol.figures import axes_or_none, new_figure
+from enumsol.texts import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from enumsol.branches.claims import Claims
     from enumsol.branches.elements import Arc, Branch, Vertex
@@ -38,8 +39,8 @@ class DrawnGraph(Protocol):
         """Paths and closed loops of arcs, and sheets."""
 
     @property
-    def complete(self) -> bool:
-        """Whether it is proven that no solution is missing."""
+    def branch_of(self) -> Mapping[int, int]:
+        """Number of the branch of every arc."""
 
     @property
     def claims(self) -> Claims:
@@ -52,97 +53,118 @@ class DrawnGraph(Protocol):
         """All solutions at one alpha."""
 
 
-QUANTITIES = {
-    "lambda_n": "normal force",
-    "lambda_t": "tangential force",
-    "u_n": "normal displacement",
-    "u_t": "tangential displacement",
-}
-_STYLES: dict[ContactStatus, Any] = {
-    ContactStatus.OPEN: "-",
-    ContactStatus.STICK: (0, (5, 2.5)),
-    ContactStatus.SLIP_PLUS: (0, (6, 1.6, 1.2, 1.6)),
-    ContactStatus.SLIP_MINUS: (0, (6, 1.6, 1.2, 1.6)),
-}
-#: Blue, orange, green, violet, red, brown, teal, olive: distinct in print and to most readers.
-_COLOURS = ("#1f5fa8", "#d9730d", "#2a8a4a", "#7a4fa3", "#c23b4b", "#7d5a3c", "#2a9aa0", "#8a8a2a")
-_FAMILY = "#333333"
 #: Panels drawn when no nodes are named.
 _MAX_PANELS = 3
 #: A third of a pixel of a large panel; and what no eye can tell from none.
 _TOLERANCE, _LEAST_TOLERANCE = 5e-4, 1e-6
+#: Arcs that coincide are drawn so far apart, and all of them no wider than that [points].
+_BESIDE, _WIDEST = 2.6, 6.0
+
+
+@dataclass(frozen=True)
+class _Style:
+    """What all panels of a figure share."""
+
+    quantity: Quantity
+    units: tuple[str, str] | None
+    tolerance: float
 
 
 def plot_graph(
     graph: DrawnGraph,
-    quantity: str = "lambda_n",
+    quantity: str | None = None,
     nodes: Sequence[Any] | None = None,
     *,
     multiplicity: bool = True,
+    zoom: bool | tuple[float, float] = True,
+    units: tuple[str, str] | None = None,
+    title: str | None = None,
     tolerance: float = _TOLERANCE,
+    ax: Any = None,
     file: Any = None,
     figsize: tuple[float, float] | None = None,
 ) -> Any:
-    """A matplotlib figure of the branches, one panel a node.
+    """A matplotlib figure of the branches: one panel of an overview, or one a node.
+
+    Branches that coincide in the quantity shown are drawn side by side, which a note says. In overviews the line style
+    tells the index, in panels of nodes the status of the node.
 
     Parameters
     ----------
     graph : BranchGraph
-    quantity : {"lambda_n", "lambda_t", "u_n", "u_t"}
+    quantity : {"norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"}, optional
+        The first three are overviews: norm of all contact forces (the default), sums of normal and of tangential
+        forces. The others are of single nodes; default "lambda_n" if nodes are named.
     nodes : sequence of node labels, optional
         Default: all of up to three nodes, otherwise the three on which branches differ most.
     multiplicity : bool
         Draw the number of solutions as steps underneath.
+    zoom : bool or (float, float)
+        Panels beside the first for parts too narrow to be seen in which the number of solutions changes, up to two of
+        them, or for the given interval of alpha.
+    units : (str, str), optional
+        Of forces and of lengths, for the axes.
+    title : str, optional
+        What the problem is; the figure adds the interval and whether the graph is complete.
     tolerance : float
         Distance of drawn curves from the branches, relative to a panel's width and height.
+    ax : matplotlib Axes, optional
+        Draw one panel there, without steps and zooms.
     file : path, optional
-        Save the figure there and close it.
+        Save the figure there.
     figsize : (float, float), optional
         Inches.
 
     Returns
     -------
     matplotlib.figure.Figure
+        Notebooks show it.
 
     Raises
     ------
     InvalidArgumentError
-        An unknown quantity or node.
+        An unknown quantity or node, an interval that is none, nodes of an overview, or several panels and ``ax``.
     MissingDependencyError
         matplotlib is not installed.
     """
-    one_of(quantity, "quantity", QUANTITIES)
-    tolerance = max(positive_number(tolerance, "tolerance"), _LEAST_TOLERANCE)
-    a, b = graph.interval
-    curves = polygons([arc for arc in graph.arcs if not arc.dimension], quantity, float(b) - float(a), tolerance)
-    chosen = _nodes(graph, nodes, curves)
-    rows = len(chosen) + int(multiplicity)
-    height = 2.7 * len(chosen) + 1.3 * int(multiplicity) + 0.6
-    figure = new_figure(figsize=figsize or (7.5, height))
-    ratios = [2.7] * len(chosen) + [1.1] * int(multiplicity)
-    axes = figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": ratios})[:, 0]
-    for axis, node in zip(axes, chosen, strict=False):
-        _panel(axis, graph, quantity, node, curves)
-    if multiplicity:
-        _steps(axes[-1], graph)
-    for axis in axes:
-        axis.grid(visible=True, color="#e4e4e4", linewidth=0.6)
-        axis.set_axisbelow(True)
-        for side in ("top", "right"):
-            axis.spines[side].set_visible(False)
-    axes[-1].set_xlabel("alpha")
-    axes[-1].set_xlim(*graph.interval)
-    _legend(figure, graph)
-    if not graph.complete:
-        axes[0].set_title(graph.completeness(), fontsize=8, color=_FAMILY, wrap=True)
+    chosen = quantity_of(("norm" if nodes is None else "lambda_n") if quantity is None else quantity)
+    style = _Style(chosen, _units(units), max(positive_number(tolerance, "tolerance"), _LEAST_TOLERANCE))
+    rows = _rows(graph, chosen, nodes, one=axes_or_none(ax) is not None)
+    windows = [] if ax is not None else _windows(graph, zoom)
+    if ax is None:
+        figure, axes = _grid(len(rows), multiplicity, len(windows), figsize)
+    else:
+        figure, axes = ax.figure, [[ax]]
+    columns = [graph.interval, *windows]
+    panels, dots = [], False
+    for column, window in zip(axes, columns, strict=True):
+        drawn = _drawn(graph, style, None if column is axes[0] else window)
+        panels += [_panel(axis, graph, style, row, drawn, window) for axis, row in zip(column, rows, strict=False)]
+        if multiplicity and ax is None:
+            dots |= draw_steps(column[-1], graph.claims.steps(), window)
+        column[-1].set_xlabel("alpha")
+    _mark_windows(axes, windows)
+    _words(figure, axes[0][0], graph, chosen, title, {"dots"} if dots else set(), alone=ax is not None)
+    draw_numbers(figure, panels, None if ax is None else ax)
     if file is not None:
         figure.savefig(file, dpi=150)
     return figure
 
 
-def _nodes(graph: DrawnGraph, nodes: Sequence[Any] | None, curves: dict[int, Any]) -> list[int]:
+def _units(units: Any) -> tuple[str, str] | None:
+    if units is None:
+        return None
+    if not isinstance(units, (tuple, list)) or len(units) != 2 or not all(isinstance(unit, str) for unit in units):
+        raise InvalidArgumentError(f"units is {shown(units)}; expected two texts, of forces and of lengths")
+    return units[0], units[1]
+
+
+def _rows(graph: DrawnGraph, quantity: Quantity, nodes: Sequence[Any] | None, *, one: bool) -> list[int]:
+    """Columns of the values, one a panel: contact nodes, or the only column of an overview."""
     ids = list(graph.problem.node_ids)
     if nodes is not None:
+        if not quantity.by_node:
+            raise InvalidArgumentError(f"nodes are given with the quantity {quantity.name!r}; expected one of nodes")
         row = {label: k for k, label in enumerate(ids)}
         try:
             chosen = [row[node] for node in nodes]
@@ -150,138 +172,164 @@ def _nodes(graph: DrawnGraph, nodes: Sequence[Any] | None, curves: dict[int, Any
             chosen = []
         if not chosen:
             raise InvalidArgumentError(f"nodes is {shown(nodes)}; expected labels among {shown(ids)}")
+        if one and len(chosen) > 1:
+            raise InvalidArgumentError(f"nodes is {shown(nodes)} with one ax; expected one label")
         return chosen
-    if len(ids) <= _MAX_PANELS or not curves:
-        return list(range(min(len(ids), _MAX_PANELS)))
-    values = np.concatenate([values for _, values in curves.values()])
-    spread = values.max(axis=0) - values.min(axis=0)
-    return sorted(np.argsort(-spread, kind="stable")[:_MAX_PANELS].tolist())
+    if not quantity.by_node:
+        return [0]
+    most = 1 if one else _MAX_PANELS
+    if len(ids) <= most or not graph.arcs:
+        return list(range(min(len(ids), most)))
+    spread = drawn_range(graph.vertices, quantity)
+    return sorted(np.argsort(-spread, kind="stable")[:most].tolist())
 
 
-def _panel(axis: Any, graph: DrawnGraph, quantity: str, node: int, curves: dict[int, Any]) -> None:
-    for branch in graph.branches:
-        colour = _COLOURS[branch.number % len(_COLOURS)]
-        for arc in branch.arcs:
-            if arc.dimension:
-                _sheet(axis, graph, arc, quantity, node)
-                continue
-            alphas, values = curves[arc.number]
-            axis.plot(alphas, values[:, node], linestyle=_STYLES[arc.statuses[node]], color=colour, linewidth=1.6)
-        _number(axis, branch, node, curves, colour)
+def _windows(graph: DrawnGraph, zoom: Any) -> list[tuple[float, float]]:
+    if isinstance(zoom, (bool, np.bool_)):
+        return narrow_changes(graph.claims.steps(), graph.interval) if zoom else []
+    low, high = (float(end) for end in alpha_interval(zoom, "zoom"))
+    a, b = graph.interval
+    if high <= a or low >= b:
+        raise InvalidArgumentError(f"zoom is {shown(zoom)}; expected an interval that overlaps [{a:g}, {b:g}]")
+    return [(max(low, a), min(high, b))]
+
+
+def _grid(rows: int, multiplicity: bool, zooms: int, figsize: Any) -> tuple[Any, list[list[Any]]]:
+    """A figure and its axes, column by column; those of the whole interval come first in figure.axes."""
+    heights = [3.6 if rows == 1 else 2.7] * rows + [1.1] * int(multiplicity)
+    size = figsize or (7.5 + 3.0 * zooms, sum(heights) + 1.0)
+    figure = new_figure(figsize=size)
+    grid = figure.add_gridspec(len(heights), 1 + zooms, height_ratios=heights, width_ratios=[7.0] + [3.6] * zooms)
+    axes: list[list[Any]] = []
+    for column in range(1 + zooms):
+        axes.append([])
+        for row in range(len(heights)):
+            share = axes[-1][0] if row else None
+            axis = figure.add_subplot(grid[row, column], sharex=share)
+            if row + 1 < len(heights):
+                axis.tick_params(labelbottom=False)
+            axes[-1].append(axis)
+    return figure, axes
+
+
+def _drawn(graph: DrawnGraph, style: _Style, window: tuple[float, float] | None) -> dict[int, Curve]:
+    lo, hi = window or graph.interval
+    arcs = [arc for arc in graph.arcs if not arc.dimension]
+    changing = [arc for arc in arcs if window is not None and (lo < arc.lo < hi or lo < arc.hi < hi)]
+    # a zoom is as high as the arcs that end in it, so that these are drawn to a tolerance of their own
+    parts = (changing, [arc for arc in arcs if arc not in changing])
+    return {
+        number: curve
+        for part in parts
+        for number, curve in curves(part, style.quantity.name, hi - lo, style.tolerance, window).items()
+    }
+
+
+def _panel(
+    axis: Any,
+    graph: DrawnGraph,
+    style: _Style,
+    row: int,
+    drawn: dict[int, Curve],
+    window: tuple[float, float],
+) -> tuple[Any, dict[int, Curve], dict[int, Place], Mapping[int, int], int]:
+    """Draw one panel; returns what numbers beside its curves need."""
+    from matplotlib.transforms import ScaledTranslation
+
+    quantity, ends = style.quantity, None if window == graph.interval else _ending(graph, drawn, row, window)
+    places = side_by_side(drawn, graph.branch_of, row, None if ends is None else ends[1] - ends[0])
+    for arc in graph.arcs:
+        if arc.dimension:
+            band = sheet_range(graph.roots_at, arc, quantity, row)
+            if band is not None:
+                axis.fill_between(*band, color=GREY, alpha=0.25, linewidth=0)
+        elif arc.number in drawn:
+            curve, place = drawn[arc.number], places[arc.number]
+            line = STATUS_STYLES[arc.statuses[row]] if quantity.by_node else index_style(arc.index)
+            colour = colour_of(graph.branch_of[arc.number])
+            (artist,) = axis.plot(curve.alphas, curve.values[:, row], linestyle=line, color=colour, linewidth=1.6)
+            if place.among > 1:
+                step = min(_BESIDE, _WIDEST / (place.among - 1))
+                away = (place.rank - (place.among - 1) / 2) * step / 72.0
+                artist.set_transform(axis.transData + ScaledTranslation(-0.4 * away, away, axis.figure.dpi_scale_trans))
+                artist.set_linewidth(min(1.6, max(0.5, 0.8 * step)))
     for v in graph.vertices:
+        if not window[0] <= v.alpha <= window[1]:
+            continue
         if v.family is not None:
-            ends = _family_range(graph, v, quantity, node)
-            axis.plot([v.alpha] * 2, ends, color=_FAMILY, linewidth=2.4, solid_capstyle="butt", zorder=3)
-        _marker(axis, v, float(getattr(v, quantity)[node]))
-    axis.set_ylabel(f"{quantity} of node {graph.problem.node_ids[node]}")
+            ends = family_range(graph.problem, v, quantity, row)
+            axis.plot([v.alpha] * 2, ends, color=GREY, linewidth=2.4, solid_capstyle="butt", zorder=3)
+        if (mark := MARKERS.get(v.kind)) is not None:
+            value = float(state_columns(quantity, v)[row])
+            axis.plot([v.alpha], [value], marker=mark[0], ms=4.5, color=GREY, markerfacecolor=mark[1], zorder=4)
+    _dress(axis, graph, style, row, window)
+    if ends is not None:
+        axis.set_ylim(*ends)
+    return axis, drawn, places, graph.branch_of, row
+
+
+def _ending(
+    graph: DrawnGraph, drawn: dict[int, Curve], row: int, window: tuple[float, float]
+) -> tuple[float, float] | None:
+    """The range of the arcs that end inside a window, with room above and below; None where it has no height."""
+    lo, hi = window
+    inside = [drawn[arc.number] for arc in graph.arcs if arc.number in drawn and (lo < arc.lo < hi or lo < arc.hi < hi)]
+    if not inside:
+        return None
+    values = np.concatenate([curve.values[:, row] for curve in inside])
+    low, high = float(values.min()), float(values.max())
+    room = 0.15 * (high - low)
+    return (low - room, high + room) if room > 1e-12 * max(abs(low), abs(high)) else None
+
+
+def _dress(axis: Any, graph: DrawnGraph, style: _Style, row: int, window: tuple[float, float]) -> None:
+    quantity = style.quantity
+    name = f"{quantity.name} of node {graph.problem.node_ids[row]}" if quantity.by_node else quantity.words
+    if style.units is not None:
+        name += f" [{style.units[0 if quantity.dimension == 'force' else 1]}]"
+    axis.set_ylabel(name)
     axis.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
+    axis.grid(visible=True, color="#e4e4e4", linewidth=0.6)
+    axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.margins(y=0.12)
+    axis.set_xlim(*window)
 
 
-_MARKERS = {
-    VertexKind.TRANSITION: "o",
-    VertexKind.TOUCH: "o",
-    VertexKind.FOLD: "s",
-    VertexKind.BIFURCATION: "D",
-    VertexKind.POINT: "x",
-    VertexKind.BROKEN: "X",
-    VertexKind.UNSETTLED: "4",
-}
-
-
-def _marker(axis: Any, v: Vertex, value: float) -> None:
-    marker = _MARKERS.get(v.kind)
-    if marker is None:
-        return
-    filled = "#333333" if marker in "xX4" else "white"
-    axis.plot([v.alpha], [value], marker=marker, markersize=4.5, color=_FAMILY, markerfacecolor=filled, zorder=4)
-
-
-def _number(axis: Any, branch: Branch, node: int, curves: dict[int, Any], colour: str) -> None:
-    """The branch's number beside the middle of its longest arc."""
-    drawn = [arc for arc in branch.arcs if not arc.dimension]
-    if not drawn:
-        return
-    alphas, values = curves[max(drawn, key=lambda arc: arc.length).number]
-    middle = len(alphas) * 5 // 8
-    axis.annotate(
-        str(branch.number),
-        (alphas[middle], values[middle, node]),
-        textcoords="offset points",
-        xytext=(0, 4),
-        color=colour,
-        fontsize=9,
-        ha="center",
-    )
-
-
-def _family_range(graph: DrawnGraph, v: Vertex, quantity: str, node: int) -> tuple[float, float]:
-    """Smallest and largest value of the quantity on a family."""
-    family = v.family
-    if family is None:
-        raise AssertionError("the vertex has no family")
-    if quantity.startswith("lambda"):
-        values = family.vertices[:, node, 0 if quantity.endswith("_n") else 1]
-    else:
-        condensed, p = graph.problem.condensed, graph.problem.p
-        forces = family.vertices.transpose(0, 2, 1).reshape(len(family.vertices), 2 * p)
-        moves = condensed.g0 + v.alpha * condensed.g1 - forces @ condensed.S
-        values = moves[:, node if quantity == "u_n" else p + node]
-    return float(np.min(values)), float(np.max(values))
-
-
-def _sheet(axis: Any, graph: DrawnGraph, arc: Arc, quantity: str, node: int) -> None:
-    """The range of a sheet, shaded (forces only; displacements of a sheet are not drawn)."""
-    if not quantity.startswith("lambda"):
-        return
-    alphas, low, high = arc.sampled(9)[1:-1], [], []
-    for alpha in alphas:
-        points = np.concatenate([family.vertices for family in graph.roots_at(float(alpha)).families])
-        values = points[:, node, 0 if quantity.endswith("_n") else 1]
-        low.append(values.min())
-        high.append(values.max())
-    axis.fill_between(alphas, low, high, color=_FAMILY, alpha=0.25, linewidth=0)
-
-
-def _steps(axis: Any, graph: DrawnGraph) -> None:
-    steps = graph.claims.steps()
-    edges = [float(alpha) for alpha in steps.alphas]
-    if steps.between:
-        axis.stairs(steps.between, edges, color=_FAMILY, linewidth=1.4, baseline=None)
-    special = [
-        (x, n)
-        for k, (x, n) in enumerate(zip(edges, steps.at, strict=True))
-        if n not in steps.between[max(k - 1, 0) : k + 1]
-    ]
-    if special:
-        axis.plot([x for x, _ in special], [n for _, n in special], ".", color=_FAMILY, markersize=5)
-    axis.set_ylabel("solutions" if steps.exact else "solutions,\nat least")
-    axis.set_ylim(0, max([*steps.between, *steps.at], default=1) + 0.8)
-    axis.yaxis.get_major_locator().set_params(integer=True)
-
-
-def _legend(figure: Any, graph: DrawnGraph) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [
-        Line2D([], [], color="#666666", linestyle=_STYLES[status], label=label)
-        for status, label in (
-            (ContactStatus.OPEN, "open"),
-            (ContactStatus.STICK, "stick"),
-            (ContactStatus.SLIP_PLUS, "slip"),
+def _mark_windows(axes: list[list[Any]], windows: list[tuple[float, float]]) -> None:
+    """Name the parts that are drawn larger, in both places."""
+    for letter, column, (lo, hi) in zip("AB", axes[1:], windows, strict=False):
+        for axis in axes[0]:
+            axis.axvspan(lo, hi, color="#f2c14e", alpha=0.45, linewidth=0.8, zorder=0.5)
+        axes[0][0].annotate(
+            letter, ((lo + hi) / 2, 0.99), xycoords=("data", "axes fraction"), fontsize=8, ha="center", va="top"
         )
-    ]
-    kinds = {v.kind for v in graph.vertices}
-    for kind, label in (
-        (VertexKind.TRANSITION, "transition"),
-        (VertexKind.FOLD, "fold"),
-        (VertexKind.BIFURCATION, "bifurcation"),
-        (VertexKind.UNSETTLED, "not followed further"),
-    ):
-        if kind in kinds:
-            filled = "#333333" if kind is VertexKind.UNSETTLED else "white"
-            handles.append(
-                Line2D([], [], linestyle="", marker=_MARKERS[kind], color=_FAMILY, markerfacecolor=filled, label=label)
-            )
-    if any(v.family is not None for v in graph.vertices):
-        handles.append(Line2D([], [], color=_FAMILY, linewidth=2.4, label="continuum"))
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False, fontsize=8)
+        words = f"{letter}: alpha from {lo:.8g}, width {hi - lo:.3g};\nas high as the arcs that end here"
+        column[0].set_title(words, fontsize=8, loc="left")
+        column[-1].tick_params(axis="x", rotation=30)
+        for axis in column:
+            axis.xaxis.get_major_locator().set_params(nbins=4)
+
+
+def _words(
+    figure: Any, first: Any, graph: DrawnGraph, quantity: Quantity, title: str | None, others: set[str], *, alone: bool
+) -> None:
+    """The title and the legend."""
+    problem, (a, b) = graph.problem, graph.interval
+    name = counted(problem.p, "contact node") if title is None else title
+    first.set_title(f"{name}, alpha in [{a:g}, {b:g}]; {graph.completeness()}", fontsize=9, loc="left", wrap=True)
+    arcs = [arc for arc in graph.arcs if not arc.dimension]
+    others |= {"continuum"} if any(v.family is not None for v in graph.vertices) else set()
+    others |= {"sheet"} if len(arcs) < len(graph.arcs) and quantity.dimension == "force" else set()
+    entries = handles(
+        {v.kind for v in graph.vertices},
+        {s for arc in arcs for s in arc.statuses} if quantity.by_node else (),
+        () if quantity.by_node else {arc.index for arc in arcs},
+        others,
+    )
+    if alone:
+        first.legend(handles=entries, frameon=False, fontsize=7)
+    else:
+        rows = -(-len(entries) // 6) or 1
+        across = -(-len(entries) // rows) or 1
+        figure.legend(handles=entries, loc="outside upper center", ncols=across, frameon=False, fontsize=8)

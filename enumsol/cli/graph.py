@@ -8,12 +8,13 @@ import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, note, parse_interval, so_far, workers
 from enumsol.cli.options import (
+    PLOT,
     Arithmetic,
-    DrawnQuantity,
     FirstAlpha,
     JsonFile,
     LastAlpha,
     MaxNodes,
+    Overview,
     PlotFile,
     ProblemArgument,
     count,
@@ -52,10 +53,17 @@ def graph(
     proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), for enumsol verify.")] = None,
     graphml_file: Annotated[str | None, file("--graphml", "Write GraphML for other programs.")] = None,
     plot_file: PlotFile = None,
-    quantity: DrawnQuantity = "lambda_n",
+    quantity: Annotated[
+        Overview | None,
+        typer.Option(
+            help="What is drawn against alpha: an overview (default: norm of the contact forces), or by nodes.",
+            rich_help_panel=PLOT,
+        ),
+    ] = None,
     nodes: Annotated[
         str | None, node("--nodes", "LABELS", "Contact nodes to draw, such as 0,3; default: up to three.")
     ] = None,
+    units: Annotated[str | None, node("--units", "FORCE,LENGTH", "Units for the figure, such as N,mm.")] = None,
 ) -> None:
     """Find all solutions of PROBLEM for every alpha of an interval, as branches of arcs.
 
@@ -73,13 +81,16 @@ def graph(
     check_plot(plot_file)
     interval, body = parse_interval(first, last), load_problem(problem)
     chosen = None if nodes is None else [body.node_ids[node_row(body, label.strip())] for label in nodes.split(",")]
+    drawn: dict[str, Any] = {"quantity": quantity, "nodes": chosen, "title": problem, "units": _units(units)}
+    if chosen is not None and quantity in ("norm", "sum_n", "sum_t"):
+        raise InvalidArgumentError(f"--nodes is given with --quantity {quantity}; expected a quantity of nodes")
     limits = {"max_nodes": max_nodes, "time_limit": time_limit}
     found, ended = so_far(lambda: build(body, interval, arithmetic, jobs, **limits))
     deliver(
         (proof_file, lambda path: _write_proof(found, path)),
         (save_file, found.save),
         (graphml_file, found.write_graphml),
-        (plot_file, lambda path: write_figure(path, found.plot(quantity, chosen))),
+        (plot_file, lambda path: write_figure(path, found.plot(**drawn))),
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: as_text(found),
@@ -87,6 +98,15 @@ def graph(
         frame=found.to_frame,
     )
     finish(ended, ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
+
+
+def _units(text: str | None) -> tuple[str, str] | None:
+    if text is None:
+        return None
+    force, comma, length = text.partition(",")
+    if not (force and comma and length):
+        raise InvalidArgumentError(f"--units is {text}; expected units of force and length, such as N,mm")
+    return force.strip(), length.strip()
 
 
 def _write_proof(found: BranchGraph, path: str) -> None:

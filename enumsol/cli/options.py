@@ -60,4 +60,5 @@ LastAlpha = Annotated[str, number("--to", "Last alpha: a number or a fraction.")
 MaxNodes = Annotated[int | None, count("Stop after N nodes of the tree.")]
 JsonFile = Annotated[str | None, file("--json", "Write the result as JSON; - is stdout.")]
 PlotFile = Annotated[str | None, file("--plot", "Draw a figure: .png, .pdf, .svg.", PLOT)]
+Overview = Literal["norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"]
 DrawnQuantity = Annotated[Quantity, typer.Option(help="What is drawn against alpha.", rich_help_panel=PLOT)]

@@ -22,8 +22,8 @@ def draw_path(path: PathData, graph: Any, node: int, quantity: str, ax: Any, gra
     if graph is not None and ax is not None:
         raise InvalidArgumentError("graph and ax are both given; draw further paths with path.plot(ax=...) alone")
     if graph is not None:
-        # the graph draws a figure of its own; its first panel is this node's
-        ax = graph.plot(quantity, [path.node_ids[node]], **graph_options).axes[0]
+        # the graph draws a figure of its own; its first panel is this node's, and no zoom shows the path
+        ax = graph.plot(quantity, [path.node_ids[node]], **{"zoom": False, **graph_options}).axes[0]
     elif ax is None:
         ax = new_figure().subplots()
     values = getattr(path, quantity)[:, node]
@@ -42,4 +42,7 @@ def draw_path(path: PathData, graph: Any, node: int, quantity: str, ax: Any, gra
     if not ax.get_ylabel():
         ax.set_xlabel("alpha")
         ax.set_ylabel(f"{quantity} of node {path.node_ids[node]}")
+        ax.set_title(f"path for alpha in [{path.alpha.min():g}, {path.alpha.max():g}]: {path.status.value}", fontsize=9)
+    named = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))  # of several paths once
+    ax.legend(handles=list(named.values()), labels=list(named), fontsize=7, frameon=False)
     return ax

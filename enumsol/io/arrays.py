@@ -32,7 +32,8 @@ def problem_from_arrays(arrays: Mapping[str, Any], layout: Layout) -> ContactPro
         options["node_ids"] = arrays["node_ids"]
     missing = [name for name in PLANE_MESH if name not in arrays]
     if not missing:
-        options["mesh"] = PlaneMesh(*(arrays[name] for name in PLANE_MESH), arrays.get("mesh_offset"))
+        points, cells, motion = (arrays[name] for name in PLANE_MESH)
+        options["mesh"] = PlaneMesh(points, cells, motion, arrays.get("mesh_offset"))
     elif len(missing) < len(PLANE_MESH) or "mesh_offset" in arrays:
         raise InvalidProblemError(f"{', '.join(missing)} is missing; expected {', '.join(PLANE_MESH)}, all or none")
     return ContactProblem(*(arrays[name] for name in layout.required), **options)

@@ -1,4 +1,4 @@
-"""States of problems in 3D as VTU files for ParaView, written by meshio."""
+"""States of problems in 2D and 3D as VTU files for ParaView, written by meshio."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from enumsol.array_checks import real_array
 from enumsol.checks import file_path, instance_of
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.files import writing
+from enumsol.problem import ContactProblem
 from enumsol.problem3d import ContactProblem3D
+from enumsol.shapes import body_shape
+from enumsol.statuses import STATUSES
 
 if TYPE_CHECKING:
     import os
@@ -23,6 +26,8 @@ if TYPE_CHECKING:
 
 #: Names that meshio has for cells and facets, by their corners; a quadrilateral has as many as a tetrahedron.
 _CELLS, _FACETS = {4: "tetra", 8: "hexahedron"}, {3: "triangle", 4: "quad"}
+_PLANE_CELLS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
+_PLANE_STATUS = {status.value: float(code) for code, status in enumerate(STATUSES)}
 _STATUS = {"open": 0.0, "stick": 1.0}
 _SLIPS = 2.0
 #: Directions of contact rows are known if they are orthonormal to this.
@@ -53,7 +58,7 @@ class State(Protocol):
         """Slips, shape (p, 2) [length]."""
 
 
-def write_vtu(problem: ContactProblem3D, state: State, path: str | os.PathLike[str]) -> None:
+def write_vtu(problem: ContactProblem | ContactProblem3D, state: State, path: str | os.PathLike[str]) -> None:
     """Write displacements and contact forces to a VTU file for ParaView, by meshio.
 
     With ``problem.mesh`` the file holds the body, its points with their ``displacement``, and the facets of the contact
@@ -66,12 +71,16 @@ def write_vtu(problem: ContactProblem3D, state: State, path: str | os.PathLike[s
 
     Without a mesh the file holds the contact nodes at ``problem.coordinates``, with the same data but no vectors.
 
+    In 2D the points lie in the plane z = 0 and have ``displacement`` and ``contact_force``; ``lambda_n``, ``lambda_t``,
+    ``u_n``, ``u_t`` and ``status`` (0 open, 1 stick, 2 slip+, 3 slip-) stand at the node that a contact row belongs to
+    most.
+
     Parameters
     ----------
-    problem : ContactProblem3D
+    problem : ContactProblem or ContactProblem3D
         With ``mesh`` or ``coordinates``.
     state : FixedPoint, TrescaSolution or other
-        With u (n,), lambda_n (p,), lambda_t (p, 2), u_n (p,) and u_t (p, 2).
+        With u (n,), lambda_n (p,), lambda_t (p, 2), u_n (p,) and u_t (p, 2); in 2D lambda_t and u_t are (p,).
     path : str or path-like
         Ends in .vtu; an existing file is replaced.
 
@@ -97,23 +106,51 @@ def write_vtu(problem: ContactProblem3D, state: State, path: str | os.PathLike[s
     ...     pathlib.Path(folder, "free.vtu").stat().st_size > 1000
     True
     """
-    instance_of(problem, ContactProblem3D, "problem")
+    if not isinstance(problem, ContactProblem):
+        instance_of(problem, ContactProblem3D, "problem")
     place = file_path(path, "path")
     if place.suffix != ".vtu":
         raise InvalidArgumentError(f"path is {str(place)!r}; expected a name that ends in .vtu")
     meshio = _meshio()
+    picture = _plane(meshio, problem, state) if isinstance(problem, ContactProblem) else _space(meshio, problem, state)
+    with writing(place, "path"):
+        picture.write(place, file_format="vtu")
+
+
+def _space(meshio: Any, problem: ContactProblem3D, state: State) -> Any:
     data = _row_data(problem, state)
     if problem.mesh is None:
         if problem.coordinates is None:
             raise InvalidArgumentError("problem has neither mesh nor coordinates; expected one of them for a picture")
         vertices = np.arange(problem.p)[:, None]
-        picture = meshio.Mesh(problem.coordinates, [("vertex", vertices)], point_data=data)
-    else:
-        data |= _vectors(problem, problem.mesh, data)
-        u = problem.mesh.displacements(_array(state, "u", (problem.n,)))
-        picture = _body(meshio, problem, problem.mesh, u, data)
-    with writing(place, "path"):
-        picture.write(place, file_format="vtu")
+        return meshio.Mesh(problem.coordinates, [("vertex", vertices)], point_data=data)
+    data |= _vectors(problem, problem.mesh, data)
+    u = problem.mesh.displacements(_array(state, "u", (problem.n,)))
+    return _body(meshio, problem, problem.mesh, u, data)
+
+
+def _plane(meshio: Any, problem: ContactProblem, state: State) -> Any:
+    p = problem.p
+    data = {name: _array(state, name, (p,)) for name in ("lambda_n", "lambda_t", "u_n", "u_t")}
+    statuses = getattr(state, "statuses", None)
+    if statuses is not None:
+        data["status"] = np.array([_PLANE_STATUS[str(status)] for status in statuses])
+    if problem.mesh is None:
+        if problem.coordinates is None:
+            raise InvalidArgumentError("problem has neither mesh nor coordinates; expected one of them for a picture")
+        return meshio.Mesh(_in_space(problem.coordinates), [("vertex", np.arange(p)[:, None])], point_data=data)
+    shape = body_shape(problem)
+    nodes, count = np.asarray(shape.weights.argmax(axis=1)).ravel(), len(shape.points)
+    moves = shape.displacements(_array(state, "u", (problem.n,)))
+    forces = shape.contact_forces(problem, data["lambda_n"], data["lambda_t"])
+    point_data = {"displacement": _in_space(moves), "contact_force": _in_space(forces)}
+    point_data |= {name: _spread(values, nodes, count) for name, values in data.items()}
+    cells = [(_PLANE_CELLS[shape.cells.shape[1]], shape.cells)]
+    return meshio.Mesh(_in_space(shape.points), cells, point_data=point_data)
+
+
+def _in_space(vectors: Floats) -> Floats:
+    return np.concatenate([vectors, np.zeros((len(vectors), 1))], axis=1)
 
 
 def _meshio() -> Any:

@@ -153,6 +153,32 @@ class Root(ContactState):
         """
         return branch_test(self._condensed, self)
 
+    @property
+    def problem(self) -> Any:
+        """The problem that it solves."""
+        return self._condensed.problem
+
+    def plot_body(self, ax: Any = None, *, scale: float | None = None) -> Any:
+        """The deformed body with contact forces as arrows and contact nodes by status; matplotlib Axes.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes or None
+            None: those of a new figure.
+        scale : float, optional
+            Displacements are multiplied by it; default so that they can be seen. The title tells it.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The problem has no mesh.
+        MissingDependencyError
+            matplotlib is not installed.
+        """
+        from enumsol.roots.body_plots import draw_body  # matplotlib comes with the first picture
+
+        return draw_body(self, self.problem, ax, scale)
+
     def _slip_sign(self, node: int) -> int:
         sign = None if self._slips is None else self._slips.sign(node)
         return int(np.sign(self.u_t[node])) if sign is None else sign

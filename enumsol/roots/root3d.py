@@ -76,6 +76,32 @@ class Root3D(ContactState):
 
         return draw_slips(self, self._condensed.problem, ax)
 
+    @property
+    def problem(self) -> Any:
+        """The problem that it solves."""
+        return self._condensed.problem
+
+    def plot_body(self, ax: Any = None, *, scale: float | None = None) -> Any:
+        """The deformed body with contact forces as arrows and contact nodes by status; matplotlib Axes.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes or None
+            With ``projection="3d"``; None: those of a new figure.
+        scale : float, optional
+            Displacements are multiplied by it; default so that they can be seen. The title tells it.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The problem has no mesh.
+        MissingDependencyError
+            matplotlib is not installed.
+        """
+        from enumsol.roots.body_plots import draw_body  # matplotlib comes with the first picture
+
+        return draw_body(self, self.problem, ax, scale)
+
     def __repr__(self) -> str:
         index = "?" if self.index is None else f"{self.index:+d}"
         regular = "regular" if self.regular else "not regular"

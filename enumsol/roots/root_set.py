@@ -223,6 +223,25 @@ class RootSet(Sequence[Root], Immutable):
             }
         )
 
+    def plot_bodies(self, *, scale: float | None = None) -> Any:
+        """A matplotlib figure of the deformed bodies of the isolated roots, up to 12 of them, in one scale.
+
+        Parameters
+        ----------
+        scale : float, optional
+            As in `Root.plot_body`.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The problem has no mesh, or there is no isolated root.
+        MissingDependencyError
+            matplotlib is not installed.
+        """
+        from enumsol.roots.body_plots import draw_bodies  # matplotlib comes with the first picture
+
+        return draw_bodies(self._roots, scale)
+
     def completeness(self) -> str:
         """The closing line of the printed table."""
         count = len(self.undecided)

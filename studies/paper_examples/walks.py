@@ -80,7 +80,7 @@ def continuation_row(example, problem, graph, h_max):
 
 def draw(title, problem, graph):
     """The graph with the accepted steps of one walk along every branch as dots."""
-    figure = graph.plot(figsize=(7.5, 2.2 + 2.5 * problem.p))
+    figure = graph.plot("lambda_n", zoom=False, figsize=(7.5, 2.2 + 2.5 * problem.p))
     paths = []
     for path in walks(problem, graph, paper_options(1.0)):
         if not any(same_ends(path, other) for other in paths):

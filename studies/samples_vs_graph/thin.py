@@ -48,6 +48,6 @@ def main(run):
         graph = branch_graph(thin_problem(length), INTERVAL, "exact")
         rows.append(row(graph, time.perf_counter() - start, length, samples))
         if length == 1.0:
-            run.figure("branch_thin", graph.plot())
+            run.figure("branch_thin", graph.plot("lambda_n"))
     hidden = ", ".join(f"{row['length']:g}" for row in rows if row["samples see it"] == "no")
     run.table("branch_thin", rows, f"branches of length {hidden or '-'} are missed by {samples} samples")

@@ -49,6 +49,6 @@ def main(run):
         graph = branch_graph(problem, INTERVAL)
         rows.append(row(problem, graph, time.perf_counter() - start, samples))
         if p == drawn:
-            run.figure(f"branch_wedge_{p}", graph.plot())
+            run.figure(f"branch_wedge_{p}", graph.plot("lambda_n"))
     note = f"alpha in {INTERVAL}, pull {OBLIQUE}, one core; 1,000 samples scaled from {samples}"
     run.table("branch_wedge", rows, note)

@@ -25,11 +25,11 @@ def test_points_between_are_near_the_polygon(name, interval, quantity):
     _, arcs = arcs_of(name, interval)
     width, tolerance = float(interval[1] - interval[0]), 1e-3
     drawn = curves(arcs, quantity, width, tolerance)
-    everything = np.concatenate([values for _, values in drawn.values()])
+    everything = np.concatenate([values for _, _, _, values in drawn.values()])
     height = np.ptp(everything, axis=0)
     changes = height > 1e-9 * (np.max(np.abs(everything), axis=0) + 1e-300)
     for arc in arcs:
-        alphas, values = drawn[arc.number]
+        alphas, _, _, values = drawn[arc.number]
         assert (alphas[0], alphas[-1]) == arc.interval
         assert np.all(np.diff(alphas) >= 0)
         for alpha in arc.sampled(41):
@@ -51,11 +51,11 @@ def distance(point, corners):
 def test_straight_arcs_take_few_points_and_curved_ones_more():
     _, arcs = arcs_of("one-node-6.1", (0, 10))
     drawn = curves(arcs, "lambda_n", 10.0, 1e-3)
-    sizes = {str(arc.statuses[0]): len(drawn[arc.number][0]) for arc in arcs}
+    sizes = {str(arc.statuses[0]): len(drawn[arc.number].alphas) for arc in arcs}
     assert sizes["open"] == sizes["stick"] < 20
     assert sizes["slip-"] > 20
     finer = curves(arcs, "lambda_n", 10.0, 1e-5)
-    assert max(len(alphas) for alphas, _ in finer.values()) > 4 * max(sizes.values())
+    assert max(len(curve.alphas) for curve in finer.values()) > 4 * max(sizes.values())
 
 
 def test_nothing_to_draw():

@@ -81,7 +81,7 @@ def test_its_table_calls_the_ends_of_its_arcs_unsettled(cut):
 def test_its_plot_shows_a_lower_bound_and_says_that_it_is_not_complete(cut, tmp_path):
     figure = cut.plot(file=tmp_path / "cut.png")
     assert (tmp_path / "cut.png").stat().st_size > 0
-    assert "complete: no" in figure.axes[0].get_title()
+    assert "complete: no" in figure.axes[0].get_title("left")
     assert "at least" in figure.axes[-1].get_ylabel()
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "fold" not in labels

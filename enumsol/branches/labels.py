@@ -1,0 +1,100 @@
+"""Numbers beside curves that overprint neither each other nor, where there is room, the curves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    Points = NDArray[np.float64]
+
+#: Where along a curve a label may stand, the best place first, and on which sides of it.
+_ALONG = (0.5, 0.65, 0.35, 0.8, 0.2, 0.9, 0.1, 0.97, 0.03)
+_SIDES = ((0.0, 1.0), (0.0, -1.0), (0.7, 0.7), (-0.7, 0.7), (0.7, -0.7), (-0.7, -0.7), (1.0, 0.0), (-1.0, 0.0))
+#: Distances from the curve [points], and pixels between labels.
+_AWAY, _APART = (5.0, 9.0), 2.0
+
+
+class Label(NamedTuple):
+    """A text and the curve it belongs to, in data coordinates (k, 2)."""
+
+    text: str
+    colour: str
+    curve: Points
+
+
+def place_labels(axis: Any, labels: Sequence[Label], obstacles: Iterable[Points]) -> list[Label]:
+    """Write labels beside their curves; returns those for which there was no room.
+
+    Parameters
+    ----------
+    axis : Axes
+        Of a figure whose layout is settled.
+    labels : sequence of Label
+        In the order of their importance.
+    obstacles : iterable of (k, 2) arrays
+        Curves and marks that labels should not stand on, in data coordinates.
+    """
+    window = axis.get_window_extent()
+    frame = np.array([[window.x0, window.y0], [window.x1, window.y1]])
+    pixel = axis.figure.dpi / 72.0
+    lines = [dense(axis.transData.transform(points), 3.0) for points in obstacles if len(points)]
+    points = np.concatenate(lines) if lines else np.zeros((0, 2))
+    points = points[np.all((points > frame[0] - 20) & (points < frame[1] + 20), axis=1)]
+    boxes: list[Points] = []
+    left = []
+    for label in labels:
+        text = axis.text(
+            0, 0, label.text, color=label.colour, fontsize=8, ha="center", va="center", transform=None, clip_on=True
+        )
+        text.set_in_layout(False)
+        drawn = text.get_window_extent()
+        size = np.array([drawn.width, drawn.height])
+        found = _place(axis.transData.transform(label.curve), size, frame, boxes, points, pixel)
+        if found is None:
+            text.remove()
+            left.append(label)
+            continue
+        boxes.append(np.array([found - size / 2, found + size / 2]))
+        # kept in data coordinates: it stays with its curve when the figure is scaled
+        text.set_transform(axis.transData)
+        text.set_position(axis.transData.inverted().transform(found))
+        text.set_gid("branch number")
+    return left
+
+
+def _place(
+    curve: Points, size: Points, frame: Points, boxes: Sequence[Points], points: Points, pixel: float
+) -> Points | None:
+    line = dense(curve, 3.0)
+    line = line[np.all((line >= frame[0] - 1) & (line <= frame[1] + 1), axis=1)]
+    if not len(line):
+        return None
+    for away in _AWAY:
+        for share in _ALONG:
+            foot = line[min(int(share * len(line)), len(line) - 1)]
+            for side in _SIDES:
+                middle = foot + np.array(side) * (away * pixel + size / 2)
+                low, high = middle - size / 2 - _APART, middle + size / 2 + _APART
+                if np.any(low < frame[0]) or np.any(high > frame[1]):
+                    continue
+                if any(np.all(low < box[1]) and np.all(high > box[0]) for box in boxes):
+                    continue
+                if not np.any(np.all((points > low) & (points < high), axis=1)):
+                    return np.asarray(middle)
+    return None
+
+
+def dense(line: Points, step: float) -> Points:
+    """A polygon with points at most ``step`` apart."""
+    if len(line) < 2:
+        return line
+    gaps = np.hypot(*np.diff(line, axis=0).T)
+    along = np.concatenate([[0.0], np.cumsum(gaps)])
+    at = np.linspace(0.0, along[-1], min(int(along[-1] / step) + 2, 4000))
+    return np.stack([np.interp(at, along, line[:, 0]), np.interp(at, along, line[:, 1])], axis=1)

@@ -1,0 +1,114 @@
+"""The deformed body of a solution: nodes, their displacements, contact forces on them, places of contact rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.errors import InvalidArgumentError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+#: Displacements are drawn so that the largest takes this part of the body's size, and forces likewise.
+_MOVED, _LONGEST = 0.08, 0.16
+#: Nodal forces below this part of the largest are rounding.
+_LEAST_FORCE = 1e-9
+
+
+@dataclass(frozen=True)
+class BodyShape:
+    """What a picture of a problem with a mesh needs, whatever the solution.
+
+    Attributes
+    ----------
+    points : (N, d) array
+        Nodes, d = 2 or 3 [length].
+    cells : (M, k) array of int
+    motion : sparse (d N, n)
+        Displacements of the nodes from u.
+    offset : (N, d) array
+        Prescribed displacements [length].
+    weights : sparse (p, N)
+        How much every contact row belongs to every node, rows adding up to 1.
+    """
+
+    points: Floats
+    cells: NDArray[np.int64]
+    motion: sp.csr_array
+    offset: Floats
+    weights: sp.csr_array
+
+    @property
+    def size(self) -> float:
+        """The largest extent of the body [length]."""
+        return float(np.max(np.ptp(self.points, axis=0)))
+
+    def displacements(self, u: Floats) -> Floats:
+        """Of all nodes, (N, d) [length]."""
+        return np.asarray(self.motion @ u).reshape(self.points.shape) + self.offset
+
+    def contact_forces(self, problem: Any, lambda_n: Floats, lambda_t: Floats) -> Floats:
+        """Contact forces on all nodes of the body in global axes, (N, d) [force]."""
+        rows = np.concatenate([lambda_n, lambda_t.ravel(order="F")])
+        forces = -np.asarray(self.motion @ (problem.contact_rows.T @ rows)).reshape(self.points.shape)
+        size = np.linalg.norm(forces, axis=1, keepdims=True)
+        return np.asarray(np.where(size > _LEAST_FORCE * np.max(size, initial=0.0), forces, 0.0))
+
+    def at_rows(self, values: Floats) -> Floats:
+        """Values of nodes (N, d) at the contact rows, (p, d)."""
+        return np.asarray(self.weights @ values)
+
+
+def body_shape(problem: Any) -> BodyShape:
+    """The shape of a problem in 2D or 3D.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The problem has no mesh.
+    """
+    mesh = problem.mesh
+    if mesh is None:
+        raise InvalidArgumentError("the problem has no mesh; expected one made by enumsol.fem, or with mesh=")
+    points = mesh.points
+    if points.shape[1] == 2:
+        motion, offset = mesh.motion, np.zeros_like(points) if mesh.offset is None else mesh.offset
+    else:
+        count = len(mesh.dofs)
+        motion = sp.csr_array((np.ones(count), (mesh.dofs, np.arange(count))), shape=(points.size, count))
+        offset = np.zeros_like(points)
+    by_node = sp.csr_array(abs(problem.Bn) @ abs(motion).T)
+    dimension = points.shape[1]
+    gather = sp.kron(sp.eye_array(len(points)), np.ones((dimension, 1)))
+    weights = sp.csr_array(by_node @ gather)
+    scale = 1.0 / np.asarray(weights.sum(axis=1)).ravel()
+    return BodyShape(points, mesh.cells, sp.csr_array(motion), offset, sp.csr_array(sp.diags_array(scale) @ weights))
+
+
+def round_scale(largest: float, size: float, share: float = _MOVED) -> float:
+    """A factor of the form 1, 2 or 5 times a power of ten by which ``largest`` takes about that share of the size."""
+    if not largest > 0:
+        return 1.0
+    wanted = share * size / largest
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-12)))
+
+
+def arrow_scale(largest: float, size: float) -> float:
+    """Length of an arrow for a unit of force."""
+    return _LONGEST * size / largest if largest > 0 else 0.0
+
+
+def boundary_faces(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Faces of tetrahedra or hexahedra (order of VTK) that belong to one cell only, (k, 3) or (k, 4)."""
+    tetra = ((0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3))
+    hexa = ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+    faces = np.concatenate([cells[:, list(face)] for face in (tetra if cells.shape[1] == 4 else hexa)])
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(faces[first[count == 1]])
