@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from enumsol.problem import ContactProblem
     from enumsol.problem3d import ContactProblem3D
     from enumsol.proof.proof_file import Proof, ProofFormatError
+    from enumsol.report import write_report
     from enumsol.roots.enumerate import enumerate_roots
     from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
     from enumsol.roots.root_set import RootSet, SearchStats, Undecided
@@ -124,6 +125,7 @@ _HOMES = {
         "successive_approximations",
     ),
     "enumsol.friction": ("FrictionTable",),
+    "enumsol.report": ("write_report",),
     "enumsol.problem": ("ContactProblem",),
     "enumsol.problem3d": ("ContactProblem3D",),
     "enumsol.roots.root": ("Enclosure", "Polytope", "Root", "RootFamily"),
@@ -214,6 +216,7 @@ __all__ = [
     "successive_approximations",
     "verify",
     "write_problem",
+    "write_report",
     "write_vtu",
 ]
 

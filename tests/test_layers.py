@@ -28,7 +28,7 @@ LAYERS = (
     ("branches", "fixed_points"),
     ("continuation",),
     ("fem", "io"),
-    ("gallery",),
+    ("gallery", "report"),
     (".",),
     ("cli",),
     ("__main__",),
@@ -42,6 +42,7 @@ STRANGERS = {
     "fixed_points": {"checker", "search", "relaxation", "roots"},
     "fem": {"checker", "search", "roots", "branches", "continuation"},
     "io": {"checker", "search", "roots", "branches", "continuation"},
+    "report": {"checker", "search", "continuation"},
     "gallery": {"checker", "search", "roots", "branches", "continuation"},
 }
 

@@ -128,7 +128,7 @@ def plot_graph(
         matplotlib is not installed.
     """
     chosen = quantity_of(("norm" if nodes is None else "lambda_n") if quantity is None else quantity)
-    style = _Style(chosen, _units(units), max(positive_number(tolerance, "tolerance"), _LEAST_TOLERANCE))
+    style = _Style(chosen, checked_units(units), max(positive_number(tolerance, "tolerance"), _LEAST_TOLERANCE))
     rows = _rows(graph, chosen, nodes, one=axes_or_none(ax) is not None)
     windows = [] if ax is not None else _windows(graph, zoom)
     if ax is None:
@@ -151,7 +151,14 @@ def plot_graph(
     return figure
 
 
-def _units(units: Any) -> tuple[str, str] | None:
+def checked_units(units: Any) -> tuple[str, str] | None:
+    """Units of forces and lengths, or None.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is something else.
+    """
     if units is None:
         return None
     if not isinstance(units, (tuple, list)) or len(units) != 2 or not all(isinstance(unit, str) for unit in units):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from enumsol.cli import audit, fixed_point, follow, gallery, graph, roots, table, verify
+from enumsol.cli import audit, fixed_point, follow, gallery, graph, report, roots, table, verify
 from enumsol.cli.common import ExitStatus
 from enumsol.cli.streams import guarded_streams
 from enumsol.errors import EnumsolError, OutputError, WorkerError
@@ -31,6 +31,7 @@ app = typer.Typer(
 app.command("roots")(roots.roots)
 app.command("table")(table.table)
 app.command("graph")(graph.graph)
+app.command("report")(report.report)
 app.command("follow")(follow.follow)
 app.command("audit")(audit.audit)
 app.command("fixed-point")(fixed_point.fixed_point)

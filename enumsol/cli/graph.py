@@ -33,17 +33,20 @@ if TYPE_CHECKING:
     from enumsol.problem import ContactProblem
 
 
+HowExact = Annotated[
+    Arithmetic,
+    typer.Option(
+        help="verified: rigorous error bounds, proven. fast: the search believes floats, never proven. "
+        "exact: rationals throughout, proven, slow beyond ten contact nodes."
+    ),
+]
+
+
 def graph(
     problem: ProblemArgument,
     first: FirstAlpha,
     last: LastAlpha,
-    arithmetic: Annotated[
-        Arithmetic,
-        typer.Option(
-            help="verified: rigorous error bounds, proven. fast: the search believes floats, never proven. "
-            "exact: rationals throughout, proven, slow beyond ten contact nodes."
-        ),
-    ] = "verified",
+    arithmetic: HowExact = "verified",
     max_nodes: MaxNodes = None,
     time_limit: Annotated[float | None, seconds("Stop the search after so long.")] = None,
     jobs: Annotated[int, count("Processes to search with.")] = 1,
@@ -81,26 +84,33 @@ def graph(
     check_plot(plot_file)
     interval, body = parse_interval(first, last), load_problem(problem)
     chosen = None if nodes is None else [body.node_ids[node_row(body, label.strip())] for label in nodes.split(",")]
-    drawn: dict[str, Any] = {"quantity": quantity, "nodes": chosen, "title": problem, "units": _units(units)}
+    drawn: dict[str, Any] = {"quantity": quantity, "nodes": chosen, "title": problem, "units": parse_units(units)}
     if chosen is not None and quantity in ("norm", "sum_n", "sum_t"):
         raise InvalidArgumentError(f"--nodes is given with --quantity {quantity}; expected a quantity of nodes")
     limits = {"max_nodes": max_nodes, "time_limit": time_limit}
     found, ended = so_far(lambda: build(body, interval, arithmetic, jobs, **limits))
     deliver(
-        (proof_file, lambda path: _write_proof(found, path)),
+        (proof_file, lambda path: write_proof(found, path)),
         (save_file, found.save),
         (graphml_file, found.write_graphml),
         (plot_file, lambda path: write_figure(path, found.plot(**drawn))),
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: as_text(found),
-        content=lambda: as_json({"problem": problem, **_content(found)}),
+        content=lambda: as_json({"problem": problem, **as_content(found)}),
         frame=found.to_frame,
     )
     finish(ended, ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
 
 
-def _units(text: str | None) -> tuple[str, str] | None:
+def parse_units(text: str | None) -> tuple[str, str] | None:
+    """Units of forces and lengths, those of --units.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is not two texts with a comma between them.
+    """
     if text is None:
         return None
     force, comma, length = text.partition(",")
@@ -109,7 +119,8 @@ def _units(text: str | None) -> tuple[str, str] | None:
     return force.strip(), length.strip()
 
 
-def _write_proof(found: BranchGraph, path: str) -> None:
+def write_proof(found: BranchGraph, path: str) -> None:
+    """Write the proof of a graph, or say why there is none."""
     if found.proof is None:
         why = "only verified arithmetic gives one" if found.arithmetic != "verified" else "this search gave none"
         note(f"no proof was written, {why}")
@@ -172,7 +183,8 @@ def as_text(found: BranchGraph) -> str:
     return "\n".join([*lines, closing])
 
 
-def _content(found: BranchGraph) -> dict[str, Any]:
+def as_content(found: BranchGraph) -> dict[str, Any]:
+    """Everything about a graph, for JSON."""
     branches = [
         {
             "branch": branch.number,

@@ -1,141 +1,86 @@
-"""A RootSet as text for the terminal and as JSON."""
+"""``enumsol report``: all solutions over an interval of alpha as one HTML page."""
 
 from __future__ import annotations
 
-import json
-import math
-from typing import TYPE_CHECKING, Any
+import shlex
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from enumsol.cli.common import ExitStatus, finish, load_problem, parse_interval, so_far
+from enumsol.cli.graph import HowExact, as_content, as_text, build, parse_units, write_proof
+from enumsol.cli.options import OUTPUT, FirstAlpha, JsonFile, LastAlpha, MaxNodes, ProblemArgument, count, file, seconds
+from enumsol.cli.output import as_json, check_outputs, check_writable, deliver
+from enumsol.errors import InvalidArgumentError, MissingDependencyError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from enumsol.roots.root import Enclosure, Root, RootFamily
-    from enumsol.roots.root_set import RootSet, Undecided
-
-#: The table over contact nodes is printed when it has at most so many rows.
-_ROWS = 24
-_FIELDS = ("lambda_n", "lambda_t", "u_n", "u_t")
+    from enumsol.branches import BranchGraph
 
 
-def as_text(found: RootSet) -> str:
-    """The printed RootSet, and before its closing lines nothing else; small ones with a table over contact nodes."""
-    rows = (len(found) + sum(len(family.vertices) for family in found.families)) * len(found.node_ids)
-    if not 0 < rows <= _ROWS:
-        return repr(found)
-    from enumsol.roots.root import node_heading  # numpy: not for --help
+def report(
+    problem: ProblemArgument,
+    first: FirstAlpha,
+    last: LastAlpha,
+    output: Annotated[
+        str, typer.Option("--output", "-o", metavar="FILE", help="The page, .html.", rich_help_panel=OUTPUT)
+    ] = "report.html",
+    arithmetic: HowExact = "verified",
+    max_nodes: MaxNodes = None,
+    time_limit: Annotated[float | None, seconds("Stop the search after so long.")] = None,
+    jobs: Annotated[int, count("Processes to search with.")] = 1,
+    title: Annotated[
+        str | None, typer.Option(metavar="TEXT", help="Heading of the page; default PROBLEM.", rich_help_panel=OUTPUT)
+    ] = None,
+    units: Annotated[
+        str | None, typer.Option(metavar="FORCE,LENGTH", help="Units, such as N,mm.", rich_help_panel=OUTPUT)
+    ] = None,
+    proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), to hand on with the page.")] = None,
+    json_file: JsonFile = None,
+) -> None:
+    """Find all solutions of PROBLEM for every alpha of an interval, and write one HTML page about them.
 
-    width = max(4, *(len(str(label)) for label in found.node_ids))
-    tangents = 2 if len(found) and found[0].lambda_t.ndim == 2 else 1
-    lines = [f"{'':>8} {node_heading(width, tangents)}"]
-    for k, root in enumerate(found):
-        lines += _root_rows(f"root {k}", root, found.node_ids, width)
-    for k, family in enumerate(found.families):
-        lines += _family_rows(k, family, found.node_ids, width)
-    return "\n".join([*lines, "", repr(found)])
+    The page needs no network: an interactive diagram of the branches, the deformed body of every solution at any
+    alpha, tables of folds and transitions, what is certified and how to check it. Prints what enumsol graph prints.
 
+    Exit status: as enumsol graph; the page is written and says so when the graph is not complete.
+    """
+    check_outputs(json=json_file)
+    for option, path in (("--output", output), ("--proof", proof_file)):
+        if path == "-":
+            raise InvalidArgumentError(f"{option} is -; expected the name of a file")
+        check_writable(path, option)
+    if find_spec("plotly") is None:
+        raise MissingDependencyError.of("reports", "plotly", "report")
+    interval, body, names = parse_interval(first, last), load_problem(problem), parse_units(units)
+    limits = {"max_nodes": max_nodes, "time_limit": time_limit}
+    found, ended = so_far(lambda: build(body, interval, arithmetic, jobs, **limits))
 
-def _root_rows(title: str, root: Root, node_ids: tuple[Any, ...], width: int) -> Iterator[str]:
-    from enumsol.roots.root import node_line  # as above
+    def write(path: str) -> None:
+        from enumsol.report import write_report  # numpy: not for --help
 
-    for i, label in enumerate(node_ids):
-        yield f"{title if i == 0 else '':>8} {node_line(root, i, label, width)}"
+        commands = _commands(found, problem, (first, last), proof_file)
+        write_report(found, path, title=problem if title is None else title, units=names, commands=commands)
 
-
-def _family_rows(k: int, family: RootFamily, node_ids: tuple[Any, ...], width: int) -> Iterator[str]:
-    yield f"family {k}, vertices"
-    for j, vertex in enumerate(family.vertices):
-        for i, (label, (normal, tangential)) in enumerate(zip(node_ids, vertex, strict=True)):
-            yield f"{j if i == 0 else '':>8} {label!s:>{width}} {'':<7} {normal + 0.0:>12.6g} {tangential + 0.0:>12.6g}"
-
-
-def as_json(found: RootSet, problem: str) -> str:
-    """The whole result; numbers read back as the same float64, what is not finite is null."""
-    stats = found.stats
-    content = {
-        "problem": problem,
-        "alpha": float(found.alpha),
-        "alpha_text": str(found.alpha),
-        "arithmetic": found.arithmetic,
-        "method": found.method,
-        "complete": found.complete,
-        "certified_data": found.certified_data if found.complete else None,
-        "completeness": found.completeness(),
-        "stopped": found.stopped,
-        "index_sum": found.index_sum,
-        "node_ids": list(found.node_ids),
-        "roots": [_root(root) for root in found],
-        "families": [_family(family) for family in found.families],
-        "undecided": [_undecided(item) for item in found.undecided],
-        "stats": {
-            name: getattr(stats, name) for name in ("nodes", "pruned", "selections", "qps", "fallback_qps", "seconds")
-        },
-    }
-    return "{\n" + ",\n".join(f"{json.dumps(key)}: {_lines(value)}" for key, value in content.items()) + "\n}"
-
-
-def _lines(value: Any) -> str:
-    """JSON with one line an entry of a list of objects."""
-    if isinstance(value, list) and value and isinstance(value[0], dict):
-        return "[\n" + ",\n".join(json.dumps(item, allow_nan=False) for item in value) + "\n]"
-    return json.dumps(value, allow_nan=False, default=str)
+    deliver(
+        (proof_file, lambda path: write_proof(found, path)),
+        (output, write),
+        json_file=json_file,
+        csv_file=None,
+        text=lambda: as_text(found),
+        content=lambda: as_json({"problem": problem, "report": output, **as_content(found)}),
+        frame=found.to_frame,
+    )
+    finish(ended, ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
 
 
-def _root(root: Root) -> dict[str, Any]:
-    return {
-        "statuses": [status.value for status in root.statuses],
-        "active": [sorted(status.value for status in holds) for holds in root.active],
-        **{name: getattr(root, name).tolist() for name in _FIELDS},
-        "enclosure": _bounds(root.enclosure),
-        "index": root.index,
-        "regular": root.regular,
-        "margin": _finite(root.margin),
-        **(_in_space(root) if root.lambda_t.ndim == 2 else _in_plane(root)),
-    }
-
-
-def _in_plane(root: Root) -> dict[str, Any]:
-    slope = root.dlambda_dalpha
-    return {"condition": _finite(root.condition), "dlambda_dalpha": None if slope is None else slope.tolist()}
-
-
-def _in_space(root: Any) -> dict[str, Any]:
-    return {"slip_angle": _angles(root.slip_angle)}
-
-
-def _undecided(item: Undecided) -> dict[str, Any]:
-    content = {"statuses": [_status(s) for s in item.statuses], "reason": item.reason, "hint": item.hint}
-    if item.slip_angle is None:
-        return content
-    return {**content, "leaves": item.leaves, "slip_angle": _angles(item.slip_angle), "bounds": _bounds(item.bounds)}
-
-
-def _bounds(box: Enclosure | None) -> dict[str, Any] | None:
-    return None if box is None else {name: getattr(box, name).tolist() for name in _FIELDS}
-
-
-def _angles(angles: Any) -> list[list[float] | None]:
-    return [None if math.isnan(low) else [low, high] for low, high in angles.tolist()]
-
-
-def _family(family: RootFamily) -> dict[str, Any]:
-    return {
-        "index": family.index,
-        "dimension": family.dimension,
-        "vertices_proven": family.vertices_proven,
-        "polytopes": [
-            {
-                "statuses": [status.value for status in part.statuses],
-                "dimension": part.dimension,
-                "vertices": part.vertices.tolist(),
-            }
-            for part in family.polytopes
-        ],
-    }
-
-
-def _status(status: Any) -> str | None:
-    return status if status is None or isinstance(status, str) else str(status.value)
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+def _commands(found: BranchGraph, problem: str, ends: tuple[str, str], proof: str | None) -> list[str]:
+    """How a reader checks the proof; none where there is none."""
+    if found.proof is None:
+        return []
+    name, low, high = (shlex.quote(text) for text in (problem, *ends))
+    if proof is not None:
+        return [f"enumsol verify {name} {shlex.quote(proof)}"]
+    # -1 would be read as an option
+    again = f"enumsol graph {name} --from={low} --to={high} --proof graph.proof"
+    return [again, f"enumsol verify {name} graph.proof"]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from enumsol.cli import report
+from enumsol.cli import root_report
 from enumsol.cli.common import ExitStatus, finish, load_any_problem, note, parse_alpha, so_far, workers
 from enumsol.cli.options import (
     Arithmetic,
@@ -81,8 +81,8 @@ def roots(
     deliver(
         json_file=json_file,
         csv_file=csv_file,
-        text=lambda: report.as_text(found),
-        content=lambda: report.as_json(found, problem),
+        text=lambda: root_report.as_text(found),
+        content=lambda: root_report.as_json(found, problem),
         frame=found.to_frame,
     )
     if csv_file is not None and found.families:

@@ -1,0 +1,141 @@
+"""A RootSet as text for the terminal and as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from enumsol.roots.root import Enclosure, Root, RootFamily
+    from enumsol.roots.root_set import RootSet, Undecided
+
+#: The table over contact nodes is printed when it has at most so many rows.
+_ROWS = 24
+_FIELDS = ("lambda_n", "lambda_t", "u_n", "u_t")
+
+
+def as_text(found: RootSet) -> str:
+    """The printed RootSet, and before its closing lines nothing else; small ones with a table over contact nodes."""
+    rows = (len(found) + sum(len(family.vertices) for family in found.families)) * len(found.node_ids)
+    if not 0 < rows <= _ROWS:
+        return repr(found)
+    from enumsol.roots.root import node_heading  # numpy: not for --help
+
+    width = max(4, *(len(str(label)) for label in found.node_ids))
+    tangents = 2 if len(found) and found[0].lambda_t.ndim == 2 else 1
+    lines = [f"{'':>8} {node_heading(width, tangents)}"]
+    for k, root in enumerate(found):
+        lines += _root_rows(f"root {k}", root, found.node_ids, width)
+    for k, family in enumerate(found.families):
+        lines += _family_rows(k, family, found.node_ids, width)
+    return "\n".join([*lines, "", repr(found)])
+
+
+def _root_rows(title: str, root: Root, node_ids: tuple[Any, ...], width: int) -> Iterator[str]:
+    from enumsol.roots.root import node_line  # as above
+
+    for i, label in enumerate(node_ids):
+        yield f"{title if i == 0 else '':>8} {node_line(root, i, label, width)}"
+
+
+def _family_rows(k: int, family: RootFamily, node_ids: tuple[Any, ...], width: int) -> Iterator[str]:
+    yield f"family {k}, vertices"
+    for j, vertex in enumerate(family.vertices):
+        for i, (label, (normal, tangential)) in enumerate(zip(node_ids, vertex, strict=True)):
+            yield f"{j if i == 0 else '':>8} {label!s:>{width}} {'':<7} {normal + 0.0:>12.6g} {tangential + 0.0:>12.6g}"
+
+
+def as_json(found: RootSet, problem: str) -> str:
+    """The whole result; numbers read back as the same float64, what is not finite is null."""
+    stats = found.stats
+    content = {
+        "problem": problem,
+        "alpha": float(found.alpha),
+        "alpha_text": str(found.alpha),
+        "arithmetic": found.arithmetic,
+        "method": found.method,
+        "complete": found.complete,
+        "certified_data": found.certified_data if found.complete else None,
+        "completeness": found.completeness(),
+        "stopped": found.stopped,
+        "index_sum": found.index_sum,
+        "node_ids": list(found.node_ids),
+        "roots": [_root(root) for root in found],
+        "families": [_family(family) for family in found.families],
+        "undecided": [_undecided(item) for item in found.undecided],
+        "stats": {
+            name: getattr(stats, name) for name in ("nodes", "pruned", "selections", "qps", "fallback_qps", "seconds")
+        },
+    }
+    return "{\n" + ",\n".join(f"{json.dumps(key)}: {_lines(value)}" for key, value in content.items()) + "\n}"
+
+
+def _lines(value: Any) -> str:
+    """JSON with one line an entry of a list of objects."""
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return "[\n" + ",\n".join(json.dumps(item, allow_nan=False) for item in value) + "\n]"
+    return json.dumps(value, allow_nan=False, default=str)
+
+
+def _root(root: Root) -> dict[str, Any]:
+    return {
+        "statuses": [status.value for status in root.statuses],
+        "active": [sorted(status.value for status in holds) for holds in root.active],
+        **{name: getattr(root, name).tolist() for name in _FIELDS},
+        "enclosure": _bounds(root.enclosure),
+        "index": root.index,
+        "regular": root.regular,
+        "margin": _finite(root.margin),
+        **(_in_space(root) if root.lambda_t.ndim == 2 else _in_plane(root)),
+    }
+
+
+def _in_plane(root: Root) -> dict[str, Any]:
+    slope = root.dlambda_dalpha
+    return {"condition": _finite(root.condition), "dlambda_dalpha": None if slope is None else slope.tolist()}
+
+
+def _in_space(root: Any) -> dict[str, Any]:
+    return {"slip_angle": _angles(root.slip_angle)}
+
+
+def _undecided(item: Undecided) -> dict[str, Any]:
+    content = {"statuses": [_status(s) for s in item.statuses], "reason": item.reason, "hint": item.hint}
+    if item.slip_angle is None:
+        return content
+    return {**content, "leaves": item.leaves, "slip_angle": _angles(item.slip_angle), "bounds": _bounds(item.bounds)}
+
+
+def _bounds(box: Enclosure | None) -> dict[str, Any] | None:
+    return None if box is None else {name: getattr(box, name).tolist() for name in _FIELDS}
+
+
+def _angles(angles: Any) -> list[list[float] | None]:
+    return [None if math.isnan(low) else [low, high] for low, high in angles.tolist()]
+
+
+def _family(family: RootFamily) -> dict[str, Any]:
+    return {
+        "index": family.index,
+        "dimension": family.dimension,
+        "vertices_proven": family.vertices_proven,
+        "polytopes": [
+            {
+                "statuses": [status.value for status in part.statuses],
+                "dimension": part.dimension,
+                "vertices": part.vertices.tolist(),
+            }
+            for part in family.polytopes
+        ],
+    }
+
+
+def _status(status: Any) -> str | None:
+    return status if status is None or isinstance(status, str) else str(status.value)
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

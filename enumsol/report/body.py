@@ -1,0 +1,101 @@
+"""The body of a problem for the page: displacements of its nodes as a linear function of alpha and contact forces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.body2d import OUTLINES
+from enumsol.shapes import BodyShape, body_shape
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.problem import ContactProblem
+
+    Floats = NDArray[np.float64]
+
+#: Most numbers of displacements; a mesh with more is drawn by its boundary, or not at all.
+_MOST_NUMBERS = 150_000
+_DIGITS = 7
+
+
+def body_record(problem: ContactProblem) -> dict[str, Any] | None:
+    """Nodes, cells or boundary edges, and what moves them; None without a mesh, or if it is too large for a page.
+
+    Displacements of the nodes, x and y in turn, are ``u0 + alpha u1 - sum_k f_k c[k]`` over the 2p contact forces; a
+    unit of force k acts on nodes as ``acts[k]``, triples (node, x, y); contact row i stands at the mean of nodes
+    ``rows[i]``, pairs (node, weight).
+    """
+    if problem.mesh is None:
+        return None
+    shape = body_shape(problem)
+    columns = 2 * problem.p + 2
+    cells = shape.cells[:, list(OUTLINES[shape.cells.shape[1]])]
+    lines = None
+    nodes = np.arange(len(shape.points))
+    if shape.points.size * columns > _MOST_NUMBERS:
+        lines = _boundary(cells)
+        nodes = np.unique(lines)
+    if 2 * len(nodes) * columns > _MOST_NUMBERS:
+        return None
+    new = np.full(len(shape.points), -1)
+    new[nodes] = np.arange(len(nodes))
+    rows = sp.csr_array(shape.weights)
+    acts = _forces(problem, shape)
+    if np.any(new[rows.indices] < 0) or any(new[node] < 0 for row in acts for node, _, _ in row):
+        return None  # contact inside the body: its nodes are not on the boundary that is drawn
+    dofs = np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()
+    motion = sp.csr_array(shape.motion[dofs])
+    moved = [motion @ problem.factorization.solve(np.asarray(column)) for column in _loads(problem)]
+    moved[0] = moved[0] + shape.offset[nodes].ravel()
+    return {
+        "points": _short(shape.points[nodes]),
+        "cells": None if lines is not None else new[cells].tolist(),
+        "lines": None if lines is None else new[lines].tolist(),
+        "u0": _short(moved[0]),
+        "u1": _short(moved[1]),
+        "c": [_short(column) for column in moved[2:]],
+        "acts": [[[int(new[node]), x, y] for node, x, y in row] for row in acts],
+        "rows": [
+            [[int(new[node]), float(f"{weight:.6g}")] for node, weight in zip(*_row(rows, i), strict=True)]
+            for i in range(problem.p)
+        ],
+        "size": shape.size,
+    }
+
+
+def _loads(problem: ContactProblem) -> list[Floats]:
+    slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
+    return [problem.f, slope, *problem.contact_rows.toarray()]
+
+
+def _forces(problem: ContactProblem, shape: BodyShape) -> list[list[tuple[int, float, float]]]:
+    """What a unit of every contact force does to the nodes of the body."""
+    forces = -sp.csr_array(problem.contact_rows @ shape.motion.T).toarray().reshape(2 * problem.p, -1, 2)
+    return [
+        [(int(node), float(f"{row[node, 0]:.9g}"), float(f"{row[node, 1]:.9g}")) for node in np.flatnonzero(row.any(1))]
+        for row in forces
+    ]
+
+
+def _row(matrix: sp.csr_array, i: int) -> tuple[Any, Any]:
+    part = slice(matrix.indptr[i], matrix.indptr[i + 1])
+    return matrix.indices[part], matrix.data[part]
+
+
+def _boundary(outlines: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Edges that belong to one cell only, (k, 2)."""
+    edges = np.concatenate([outlines[:, [k, (k + 1) % outlines.shape[1]]] for k in range(outlines.shape[1])])
+    _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(edges[first[count == 1]])
+
+
+def _short(values: Any) -> Any:
+    return (
+        [[float(f"{x:.{_DIGITS}g}") for x in row] for row in values]
+        if np.ndim(values) == 2
+        else [float(f"{x:.{_DIGITS}g}") for x in values]
+    )

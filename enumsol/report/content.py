@@ -1,0 +1,170 @@
+"""What a report shows, as plain values that JSON can hold; the page's script draws it."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.branches.curves import Curve, curves, side_by_side
+from enumsol.branches.elements import VertexKind
+from enumsol.branches.marks import colour_of
+from enumsol.branches.quantities import QUANTITIES, state_columns
+from enumsol.report.body import body_record
+from enumsol.statuses import STATUSES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from enumsol.branches import BranchGraph
+    from enumsol.branches.elements import Arc, Vertex
+    from enumsol.statuses import ContactStatus
+
+#: Distance of drawn curves from the arcs, relative to the picture; coarser until the page is small enough.
+_TOLERANCE, _COARSEST = 1e-3, 2e-2
+#: Most numbers of forces and displacements along the arcs, about ten characters each.
+_MOST_NUMBERS = 250_000
+#: Positions of the slider over the whole interval, and at least so many between neighbouring critical alphas.
+_POSITIONS, _BETWEEN = 160, 3
+#: Digits of values; critical alphas are kept to the last one.
+_DIGITS = 9
+#: Beyond so many arcs, only those of overviews are compared for coinciding.
+_COMPARED = 300
+
+
+def report_content(graph: BranchGraph) -> dict[str, Any]:
+    """Everything that the script needs: nodes, quantities, arcs with points along them, vertices, steps, the body.
+
+    Statuses are texts of one digit a node, the codes of `enumsol.statuses`. ``f`` and ``w`` are forces and
+    displacements, normal ones first, at the points ``a`` of an arc.
+    """
+    drawn, tolerance = _sampled(graph)
+    steps = graph.claims.steps()
+    return {
+        "interval": list(graph.interval),
+        "complete": graph.complete,
+        "exact_counts": steps.exact,
+        "nodes": [str(label) for label in graph.problem.node_ids],
+        "statuses": [status.value for status in STATUSES],
+        "quantities": [item._asdict() for item in QUANTITIES.values()],
+        "tolerance": tolerance,
+        "arcs": [_arc(arc, graph.branch_of[arc.number], drawn.get(arc.number)) for arc in graph.arcs],
+        "branches": [
+            {"number": branch.number, "colour": colour_of(branch.number), "arcs": [arc.number for arc in branch.arcs]}
+            for branch in graph.branches
+        ],
+        "vertices": [_vertex(v, graph) for v in graph.vertices],
+        "steps": {
+            "alphas": [float(alpha) for alpha in steps.alphas],
+            "at": list(steps.at),
+            "between": list(steps.between),
+        },
+        "beside": _beside(graph, drawn),
+        "slider": slider_alphas([v.alpha for v in graph.vertices], graph.interval),
+        "body": body_record(graph.problem),
+    }
+
+
+def codes(statuses: Sequence[ContactStatus]) -> str:
+    """One digit a node."""
+    return "".join(str(STATUSES.index(status)) for status in statuses)
+
+
+def rounded(values: Any) -> Any:
+    """Numbers of an array to nine digits, as lists."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim:
+        return [rounded(row) for row in array]
+    number = float(f"{float(array):.{_DIGITS}g}")
+    return int(number) if number.is_integer() and abs(number) < 1e15 else number
+
+
+def slider_alphas(critical: Sequence[float], interval: tuple[float, float]) -> list[float]:
+    """Positions of the slider: all critical alphas, and between neighbours enough to see what happens there."""
+    marks = sorted({*critical, *interval})
+    # narrow steps have positions inside, however narrow they are
+    few = 1 if len(marks) > _POSITIONS else _BETWEEN
+    width = interval[1] - interval[0]
+    found = [marks[0]]
+    for low, high in pairwise(marks):
+        count = max(few, round(_POSITIONS * (high - low) / width))
+        inside = [low + (high - low) * k / (count + 1) for k in range(1, count + 1)]
+        found += [alpha for alpha in inside if low < alpha < high] + [high]
+    return found
+
+
+def _sampled(graph: BranchGraph) -> tuple[dict[int, Curve], float]:
+    """Points along all arcs that are no sheets, and the tolerance to which they are near."""
+    arcs = [arc for arc in graph.arcs if not arc.dimension]
+    width, tolerance = graph.interval[1] - graph.interval[0], _TOLERANCE
+    while True:
+        drawn = curves(arcs, tuple(QUANTITIES), width, tolerance)
+        numbers = sum(curve.forces.size + curve.moves.size for curve in drawn.values())
+        if numbers <= _MOST_NUMBERS or tolerance >= _COARSEST:
+            return drawn, tolerance
+        tolerance *= 2
+
+
+def _arc(arc: Arc, branch: int, curve: Curve | None) -> dict[str, Any]:
+    record = {
+        "number": arc.number,
+        "branch": branch,
+        "tail": arc.tail,
+        "head": arc.head,
+        "index": arc.index,
+        "statuses": codes(arc.statuses),
+        "dimension": arc.dimension,
+        "grazing": arc.grazing,
+        "lo": arc.lo,
+        "hi": arc.hi,
+    }
+    if curve is not None:
+        record |= {"a": curve.alphas.tolist(), "f": rounded(curve.forces), "w": rounded(curve.moves)}
+    return record
+
+
+def _vertex(v: Vertex, graph: BranchGraph) -> dict[str, Any]:
+    p = graph.problem.p
+    record: dict[str, Any] = {
+        "number": v.number,
+        "alpha": v.alpha,
+        "kind": v.kind.value,
+        "border": v.border,
+        "statuses": codes(v.statuses),
+        "several": [k for k, holds in enumerate(v.active) if len(holds) > 1],
+        "f": rounded(np.concatenate([v.lambda_n, v.lambda_t])),
+        "w": rounded(np.concatenate([v.u_n, v.u_t])),
+        "family": None,
+    }
+    if v.family is not None:
+        condensed = graph.problem.condensed
+        forces = v.family.vertices.transpose(0, 2, 1).reshape(len(v.family.vertices), 2 * p)
+        moves = condensed.g0 + v.alpha * condensed.g1 - forces @ condensed.S
+        record["family"] = {"f": rounded(forces), "w": rounded(moves), "dimension": v.family.dimension}
+    return record
+
+
+def _beside(graph: BranchGraph, drawn: Mapping[int, Curve]) -> dict[str, dict[str, list[int]]]:
+    """By columns of the quantities, arcs that coincide with others: rank among them, and how many they are."""
+    if not drawn:
+        return {}
+    columns = next(iter(drawn.values())).values.shape[1]
+    overviews = sum(not item.by_node for item in QUANTITIES.values())
+    found = {}
+    for column in range(columns if len(drawn) <= _COMPARED else overviews):
+        places = side_by_side(drawn, graph.branch_of, column)
+        several = {str(arc): [place.rank, place.among] for arc, place in places.items() if place.among > 1}
+        if several:
+            found[str(column)] = several
+    return found
+
+
+def vertex_values(v: Vertex) -> dict[str, float]:
+    """The overviews at a vertex, for tables."""
+    return {name: float(state_columns(item, v)[0]) for name, item in QUANTITIES.items() if not item.by_node}
+
+
+def listed(graph: BranchGraph) -> list[Vertex]:
+    """Vertices worth a row in a table: all but the ends of the interval."""
+    return [v for v in graph.vertices if v.kind is not VertexKind.END]

@@ -1,0 +1,238 @@
+"""The page of a report: words and tables in HTML, the graph's numbers, and the script that draws them."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from html import escape
+from importlib.resources import files
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol._version import find_version
+from enumsol.branches import BranchGraph
+from enumsol.branches.plots import checked_units
+from enumsol.checks import file_path, instance_of
+from enumsol.errors import MissingDependencyError
+from enumsol.files import writing
+from enumsol.report.content import listed, report_content
+from enumsol.texts import counted
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable, Sequence
+
+    from enumsol.branches.elements import Vertex
+
+
+def write_report(
+    graph: BranchGraph,
+    file: str | os.PathLike[str],
+    *,
+    title: str = "Contact problem with Coulomb friction",
+    units: tuple[str, str] | None = None,
+    commands: Sequence[str] = (),
+) -> None:
+    """Write all solutions over an interval of alpha as one HTML page that needs no network.
+
+    The page has the branches against alpha (pointing shows values and statuses, a click on a branch its arcs), the
+    number of solutions, a slider over alpha with the deformed bodies of all solutions (without a mesh: forces and
+    displacements of the contact nodes), tables of branches, transitions and folds, and what is certified. It says
+    "complete" only where ``graph.complete`` does; of a graph that was cut short it says what is missing.
+
+    Parameters
+    ----------
+    graph : BranchGraph
+    file : str or path-like
+        An existing file is replaced.
+    title : str
+        What the problem is.
+    units : (str, str), optional
+        Of forces and of lengths.
+    commands : sequence of str
+        Lines of a shell by which a reader can check the proof.
+
+    Raises
+    ------
+    InvalidArgumentError
+        There can be no such file, or an argument is not of that form.
+    MissingDependencyError
+        plotly is not installed, whose script draws the diagram in the page.
+    OutputError
+        There is no room for the file.
+
+    Examples
+    --------
+    >>> import enumsol, pathlib, tempfile
+    >>> graph = enumsol.branch_graph(enumsol.gallery.two_node_square(), (0, 10))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     enumsol.write_report(graph, f"{folder}/square.html", title="Square in a corner")
+    ...     "complete: yes (proven)" in pathlib.Path(folder, "square.html").read_text()
+    True
+    """
+    instance_of(graph, BranchGraph, "graph")
+    place = file_path(file, "file")
+    page = report_page(graph, instance_of(title, str, "title"), checked_units(units), tuple(commands))
+    with writing(place, "file"):
+        place.write_text(page, encoding="utf-8")
+
+
+def report_page(graph: BranchGraph, title: str, units: tuple[str, str] | None, commands: Sequence[str]) -> str:
+    """The text of the page."""
+    parts = files("enumsol.report")
+    content = report_content(graph) | {"units": units}
+    words = {
+        "title": escape(title),
+        "style": (parts / "page.css").read_text(encoding="utf-8"),
+        "script": (parts / "page.js").read_text(encoding="utf-8"),
+        "plotly": _packed_plotly(),
+        # no "<" of a name may end the element
+        "data": json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
+        "badge": "yes" if graph.complete else "no",
+        "completeness": escape(graph.completeness()),
+        "reasons": _reasons(graph.reasons),
+        "facts": _facts(graph),
+        "answers": "".join(f"<li>{escape(line)}</li>" for line in graph.claims.sentences(graph.uniqueness_bound)),
+        "branches": _branches(graph),
+        "vertices": _vertices(graph),
+        "certified": _certified(graph, commands),
+        "version": escape(find_version()),
+    }
+    return Template((parts / "page.html").read_text(encoding="utf-8")).substitute(words)
+
+
+def _packed_plotly() -> str:
+    """Plotly's script, compressed, in base64."""
+    try:
+        from plotly.offline import get_plotlyjs  # an extra
+    except ImportError as error:
+        raise MissingDependencyError.of("reports", "plotly", "report") from error
+    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
+
+
+def _reasons(reasons: Sequence[str]) -> str:
+    if not reasons:
+        return ""
+    items = "".join(f"<li>{escape(reason)}</li>" for reason in reasons[:20])
+    more = f"<li>and {len(reasons) - 20} more</li>" if len(reasons) > 20 else ""
+    return (
+        '<div class="warning" id="incomplete"><p>This graph is not complete. Everything shown is a solution, but '
+        f"solutions may be missing: numbers of solutions are lower bounds. Why:</p><ul>{items}{more}</ul></div>"
+    )
+
+
+def _facts(graph: BranchGraph) -> str:
+    problem, (a, b) = graph.problem, graph.interval
+    F0, F1 = problem.friction
+    load = "constant" if problem.load_slope is None else "f + alpha load_slope"
+    facts = (
+        ("contact nodes", str(problem.p)),
+        ("degrees of freedom", f"{problem.n:,}"),
+        ("combinations of statuses", f"4^{problem.p}" + (f" = {4**problem.p:.3g}" if problem.p < 500 else "")),
+        ("friction", f"F0 + alpha F1, F0 {_span(F0)}, F1 {_span(F1)}"),
+        ("load", f"{load}, max |f| = {np.max(np.abs(problem.f)):.4g}"),
+        ("gap", _span(problem.gap)),
+        ("alpha", f"from {a:.10g} to {b:.10g}"),
+        ("arithmetic", graph.arithmetic),
+        ("found", f"{counted(len(graph.branches), 'branch', 'branches')}, {counted(len(graph.arcs), 'arc')}, "
+                  f"{counted(len(graph.folds), 'fold')}"),
+    )  # fmt: skip
+    return "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts)
+
+
+def _span(values: Any) -> str:
+    low, high = float(np.min(values)), float(np.max(values))
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+
+
+def _table(heads: Iterable[str], rows: Iterable[tuple[str, Sequence[str]]]) -> str:
+    """A table; a row is its attributes and its cells, which are escaped here."""
+    head = "".join(f"<th>{escape(name)}</th>" for name in heads)
+    body = "".join(f"<tr{kept}>" + "".join(f"<td>{escape(c)}</td>" for c in cells) + "</tr>" for kept, cells in rows)
+    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _branches(graph: BranchGraph) -> str:
+    def shape(branch: Any) -> str:
+        if branch.sheet:
+            return "sheet (a continuum over an interval)"
+        if branch.closed:
+            return "closed"
+        return "unfinished" if any(v.kind.value == "unsettled" for v in branch.vertices) else "open"
+
+    rows = []
+    for branch in graph.branches:
+        lo, hi = branch.interval
+        folds = ", ".join(f"{v.alpha:.8g}" for v in branch.folds)
+        indices = ", ".join(sorted({"?" if arc.index is None else f"{arc.index:+d}" for arc in branch.arcs}))
+        cells = (str(branch.number), f"{lo:.8g}", f"{hi:.8g}", shape(branch), str(len(branch.arcs)), indices, folds)
+        rows.append((f' data-branch="{branch.number}" tabindex="0"', cells))
+    return _table(("branch", "alpha from", "to", "shape", "arcs", "indices", "folds at"), rows)
+
+
+def _vertices(graph: BranchGraph) -> str:
+    found = listed(graph)
+    if not found:
+        return "<p>None: no status changes inside the interval.</p>"
+    meeting: dict[int, list[Any]] = {v.number: [] for v in found}
+    for arc in graph.arcs:
+        for end in (arc.tail, arc.head):
+            if end in meeting:
+                meeting[end].append(arc)
+    rows = []
+    for v in found:
+        low, high = v.enclosure
+        branches = sorted({graph.branch_of[arc.number] for arc in meeting[v.number]})
+        error = "exact" if low == high else f"{float(high - low):.1e}"
+        change = _change(graph, v, meeting[v.number])
+        cells = (repr(v.alpha), error, v.kind.value, ", ".join(map(str, branches)), change)
+        rows.append((f' data-alpha="{v.alpha!r}" tabindex="0"', cells))
+    return _table(("alpha", "width of its bounds", "kind", "branches", "what happens"), rows)
+
+
+def _change(graph: BranchGraph, v: Vertex, arcs: Sequence[Any]) -> str:
+    """Nodes whose status differs between the arcs that meet there."""
+    if v.family is not None:
+        return f"a continuum of solutions, dimension {v.family.dimension}"
+    labels = graph.problem.node_ids
+    parts = []
+    for k, label in enumerate(labels):
+        seen = list(dict.fromkeys(arc.statuses[k].value for arc in arcs))
+        if len(seen) > 1:
+            parts.append(f"node {label}: {' / '.join(seen)}")
+    more = f" and {len(parts) - 6} more nodes" if len(parts) > 6 else ""
+    return "; ".join(parts[:6]) + more
+
+
+def _certified(graph: BranchGraph, commands: Sequence[str]) -> str:
+    about = {
+        "problem": "the matrices A, Bn, Bt and f as they were given",
+        "condensed": "the condensed problem, S and g as computed",
+    }[graph.certified_data]
+    lines = [f"<p>{escape(graph.completeness())}.</p>"]
+    if graph.complete:
+        lines.append(
+            f"<p>It is proven that every solution for every alpha of the interval lies on the arcs shown here. This is "
+            f"about {about}.</p>"
+        )
+    elif graph.reasons:
+        lines.append("<p>Nothing is claimed about solutions that are not shown here.</p>")
+    else:
+        lines.append("<p>Nothing is proven: floating-point numbers were believed.</p>")
+    lines.append(
+        "<p>This page is a picture of the result and no proof. Curves are drawn between points on the arcs; critical "
+        "alphas are given to the last digit.</p>"
+        f"<p>Fingerprint of the problem (SHA-256 of its data): <code>{escape(graph.problem.fingerprint)}</code></p>"
+    )
+    if commands:
+        shell = escape("\n".join(commands))
+        lines.append(f"<p>To check it, with the problem and the proof at hand:</p><pre>{shell}</pre>")
+    else:
+        lines.append(
+            "<p>To check it: <code>enumsol graph PROBLEM --from A --to B --proof FILE</code>, then "
+            "<code>enumsol verify PROBLEM FILE</code>; the proof's first record holds the same fingerprint.</p>"
+        )
+    return "".join(lines)

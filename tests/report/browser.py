@@ -1,0 +1,148 @@
+"""A headless browser spoken to by the DevTools protocol over a pipe, without further packages."""
+
+import base64
+import itertools
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+
+
+def find_browser():
+    """The path of a browser, or None."""
+    return next((found for name in NAMES if (found := shutil.which(name))), None)
+
+
+class Browser:
+    """One page of a headless browser; errors and warnings of its console are collected."""
+
+    def __init__(self, path, width=1280, height=900):
+        to_browser, self._write = os.pipe()
+        self._read, from_browser = os.pipe()
+        self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        command = [
+            *(path, "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-gpu", "--no-first-run"),
+            *("--disable-dev-shm-usage", "--disable-extensions", f"--user-data-dir={self._profile.name}"),
+            *("--force-device-scale-factor=1", f"--window-size={width},{height}", "about:blank"),
+        ]
+
+        def descriptors():
+            # the protocol wants 3 and 4
+            a, b = os.dup(to_browser), os.dup(from_browser)
+            os.dup2(a, 3)
+            os.dup2(b, 4)
+
+        self._process = subprocess.Popen(
+            command, preexec_fn=descriptors, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        os.close(to_browser)
+        os.close(from_browser)
+        self._numbers, self._pending, self._events = itertools.count(1), b"", []
+        self._session = None
+        targets = self.call("Target.getTargets")["targetInfos"]
+        target = next(item["targetId"] for item in targets if item["type"] == "page")
+        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.call(f"{domain}.enable")
+        self.size(width, height)
+
+    def call(self, method, **parameters):
+        """The result of a call."""
+        number = next(self._numbers)
+        message = {"id": number, "method": method, "params": parameters}
+        if self._session is not None:
+            message["sessionId"] = self._session
+        os.write(self._write, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._message()
+            if answer.get("id") == number:
+                assert "error" not in answer, answer
+                return answer["result"]
+            self._events.append(answer)
+
+    def _message(self):
+        while b"\0" not in self._pending:
+            part = os.read(self._read, 1 << 20)
+            assert part, "the browser has ended"
+            self._pending += part
+        message, _, self._pending = self._pending.partition(b"\0")
+        return json.loads(message)
+
+    def size(self, width, height):
+        """Set the size of the window."""
+        self.call(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
+        )
+
+    def open(self, path):
+        """Open a file, and wait until its script has started."""
+        self._events.clear()
+        self.call("Page.navigate", url=path.resolve().as_uri())
+        script = """new Promise((done) => {
+            const look = () => (document.body && document.body.dataset.ready === "yes") ? done(true)
+                : document.getElementById("failed") && !document.getElementById("failed").hidden ? done(false)
+                : setTimeout(look, 20);
+            look();
+        })"""
+        assert self.evaluate(script), "the page says that it failed"
+        self.settle()
+
+    def settle(self):
+        """Wait until what was begun has been drawn."""
+        self.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))")
+
+    def evaluate(self, script):
+        """The value of an expression; promises are awaited."""
+        result = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in result, result["exceptionDetails"]
+        return result["result"].get("value")
+
+    def mouse(self, kind, x, y, **options):
+        """Send a mouse event: mouseMoved, mousePressed or mouseReleased."""
+        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **options)
+
+    def click(self, x, y):
+        """Move there and click."""
+        self.mouse("mouseMoved", x, y)
+        self.settle()
+        self.mouse("mousePressed", x, y, button="left", clickCount=1)
+        self.mouse("mouseReleased", x, y, button="left", clickCount=1)
+        self.settle()
+
+    def complaints(self):
+        """What the console was told: errors and warnings, exceptions, and requests that left the page."""
+        found = []
+        for event in self._events:
+            parameters = event.get("params", {})
+            if event.get("method") == "Runtime.exceptionThrown":
+                found.append(parameters["exceptionDetails"].get("text"))
+            if event.get("method") == "Runtime.consoleAPICalled" and parameters["type"] in ("error", "warning"):
+                found.append(str([item.get("value") for item in parameters["args"]]))
+            if event.get("method") == "Log.entryAdded" and parameters["entry"]["level"] in ("error", "warning"):
+                found.append(parameters["entry"]["text"])
+            if event.get("method") == "Network.requestWillBeSent":
+                url = parameters["request"]["url"]
+                if not url.startswith(("file:", "data:", "blob:", "about:")):
+                    found.append(f"a request to {url}")
+        return found
+
+    def screenshot(self, path, *, whole=True):
+        """Write a picture of the page."""
+        drawn = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
+        path.write_bytes(base64.b64decode(drawn["data"]))
+
+    def close(self):
+        """End the browser."""
+        self._session = None
+        try:
+            self.call("Browser.close")
+            self._process.wait(20)
+        finally:
+            self._process.kill()
+            self._process.wait()
+            os.close(self._write)
+            os.close(self._read)
+            self._profile.cleanup()
