@@ -89,14 +89,16 @@ class _Polygon:
         lo, hi = self._lo, self._hi
         alphas = np.clip(lo + 0.5 * (1.0 - np.cos(angles)) * (hi - lo), lo, hi)
         alphas[angles == np.pi] = hi
-        points = [(self._arc.values(float(alpha)), self._arc.displacements(float(alpha))) for alpha in alphas]
-        forces, moves = (np.array([np.concatenate(point[part]) for point in points]) for part in (0, 1))
+        # an arc shorter than rounding is a point
+        points = [self._arc.state(float(alpha)) for alpha in alphas[: 1 if lo == hi else None]]
+        points *= 1 if len(points) == len(alphas) else len(alphas)
+        forces, moves = (np.array([point[part] for point in points]) for part in (0, 1))
         values = np.concatenate([columns(item, forces, moves) for item in self._quantities], axis=1)
         return Curve(alphas, forces, moves, values)
 
     def refine(self, width: float, height: Vector, tolerance: float) -> None:
         """Halve angles until all chords are close."""
-        doubtful = np.ones(len(self._angles) - 1, dtype=bool)
+        doubtful = np.full(len(self._angles) - 1, self._lo < self._hi)
         while np.any(doubtful) and len(self._angles) < _MOST:
             k = np.flatnonzero(doubtful)
             middle = 0.5 * (self._angles[k] + self._angles[k + 1])

@@ -148,7 +148,8 @@ class Arc:
         """hi - lo."""
         return self.hi - self.lo
 
-    def _at(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def state(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Forces and displacements at an alpha of the arc, both (2p,), normal ones first; errors as ``values``."""
         exact = alpha_value(alpha)
         value = float(exact)
         if self.dimension:
@@ -171,12 +172,12 @@ class Arc:
         InvalidArgumentError
             alpha is outside the arc, or the arc is a sheet.
         """
-        forces = self._at(alpha)[0]
+        forces = self.state(alpha)[0]
         return forces[: len(self.statuses)], forces[len(self.statuses) :]
 
     def displacements(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(u_n, u_t) at an alpha of the arc, two arrays of shape (p,) [length]; errors as ``values``."""
-        moves = self._at(alpha)[1]
+        moves = self.state(alpha)[1]
         return moves[: len(self.statuses)], moves[len(self.statuses) :]
 
     def sampled(self, count: int = 33) -> NDArray[np.float64]:

@@ -1,11 +1,13 @@
 """A headless browser spoken to by the DevTools protocol over a pipe, without further packages."""
 
 import base64
+import contextlib
+import fcntl
 import itertools
 import json
 import os
 import shutil
-import subprocess
+import signal
 import tempfile
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
@@ -22,6 +24,8 @@ class Browser:
     def __init__(self, path, width=1280, height=900):
         to_browser, self._write = os.pipe()
         self._read, from_browser = os.pipe()
+        # out of the way of 3 and 4, which the protocol wants
+        ends = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 64) for end in (to_browser, from_browser)]
         self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         command = [
             *(path, "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-gpu", "--no-first-run"),
@@ -29,17 +33,11 @@ class Browser:
             *("--force-device-scale-factor=1", f"--window-size={width},{height}", "about:blank"),
         ]
 
-        def descriptors():
-            # the protocol wants 3 and 4
-            a, b = os.dup(to_browser), os.dup(from_browser)
-            os.dup2(a, 3)
-            os.dup2(b, 4)
-
-        self._process = subprocess.Popen(
-            command, preexec_fn=descriptors, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
-        os.close(to_browser)
-        os.close(from_browser)
+        files = [(os.POSIX_SPAWN_DUP2, ends[0], 3), (os.POSIX_SPAWN_DUP2, ends[1], 4)]
+        files += [(os.POSIX_SPAWN_OPEN, stream, os.devnull, os.O_WRONLY, 0) for stream in (1, 2)]
+        self._process = os.posix_spawn(path, command, os.environ, file_actions=files)
+        for end in (to_browser, from_browser, *ends):
+            os.close(end)
         self._numbers, self._pending, self._events = itertools.count(1), b"", []
         self._session = None
         targets = self.call("Target.getTargets")["targetInfos"]
@@ -139,10 +137,10 @@ class Browser:
         self._session = None
         try:
             self.call("Browser.close")
-            self._process.wait(20)
         finally:
-            self._process.kill()
-            self._process.wait()
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self._process, signal.SIGKILL)
+            os.waitpid(self._process, 0)
             os.close(self._write)
             os.close(self._read)
             self._profile.cleanup()

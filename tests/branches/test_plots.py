@@ -1,0 +1,223 @@
+"""Figures of branch graphs, in pixels where it matters: labels, lines side by side, zooms, legends, titles."""
+
+from fractions import Fraction
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from enumsol import InvalidArgumentError, branch_graph, gallery
+from enumsol.branches.claims import MultiplicitySteps
+from enumsol.branches.curves import Curve, curves, side_by_side
+from enumsol.branches.marks import MARKERS, STATUS_STYLES
+from enumsol.branches.quantities import QUANTITIES
+from enumsol.branches.zooms import narrow_changes
+from enumsol.statuses import ContactStatus
+
+
+@pytest.fixture(scope="module")
+def graphs():
+    wedge = gallery.wedge(2, 3, (0, 5e-4), half_angle=5.0)
+    return {
+        "square": branch_graph(gallery.two_node_square(), (0, 10)),
+        "chain": branch_graph(gallery.chain(3), (0, 10)),
+        "spike": branch_graph(wedge, (0, 1)),
+        "oblique": branch_graph(gallery.get("wedge-8-5").build(), (0, 5)),
+    }
+
+
+def numbers_of(axis):
+    return [text for text in axis.texts if text.get_gid() == "branch number"]
+
+
+@pytest.mark.parametrize("quantity", [None, "lambda_n", "u_t"])
+@pytest.mark.parametrize("name", ["square", "chain", "spike", "oblique"])
+def test_numbers_neither_overlap_nor_leave_their_panel(graphs, name, quantity):
+    figure = graphs[name].plot(quantity)
+    figure.draw_without_rendering()
+    labelled = 0
+    for axis in figure.axes:
+        boxes = [text.get_window_extent() for text in numbers_of(axis)]
+        labelled += len(boxes)
+        assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
+        frame = axis.get_window_extent()
+        assert all(frame.x0 <= box.x0 and box.x1 <= frame.x1 for box in boxes)
+        assert all(frame.y0 <= box.y0 and box.y1 <= frame.y1 for box in boxes)
+    assert labelled > 0
+
+
+@pytest.mark.parametrize("name", ["square", "chain", "oblique"])
+def test_every_branch_is_named_beside_its_curve_or_in_the_note(graphs, name):
+    graph = graphs[name]
+    figure = graph.plot("lambda_n", zoom=False)
+    named = set()
+    for axis in figure.axes:
+        for text in numbers_of(axis):
+            words = text.get_text().split(" (")[0].replace(" ..", "").split(", ")
+            named.update(words)
+    note = figure.get_supxlabel()
+    for branch in graph.branches:
+        # a long label names the first, the second and the last of a group
+        assert str(branch.number) in named or "side by side" in note
+
+
+def test_branches_that_coincide_are_drawn_apart_and_said_to(graphs):
+    figure = graphs["square"].plot("lambda_n")
+    figure.draw_without_rendering()
+    axis = figure.axes[1]
+    lines = [line for line in axis.lines if len(line.get_xdata()) > 2 and not np.any(line.get_ydata())]
+    assert len(lines) == 2  # open on both branches, lambda_n = 0
+    heights = [line.get_transform().transform((5.0, 0.0))[1] for line in lines]
+    assert abs(heights[0] - heights[1]) > 2.0
+    assert {line.get_color() for line in lines} == {"#1f5fa8", "#d9730d"}
+    assert "side by side" in figure.get_supxlabel()
+    assert "side by side" not in graphs["square"].plot().get_supxlabel()
+    # apart from that a line lies where the values are
+    top = next(line for line in axis.lines if len(line.get_xdata()) > 2 and line.get_ydata().min() > 0.99)
+    assert top.get_transform() is axis.transData or top.get_transform() == axis.transData
+
+
+def line(alphas, values):
+    a = np.asarray(alphas, dtype=float)
+    return Curve(a, a, a, np.asarray(values, dtype=float)[:, None])
+
+
+def test_places_of_curves_side_by_side():
+    drawn = {
+        0: line([0, 10], [0, 0]),
+        1: line([0, 4], [0, 0]),  # on 0
+        2: line([4, 10], [0, 5]),  # leaves it
+        3: line([6, 10], [0, 1e-3]),  # near 0 within a line's width
+        4: line([0, 10], [-5, 5]),  # crosses
+        5: line([5.0, 5.01], [0, 0]),  # too short to be told
+    }
+    places = side_by_side(drawn, {0: 0, 1: 1, 2: 1, 3: 2, 4: 3, 5: 4}, 0)
+    assert [places[k].among for k in range(6)] == [2, 2, 1, 2, 1, 1]
+    assert places[0].rank == 0
+    assert places[1].rank == places[3].rank == 1  # they never meet each other
+    assert places[0].group == places[1].group == places[3].group != places[4].group
+    assert side_by_side({}, {}, 0) == {}
+
+
+def steps(alphas, between):
+    return MultiplicitySteps(tuple(Fraction(a) for a in alphas), tuple([0] * len(alphas)), tuple(between), True)
+
+
+@pytest.mark.parametrize(
+    ("alphas", "between", "expected"),
+    [
+        ([0, 3, 10], [1, 3], []),
+        ([0, 3, 3.01, 10], [1, 1, 3], []),  # a transition and a fold close together hide nothing
+        ([0, 3, 3.01, 10], [1, 5, 1], [(2.9925, 3.0175)]),
+        ([0, 3, 3.01, 3.02, 10], [1, 5, 5, 1], [(2.985, 3.035)]),
+        ([0, 3, 3.01, 3.02, 10], [1, 3, 5, 7], [(2.985, 3.035)]),
+        ([0, 1, 1.01, 5, 5.01, 8, 8.01, 10], [1, 2, 1, 5, 1, 3, 1], [(4.9925, 5.0175), (7.9925, 8.0175)]),
+        ([0, 9.99, 10], [1, 3], [(9.9825, 10)]),
+        ([0, 0.001], [5], []),
+    ],
+)
+def test_windows_around_narrow_steps(alphas, between, expected):
+    found = narrow_changes(steps(alphas, between), (0.0, 10.0))
+    np.testing.assert_allclose(np.reshape(found, (-1, 2)), np.reshape(expected, (-1, 2)), atol=1e-9)
+
+
+def test_a_spike_is_shown_larger(graphs):
+    graph = graphs["spike"]
+    alphas, _, between = graph.steps
+    low, high = next(
+        (float(a), float(b)) for a, b, n in zip(alphas, alphas[1:], between, strict=False) if n == 5 and b - a > 1e-9
+    )
+    assert high - low < 1e-3
+    figure = graph.plot()
+    main, counts, zoomed, zoomed_counts = figure.axes
+    assert main.get_xlim() == (0, 1)
+    a, b = zoomed.get_xlim()
+    assert 0 <= a < low < high < b <= 1
+    assert (low - a) + (b - high) < 2 * (high - low)
+    # as high as the arcs that end there: the fold takes more than half of the height
+    ends = [np.linalg.norm(np.concatenate([v.lambda_n, v.lambda_t])) for v in graph.vertices if low <= v.alpha <= high]
+    bottom, top = zoomed.get_ylim()
+    assert bottom < min(ends) < max(ends) < top
+    assert max(ends) - min(ends) > 0.5 * (top - bottom)
+    assert counts.get_ylim()[1] == zoomed_counts.get_ylim()[1] > 5
+    assert len(graph.plot(zoom=False).axes) == 2
+    assert graph.plot(zoom=(0.2, 0.3)).axes[2].get_xlim() == (0.2, 0.3)
+    with pytest.raises(InvalidArgumentError, match="overlaps"):
+        graph.plot(zoom=(2, 3))
+
+
+@pytest.mark.parametrize("window", [None, (2.9, 4.0)])
+def test_chords_are_near_at_ten_times_finer_points_in_all_quantities_at_once(graphs, window):
+    graph, tolerance = graphs["square"], 1e-3
+    width = 10.0 if window is None else window[1] - window[0]
+    drawn = curves(graph.arcs, tuple(QUANTITIES), width, tolerance, window)
+    everything = np.concatenate([curve.values for curve in drawn.values()])
+    height = np.ptp(everything, axis=0)
+    for arc in graph.arcs:
+        curve = drawn[arc.number]
+        if window is not None:
+            assert window[0] <= curve.alphas[0] < curve.alphas[-1] <= window[1]
+        for k in range(len(curve.alphas) - 1):
+            low, high = curve.alphas[k : k + 2]
+            rise = (curve.values[k + 1] - curve.values[k]) / height
+            run = (high - low) / width
+            for share in np.linspace(0, 1, 11)[1:-1]:
+                alpha = min(max(low + share * (high - low), arc.lo), arc.hi)
+                forces, moves = (np.concatenate(pair) for pair in (arc.values(alpha), arc.displacements(alpha)))
+                n, t, u, w = np.split(np.concatenate([forces, moves]), 4)
+                exact = np.concatenate([[np.linalg.norm(forces)], [n.sum()], [t.sum()], n, t, u, w])
+                up, across = (exact - curve.values[k]) / height, (alpha - low) / width
+                off = np.abs(run * up - rise * across) / np.maximum(np.hypot(run, rise), 1e-300)
+                assert np.max(off) < 1.5 * tolerance
+
+
+def test_the_legend_names_every_mark(graphs):
+    for quantity in (None, "lambda_n"):
+        graph = graphs["oblique"]
+        figure = graph.plot(quantity)
+        entries = {text.get_text() for text in figure.legends[0].get_texts()}
+        assert {MARKERS[v.kind][2] for v in graph.vertices if v.kind in MARKERS} <= entries
+        if quantity is None:
+            assert {f"index {arc.index:+d}" for arc in graph.arcs} <= entries
+        else:
+            assert {status.value for arc in graph.arcs for status in arc.statuses} <= entries
+        assert "number at that alpha alone" in entries
+
+
+def test_both_slips_have_styles_of_their_own():
+    assert STATUS_STYLES[ContactStatus.SLIP_PLUS] != STATUS_STYLES[ContactStatus.SLIP_MINUS]
+    assert len({str(style) for style in STATUS_STYLES.values()}) == 4
+
+
+def test_title_units_and_other_axes(graphs):
+    from enumsol.figures import new_figure
+
+    figure = graphs["square"].plot("u_n", [1], title="square", units=("N", "mm"))
+    title = figure.axes[0].get_title("left")
+    assert title == "square, alpha in [0, 10]; complete: yes (proven)"
+    assert figure.axes[0].get_ylabel() == "u_n of node 1 [mm]"
+    axes = new_figure().subplots(1, 2)
+    assert graphs["square"].plot("lambda_n", [0], ax=axes[1]) is axes[1].figure
+    assert not axes[0].lines
+    assert "side by side" not in axes[1].get_xlabel()
+    assert axes[1].get_legend() is not None
+    assert figure._repr_png_().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"quantity": "pressure"}, "quantity is 'pressure'"),
+        ({"quantity": "norm", "nodes": [0]}, "nodes are given with the quantity 'norm'"),
+        ({"units": "N"}, "units is 'N'"),
+        ({"ax": 3}, "ax is a int"),
+        ({"nodes": [0, 1], "ax": "axes"}, "expected one label"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(graphs, options, message):
+    from enumsol.figures import new_figure
+
+    if options.get("ax") == "axes":
+        options = {**options, "ax": new_figure().subplots()}
+    with pytest.raises(InvalidArgumentError, match=message):
+        graphs["square"].plot(**options)

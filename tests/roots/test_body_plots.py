@@ -1,0 +1,182 @@
+"""Deformed bodies: displacements and forces in global axes against those of the rows, marks by status; 2D and 3D."""
+
+import numpy as np
+import pytest
+
+import enumsol
+from enumsol import InvalidArgumentError, PlaneMesh, fem
+from enumsol.shapes import body_shape, boundary_faces, round_scale
+
+
+@pytest.fixture(scope="module")
+def wedge():
+    problem = enumsol.gallery.wedge(4, 4, (4e-4, 1e-3))
+    return problem, enumsol.enumerate_roots(problem, 3.0)
+
+
+def test_displacements_and_forces_in_global_axes(wedge):
+    problem, roots = wedge
+    shape = body_shape(problem)
+    c, s = np.cos(np.radians(20)), np.sin(np.radians(20))
+    normals = np.repeat([[-c, -s], [c, -s]], 4, axis=0)
+    tangents = np.repeat([[-s, c], [s, c]], 4, axis=0)
+    assert len(roots) == 5
+    for root in roots:
+        moves = shape.at_rows(shape.displacements(root.u))
+        np.testing.assert_allclose(np.sum(moves * normals, axis=1) - problem.gap, root.u_n, atol=1e-12)
+        np.testing.assert_allclose(np.sum(moves * tangents, axis=1), root.u_t, atol=1e-12)
+        forces = shape.contact_forces(problem, root.lambda_n, root.lambda_t)
+        expected = np.zeros_like(forces)
+        expected[list(problem.node_ids)] = -(root.lambda_n[:, None] * normals + root.lambda_t[:, None] * tangents)
+        np.testing.assert_allclose(forces, expected, atol=1e-12 * max(np.max(root.lambda_n), 1e-30))
+    np.testing.assert_allclose(shape.at_rows(shape.points), problem.coordinates, atol=1e-15)
+
+
+def test_turned_degrees_of_freedom_of_the_square():
+    problem = enumsol.gallery.two_node_square()
+    root = enumsol.enumerate_roots(problem, 3.5)[0]
+    moves = problem.mesh.displacements(root.u)
+    # node 0: normal (0, -1), tangent (1, 0); node 1: normal (1, 0), tangent (0, 1); the others are clamped
+    np.testing.assert_allclose(moves[0], [root.u_t[0], -root.u_n[0]])
+    np.testing.assert_allclose(moves[1], [root.u_n[1], root.u_t[1]])
+    assert not np.any(moves[2:])
+
+
+def test_what_is_drawn(wedge):
+    problem, roots = wedge
+    root = next(root for root in roots if len(set(root.statuses)) > 1)
+    ax = root.plot_body(scale=20)
+    assert "displacements times 20" in ax.get_title()
+    (arrows,) = [part for part in ax.collections if hasattr(part, "U")]
+    assert len(arrows.U) == np.count_nonzero(root.lambda_n)
+    shape = body_shape(problem)
+    moved = shape.at_rows(shape.points + 20 * shape.displacements(root.u))
+    drawn = np.concatenate([np.stack(line.get_data(), axis=1) for line in ax.lines])
+    assert {tuple(point) for point in drawn.round(9)} == {tuple(point) for point in moved.round(9)}
+    tips = np.stack([arrows.X + arrows.U, arrows.Y + arrows.V], axis=1)
+    assert {tuple(tip) for tip in tips.round(9)} <= {tuple(point) for point in moved.round(9)}
+    entries = {text.get_text() for text in ax.get_legend().get_texts()}
+    assert entries == {*(status.value for status in root.statuses), "contact force on the body"}
+
+
+def test_all_roots_side_by_side_in_one_scale(wedge):
+    _, roots = wedge
+    figure = roots.plot_bodies()
+    assert [ax.get_title() for ax in figure.axes] == [f"root {k}: index {r.index:+d}" for k, r in enumerate(roots)]
+    many = enumsol.enumerate_roots(enumsol.gallery.chain(3), 5.0).plot_bodies()
+    assert len(many.axes) == 12
+    assert "the first 12 of 27 roots" in many.get_suptitle()
+
+
+def test_in_space():
+    problem = enumsol.gallery.get("wedge3d-8-5").build()
+    roots = enumsol.enumerate_roots(problem, 2.0)
+    shape = body_shape(problem)
+    for root in roots:
+        moves = problem.mesh.displacements(root.u)
+        np.testing.assert_allclose(shape.displacements(root.u), moves)
+        forces = shape.contact_forces(problem, root.lambda_n, root.lambda_t)
+        # forces on the whole body are in balance with load and stiffness: the work on any motion is that of the rows
+        work = root.lambda_n @ (problem.Bn @ root.u) + np.sum(
+            root.lambda_t * np.stack([problem.Bt1 @ root.u, problem.Bt2 @ root.u], axis=1)
+        )
+        assert np.sum(forces * moves) == pytest.approx(-work, rel=1e-9, abs=1e-18)
+    ax = roots[0].plot_body()
+    assert ax.name == "3d"
+    assert len(roots.plot_bodies().axes) == len(roots)
+    from enumsol.figures import new_figure
+
+    with pytest.raises(InvalidArgumentError, match="projection '3d'"):
+        roots[0].plot_body(new_figure().subplots())
+
+
+@pytest.mark.parametrize("cells", ["hexahedra", "tetrahedra"])
+def test_boundary_faces_enclose_the_body(cells):
+    mesh = fem.box(3, 2, 2, cells=cells)
+    faces = boundary_faces(mesh.cells)
+    corners = mesh.points[faces]
+    # every face lies in one of the six sides of the box
+    flat = [np.all(corners[:, :, axis] == side, axis=1) for axis in range(3) for side in (0.0, 1.0)]
+    assert np.all(np.any(flat, axis=0))
+    assert len(faces) == 2 * (3 * 2 + 3 * 2 + 2 * 2) * (1 if cells == "hexahedra" else 2)
+
+
+def test_scales_are_round():
+    assert [round_scale(x, 1.0, 0.08) for x in (0.08, 0.081, 0.03, 0.0016, 0.0)] == [1.0, 0.5, 2.0, 50.0, 1.0]
+
+
+def test_without_a_mesh_the_picture_is_refused():
+    square = enumsol.gallery.two_node_square()
+    problem = enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f)
+    roots = enumsol.enumerate_roots(problem, 3.5)
+    with pytest.raises(InvalidArgumentError, match="no mesh"):
+        roots[0].plot_body()
+    assert (
+        problem.fingerprint
+        == enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f, mesh=square.mesh).fingerprint
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"points": np.zeros((4, 3))}, "mesh_points has shape"),
+        ({"cells": [[0, 1]]}, "mesh_cells has shape"),
+        ({"cells": [[0, 1, 4]]}, "other numbers than 0 .. 3"),
+        ({"cells": [[0, 1, 0.5]]}, "other numbers than 0 .. 3"),
+        ({"motion": np.zeros((7, 4))}, "mesh_motion has shape"),
+        ({"offset": np.zeros((3, 2))}, "mesh_offset has shape"),
+    ],
+)
+def test_a_mesh_that_does_not_fit_is_refused(change, message):
+    parts = {"points": np.zeros((4, 2)), "cells": [[0, 1, 2]], "motion": np.zeros((8, 4)), "offset": None}
+    with pytest.raises(enumsol.InvalidProblemError, match=message):
+        PlaneMesh(**{**parts, **change})
+    square = enumsol.gallery.two_node_square()
+    with pytest.raises(enumsol.InvalidProblemError, match="expected n = 4"):
+        enumsol.ContactProblem(
+            square.A, square.Bn, square.Bt, square.f, mesh=PlaneMesh(np.zeros((1, 2)), [[0, 0, 0]], np.zeros((2, 5)))
+        )
+
+
+@pytest.mark.parametrize("place", ["p.npz", "folder"])
+def test_files_keep_the_mesh(tmp_path, place):
+    square = enumsol.gallery.two_node_square()
+    offset = np.arange(8.0).reshape(4, 2)
+    mesh = PlaneMesh(square.mesh.points, square.mesh.cells, square.mesh.motion, offset)
+    problem = enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f, mesh=mesh)
+    enumsol.write_problem(problem, tmp_path / place)
+    back = enumsol.read_problem(tmp_path / place).mesh
+    assert np.array_equal(back.points, mesh.points)
+    assert np.array_equal(back.cells, mesh.cells)
+    assert (back.motion != mesh.motion).nnz == 0
+    assert np.array_equal(back.offset, offset)
+    graph = enumsol.branch_graph(problem, (0, 2))
+    graph.save(tmp_path / "graph.json")
+    kept = enumsol.BranchGraph.load(tmp_path / "graph.json").problem.mesh
+    assert np.array_equal(kept.displacements([1, 2, 3, 4]), mesh.displacements([1, 2, 3, 4]))
+
+
+def test_part_of_a_mesh_in_a_file_is_refused(tmp_path):
+    arrays = {"A": np.eye(2), "Bn": [[1, 0]], "Bt": [[0, 1]], "f": [1, 1], "mesh_points": np.zeros((3, 2))}
+    np.savez(tmp_path / "part.npz", **arrays)
+    with pytest.raises(enumsol.InvalidProblemError, match="mesh_cells, mesh_motion is missing"):
+        enumsol.read_problem(tmp_path / "part.npz")
+
+
+def test_vtu_of_a_plane_body(wedge, tmp_path):
+    meshio = pytest.importorskip("meshio")
+    problem, roots = wedge
+    root = roots[2]
+    enumsol.write_vtu(problem, root, tmp_path / "wedge.vtu")
+    back = meshio.read(tmp_path / "wedge.vtu")
+    assert [block.type for block in back.cells] == ["triangle"]
+    np.testing.assert_allclose(back.point_data["displacement"][:, :2], problem.mesh.displacements(root.u))
+    nodes = list(problem.node_ids)
+    np.testing.assert_allclose(back.point_data["lambda_n"][nodes], root.lambda_n)
+    names = [("open", "stick", "slip+", "slip-")[int(code)] for code in back.point_data["status"][nodes]]
+    assert names == [status.value for status in root.statuses]
+    assert np.isnan(np.delete(back.point_data["lambda_n"], nodes)).all()
+    work = np.sum(back.point_data["contact_force"] * back.point_data["displacement"])
+    rows = root.lambda_n @ (problem.Bn @ root.u) + root.lambda_t @ (problem.Bt @ root.u)
+    assert work == pytest.approx(-rows, rel=1e-9)
