@@ -1,0 +1,277 @@
+"""The page of a report against the graph it was made of: numbers, words, tables; what is escaped; what is refused."""
+
+import json
+import re
+import sys
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import enumsol
+from enumsol import InvalidArgumentError, MissingDependencyError, branch_graph, enumerate_roots, gallery, write_report
+from enumsol.cli import main
+from enumsol.report.body import body_record
+from enumsol.report.content import rounded, slider_alphas
+
+pytest.importorskip("plotly")
+HOSTILE = '</script><script>alert("2")</script>'
+
+
+def page_of(graph, folder, **options):
+    write_report(graph, folder / "page.html", **options)
+    return (folder / "page.html").read_text(encoding="utf-8")
+
+
+def data_of(page):
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)[1])
+
+
+class Reader(HTMLParser):
+    """Counts elements and keeps the text outside of scripts and styles."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.tags, self.words, self._silent = [], [], False
+        self.feed(page)
+        self.text = " ".join(" ".join(self.words).split())
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        self._silent = tag in ("script", "style")
+
+    def handle_endtag(self, tag):
+        self._silent = False
+
+    def handle_data(self, data):
+        if not self._silent:
+            self.words.append(data)
+
+
+@pytest.fixture(scope="module")
+def wedge():
+    return branch_graph(gallery.get("wedge-14-5").build(), (0, 3))
+
+
+@pytest.fixture(scope="module")
+def wedge_page(wedge, tmp_path_factory):
+    return page_of(wedge, tmp_path_factory.mktemp("wedge"), title="Wedge in a notch", units=("N", "mm"))
+
+
+def test_the_numbers_are_those_of_the_graph(wedge, wedge_page):
+    data = data_of(wedge_page)
+    p = wedge.problem.p
+    assert data["interval"] == [0, 3]
+    assert data["complete"] is True
+    assert data["nodes"] == [str(label) for label in wedge.problem.node_ids]
+    assert (data["steps"]["alphas"], data["steps"]["at"], data["steps"]["between"]) == tuple(
+        [float(x) if k == 0 else x for x in part] for k, part in enumerate(wedge.steps)
+    )
+    assert len(data["arcs"]) == len(wedge.arcs)
+    for record, arc in zip(data["arcs"], wedge.arcs, strict=True):
+        assert (record["number"], record["branch"]) == (arc.number, wedge.branch_of[arc.number])
+        assert (record["tail"], record["head"], record["index"]) == (arc.tail, arc.head, arc.index)
+        assert [data["statuses"][int(code)] for code in record["statuses"]] == [s.value for s in arc.statuses]
+        assert (record["a"][0], record["a"][-1]) == arc.interval
+        for k in range(0, len(record["a"]), 7):
+            lambda_n, lambda_t = arc.values(record["a"][k])
+            u_n, u_t = arc.displacements(record["a"][k])
+            np.testing.assert_allclose(record["f"][k], np.concatenate([lambda_n, lambda_t]), rtol=1e-8)
+            np.testing.assert_allclose(record["w"][k], np.concatenate([u_n, u_t]), rtol=1e-8)
+    assert [v["alpha"] for v in data["vertices"]] == [v.alpha for v in wedge.vertices]
+    for record, v in zip(data["vertices"], wedge.vertices, strict=True):
+        assert (record["number"], record["kind"], record["border"]) == (v.number, v.kind.value, v.border)
+        np.testing.assert_allclose(record["f"][:p], v.lambda_n, rtol=1e-8)
+        np.testing.assert_allclose(record["w"][p:], v.u_t, rtol=1e-8)
+        assert set(record["several"]) == {k for k, holds in enumerate(v.active) if len(holds) > 1}
+    assert {b["number"]: b["arcs"] for b in data["branches"]} == {
+        b.number: [arc.number for arc in b.arcs] for b in wedge.branches
+    }
+
+
+def test_interpolated_values_are_near_the_roots(wedge, wedge_page):
+    data = data_of(wedge_page)
+    for alpha in (1.6, 2.2, 2.9):
+        roots = enumerate_roots(wedge.problem, alpha)
+        found = []
+        for arc in data["arcs"]:
+            if arc["a"][0] < alpha < arc["a"][-1]:
+                f = np.array(arc["f"])
+                found.append(np.array([np.interp(alpha, arc["a"], column) for column in f.T]))
+        assert len(found) == len(roots)
+        largest = max(np.max(np.abs(root.lambda_n)) for root in roots)
+        for root in roots:
+            exact = np.concatenate([root.lambda_n, root.lambda_t])
+            assert min(np.max(np.abs(values - exact)) for values in found) < 3 * data["tolerance"] * largest
+
+
+def test_bodies_move_as_the_roots_say(wedge, wedge_page):
+    body = data_of(wedge_page)["body"]
+    mesh = wedge.problem.mesh
+    np.testing.assert_allclose(body["points"], mesh.points, atol=1e-6)
+    assert body["cells"] == mesh.cells.tolist()
+    for root in enumerate_roots(wedge.problem, 2.2):
+        forces = np.concatenate([root.lambda_n, root.lambda_t])
+        u = np.array(body["u0"]) + 2.2 * np.array(body["u1"]) - forces @ np.array(body["c"])
+        scale = np.max(np.abs(body["u0"]))
+        np.testing.assert_allclose(u.reshape(-1, 2), mesh.displacements(root.u), atol=1e-6 * scale)
+        nodal = np.zeros_like(mesh.points)
+        for force, acts in zip(forces, body["acts"], strict=True):
+            for node, x, y in acts:
+                nodal[node] += force * np.array([x, y])
+        from enumsol.shapes import body_shape
+
+        expected = body_shape(wedge.problem).contact_forces(wedge.problem, root.lambda_n, root.lambda_t)
+        np.testing.assert_allclose(nodal, expected, atol=1e-8 * max(np.max(np.abs(expected)), 1e-30))
+    assert [[node for node, _ in row] for row in body["rows"]] == [[node] for node in wedge.problem.node_ids]
+
+
+def test_large_meshes_are_drawn_by_their_boundary_or_not_at_all():
+    problem = gallery.clamped_block(80, 80, contact=10)
+    body = body_record(problem)
+    assert body["cells"] is None
+    assert len(body["lines"]) == 320  # edges along the four sides
+    assert len(body["points"]) == 320
+    assert body_record(gallery.clamped_block(100, 100)) is None  # 200 forces on 400 nodes
+    square = gallery.two_node_square()
+    assert body_record(enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f)) is None
+
+
+def test_the_slider_reaches_every_narrow_step():
+    critical = [0.0, 0.3, 0.300001, 0.5, 1.0]
+    found = slider_alphas(critical, (0.0, 1.0))
+    assert found == sorted(set(found))
+    assert set(critical) <= set(found)
+    assert sum(0.3 < alpha < 0.300001 for alpha in found) >= 3
+    assert 150 < len(found) < 200
+    assert len(slider_alphas([k / 1000 for k in range(1001)], (0.0, 1.0))) < 2100
+
+
+def test_numbers_are_short_and_finite():
+    assert rounded([1 / 3, 2.0, -0.0, 1e20]) == [0.333333333, 2, 0, 1e20]
+    assert json.dumps(rounded(np.eye(2))) == "[[1, 0], [0, 1]]"
+
+
+def test_words_and_tables(wedge, wedge_page):
+    reader = Reader(wedge_page)
+    assert reader.text.count("complete: yes (proven)") == 2
+    assert wedge.problem.fingerprint in reader.text
+    assert "one solution below alpha = 1.5216925" in reader.text
+    assert "4^14" in reader.text
+    rows = [attributes for tag, attributes in reader.tags if tag == "tr" and "data-alpha" in attributes]
+    assert [float(row["data-alpha"]) for row in rows] == [v.alpha for v in wedge.vertices if v.kind != "end"]
+    assert sum("data-branch" in attributes for tag, attributes in reader.tags if tag == "tr") == len(wedge.branches)
+    assert data_of(wedge_page)["units"] == ["N", "mm"]
+
+
+def test_the_page_is_small_and_asks_the_network_for_nothing(wedge_page):
+    assert len(wedge_page.encode()) < 5_000_000
+    for tag, attributes in Reader(wedge_page).tags:
+        assert not {"src", "srcset", "data", "action"} & set(attributes), tag
+        assert attributes.get("href", "data:,") == "data:,"
+    policy = next(a["content"] for tag, a in Reader(wedge_page).tags if a.get("http-equiv"))
+    assert policy.startswith("default-src 'none'")
+
+
+def test_names_are_escaped(tmp_path):
+    square = gallery.two_node_square()
+    problem = enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f, node_ids=[HOSTILE, "<b>&amp;"])
+    page = page_of(branch_graph(problem, (0, 10)), tmp_path, title=HOSTILE, units=(HOSTILE, "<i>"), commands=[HOSTILE])
+    plain = page_of(branch_graph(square, (0, 10)), tmp_path, commands=["enumsol"])
+    names = [[tag for tag, _ in Reader(text).tags] for text in (page, plain)]
+    assert names[0] == names[1]
+    assert HOSTILE in Reader(page).text
+    assert HOSTILE not in page
+    assert data_of(page)["nodes"] == [HOSTILE, "<b>&amp;"]
+    assert data_of(page)["body"] is None
+
+
+@pytest.mark.parametrize("nodes", [1, 8, 12])
+def test_a_graph_cut_short_says_so(tmp_path, nodes):
+    graph = branch_graph(gallery.two_node_square(), (0, 10), max_nodes=nodes)
+    assert not graph.complete
+    page = page_of(graph, tmp_path)
+    text = Reader(page).text
+    assert "complete: yes" not in text
+    assert "It is proven" not in text
+    assert "This graph is not complete" in text
+    assert graph.completeness() in text
+    assert "numbers of solutions are lower bounds" in text
+    data = data_of(page)
+    assert (data["complete"], data["exact_counts"]) == (False, False)
+
+
+def test_fast_arithmetic_proves_nothing(tmp_path):
+    graph = branch_graph(gallery.two_node_square(), (0, 10), "fast")
+    page = page_of(graph, tmp_path)
+    assert "complete: yes" not in Reader(page).text
+    assert "It is proven" not in Reader(page).text
+    assert "Nothing is proven" in Reader(page).text
+    assert data_of(page)["complete"] is False
+
+
+def test_continua_and_sheets(tmp_path):
+    data = data_of(page_of(branch_graph(gallery.one_node_triangle(f=(1, -2)), (0, 5)), tmp_path))
+    (family,) = [v["family"] for v in data["vertices"] if v["family"] is not None]
+    assert family["dimension"] == 1
+    assert family["f"] == [[0, 0], [1, -2]]
+    triangle = gallery.one_node_triangle()
+    options = {"friction": 2.0, "load_slope": [1.0, -2.0]}
+    unloaded = enumsol.ContactProblem(triangle.A, triangle.Bn, triangle.Bt, [0.0, 0.0], **options)
+    page = page_of(branch_graph(unloaded, (-1, 1)), tmp_path)
+    (sheet,) = [arc for arc in data_of(page)["arcs"] if arc["dimension"]]
+    assert "a" not in sheet
+    assert (sheet["lo"], sheet["hi"]) == (0, 1)
+    assert "sheet (a continuum over an interval)" in Reader(page).text
+
+
+def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
+    graph = branch_graph(gallery.one_node_triangle(), (0, 5))
+    with pytest.raises(InvalidArgumentError, match="graph is a int"):
+        write_report(3, tmp_path / "page.html")
+    with pytest.raises(InvalidArgumentError, match="title is a int"):
+        write_report(graph, tmp_path / "page.html", title=3)
+    with pytest.raises(InvalidArgumentError, match="units is 'N'"):
+        write_report(graph, tmp_path / "page.html", units="N")
+    with pytest.raises(InvalidArgumentError, match="cannot be written"):
+        write_report(graph, tmp_path / "nowhere" / "page.html")
+    monkeypatch.setitem(sys.modules, "plotly.offline", None)
+    with pytest.raises(MissingDependencyError, match=r"enumsol\[report\]"):
+        write_report(graph, tmp_path / "page.html")
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_the_command(tmp_path, capsys):
+    page, proof = tmp_path / "a page.html", tmp_path / "square.proof"
+    command = ["report", "gallery:two-node-6.4", "--from", "0", "--to", "10", "-o", str(page), "--proof", str(proof)]
+    assert main(command) == 0
+    assert capsys.readouterr().out.endswith("complete: yes (proven)\n")
+    text = Reader(page.read_text(encoding="utf-8")).text
+    assert f"enumsol verify gallery:two-node-6.4 {proof}" in text
+    assert text.startswith("gallery:two-node-6.4")
+    assert main(["verify", "gallery:two-node-6.4", str(proof)]) == 0
+    capsys.readouterr()
+    assert main([*command[:8], "--max-nodes", "3", "--title", "<T>", "--units", "kN,m", "--json", "-"]) == 3
+    found = json.loads(capsys.readouterr().out)
+    assert (found["report"], found["complete"]) == (str(page), False)
+    page_text = page.read_text(encoding="utf-8")
+    assert "<h1>&lt;T&gt;</h1>" in page_text
+    assert data_of(page_text)["units"] == ["kN", "m"]
+    assert "enumsol verify gallery" not in Reader(page_text).text
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["-o", "-"], "--output is -"),
+        (["-o", "nowhere/page.html"], "--output is nowhere/page.html"),
+        (["--units", "N"], "--units is N"),
+        (["--to", "-1"], "--from is 0"),
+    ],
+)
+def test_the_command_refuses_before_it_searches(capsys, options, message):
+    assert main(["report", "gallery:two-node-6.4", "--from", "0", "--to", "10", *options]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert message in err
+    assert err.count("\n") == 1
