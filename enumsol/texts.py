@@ -1,6 +1,26 @@
-"""Words in messages and printed results."""
+"""Words in messages and printed results, and their form in notebooks."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 
 def counted(number: int, singular: str, plural: str | None = None) -> str:
     """A number of things, as in "1 root" and "2 roots"."""
     return f"{number} {singular if number == 1 else plural or singular + 's'}"
+
+
+def html_lines(lines: Iterable[str]) -> str:
+    """Lines of text as HTML, a paragraph each."""
+    return "".join(f"<p style='margin:2px 0'>{escape(line)}</p>" for line in lines)
+
+
+def html_table(heads: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """A table as HTML; what stands in it is escaped."""
+    head = "".join(f"<th>{escape(name)}</th>" for name in heads)
+    body = "".join("<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

@@ -13,7 +13,7 @@ from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps, uniqueness_bound
 from enumsol.branches.elements import VertexKind
-from enumsol.branches.graph_text import completeness, graph_text
+from enumsol.branches.graph_text import completeness, graph_html, graph_text
 from enumsol.branches.make_elements import make_branches, make_components, multigraph
 from enumsol.branches.roots_at import roots_of
 from enumsol.checks import alpha_value
@@ -356,11 +356,9 @@ class BranchGraph(Immutable):
 
     def plot(self, quantity: str | None = None, nodes: Sequence[Any] | None = None, **options: Any) -> Any:
         """A figure of alpha against an overview, or a quantity of chosen nodes; see enumsol.branches.plots."""
-        from enumsol.branches.plots import plot_graph
+        from enumsol.branches.plots import plot_graph  # as above
 
         return plot_graph(self, quantity, nodes, **options)
-
-    # -- printing --------------------------------------------------------------------------------------------------
 
     def completeness(self) -> str:
         """The closing line of the printed summary."""
@@ -368,6 +366,9 @@ class BranchGraph(Immutable):
 
     def __repr__(self) -> str:
         return graph_text(self.data, len(self.components), self.branches)
+
+    def _repr_html_(self) -> str:
+        return graph_html(self.data, len(self.components), self.branches)
 
     def summary(self) -> dict[str, Any]:
         """Counts and answers as plain values, for JSON; what is not known is None."""

@@ -6,7 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from enumsol.branches.elements import VertexKind
-from enumsol.texts import counted
+from enumsol.texts import counted, html_lines, html_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,19 +32,40 @@ def completeness(data: GraphData) -> str:
 
 def graph_text(data: GraphData, components: int, branches: Sequence[Branch]) -> str:
     """Counts, a line a branch, and whether the graph is complete."""
+    lines = [*_heading(data, components, branches), *map(_branch_line, branches[:_PRINTED_BRANCHES])]
+    if len(branches) > _PRINTED_BRANCHES:
+        lines.append(f"  ... {len(branches) - _PRINTED_BRANCHES} more branches")
+    return "\n".join([*lines, completeness(data)])
+
+
+def graph_html(data: GraphData, components: int, branches: Sequence[Branch]) -> str:
+    """The same in a notebook."""
+    rows = [
+        (
+            branch.number,
+            _shape(branch),
+            len(branch.arcs),
+            *(f"{end:.6g}" for end in branch.interval),
+            ", ".join(f"{v.alpha:.6g}" for v in branch.folds),
+        )
+        for branch in branches[:_PRINTED_BRANCHES]
+    ]
+    more = len(branches) - _PRINTED_BRANCHES
+    table = html_table(("branch", "shape", "arcs", "alpha from", "to", "folds at"), rows) if rows else ""
+    closing = [*([f"... {more} more branches"] if more > 0 else []), completeness(data)]
+    return html_lines(_heading(data, components, branches)) + table + html_lines(closing)
+
+
+def _heading(data: GraphData, components: int, branches: Sequence[Branch]) -> list[str]:
     kinds = Counter(v.kind for v in data.vertices)
     numbers = ", ".join(f"{kinds[kind]} {kind}" for kind in VertexKind if kinds[kind])
     a, b = (float(end) for end in data.interval)
     found = "" if data.claims.whole else ", not complete; of what was found:"
-    lines = [
+    return [
         f"BranchGraph for alpha in [{a:g}, {b:g}] ({data.arithmetic}){found}",
         f"  components {components}, branches {len(branches)}, arcs {len(data.arcs)}",
         f"  vertices {len(data.vertices)}" + (f": {numbers}" if numbers else ""),
-        *map(_branch_line, branches[:_PRINTED_BRANCHES]),
     ]
-    if len(branches) > _PRINTED_BRANCHES:
-        lines.append(f"  ... {len(branches) - _PRINTED_BRANCHES} more branches")
-    return "\n".join([*lines, completeness(data)])
 
 
 def _branch_line(branch: Branch) -> str:

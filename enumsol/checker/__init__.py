@@ -33,9 +33,10 @@ What checker and search share
       ``condensation.affine``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
       definite matrix, and floats as rationals;
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file;
-    - ``problem``, ``contact_body``, ``condensation.data``, ``condensation.condensed``, ``condensation.factorization``,
-      ``sealed``, ``checks``, ``array_checks``, ``files``, ``texts`` and ``errors``: the data, their checks and their
-      fingerprint, the factorization of A (no bound assumes that it is accurate), S and g as computed;
+    - ``problem``, ``body2d``, ``contact_body``, ``condensation.data``, ``condensation.condensed``,
+      ``condensation.factorization``, ``sealed``, ``checks``, ``array_checks``, ``files``, ``texts`` and ``errors``: the
+      data, their checks and their fingerprint, the factorization of A (no bound assumes that it is accurate), S and g
+      as computed;
     - numpy, scipy and python-flint.
 
     They are shared because the two must agree. A leaf is written when its inequality is proven positive, and a second

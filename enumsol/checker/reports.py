@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from enumsol.proof.reading import shown_alpha
-from enumsol.texts import counted
+from enumsol.texts import counted, html_lines
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -55,6 +55,9 @@ class VerificationReport:
     def complete(self) -> bool:
         """The proof shows that nothing but the listed roots and families solves the problem."""
         return self.ok and self.undecided == 0
+
+    def _repr_html_(self) -> str:
+        return html_lines(repr(self).splitlines())
 
     def __repr__(self) -> str:
         where = "" if self.alpha is None else f" at alpha = {shown_alpha(self.alpha)}"
@@ -113,6 +116,9 @@ class GraphVerificationReport:
     def whole(self) -> bool:
         """Every solution for every alpha in the interval lies on one of the arcs, whose ends are joined as proven."""
         return self.ok and self.arcs is not None and not self.open
+
+    def _repr_html_(self) -> str:
+        return html_lines(repr(self).splitlines())
 
     def __repr__(self) -> str:
         ends = () if self.interval is None else tuple(float(end) for end in self.interval)

@@ -50,6 +50,7 @@ import numpy as np
 from enumsol.checks import file_path
 from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.files import writing
+from enumsol.texts import html_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -309,6 +310,9 @@ class Proof:
         except ProofFormatError:
             size = "which cannot be read"
         return f"Proof ({self._name}, {size})"
+
+    def _repr_html_(self) -> str:
+        return html_lines([repr(self)])
 
 
 def _reason(error: Exception) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from enumsol.roots.local_branch import branch_test
 from enumsol.sealed import Sealed, sealed
 from enumsol.statuses import ContactStatus, sign_array
+from enumsol.texts import html_lines, html_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -204,10 +205,10 @@ class Root(ContactState):
         return signs
 
     def __repr__(self) -> str:
-        index = "?" if self.index is None else f"{self.index:+d}"
-        regular = "regular" if self.regular else "not regular"
-        heading = f"Root at alpha = {float(self.alpha):g}: index {index}, {regular}, margin {self.margin:.2e}"
-        return "\n".join([heading, *node_table(self, self._condensed.problem.node_ids)])
+        return "\n".join([root_heading(self), *node_table(self, self._condensed.problem.node_ids)])
+
+    def _repr_html_(self) -> str:
+        return root_html(self, self._condensed.problem.node_ids)
 
 
 @dataclass(frozen=True)
@@ -273,6 +274,26 @@ class RootFamily:
         return sealed(np.unique(np.concatenate([part.vertices for part in self.polytopes]), axis=0))
 
 
+def root_heading(root: Any) -> str:
+    """The first line of a printed root, in 2D or 3D."""
+    index = "?" if root.index is None else f"{root.index:+d}"
+    regular = "regular" if root.regular else "not regular"
+    return f"Root at alpha = {float(root.alpha):g}: index {index}, {regular}, margin {root.margin:.2e}"
+
+
+def root_html(root: Any, labels: tuple[Any, ...]) -> str:
+    """A root in a notebook: its heading, and a table over the contact nodes; of many the first."""
+    shown = min(len(labels), _PRINTED_NODES)
+    heads = _node_heads(1 if root.lambda_t.ndim == 1 else 2)
+    rows = [(labels[i], root.statuses[i].value, *(f"{x:.6g}" for x in _node_numbers(root, i))) for i in range(shown)]
+    more = [f"... {len(labels) - shown} more nodes; all of them: {summary(root.statuses)}"]
+    return (
+        html_lines([root_heading(root)])
+        + html_table(("node", "status", *heads), rows)
+        + html_lines(more if shown < len(labels) else [])
+    )
+
+
 def node_table(state: ContactState, labels: tuple[Any, ...]) -> list[str]:
     """Lines of a table over the contact nodes; of many the first."""
     shown = min(len(labels), _PRINTED_NODES)
@@ -288,17 +309,24 @@ def node_table(state: ContactState, labels: tuple[Any, ...]) -> list[str]:
 
 def node_heading(width: int, tangents: int = 1) -> str:
     """The heading of lines over contact nodes, whose labels take that width."""
+    return f"{'node':>{width}} {'status':<7} " + " ".join(f"{name:>12}" for name in _node_heads(tangents))
+
+
+def _node_heads(tangents: int) -> list[str]:
     across = [[name] if tangents == 1 else [f"{name}1", f"{name}2"] for name in ("lambda_t", "u_t")]
-    names = ["lambda_n", *across[0], "u_n", *across[1]]
-    return f"{'node':>{width}} {'status':<7} " + " ".join(f"{name:>12}" for name in names)
+    return ["lambda_n", *across[0], "u_n", *across[1]]
 
 
 def node_line(state: ContactState, i: int, label: object, width: int) -> str:
     """Status, forces and displacements of a contact node, below `node_heading`."""
+    text = " ".join(f"{number:>12.6g}" for number in _node_numbers(state, i))
+    return f"{label!s:>{width}} {state.statuses[i].value:<7} {text}"
+
+
+def _node_numbers(state: ContactState, i: int) -> list[float]:
     numbers = [state.lambda_n[i], *np.ravel(state.lambda_t[i]), state.u_n[i], *np.ravel(state.u_t[i])]
     # + 0.0 turns a negative zero, which means nothing to a reader, into zero
-    text = " ".join(f"{number + 0.0:>12.6g}" for number in numbers)
-    return f"{label!s:>{width}} {state.statuses[i].value:<7} {text}"
+    return [float(number) + 0.0 for number in numbers]
 
 
 def summary(statuses: Sequence[ContactStatus | str | None]) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.roots.root import ContactState, Enclosure, node_table
+from enumsol.roots.root import ContactState, Enclosure, node_table, root_heading, root_html
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -103,7 +103,7 @@ class Root3D(ContactState):
         return draw_body(self, self.problem, ax, scale)
 
     def __repr__(self) -> str:
-        index = "?" if self.index is None else f"{self.index:+d}"
-        regular = "regular" if self.regular else "not regular"
-        heading = f"Root at alpha = {float(self.alpha):g}: index {index}, {regular}, margin {self.margin:.2e}"
-        return "\n".join([heading, *node_table(self, self._condensed.problem.node_ids)])
+        return "\n".join([root_heading(self), *node_table(self, self._condensed.problem.node_ids)])
+
+    def _repr_html_(self) -> str:
+        return root_html(self, self._condensed.problem.node_ids)

@@ -11,7 +11,7 @@ import numpy as np
 
 from enumsol.roots.root import Root, summary
 from enumsol.sealed import Immutable, Sealed
-from enumsol.texts import counted
+from enumsol.texts import counted, html_lines, html_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from enumsol.statuses import ContactStatus
 
 _PRINTED_ROOTS, _PRINTED_REGIONS = 20, 5
+_HEADS = ("", "index", "regular", "margin", "max lambda_n", "contact")
 
 
 @dataclass(frozen=True)
@@ -254,21 +255,31 @@ class RootSet(Sequence[Root], Immutable):
         about = "" if self.certified_data == "problem" else " for S and g as computed"
         return f"complete: yes (proven{about})"
 
-    def __repr__(self) -> str:
+    def _heading(self) -> str:
         heading = f"RootSet at alpha = {float(self.alpha):g}: {counted(len(self), 'root')}"
         if self.families:
             heading += f", {counted(len(self.families), 'family', 'families')}"
         if not self.whole:
             heading += f" found, at least {self.at_least} in all"
-        lines = [f"{heading} ({self.arithmetic}, {self.method})"]
-        if len(self):
-            lines.append(f"{'':>6} {'index':>5} {'regular':>7} {'margin':>9} {'max lambda_n':>12}  contact")
-        for k, root in enumerate(self._roots[:_PRINTED_ROOTS]):
-            index = "?" if root.index is None else f"{root.index:+d}"
-            lines.append(
-                f"{k:>6} {index:>5} {'yes' if root.regular else 'no':>7} {root.margin:>9.2e} "
-                f"{np.max(root.lambda_n):>12.5g}  {summary(root.statuses)}"
+        return f"{heading} ({self.arithmetic}, {self.method})"
+
+    def _rows(self) -> list[tuple[str, str, str, str, str, str]]:
+        """What is printed of the first roots: number, index, whether regular, margin, largest force, statuses."""
+        return [
+            (
+                str(k),
+                "?" if root.index is None else f"{root.index:+d}",
+                "yes" if root.regular else "no",
+                f"{root.margin:.2e}",
+                f"{np.max(root.lambda_n):.5g}",
+                summary(root.statuses),
             )
+            for k, root in enumerate(self._roots[:_PRINTED_ROOTS])
+        ]
+
+    def _notes(self) -> list[str]:
+        """The lines below the table of roots."""
+        lines = []
         if len(self) > _PRINTED_ROOTS:
             lines.append(f"   ... {len(self) - _PRINTED_ROOTS} more")
         for k, family in enumerate(self.families[:_PRINTED_ROOTS]):
@@ -287,9 +298,17 @@ class RootSet(Sequence[Root], Immutable):
         total = self.index_sum
         # a sum other than +1 proves that something is missing or wrong
         note = "unknown" if total is None else f"{total:+d}" if total == 1 else f"{total:+d} (not +1!)"
-        lines.append(f"index sum: {note}")
-        lines.append(self.completeness())
-        return "\n".join(lines)
+        return [*lines, f"index sum: {note}", self.completeness()]
+
+    def __repr__(self) -> str:
+        rows = [_HEADS, *self._rows()] if len(self) else []
+        widths = (6, 5, 7, 9, 12)
+        table = [" ".join(f"{c:>{w}}" for c, w in zip(row, widths, strict=False)) + f"  {row[-1]}" for row in rows]
+        return "\n".join([self._heading(), *table, *self._notes()])
+
+    def _repr_html_(self) -> str:
+        table = html_table(("root", *_HEADS[1:]), self._rows()) if len(self) else ""
+        return html_lines([self._heading()]) + table + html_lines(self._notes())
 
 
 def _region(item: Undecided) -> str:
