@@ -10,6 +10,7 @@ import typer
 
 from enumsol.cli import audit, fixed_point, follow, gallery, graph, report, roots, table, verify
 from enumsol.cli.common import ExitStatus
+from enumsol.cli.quiet import loud_again
 from enumsol.cli.streams import guarded_streams
 from enumsol.errors import EnumsolError, OutputError, WorkerError
 
@@ -23,7 +24,6 @@ app = typer.Typer(
     name="enumsol",
     help="Every equilibrium of a discrete contact problem with Coulomb friction.",
     epilog="Start with: enumsol gallery list",
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         Default: those of the process.
     """
-    with guarded_streams(), warnings.catch_warnings():
+    with guarded_streams(), loud_again(), warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:
             status = app(arguments, prog_name="enumsol", standalone_mode=False)

@@ -9,7 +9,7 @@ import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far
 from enumsol.cli.graph import build, read_graph
-from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, csv, file, number
+from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, csv, file, number
 from enumsol.cli.output import as_json, check_outputs, deliver
 from enumsol.errors import InvalidArgumentError
 from enumsol.texts import counted
@@ -56,6 +56,7 @@ def audit(
     columns: NamedBy = "auto",
     json_file: JsonFile = None,
     csv_file: Annotated[str | None, csv("a point")] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Check POINTS, from any continuation code, against all solutions of PROBLEM.
 

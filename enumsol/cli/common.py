@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import typer
 
+from enumsol.cli.quiet import is_quiet
 from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutputError, WorkerError
 
 if TYPE_CHECKING:
@@ -137,7 +138,8 @@ def node_row(problem: ContactProblem, label: str | None) -> int:
 
 def note(text: str) -> None:
     """Say something on stderr that is no error."""
-    typer.echo(f"enumsol: note: {text}", err=True)
+    if not is_quiet():
+        typer.echo(f"enumsol: note: {text}", err=True)
 
 
 def so_far(search: Callable[[], T]) -> tuple[T | Any, EnumsolError | None]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, so_far
-from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, count, csv, file, number
+from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, Quiet, count, csv, file, number
 from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
@@ -45,6 +45,7 @@ def fixed_point(
     npz_file: Annotated[str | None, file("--npz", "Write all arrays, for FixedPoint.load.")] = None,
     vtu_file: Annotated[str | None, file("--vtu", "Write the deformed body for ParaView (3D).")] = None,
     plot_file: PlotFile = None,
+    quiet: Quiet = False,
 ) -> None:
     """Find one solution of PROBLEM at one ALPHA, as a limit of contact problems with given slip bounds.
 

@@ -19,6 +19,7 @@ from enumsol.cli.options import (
     LastAlpha,
     PlotFile,
     ProblemArgument,
+    Quiet,
     count,
     csv,
     file,
@@ -79,6 +80,7 @@ def follow(
     graph_file: Annotated[str | None, file("--graph", "Draw over this graph of enumsol graph --save.", PLOT)] = None,
     quantity: DrawnQuantity = "lambda_n",
     label: Annotated[str | None, node("--node", "LABEL", "Contact node to draw; default: the first.")] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Follow branches of solutions of PROBLEM from its roots at one alpha.
 

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from enumsol.cli.options import JsonFile, Quiet
+from enumsol.cli.output import as_json, check_outputs, deliver, write_text
+
 if TYPE_CHECKING:
     from enumsol.gallery import GalleryEntry
 
@@ -20,10 +23,17 @@ def _gallery(context: typer.Context) -> None:
 
 
 @app.command("list")
-def list_() -> None:
+def list_(json_file: JsonFile = None) -> None:
     """List the problems, each with an alpha worth a look and the number of its roots there."""
     from enumsol import gallery  # numpy and scipy: not for --help
 
+    check_outputs(json=json_file)
+    if json_file is not None:
+        names = ("name", "summary", "alpha", "roots", "dimension")
+        entries = [{name: getattr(entry, name) for name in names} for entry in gallery.GALLERY.values()]
+        write_text(json_file, as_json(entries))
+        if json_file == "-":
+            return
     rows = [(entry.name, f"{entry.alpha:g}", _count(entry), entry.summary) for entry in gallery.GALLERY.values()]
     if not sys.stdout.isatty():
         # for other programs: one line a problem, however long
@@ -68,12 +78,23 @@ def write(
             show_default=False,
         ),
     ],
+    json_file: JsonFile = None,
+    quiet: Quiet = False,
 ) -> None:
     """Write the problem NAME to FILE, in a form that read_problem and the other commands take."""
     from enumsol import gallery  # as above
     from enumsol.io import write_problem
 
+    check_outputs(json=json_file)
     entry = gallery.get(name.removeprefix("gallery:"))
-    write_problem(entry.build(), file)
+    problem = entry.build()
+    write_problem(problem, file)
     command = "fixed-point" if entry.roots is None and entry.dimension == 3 else "roots"
-    typer.echo(f"wrote {entry.name} to {file}; try: enumsol {command} {file} --alpha {entry.alpha:g}")
+    about = {"name": entry.name, "file": file, "alpha": entry.alpha, "fingerprint": problem.fingerprint}
+    deliver(
+        json_file=json_file,
+        csv_file=None,
+        text=lambda: f"wrote {entry.name} to {file}; try: enumsol {command} {file} --alpha {entry.alpha:g}",
+        content=lambda: as_json(about),
+        frame=None,
+    )

@@ -17,6 +17,7 @@ from enumsol.cli.options import (
     Overview,
     PlotFile,
     ProblemArgument,
+    Quiet,
     count,
     csv,
     file,
@@ -67,6 +68,7 @@ def graph(
         str | None, node("--nodes", "LABELS", "Contact nodes to draw, such as 0,3; default: up to three.")
     ] = None,
     units: Annotated[str | None, node("--units", "FORCE,LENGTH", "Units for the figure, such as N,mm.")] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Find all solutions of PROBLEM for every alpha of an interval, as branches of arcs.
 

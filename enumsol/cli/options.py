@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from os.path import isdir
 from typing import Annotated, Any, Literal
 
 import typer
+
+from enumsol.cli.quiet import set_quiet
 
 #: Groups of options in the help of every command.
 LIMITS, OUTPUT, PLOT, STEPS = "Limits", "Output", "Plot", "Steps"
@@ -45,11 +48,25 @@ def csv(text: str) -> Any:
     return file("--csv", f"Write one row {text}; - is stdout.")
 
 
+def problem_names(incomplete: str) -> list[str]:
+    """What an argument PROBLEM may become: problems of the gallery, and files and directories that may hold one."""
+    from glob import escape, glob  # for a shell that completes only
+
+    from enumsol import gallery
+    from enumsol.io import SUFFIXES
+
+    files = [name for name in sorted(glob(escape(incomplete) + "*")) if isdir(name) or name.endswith(SUFFIXES)]
+    # a shell that takes the colon for the end of a word asks for what follows it
+    names = [f"gallery:{name}" for name in gallery.GALLERY]
+    return files + [name for name in (*names, *gallery.GALLERY) if incomplete and name.startswith(incomplete)]
+
+
 ProblemArgument = Annotated[
     str,
     typer.Argument(
         metavar="PROBLEM",
         help="A file (.npz, .h5), a directory of MatrixMarket files, or gallery:NAME.",
+        autocompletion=problem_names,
         show_default=False,
     ),
 ]
@@ -58,6 +75,16 @@ Quantity = Literal["lambda_n", "lambda_t", "u_n", "u_t"]
 FirstAlpha = Annotated[str, number("--from", "First alpha: a number or a fraction.")]
 LastAlpha = Annotated[str, number("--to", "Last alpha: a number or a fraction.")]
 MaxNodes = Annotated[int | None, count("Stop after N nodes of the tree.")]
+Quiet = Annotated[
+    bool,
+    typer.Option(
+        "--quiet",
+        "-q",
+        callback=set_quiet,
+        help="Print no result, note or progress; files, JSON, errors and the exit status stay.",
+        rich_help_panel=OUTPUT,
+    ),
+]
 JsonFile = Annotated[str | None, file("--json", "Write the result as JSON; - is stdout.")]
 PlotFile = Annotated[str | None, file("--plot", "Draw a figure: .png, .pdf, .svg.", PLOT)]
 Overview = Literal["norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"]

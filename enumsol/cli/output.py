@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from enumsol.cli.quiet import is_quiet
 from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
 from enumsol.files import writing
 
@@ -71,9 +72,9 @@ def deliver(
     csv_file: str | None,
     text: Callable[[], str],
     content: Callable[[], str],
-    frame: Callable[[], pd.DataFrame],
+    frame: Callable[[], pd.DataFrame] | None,
 ) -> None:
-    """Write results one after the other: text on stdout, unless a file is to be written there; JSON; a table; ``more``.
+    """Write results: text on stdout, unless a file is to be written there or --quiet is given; JSON; a table; ``more``.
 
     Raises
     ------
@@ -81,9 +82,9 @@ def deliver(
         Some could not be written, after all the others were.
     """
     outputs: tuple[Output, ...] = (
-        (None if "-" in (json_file, csv_file) else "-", lambda path: write_text(path, text())),
+        (None if "-" in (json_file, csv_file) or is_quiet() else "-", lambda path: write_text(path, text())),
         (json_file, lambda path: write_text(path, content())),
-        (csv_file, lambda path: write_text(path, frame().to_csv(index=False))),
+        (csv_file, lambda path: write_text(path, _csv(frame))),
         *more,
     )
     failures = []
@@ -101,6 +102,10 @@ def deliver(
         raise failures[0]
     if failures:
         raise OutputError("; ".join(map(str, failures)))
+
+
+def _csv(frame: Callable[[], pd.DataFrame] | None) -> str:
+    return "" if frame is None else frame().to_csv(index=False)
 
 
 def check_outputs(**paths: str | None) -> None:

@@ -7,6 +7,8 @@ import time
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any, Self
 
+from enumsol.cli.quiet import is_quiet
+
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import TracebackType
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Work shorter than this shows no progress [seconds].
 _PROGRESS_DELAY = 1.0
+#: A smaller part of the work says nothing about the rest.
+_LEAST_SHARE = 0.02
 
 
 class Display(AbstractContextManager[Any]):
@@ -33,7 +37,7 @@ class Display(AbstractContextManager[Any]):
         self._started = time.perf_counter()
         self._progress: Progress | None = None
         self._task: TaskID | None = None
-        self._shown = sys.stderr.isatty()
+        self._shown = sys.stderr.isatty() and not is_quiet()
 
     def __enter__(self) -> Self:
         """Nothing is shown yet."""
@@ -46,7 +50,8 @@ class Display(AbstractContextManager[Any]):
             return
         if self._progress is None or self._task is None:
             self._progress, self._task = _progress_bar(self._title)
-        self._progress.update(self._task, completed=share, counts=f"{note}  {seconds:.0f} s")
+        counts = f"{note}  {seconds:.0f} s{remaining(seconds, share)}"
+        self._progress.update(self._task, completed=share, counts=counts)
         self._progress.start()
 
     def count(self, unit: str) -> Callable[[int, int], None]:
@@ -62,6 +67,17 @@ class Display(AbstractContextManager[Any]):
         """Take the bar away."""
         if self._progress is not None:
             self._progress.stop()
+
+
+def remaining(seconds: float, share: float) -> str:
+    """How long it will take, if the rest is done as fast as the part so far; nothing before enough is done to tell."""
+    if not _LEAST_SHARE <= share < 1.0:
+        return ""
+    left = seconds * (1.0 - share) / share
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if left >= 2 * size:
+            return f", about {left / size:.0f} {unit} left"
+    return f", about {left:.0f} s left"
 
 
 class SearchDisplay(Display):

@@ -10,7 +10,18 @@ import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_interval, so_far
 from enumsol.cli.graph import HowExact, as_content, as_text, build, parse_units, write_proof
-from enumsol.cli.options import OUTPUT, FirstAlpha, JsonFile, LastAlpha, MaxNodes, ProblemArgument, count, file, seconds
+from enumsol.cli.options import (
+    OUTPUT,
+    FirstAlpha,
+    JsonFile,
+    LastAlpha,
+    MaxNodes,
+    ProblemArgument,
+    Quiet,
+    count,
+    file,
+    seconds,
+)
 from enumsol.cli.output import as_json, check_outputs, check_writable, deliver
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 
@@ -37,6 +48,7 @@ def report(
     ] = None,
     proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), to hand on with the page.")] = None,
     json_file: JsonFile = None,
+    quiet: Quiet = False,
 ) -> None:
     """Find all solutions of PROBLEM for every alpha of an interval, and write one HTML page about them.
 

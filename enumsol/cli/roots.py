@@ -13,6 +13,7 @@ from enumsol.cli.options import (
     JsonFile,
     MaxNodes,
     ProblemArgument,
+    Quiet,
     count,
     csv,
     file,
@@ -57,6 +58,7 @@ def roots(
     proof_file: Annotated[str | None, file("--proof", "Write the proof (verified).")] = None,
     json_file: JsonFile = None,
     csv_file: Annotated[str | None, csv("a root and contact node")] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
 

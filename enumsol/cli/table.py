@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, parse_interval, so_far, workers
-from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, count, csv, number, seconds
+from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, count, csv, number, seconds
 from enumsol.cli.output import as_json, check_outputs, deliver
 from enumsol.cli.progress import Display
 from enumsol.errors import EnumsolError, InvalidArgumentError, WorkerError
@@ -52,6 +52,7 @@ def table(
     jobs: Annotated[int, count("Processes: alphas searched at a time.")] = 1,
     json_file: JsonFile = None,
     csv_file: Annotated[str | None, csv("an alpha")] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Count the solutions of PROBLEM at many alphas, by kind of contact.
 

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from enumsol.cli.common import ExitStatus, load_any_problem
-from enumsol.cli.options import ProblemArgument
+from enumsol.cli.options import JsonFile, ProblemArgument, Quiet
+from enumsol.cli.output import as_json, check_outputs, deliver
+from enumsol.cli.quiet import is_quiet
+
+if TYPE_CHECKING:
+    from enumsol.checker.reports import GraphVerificationReport, VerificationReport
 
 
 def verify(
@@ -19,6 +25,8 @@ def verify(
             metavar="PROOF", help="A file written by --proof of enumsol roots or graph.", show_default=False
         ),
     ],
+    json_file: JsonFile = None,
+    quiet: Quiet = False,
 ) -> None:
     """Check that PROOF shows its list of roots of PROBLEM, or its list of selections of a graph, to be complete.
 
@@ -33,13 +41,32 @@ def verify(
     from enumsol.checker.verify import verify as check
     from enumsol.proof.proof_file import Proof
 
-    report = check(load_any_problem(problem), Proof.load(proof), _show_progress if sys.stderr.isatty() else None)
-    if sys.stderr.isatty():
+    check_outputs(json=json_file)
+    body, shown = load_any_problem(problem), sys.stderr.isatty() and not is_quiet()
+    report = check(body, Proof.load(proof), _show_progress if shown else None)
+    if shown:
         typer.echo("\r\033[K", nl=False, err=True)
-    typer.echo(repr(report))
+    about = {"problem": problem, "proof": proof, "fingerprint": body.fingerprint}
+    deliver(
+        json_file=json_file,
+        csv_file=None,
+        text=lambda: repr(report),
+        content=lambda: as_json({**about, **_content(report)}),
+        frame=None,
+    )
     if not report.ok:
         raise typer.Exit(ExitStatus.BAD_INPUT)
     raise typer.Exit(ExitStatus.DONE if report.complete else ExitStatus.INCOMPLETE)
+
+
+def _content(report: VerificationReport | GraphVerificationReport) -> dict[str, Any]:
+    """The report, for JSON; of a graph the number of its selections."""
+    content = asdict(report) | {"complete": report.complete}
+    if "selections" in content and not isinstance(content["selections"], int):
+        content["selections"] = len(content["selections"])
+    if "arcs" in content:
+        content["whole"] = getattr(report, "whole", None)
+    return content
 
 
 def _show_progress(leaves: int) -> None:

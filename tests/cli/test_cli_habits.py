@@ -1,0 +1,148 @@
+"""What all verbs share: --quiet, --json, exit statuses in one table, completion, an estimate of the time left."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from enumsol import gallery
+from enumsol.cli import main
+from enumsol.cli.app import app
+from enumsol.cli.common import ExitStatus
+from enumsol.cli.options import problem_names
+from enumsol.cli.progress import remaining
+
+SQUARE = "gallery:two-node-6.4"
+
+
+@pytest.fixture
+def proof(tmp_path, capsys):
+    assert main(["roots", SQUARE, "--alpha", "3.5", "--proof", str(tmp_path / "square.proof")]) == 0
+    capsys.readouterr()
+    return str(tmp_path / "square.proof")
+
+
+def verbs(proof, folder):
+    points = str(folder / "points.csv")
+    assert main(["follow", SQUARE, "--from", "0", "--to", "10", "--start", "3.5", "--csv", points, "--quiet"]) == 0
+    return {
+        "roots": ["roots", SQUARE, "--alpha", "3.5"],
+        "table": ["table", SQUARE, "--alphas", "1,3.5"],
+        "graph": ["graph", SQUARE, "--from", "0", "--to", "10"],
+        "report": ["report", SQUARE, "--from", "0", "--to", "10", "-o", str(folder / "page.html")],
+        "follow": ["follow", SQUARE, "--from", "0", "--to", "10", "--start", "3.5"],
+        "audit": ["audit", SQUARE, points, "--from", "0", "--to", "10"],
+        "fixed-point": ["fixed-point", SQUARE, "--alpha", "1"],
+        "verify": ["verify", SQUARE, proof],
+        "gallery write": ["gallery", "write", "two-node-6.4", str(folder / "square.npz")],
+        "gallery list": ["gallery", "list"],
+    }
+
+
+def test_every_verb_can_be_quiet_and_writes_json(proof, tmp_path, capsys):
+    pytest.importorskip("plotly")
+    commands = verbs(proof, tmp_path)
+    groups = [group for group in app.registered_groups if group.name == "gallery"]
+    names = [item.name for item in app.registered_commands]
+    names += [
+        f"gallery {item.name or item.callback.__name__.strip('_')}"
+        for item in groups[0].typer_instance.registered_commands
+    ]
+    assert sorted(commands) == sorted(names)
+    for name, command in commands.items():
+        file = tmp_path / "result.json"
+        status = main([*command, "--json", str(file)])
+        said = capsys.readouterr()
+        assert said.out, name
+        json.loads(file.read_text())
+        if name == "gallery list":
+            continue  # it has nothing to say but its list
+        assert main([*command, "--quiet"]) == status, name
+        assert main([*command, "-q"]) == status, name
+        assert capsys.readouterr() == ("", ""), name
+        assert main(command) == status, name
+        assert capsys.readouterr() == said, name  # loud again
+
+
+def test_json_of_a_proof_and_of_the_gallery(proof, capsys):
+    assert main(["verify", SQUARE, proof, "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["ok"], found["complete"], found["alpha"]) == (True, True, 3.5)
+    assert found["fingerprint"] == gallery.get("two-node-6.4").build().fingerprint
+    assert main(["gallery", "list", "--json", "-"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert [entry["name"] for entry in listed] == list(gallery.GALLERY)
+
+
+def test_quiet_commands_still_say_what_is_wrong(capsys):
+    assert main(["roots", "nowhere.npz", "--alpha", "1", "--quiet"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "no such file" in err
+
+
+def test_the_table_of_exit_statuses_is_complete():
+    text = (Path(__file__).parents[2] / "docs" / "command_line.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\d+) \| `(\w+)` \|", text, re.MULTILINE)
+    assert [(int(number), name) for number, name in rows] == [(status.value, status.name) for status in ExitStatus]
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("enumsol re", {"report"}),
+        ("enumsol roots wedge-14", {"wedge-14-3", "wedge-14-5"}),
+        ("enumsol graph x --arith", {"--arithmetic"}),
+    ],
+)
+def test_completion(words, expected):
+    environment = {
+        **os.environ,
+        "_ENUMSOL_COMPLETE": "complete_bash",
+        "COMP_WORDS": words,
+        "COMP_CWORD": str(len(words.split()) - 1),
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", "import enumsol.cli; enumsol.cli.main()"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert set(done.stdout.split()) == expected, done.stderr
+
+
+def test_files_and_problems_are_completed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("block.npz", "block.txt", "blocks.h5"):
+        (tmp_path / name).touch()
+    (tmp_path / "block.dir").mkdir()
+    assert problem_names("block") == [
+        "block.dir",
+        "block.npz",
+        "blocks.h5",
+        "block3d-4",
+        "block3d-9",
+        "block3d-16",
+        "block3d-100",
+    ]
+    assert problem_names("gallery:chain-2") == ["gallery:chain-2", "gallery:chain-2-coupled"]
+    assert problem_names("[") == []
+
+
+@pytest.mark.parametrize(
+    ("seconds", "share", "expected"),
+    [
+        (10, 0.5, ", about 10 s left"),
+        (10, 0.01, ""),
+        (10, 1.0, ""),
+        (60, 0.2, ", about 4 min left"),
+        (3600, 0.1, ", about 9 h left"),
+    ],
+)
+def test_the_time_that_is_left(seconds, share, expected):
+    assert remaining(seconds, share) == expected
