@@ -38,10 +38,11 @@ def drawn_range(vertices: Iterable[Vertex], quantity: Quantity) -> Floats:
 
 
 def family_range(problem: ContactProblem, v: Vertex, quantity: Quantity, column: int) -> tuple[float, float]:
-    """Smallest and largest value of the quantity at the vertices of a family."""
+    """Smallest and largest value of the quantity at the vertices of a family, or at a single solution."""
     family = v.family
     if family is None:
-        raise AssertionError("the vertex has no family")
+        value = float(state_columns(quantity, v)[column])
+        return value, value
     condensed, p = problem.condensed, problem.p
     forces = family.vertices.transpose(0, 2, 1).reshape(len(family.vertices), 2 * p)
     moves = condensed.g0 + v.alpha * condensed.g1 - forces @ condensed.S
@@ -50,19 +51,25 @@ def family_range(problem: ContactProblem, v: Vertex, quantity: Quantity, column:
 
 
 def sheet_range(
-    roots_at: Callable[[float], RootSet], arc: Arc, quantity: Quantity, column: int
+    problem: ContactProblem,
+    roots_at: Callable[[float], RootSet],
+    arc: Arc,
+    ends: tuple[Vertex, Vertex],
+    quantity: Quantity,
+    column: int,
 ) -> tuple[Floats, Floats, Floats] | None:
     """Alphas with smallest and largest values on a sheet, of forces; displacements of a sheet are not drawn."""
     if quantity.dimension != "force":
         return None
-    alphas, low, high = arc.sampled(_SHEET)[1:-1], [], []
-    for alpha in alphas:
+    alphas, ranges = arc.sampled(_SHEET), []
+    for alpha in alphas[1:-1]:
         points = np.concatenate([family.vertices for family in roots_at(float(alpha)).families])
         forces = points.transpose(0, 2, 1).reshape(len(points), -1)
         values = columns(quantity, forces, forces)[:, column]
-        low.append(values.min())
-        high.append(values.max())
-    return alphas, np.array(low), np.array(high)
+        ranges.append((float(values.min()), float(values.max())))
+    first, last = (family_range(problem, v, quantity, column) for v in ends)
+    low, high = np.array([first, *ranges, last]).T
+    return alphas, low, high
 
 
 def draw_steps(axis: Any, steps: MultiplicitySteps, window: tuple[float, float]) -> bool:

@@ -243,11 +243,12 @@ def _panel(
     """Draw one panel; returns what numbers beside its curves need."""
     from matplotlib.transforms import ScaledTranslation
 
-    quantity, ends = style.quantity, None if window == graph.interval else _ending(graph, drawn, row, window)
-    places = side_by_side(drawn, graph.branch_of, row, None if ends is None else ends[1] - ends[0])
+    quantity, height = style.quantity, None if window == graph.interval else _ending(graph, drawn, row, window)
+    places = side_by_side(drawn, graph.branch_of, row, None if height is None else height[1] - height[0])
     for arc in graph.arcs:
         if arc.dimension:
-            band = sheet_range(graph.roots_at, arc, quantity, row)
+            sides = graph.vertices[arc.tail], graph.vertices[arc.head]
+            band = sheet_range(graph.problem, graph.roots_at, arc, sides, quantity, row)
             if band is not None:
                 axis.fill_between(*band, color=GREY, alpha=0.25, linewidth=0)
         elif arc.number in drawn:
@@ -270,8 +271,8 @@ def _panel(
             value = float(state_columns(quantity, v)[row])
             axis.plot([v.alpha], [value], marker=mark[0], ms=4.5, color=GREY, markerfacecolor=mark[1], zorder=4)
     _dress(axis, graph, style, row, window)
-    if ends is not None:
-        axis.set_ylim(*ends)
+    if height is not None:
+        axis.set_ylim(*height)
     return axis, drawn, places, graph.branch_of, row
 
 

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from enumsol import InvalidArgumentError, branch_graph, gallery
+from enumsol import ContactProblem, InvalidArgumentError, branch_graph, gallery
 from enumsol.branches.claims import MultiplicitySteps
 from enumsol.branches.curves import Curve, curves, side_by_side
 from enumsol.branches.marks import MARKERS, STATUS_STYLES
@@ -221,3 +221,17 @@ def test_what_cannot_be_drawn_is_refused(graphs, options, message):
         options = {**options, "ax": new_figure().subplots()}
     with pytest.raises(InvalidArgumentError, match=message):
         graphs["square"].plot(**options)
+
+
+def test_a_sheet_is_shaded_from_end_to_end():
+    triangle = gallery.one_node_triangle()
+    options = {"friction": 2.0, "load_slope": [1.0, -2.0]}
+    unloaded = ContactProblem(triangle.A, triangle.Bn, triangle.Bt, [0.0, 0.0], **options)
+    axis = branch_graph(unloaded, (-1, 1)).plot().axes[0]
+    (band,) = [part for part in axis.collections if part.get_label() != "A"]
+    corners = band.get_paths()[0].vertices
+    # the load (1, -2) grows like alpha, and so does the largest force, (1, -2) itself at alpha = 1
+    assert (corners[:, 0].min(), corners[:, 0].max()) == (0, 1)
+    assert corners[:, 1].max() == pytest.approx(5**0.5)
+    low, high = axis.get_ylim()
+    assert low < 0 < 5**0.5 < high
