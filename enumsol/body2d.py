@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+#: How far products of the columns of a motion may be from those of orthonormal ones.
+_ORTHONORMAL = 1e-8
 #: Corners and midside nodes of a cell along its outline, by the number of its nodes, in the order of VTK.
 OUTLINES = {
     3: (0, 1, 2),
@@ -78,6 +80,9 @@ class PlaneMesh(Immutable):
             raise InvalidProblemError(
                 f"mesh_motion has shape {self._motion.shape}; expected 2 N = {2 * count} rows, two a node"
             )
+        off = sp.csr_array(self.motion.T @ self.motion - sp.eye_array(self._motion.shape[1]))
+        if np.max(np.abs(off.data), initial=0.0) > _ORTHONORMAL:
+            raise InvalidProblemError("mesh_motion has columns that are not orthonormal; expected orthonormal ones")
         self.offset = None if offset is None else sealed(real_array(offset, "mesh_offset"))
         if self.offset is not None and self.offset.shape != (count, 2):
             raise InvalidProblemError(f"mesh_offset has shape {self.offset.shape}; expected (N, 2) = ({count}, 2)")

@@ -16,6 +16,7 @@ RARE = {
     "networkx",
     "pandas",
     "matplotlib",
+    "plotly",
     "cvxpy",
     "skfem",
     "typer",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from enumsol.array_checks import real_array
-from enumsol.checks import file_path, instance_of
+from enumsol.checks import file_path
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.files import writing
 from enumsol.problem import ContactProblem
@@ -106,8 +106,11 @@ def write_vtu(problem: ContactProblem | ContactProblem3D, state: State, path: st
     ...     pathlib.Path(folder, "free.vtu").stat().st_size > 1000
     True
     """
-    if not isinstance(problem, ContactProblem):
-        instance_of(problem, ContactProblem3D, "problem")
+    given: object = problem
+    if not isinstance(given, (ContactProblem, ContactProblem3D)):
+        raise InvalidArgumentError(
+            f"problem is a {type(given).__name__}; expected a ContactProblem or ContactProblem3D"
+        )
     place = file_path(path, "path")
     if place.suffix != ".vtu":
         raise InvalidArgumentError(f"path is {str(place)!r}; expected a name that ends in .vtu")

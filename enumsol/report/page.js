@@ -148,7 +148,7 @@ function drawDiagram() {
     yaxis2: { ...grid, title: { text: data.exact_counts ? "solutions" : "at least" }, domain: [0, 0.22], rangemode: "tozero", tickformat: "d", dtick: Math.max(1, Math.ceil(Math.max(0, ...data.steps.between, ...data.steps.at) / 4)) },
     shapes: [...sheetShapes(), cursor()],
   };
-  const config = { responsive: true, displaylogo: false, displayModeBar: window.innerWidth < 560 ? false : "hover", modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] };
+  const config = { responsive: true, displaylogo: false, displayModeBar: window.innerWidth < 560 ? false : "hover", modeBarButtons: [["toImage", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]] };
   const target = byId("diagram");
   Plotly.react(target, traces, layout, config).then(() => {
     if (plotted === null) {
@@ -279,7 +279,7 @@ function drawCards() {
   byId("range").textContent = `${state.page * CARDS + 1} to ${state.page * CARDS + shown.length} of ${found.length}`;
   const solved = found.filter((item) => item.f);
   const scales = data.body ? bodyScales(solved) : barScales(solved);
-  byId("scale").textContent = scales.words + (solved.length ? ". Values between points of an arc are interpolated." : "");
+  byId("scale").textContent = scales.words + (solved.length ? `. Values between points of an arc are interpolated, to ${Number((100 * data.tolerance).toPrecision(3))} % of what the arcs span.` : "");
   byId("cards").replaceChildren(...shown.map((item) => card(item, scales)));
 }
 

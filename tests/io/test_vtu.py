@@ -171,7 +171,8 @@ def test_a_mesh_without_facets_will_do_for_nodes(tmp_path):
         (PATCHES, {"u": np.zeros(3)}, "p.vtu", r"u of the state has shape \(3,\); expected"),
         (no_mesh(PATCHES), {}, "p.vtu", "problem has neither mesh nor coordinates"),
         (no_facets(PATCHES), {}, "p.vtu", "problem has contact rows of more than one node, and its mesh has no facets"),
-        (gallery.one_node_triangle(), {}, "p.vtu", "problem is a ContactProblem; expected a ContactProblem3D"),
+        (gallery.two_node_square(), {}, "p.vtu", r"lambda_t of the state has shape \(2, 2\); expected \(2,\)"),
+        ("block", {}, "p.vtu", "problem is a str; expected a ContactProblem or ContactProblem3D"),
     ],
 )
 def test_bad_arguments_are_named(tmp_path, problem, change, name, message):

@@ -11,6 +11,7 @@ import pytest
 import enumsol
 from enumsol import InvalidArgumentError, MissingDependencyError, branch_graph, enumerate_roots, gallery, write_report
 from enumsol.cli import main
+from enumsol.report import content
 from enumsol.report.body import body_record
 from enumsol.report.content import rounded, slider_alphas
 
@@ -145,6 +146,16 @@ def test_the_slider_reaches_every_narrow_step():
     assert sum(0.3 < alpha < 0.300001 for alpha in found) >= 3
     assert 150 < len(found) < 200
     assert len(slider_alphas([k / 1000 for k in range(1001)], (0.0, 1.0))) < 2100
+
+
+def test_a_graph_of_many_arcs_is_drawn_more_coarsely(wedge, monkeypatch):
+    fine = content.report_content(wedge)
+    assert fine["tolerance"] == 1e-3
+    monkeypatch.setattr(content, "_MOST_NUMBERS", 1)
+    coarse = content.report_content(wedge)
+    assert 0.01 < coarse["tolerance"] < 0.05
+    points = [sum(len(arc["a"]) for arc in part["arcs"]) for part in (coarse, fine)]
+    assert points[0] < points[1]
 
 
 def test_numbers_are_short_and_finite():

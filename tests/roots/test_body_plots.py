@@ -125,17 +125,18 @@ def test_without_a_mesh_the_picture_is_refused():
         ({"cells": [[0, 1, 4]]}, "other numbers than 0 .. 3"),
         ({"cells": [[0, 1, 0.5]]}, "other numbers than 0 .. 3"),
         ({"motion": np.zeros((7, 4))}, "mesh_motion has shape"),
+        ({"motion": 2 * np.eye(8)[:, :4]}, "not orthonormal"),
         ({"offset": np.zeros((3, 2))}, "mesh_offset has shape"),
     ],
 )
 def test_a_mesh_that_does_not_fit_is_refused(change, message):
-    parts = {"points": np.zeros((4, 2)), "cells": [[0, 1, 2]], "motion": np.zeros((8, 4)), "offset": None}
+    parts = {"points": np.zeros((4, 2)), "cells": [[0, 1, 2]], "motion": np.eye(8)[:, :4], "offset": None}
     with pytest.raises(enumsol.InvalidProblemError, match=message):
         PlaneMesh(**{**parts, **change})
     square = enumsol.gallery.two_node_square()
     with pytest.raises(enumsol.InvalidProblemError, match="expected n = 4"):
         enumsol.ContactProblem(
-            square.A, square.Bn, square.Bt, square.f, mesh=PlaneMesh(np.zeros((1, 2)), [[0, 0, 0]], np.zeros((2, 5)))
+            square.A, square.Bn, square.Bt, square.f, mesh=PlaneMesh(np.zeros((1, 2)), [[0, 0, 0]], np.eye(2))
         )
 
 
