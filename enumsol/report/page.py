@@ -87,7 +87,7 @@ def report_page(graph: BranchGraph, title: str, units: tuple[str, str] | None, c
     words = {
         "title": escape(title),
         "style": (parts / "page.css").read_text(encoding="utf-8"),
-        "script": (parts / "page.js").read_text(encoding="utf-8"),
+        "script": "\n".join((parts / name).read_text(encoding="utf-8") for name in ("page.js", "page.solutions.js")),
         "plotly": _packed_plotly(),
         # no "<" of a name may end the element
         "data": json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),

@@ -1,0 +1,184 @@
+// -- solutions at one alpha ---------------------------------------------------------------------------------------
+
+function between(arc, alpha) {
+  let k = arc.a.findIndex((a) => a >= alpha);
+  if (k <= 0) k = 1;
+  const low = arc.a[k - 1], share = arc.a[k] > low ? (alpha - low) / (arc.a[k] - low) : 0;
+  const mix = (rows) => rows[k - 1].map((x, i) => x + share * (rows[k][i] - x));
+  return { f: mix(arc.f), w: mix(arc.w) };
+}
+
+function solutionsAt(alpha) {
+  const found = [];
+  for (const arc of data.arcs) {
+    if (!(data.vertices[arc.tail].alpha < alpha && alpha < data.vertices[arc.head].alpha)) continue;
+    const name = `branch ${arc.branch}`, colour = branches.get(arc.branch).colour;
+    if (arc.dimension > 0) found.push({ name, colour, words: `a sheet: a continuum of dimension ${arc.dimension}` });
+    else found.push({ name, colour, words: `arc ${arc.number}, index ${signed(arc.index)}`, statuses: arc.statuses, several: [], ...between(arc, alpha) });
+  }
+  for (const v of data.vertices) {
+    if (v.alpha !== alpha) continue;
+    const arc = data.arcs.find((other) => other.tail === v.number || other.head === v.number);
+    const words = v.family !== null ? `a continuum of dimension ${v.family.dimension}; one point of it is shown` : v.kind === "end" ? "at the end of the interval" : v.kind;
+    found.push({
+      name: arc ? `branch ${arc.branch}` : "no branch", colour: arc ? branches.get(arc.branch).colour : GREY,
+      words, statuses: v.statuses, several: v.several, f: v.f, w: v.w,
+    });
+  }
+  return found;
+}
+
+function showAlpha(alpha) {
+  const last = data.slider.length - 1;
+  state.alpha = Math.min(Math.max(alpha, data.interval[0]), data.interval[1]);
+  state.page = 0;
+  let nearest = 0;
+  data.slider.forEach((x, k) => { if (Math.abs(x - state.alpha) < Math.abs(data.slider[nearest] - state.alpha)) nearest = k; });
+  byId("slider").value = String(Math.min(nearest, last));
+  byId("alpha").value = String(state.alpha);
+  if (plotted !== null) Plotly.relayout("diagram", { shapes: [...sheetShapes(), cursor()] });
+  drawCards();
+}
+
+function drawCards() {
+  const found = solutionsAt(state.alpha), shown = found.slice(state.page * CARDS, (state.page + 1) * CARDS);
+  const special = data.vertices.some((v) => v.alpha === state.alpha && v.kind !== "end");
+  const number = `${found.length} ${found.length === 1 ? "solution" : "solutions"}`;
+  byId("count").textContent = (data.complete ? number : data.exact_counts ? `${number} found, not proven` : `${number} found; there may be more`)
+    + (special ? ", at a critical alpha (rounded)" : "");
+  byId("pages").hidden = found.length <= CARDS;
+  byId("range").textContent = `${state.page * CARDS + 1} to ${state.page * CARDS + shown.length} of ${found.length}`;
+  const solved = found.filter((item) => item.f);
+  const scales = data.body ? bodyScales(solved) : barScales(solved);
+  byId("scale").textContent = scales.words + (solved.length ? `. Values between points of an arc are interpolated, to ${Number((100 * data.tolerance).toPrecision(3))} % of what the arcs span.` : "");
+  byId("cards").replaceChildren(...shown.map((item) => card(item, scales)));
+}
+
+function card(item, scales) {
+  const dot = element("span", { className: "dot" });
+  dot.style.background = item.colour;
+  const made = element("article", { className: "card" }, element("h3", {}, dot, item.name), element("p", {}, item.words));
+  if (!item.f) return made;
+  made.append(element("p", {}, runs(item.statuses)));
+  if (item.several.length) made.append(element("p", {}, `several statuses hold at: ${item.several.map((k) => data.nodes[k]).join(", ")}`));
+  made.append(data.body ? drawBody(item, scales) : drawBars(item, scales));
+  const details = element("details", {}, element("summary", {}, "values by nodes"));
+  details.addEventListener("toggle", () => {
+    if (details.childElementCount > 1) return;
+    const rows = data.nodes.map((label, k) => [label, status(item.statuses, k), ...[item.f, item.w].flatMap((v) => [short(v[k]), short(v[p + k])])]);
+    details.append(table(["node", "status", "lambda_n", "lambda_t", "u_n", "u_t"], rows));
+  });
+  made.append(details);
+  return made;
+}
+
+function svg(name, attributes = {}, ...children) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+}
+
+const tip = (text) => { const made = svg("title"); made.textContent = text; return made; };
+
+function marker(name, x, y, size, text) {
+  const look = { fill: COLOURS[name], stroke: "#111", "stroke-width": size / 6 };
+  const h = size, corner = (...points) => svg("polygon", { ...look, points: points.map(([a, b]) => `${x + a * h},${y + b * h}`).join(" ") }, tip(text));
+  if (name === "open") return svg("circle", { ...look, cx: x, cy: y, r: 0.85 * h }, tip(text));
+  if (name === "stick") return corner([-0.8, -0.8], [0.8, -0.8], [0.8, 0.8], [-0.8, 0.8]);
+  return name === "slip+" ? corner([0, -1.1], [1, 0.8], [-1, 0.8]) : corner([0, 1.1], [1, -0.8], [-1, -0.8]);
+}
+
+// -- deformed bodies ----------------------------------------------------------------------------------------------
+
+function moves(f) {
+  const body = data.body, u = body.u0.map((x, i) => x + state.alpha * body.u1[i]);
+  f.forEach((force, k) => { if (force !== 0) body.c[k].forEach((x, i) => { u[i] -= force * x; }); });
+  return u;
+}
+
+function nodalForces(f) {
+  const forces = new Map();
+  f.forEach((force, k) => data.body.acts[k].forEach(([node, x, y]) => {
+    const sum = forces.get(node) || [0, 0];
+    forces.set(node, [sum[0] + force * x, sum[1] + force * y]);
+  }));
+  return forces;
+}
+
+function bodyScales(solutions) {
+  let moved = 0, force = 0;
+  for (const item of solutions) {
+    item.u = moves(item.f);
+    for (let i = 0; i < item.u.length; i += 2) moved = Math.max(moved, Math.hypot(item.u[i], item.u[i + 1]));
+    item.forces = nodalForces(item.f);
+    for (const [x, y] of item.forces.values()) force = Math.max(force, Math.hypot(x, y));
+  }
+  const size = data.body.size, wanted = moved > 0 ? 0.08 * size / moved : 1, power = 10 ** Math.floor(Math.log10(wanted));
+  const scale = moved > 0 ? power * Math.max(...[1, 2, 5].filter((step) => step * power <= wanted * (1 + 1e-9))) : 1;
+  const words = `Displacements times ${Number(scale.toPrecision(1))}; arrows: contact forces on the body, the longest is ${short(force)}${data.units ? ` ${data.units[0]}` : ""}`;
+  return { scale, arrow: force > 0 ? 0.16 * size / force : 0, least: 1e-9 * force, words };
+}
+
+function drawBody(item, { scale, arrow, least }) {
+  const { points, cells, lines, size, rows } = data.body;
+  const at = points.map(([x, y], k) => [x + scale * item.u[2 * k], -(y + scale * item.u[2 * k + 1])]);
+  const bounds = (k, pick) => pick(...points.map((point) => (k ? -point[1] : point[0])));
+  const room = 0.2 * size, x0 = bounds(0, Math.min) - room, y0 = bounds(1, Math.min) - room;
+  const width = bounds(0, Math.max) + room - x0, height = bounds(1, Math.max) + room - y0, stroke = size / 250;
+  const round = (x) => Number(x.toPrecision(6));
+  const path = (groups, close) => groups.map((nodes) => `M${nodes.map((k) => `${round(at[k][0])} ${round(at[k][1])}`).join("L")}${close}`).join("");
+  const picture = svg("svg", { viewBox: `${x0} ${y0} ${width} ${height}`, role: "img", class: "body" });
+  const before = (groups, close) => groups.map((nodes) => `M${nodes.map((k) => `${points[k][0]} ${-points[k][1]}`).join("L")}${close}`).join("");
+  picture.append(svg("path", { d: cells ? before(cells, "Z") : before(lines, ""), stroke: "#dcdcdc", "stroke-width": stroke, fill: "none" }));
+  const look = { stroke: "#8796a8", "stroke-width": stroke, fill: cells ? "#dfe6ee" : "none" };
+  picture.append(svg("path", { ...look, d: cells ? path(cells, "Z") : path(lines, "") }));
+  for (const [node, [fx, fy]] of item.forces) {
+    const length = Math.hypot(fx, fy);
+    if (length <= least) continue;
+    const [x, y] = at[node], dx = arrow * fx, dy = -arrow * fy, head = Math.min(0.03 * size, 0.5 * Math.hypot(dx, dy)), n = Math.hypot(dx, dy);
+    const ux = dx / n, uy = dy / n, tipped = [[0, 0], [-ux - 0.4 * uy, -uy + 0.4 * ux], [-ux + 0.4 * uy, -uy - 0.4 * ux]];
+    picture.append(
+      svg("line", { x1: x - dx, y1: y - dy, x2: x - 0.8 * head * ux, y2: y - 0.8 * head * uy, stroke: FORCE, "stroke-width": 2.2 * stroke }),
+      svg("polygon", { fill: FORCE, class: "arrow", points: tipped.map(([a, b]) => `${x + head * a},${y + head * b}`).join(" ") }, tip(`force ${short(length)}`)),
+    );
+  }
+  rows.forEach((row, k) => {
+    const [x, y] = row.reduce(([a, b], [node, weight]) => [a + weight * at[node][0], b + weight * at[node][1]], [0, 0]);
+    const name = status(item.statuses, k);
+    picture.append(marker(name, x, y, 0.016 * size, `node ${data.nodes[k]}: ${name}, lambda_n ${short(item.f[k])}, lambda_t ${short(item.f[p + k])}`));
+  });
+  return picture;
+}
+
+// -- without a mesh: forces and displacements of the nodes ----------------------------------------------------------
+
+function barScales(solutions) {
+  const largest = (key) => Math.max(1e-300, ...solutions.flatMap((item) => item[key].map(Math.abs)));
+  const unit = (k) => (data.units ? ` ${data.units[k]}` : "");
+  return {
+    f: largest("f"), w: largest("w"),
+    words: `The problem has no mesh: upper bars are forces (largest ${short(largest("f"))}${unit(0)}), lower bars displacements (largest ${short(largest("w"))}${unit(1)}); left of a node normal, right tangential`,
+  };
+}
+
+function drawBars(item, scales) {
+  const step = Math.max(8, 280 / p), width = step * p, half = 55, height = 4 * half + 34;
+  const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", class: "bars" });
+  [["f", half + 4], ["w", 3 * half + 26]].forEach(([key, zero]) => {
+    picture.append(svg("line", { x1: 0, x2: width, y1: zero, y2: zero, stroke: "#8796a8", "stroke-width": 0.7 }));
+    for (let k = 0; k < 2 * p; k += 1) {
+      const tangential = k >= p, node = k % p, value = item[key][k], size = (half - 3) * Math.abs(value) / scales[key];
+      const name = `${key === "f" ? "lambda" : "u"}_${tangential ? "t" : "n"}`;
+      picture.append(svg("rect", {
+        x: step * (node + (tangential ? 0.52 : 0.14)), width: 0.34 * step, y: value > 0 ? zero - size : zero, height: size,
+        fill: tangential ? "#d9730d" : "#1f5fa8",
+      }, tip(`node ${data.nodes[node]}: ${name} ${short(value)}`)));
+    }
+  });
+  for (let k = 0; k < p; k += 1) {
+    const name = status(item.statuses, k);
+    picture.append(marker(name, step * (k + 0.5), 2 * half + 15, Math.min(5, 0.4 * step), `node ${data.nodes[k]}: ${name}`));
+  }
+  return picture;
+}
