@@ -89,11 +89,14 @@ class PlaneMesh(Immutable):
         self._freeze()
 
     @classmethod
-    def of_dofs(cls, points: ArrayLike, cells: ArrayLike, dofs: ArrayLike) -> PlaneMesh:
+    def of_dofs(
+        cls, points: ArrayLike, cells: ArrayLike, dofs: ArrayLike, offset: ArrayLike | None = None
+    ) -> PlaneMesh:
         """The mesh of a problem whose entries of u are the components ``2 node + component`` in ``dofs``, (n,)."""
         columns, size = np.asarray(dofs, dtype=np.int64), 2 * len(np.asarray(points))
         count = len(columns)
-        return cls(points, cells, sp.csr_array((np.ones(count), (columns, np.arange(count))), shape=(size, count)))
+        motion = sp.csr_array((np.ones(count), (columns, np.arange(count))), shape=(size, count))
+        return cls(points, cells, motion, offset)
 
     @property
     def motion(self) -> sp.csr_array:

@@ -181,3 +181,11 @@ def test_vtu_of_a_plane_body(wedge, tmp_path):
     work = np.sum(back.point_data["contact_force"] * back.point_data["displacement"])
     rows = root.lambda_n @ (problem.Bn @ root.u) + root.lambda_t @ (problem.Bt @ root.u)
     assert work == pytest.approx(-rows, rel=1e-9)
+
+
+def test_prescribed_displacements_move_nodes_too():
+    points, offset = [[0, 0], [1, 0], [0, 1]], [[0, 0], [0.5, 0], [0, 0]]
+    mesh = PlaneMesh.of_dofs(points, [[0, 1, 2]], [0, 5], offset)
+    assert mesh.displacements([2.0, 3.0]).tolist() == [[2, 0], [0.5, 0], [0, 3]]
+    problem = enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 1], mesh=mesh)
+    assert body_shape(problem).displacements(np.array([2.0, 3.0])).tolist() == [[2, 0], [0.5, 0], [0, 3]]
