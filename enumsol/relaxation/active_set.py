@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation._active_set import BranchingRule, QPData, QPState
+    from enumsol.relaxation.forms import Form
     from enumsol.selections.solution import Codes
 
 
@@ -41,6 +42,9 @@ class CompiledEngine:
         self.data, self.rule, self.size, self.offset, self.always = data, rule, size, offset, always
         #: Most changes of the active set; a program that needs more has stalled.
         self.limit = 200 + 10 * size
+
+    #: The form that is minimised in place of the energy, if any.
+    form: Form | None = None
 
     def root(self, rows: list[int], modes: list[int]) -> Relaxation:
         """The relaxation with the given rows on."""
@@ -82,10 +86,32 @@ class ActiveSetEngine(CompiledEngine):
         start, index, value = row_terms(p, system.F)
         rhs = np.zeros(len(start) - 1)
         H, h = (system.S, system.g) if form is None else form
-        data = _active_set.QPData(H, h, -system.S, system.g, start, index, value, rhs)
+        #: All rows, as sparse combinations of lambda and w.
+        self.rows = start, index, value, rhs
+        data = _active_set.QPData(H, h, -system.S, system.g, *self.rows)
         cones = np.array([RowKind.CONE_PLUS, RowKind.CONE_MINUS])[:, None] * p + np.arange(p)
         modes = np.full((2, p), EQUALITY, dtype=np.int8)
         super().__init__(data, _active_set.BranchingRule(system.F, cones, modes, candidates), 2 * p)
+
+
+class FormEngine(CompiledEngine):
+    """Relaxations with a form in place of the energy, which bound it from below.
+
+    Parameters
+    ----------
+    engine : ActiveSetEngine
+        Relaxations with the energy.
+    scaled : ScaledSystem
+    form : Form
+    """
+
+    def __init__(self, engine: ActiveSetEngine, scaled: ScaledSystem, form: Form) -> None:
+        from enumsol.relaxation._active_set import QPData
+
+        proven = form.proven
+        data = QPData(proven.H, proven.h, -scaled.S, scaled.g, *engine.rows)
+        super().__init__(data, engine.rule, engine.size, -proven.k)
+        self.form = form
 
 
 class ActiveSetRelaxation:
@@ -100,6 +126,11 @@ class ActiveSetRelaxation:
         self.bound: float = state.bound - engine.offset
         self.pruned = status == 1
         self.stalled = status == 2
+
+    @property
+    def form(self) -> Form | None:
+        """The form that ``bound`` is about; None for the energy."""
+        return self._engine.form
 
     @property
     def forces(self) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation, largest_violatio
 from enumsol.relaxation.rows import EQUALITY, row_terms
 
 if TYPE_CHECKING:
+    from enumsol.relaxation.forms import Form
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import ScaledSystem
@@ -91,6 +92,8 @@ class InteriorPointEngine:
 
 class _InteriorPointRelaxation:
     """A relaxation that was solved, or not (``forces`` None)."""
+
+    form: Form | None = None
 
     def __init__(
         self,

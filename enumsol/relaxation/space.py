@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.space import SpaceSystem
     from enumsol.kernel.space import Row
     from enumsol.relaxation._active_set import QPState
+    from enumsol.relaxation.forms import Form
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -156,6 +157,8 @@ class SpaceRelaxation:
     """A solved relaxation, with tangents put where its minimiser left the disc."""
 
     __slots__ = ("_engine", "_found", "_kept", "_state", "bound", "pruned", "stalled")
+
+    form: Form | None = None
 
     def __init__(self, engine: SpaceEngine, state: QPState, rows: list[int], modes: list[int]) -> None:
         self._engine, self._state = engine, state
