@@ -1,4 +1,4 @@
-"""The trusted kernel of quadratic forms other than the energy: bounds over partial assignments (theory, section 6.6).
+"""The trusted kernel of quadratic forms other than the energy: bounds over partial assignments (theory, section 6.11).
 
 At every solution lambda_n w_n = 0, lambda_t w_n = 0, (lambda_t - F lambda_n) w_t >= 0 and (lambda_t + F lambda_n) w_t
 >= 0, node by node. With multipliers mu, nu and alpha, beta >= 0 of a node, D maps its (lambda_n, lambda_t) to
@@ -69,18 +69,28 @@ class Equations:
         return cls(a, a_rad, b, b_rad)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EnclosedForm:
     """q(lambda) = lambda'H lambda - h'lambda + k for all data of an enclosure.
 
     Attributes
     ----------
+    codes : (partial) status codes whose equations enter
+    multipliers : (4, p) array
+        mu, nu, alpha and beta of every node.
+    weight : float
+        That of the equations.
     system : EnclosedSystem
     H, H_rad : (2p, 2p) arrays, H symmetric
     h, h_rad : (2p,) arrays
     k, k_rad : float
+    F_rad : (p,) array
+        As of the system.
     """
 
+    codes: tuple[int, ...]
+    multipliers: Array
+    weight: float
     system: EnclosedSystem
     H: Array
     H_rad: Array
@@ -88,6 +98,7 @@ class EnclosedForm:
     h_rad: Array
     k: float
     k_rad: float
+    F_rad: Array
 
     @classmethod
     def of(cls, system: EnclosedSystem, codes: Sequence[int], multipliers: Array, weight: float) -> EnclosedForm:
@@ -108,7 +119,7 @@ class EnclosedForm:
         one_sided = beta - alpha
         tau, s = system.F * one_sided, alpha + beta
         tau_rad = np.abs(one_sided) * system.F_rad * (1 + 4 * UNIT) + 4 * UNIT * np.abs(tau) + TINY
-        left, left_rad = np.concatenate([mu, nu]), np.zeros(2 * p)
+        left = np.concatenate([mu, nu])
         right, right_rad = np.concatenate([tau, s]), np.concatenate([tau_rad, 2 * UNIT * s])
 
         def combined(value: Array, radius: Array) -> tuple[Array, Array]:
@@ -144,12 +155,7 @@ class EnclosedForm:
             h_rad = (h_rad + off * (1 + error) + 2 * UNIT * np.abs(h)) * SAFE + TINY
             k = float(np.sum(factor * b * b))
             k_rad = float(np.sum(factor * b_rad * (2 * b_size + b_rad)) + error * k) * (1 + error) * SAFE + TINY
-        return cls(system, H, H_rad, h, h_rad, k, k_rad)
-
-    @property
-    def F_rad(self) -> Array:
-        """As of the system."""
-        return self.system.F_rad
+        return cls(tuple(codes), multipliers, weight, system, H, H_rad, h, h_rad, k, k_rad, system.F_rad)
 
     @cached_property
     def smallest_eigenvalue(self) -> float:

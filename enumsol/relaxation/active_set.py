@@ -8,15 +8,19 @@ import numpy as np
 
 from enumsol.relaxation.engine import BRANCHING_CANDIDATES, FEASIBILITY_TOLERANCE, PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.rows import EQUALITY, INEQUALITY, row_terms
-from enumsol.statuses import RowKind
+from enumsol.statuses import UNDECIDED, RowKind
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.relaxation._active_set import BranchingRule, QPData, QPState
-    from enumsol.relaxation.forms import Form
     from enumsol.selections.solution import Codes
+
+
+#: Rows that become equations when a node is open, or in contact.
+_APART = (int(RowKind.NORMAL_FORCE), int(RowKind.PENETRATION))
 
 
 class CompiledEngine:
@@ -44,7 +48,7 @@ class CompiledEngine:
         self.limit = 200 + 10 * size
 
     #: The form that is minimised in place of the energy, if any.
-    form: Form | None = None
+    form: EnclosedForm | None = None
 
     def root(self, rows: list[int], modes: list[int]) -> Relaxation:
         """The relaxation with the given rows on."""
@@ -102,15 +106,14 @@ class FormEngine(CompiledEngine):
     engine : ActiveSetEngine
         Relaxations with the energy.
     scaled : ScaledSystem
-    form : Form
+    form : EnclosedForm
     """
 
-    def __init__(self, engine: ActiveSetEngine, scaled: ScaledSystem, form: Form) -> None:
+    def __init__(self, engine: ActiveSetEngine, scaled: ScaledSystem, form: EnclosedForm) -> None:
         from enumsol.relaxation._active_set import QPData
 
-        proven = form.proven
-        data = QPData(proven.H, proven.h, -scaled.S, scaled.g, *engine.rows)
-        super().__init__(data, engine.rule, engine.size, -proven.k)
+        data = QPData(form.H, form.h, -scaled.S, scaled.g, *engine.rows)
+        super().__init__(data, engine.rule, engine.size, -form.k)
         self.form = form
 
 
@@ -128,7 +131,7 @@ class ActiveSetRelaxation:
         self.stalled = status == 2
 
     @property
-    def form(self) -> Form | None:
+    def form(self) -> EnclosedForm | None:
         """The form that ``bound`` is about; None for the energy."""
         return self._engine.form
 
@@ -159,6 +162,16 @@ class ActiveSetRelaxation:
         """Undecided contact nodes with at most one child that no known bound excludes."""
         engine = self._engine
         return self._state.forced(np.array(codes, dtype=np.int8), engine.rule, PRUNE_MARGIN + engine.offset)
+
+    def gap_closed(self, codes: Codes) -> float:
+        """Mean share of the gap to zero that one dual step closes in the better child of an undecided node."""
+        p, gap = len(codes), max(-self.bound, 1e-300)
+        shares = []
+        for node, code in enumerate(codes):
+            if code == UNDECIDED:
+                gains = [self._state.gain(kind * p + node, EQUALITY) for kind in _APART]
+                shares.append(min(1.0, max(gains) / gap))
+        return float(np.mean(shares)) if shares else 1.0
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""

@@ -11,7 +11,7 @@ from enumsol.statuses import CONTACT, UNDECIDED
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.relaxation.forms import Form
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.selections.solution import Codes
 
 #: The compiled module of the active-set method.
@@ -32,7 +32,7 @@ class Relaxation(Protocol):
     bound: float
 
     @property
-    def form(self) -> Form | None:
+    def form(self) -> EnclosedForm | None:
         """The form that ``bound`` is about; None for the energy."""
 
     @property

@@ -1,4 +1,4 @@
-"""Quadratic forms other than the energy that bound more tightly, and the ascent that finds them (theory, section 5.7).
+"""Quadratic forms other than the energy that bound more tightly, and the ascent that finds them (theory, section 5.8).
 
 The bound of a form over a partial assignment is concave in its multipliers, which may be what they like as long as the
 form is convex on the subspace of the assignment's equations. Newton's method maximises it together with barriers: the
@@ -20,8 +20,6 @@ from enumsol.relaxation.active_set import ActiveSetRelaxation, FormEngine
 from enumsol.relaxation.rows import row_normals
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import ScaledSystem
@@ -48,27 +46,6 @@ _CURVATURE = 1e-9
 _DEPENDENT = 1e-10
 
 
-@dataclass(frozen=True, eq=False)
-class Form:
-    """A form at most zero at every solution of a partial assignment.
-
-    Attributes
-    ----------
-    codes : (partial) status codes for which it was made; it serves all that is below
-    multipliers : (4, p) array
-        mu, nu, alpha and beta of every node (see kernel.forms).
-    weight : float
-        That of the equations of ``codes``.
-    proven : EnclosedForm
-        For the data of an enclosure.
-    """
-
-    codes: Codes
-    multipliers: Array
-    weight: float
-    proven: EnclosedForm
-
-
 @dataclass(frozen=True)
 class _Subspace:
     """lambda = anything with the equations of a partial assignment.
@@ -90,7 +67,7 @@ class _Candidate:
     """Multipliers at which the bound is known."""
 
     multipliers: Array
-    form: Form
+    form: EnclosedForm
     factor: Array
     relaxation: ActiveSetRelaxation
 
@@ -122,7 +99,7 @@ class FormAscent:
 
     def improve(
         self, codes: Codes, multipliers: Array, rows: Rows, steps: int
-    ) -> tuple[Form, ActiveSetRelaxation] | None:
+    ) -> tuple[EnclosedForm, ActiveSetRelaxation] | None:
         """A form for a partial assignment and its solved relaxation; None where nothing is found.
 
         Parameters
@@ -177,7 +154,7 @@ class FormAscent:
         except np.linalg.LinAlgError:
             return None
         mean = float(np.sum(factor * factor)) / len(factor)
-        proven, weight = plain, 0.0
+        proven = plain
         if len(factor) < len(plain.h):
             for k in range(_HEAVIER):
                 weight = _WEIGHT * mean * 10.0**k
@@ -188,11 +165,10 @@ class FormAscent:
                 return None
         elif not _is_convex(plain.H, mean):
             return None
-        form = Form(codes, table, weight, proven)
-        relaxation = FormEngine(self._engine, self._scaled, form).root(*rows)
+        relaxation = FormEngine(self._engine, self._scaled, proven).root(*rows)
         if relaxation.stalled or not isinstance(relaxation, ActiveSetRelaxation):
             return None
-        return _Candidate(multipliers, form, factor, relaxation)
+        return _Candidate(multipliers, proven, np.asarray(factor, dtype=np.float64), relaxation)
 
     def _step(self, codes: Codes, space: _Subspace, found: _Candidate, rows: Rows) -> tuple[_Candidate, bool] | None:
         """One step of Newton's method; with it whether it is to be the last."""
@@ -252,13 +228,13 @@ class FormAscent:
             return np.zeros((len(live), len(live)))
         slopes = self._left(free) * right[:, None] + self._right(scaled.S @ free) * left[:, None]
         try:
-            factor = np.linalg.cholesky(free.T @ found.form.proven.H @ free)
+            factor = np.linalg.cholesky(free.T @ found.form.H @ free)
         except np.linalg.LinAlgError:
             return np.zeros((len(live), len(live)))
         moved = solve_triangular(factor, slopes[live].T, lower=True)
         return np.asarray(0.5 * (moved.T @ moved))
 
-    # -- terms: the product of a factor in lambda and one in S lambda - g, (4p) of each, multiplier by multiplier ---------
+    # -- the terms of all 4p multipliers: products of a factor in lambda and one in S lambda - g -----------------------
 
     def _factors(self, forces: Array) -> tuple[Array, Array]:
         w = self._scaled.g - self._scaled.S @ forces

@@ -12,10 +12,10 @@ from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation, largest_violatio
 from enumsol.relaxation.rows import EQUALITY, row_terms
 
 if TYPE_CHECKING:
-    from enumsol.relaxation.forms import Form
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.selections.solution import Codes
 
 
@@ -93,7 +93,7 @@ class InteriorPointEngine:
 class _InteriorPointRelaxation:
     """A relaxation that was solved, or not (``forces`` None)."""
 
-    form: Form | None = None
+    form: EnclosedForm | None = None
 
     def __init__(
         self,

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.space import SpaceSystem
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.kernel.space import Row
     from enumsol.relaxation._active_set import QPState
-    from enumsol.relaxation.forms import Form
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -158,7 +158,7 @@ class SpaceRelaxation:
 
     __slots__ = ("_engine", "_found", "_kept", "_state", "bound", "pruned", "stalled")
 
-    form: Form | None = None
+    form: EnclosedForm | None = None
 
     def __init__(self, engine: SpaceEngine, state: QPState, rows: list[int], modes: list[int]) -> None:
         self._engine, self._state = engine, state

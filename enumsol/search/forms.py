@@ -1,15 +1,15 @@
-"""When a search turns from the energy to tighter quadratic forms, and where it looks for new ones (theory, section 5.7).
+"""When a search turns from the energy to tighter forms, and where it looks for new ones (theory, section 5.8).
 
-A form costs as much as a thousand nodes of the tree, and pays where it decides contact nodes that the energy leaves
-open. So a search begins with the energy; one that is still far from its end after many nodes tries a form at its
-root, and begins again with it if that is worth it.
+A form costs as much as a thousand nodes of the tree, and does not pay everywhere. So a search begins with the energy;
+one that is still far from its end after many nodes tries a form at its root, and begins again with it if that is worth
+it.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from enumsol.relaxation.active_set import ActiveSetEngine, FormEngine
+from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, FormEngine
 from enumsol.statuses import CONTACT, UNDECIDED
 
 if TYPE_CHECKING:
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import Codes
 
 #: Nodes examined with the energy before a form is tried, and the share of the tree that may be left only then.
-NODES, _LEFT = 4000, 0.5
-#: Steps of the ascent on trial, at the root once it pays, and below.
-_TRIAL, _ROOT, _BELOW = 6, 14, 10
-#: A form pays when it decides so many contact nodes more at the root, and this share of them.
-_NODES_MORE, _SHARE_MORE = 3, 0.125
+NODES, _LEFT = 3000, 0.5
+#: Steps of the ascent on trial; at the root once it pays, with one more for so many contact nodes; and below.
+_TRIAL, _ROOT, _NODES_A_STEP, _BELOW = 4, 14, 10, 10
+#: A form pays when it closes so much more of the gap at the root, or so many times as much.
+_MORE, _TIMES = 0.1, 3.0
 #: A new form is looked for after this share of the contact nodes was decided, unless so few are open.
 _DEEPER, _FEW = 0.32, 8
 
@@ -41,12 +41,13 @@ class Forms:
     scaled : ScaledSystem
     enclosed : EnclosedSystem
         Balls for the same system.
-    nodes : int
-        Nodes examined with the energy before a form is tried.
+    nodes : int, optional
+        Nodes examined with the energy before a form is tried; default NODES.
     """
 
-    def __init__(self, scaled: ScaledSystem, enclosed: EnclosedSystem, nodes: int = NODES) -> None:
-        self._scaled, self._enclosed, self.nodes = scaled, enclosed, nodes
+    def __init__(self, scaled: ScaledSystem, enclosed: EnclosedSystem, nodes: int | None = None) -> None:
+        self._scaled, self._enclosed = scaled, enclosed
+        self.nodes = NODES if nodes is None else nodes
         self._ascent: FormAscent | None = None
         self._engine: Engine | None = None
         #: Forms made.
@@ -62,7 +63,7 @@ class Forms:
         return nodes >= self.nodes and covered < 1.0 - _LEFT
 
     def pay(self, engine: Any, codes: Codes, rows: ImposedRows) -> bool:
-        """Whether a form at the root of the search decides more contact nodes than the energy; if so it is in use."""
+        """Whether a form at the root of the search is clearly tighter than the energy; if so it is in use."""
         if not isinstance(engine, ActiveSetEngine):
             return False
         from enumsol.relaxation.forms import FormAscent
@@ -71,14 +72,15 @@ class Forms:
         imposed = rows.over(codes, range(len(codes)))
         plain = engine.root(*imposed)
         found = ascent.improve(codes, ascent.energy, imposed, _TRIAL)
-        if plain.stalled or plain.pruned or found is None:
-            return False
-        more = len(found[1].forced(codes)) - len(plain.forced(codes))
-        if not found[1].pruned and more < max(_NODES_MORE, _SHARE_MORE * self._scaled.p):
+        if found is None or not isinstance(plain, ActiveSetRelaxation) or plain.stalled or plain.pruned:
             return False
         if not found[1].pruned:
-            found = ascent.improve(codes, found[0].multipliers, imposed, _ROOT) or found
-        if not found[0].proven.smallest_eigenvalue > 0:
+            before, after = plain.gap_closed(codes), found[1].gap_closed(codes)
+            if after < min(before + _MORE, _TIMES * before):
+                return False
+            steps = _ROOT + self._scaled.p // _NODES_A_STEP
+            found = ascent.improve(codes, found[0].multipliers, imposed, steps) or found
+        if not found[0].smallest_eigenvalue > 0:
             return False
         self._engine = FormEngine(engine, self._scaled, found[0])
         self.made = 1
@@ -100,7 +102,7 @@ class Forms:
             return relaxation
         found = self._ascent.improve(codes, form.multipliers, rows.over(codes, range(len(codes))), _BELOW)
         self.made += 1
-        if found is None or not found[0].proven.smallest_eigenvalue > 0:
+        if found is None or not found[0].smallest_eigenvalue > 0:
             return relaxation
         return found[1]
 

@@ -42,7 +42,7 @@ class FastCertifier(WithoutProof):
         shift = float(np.abs(values) @ self._norms[rows])
         if relaxation.form is not None:
             # hardly convex: its bound is worth what is left of it after rounding
-            margin = form_margin(relaxation.form.proven, codes, rows, values)
+            margin = form_margin(relaxation.form, codes, rows, values)
             return margin > 2.0 * self._selections.tolerance * shift
         return relaxation.bound > PRUNE_MARGIN + 2.0 * self._selections.tolerance * shift
 

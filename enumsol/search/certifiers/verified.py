@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.relaxation.forms import Form
     from enumsol.search.certifiers.rationals import ExactCertifier
     from enumsol.selections.solution import Codes
 
@@ -100,7 +100,7 @@ class VerifiedCertifier:
         self._verified: dict[Codes, VerifiedSelection] = {}
         self._leaves = 0
         #: Forms in the order in which they were written.
-        self._forms: dict[Form, int] = {}
+        self._forms: dict[EnclosedForm, int] = {}
 
     @property
     def certified(self) -> Certified:
@@ -129,9 +129,9 @@ class VerifiedCertifier:
         self._escalations.refined += 1
         return False
 
-    def _excluded_by(self, form: Form, codes: Codes, rows: NDArray[np.intp], values: Array) -> bool:
+    def _excluded_by(self, form: EnclosedForm, codes: Codes, rows: NDArray[np.intp], values: Array) -> bool:
         """The same with a form in place of the energy."""
-        if not form_margin(form.proven, codes, rows, values, errors=2.0) > 0:
+        if not form_margin(form, codes, rows, values, errors=2.0) > 0:
             self._escalations.refined += 1
             return False
         if form not in self._forms:
