@@ -144,6 +144,7 @@ class Point(Proof):
         self.scale = self.units(header)
         self.regular = self.undecided = self.leaves = 0
         self.polytopes = []
+        self.declared = []
 
     def run(self, records):
         due, position = [(6,) * self.p], 0
@@ -153,6 +154,9 @@ class Point(Proof):
             need(isinstance(record, list) and record, "the tree breaks off")
             if record[0] == "b":
                 due += reversed(self.split(codes, record))
+            elif record[0] == "q":
+                self.declare(*record[1:])
+                due.append(codes)
             else:
                 self.leaves += 1
                 self.leaf(codes, *record)
@@ -174,6 +178,8 @@ class Point(Proof):
         if kind in ("x", "X"):
             terms = self.terms(codes, rest, self.scale, self.friction)
             need(self.forms.excludes(terms), "multipliers do not exclude a leaf")
+        elif kind == "f":
+            self.excluded_by(codes, *rest)
         elif kind == "u":
             self.undecided += 1
         elif kind == "z":
@@ -183,6 +189,29 @@ class Point(Proof):
             need(kind in ("n", "N", "r", "D"), "an unknown leaf")
             need(max(codes) < 5, "a selection is not complete")
             {"n": self.empty, "N": self.empty, "r": self.root, "D": self.polytope}[kind](codes, *rest)
+
+    def declare(self, text, mu, nu, alpha, beta, weight):
+        """[5.5]"""
+        need(len(text) == self.p and set(text) <= set("0123456"), "codes of a form are none")
+        multipliers = [[exact(value) for value in values] for values in (mu, nu, alpha, beta)]
+        need(all(len(values) == self.p for values in multipliers), "a form has other multipliers")
+        need(min(multipliers[2] + multipliers[3]) >= 0 and exact(weight) >= 0, "a form is not allowed")
+        self.declared.append(([int(digit) for digit in text], multipliers))
+
+    def excluded_by(self, codes, back, *packed):
+        """[5.5]"""
+        need(1 <= integer(back) <= len(self.declared), "a form was not declared")
+        base, multipliers = self.declared[-back]
+        for mine, code in zip(base, codes, strict=True):
+            need(mine in (code, 6) or (mine == 5 and code in (1, 2, 3)), "a form is of another assignment")
+        equations = []
+        for i, code in enumerate(base):
+            kinds = {0: (0, 1), 1: (4, 5), 2: (4, 2), 3: (4, 3), 4: (4, 1), 5: (4,)}.get(code, ())
+            kinds = (1,) if code == 6 and not self.friction[i] else kinds
+            equations += [self.forms.row(kind, i) for kind in kinds]
+        terms = self.terms(codes, packed, self.scale, self.friction)
+        form = self.forms.own_form(multipliers)
+        need(self.forms.excludes_by(form, equations, terms), "a form does not exclude a leaf")
 
     def empty(self, codes):
         need(not self.forms.hull(codes), "a selection has a solution")

@@ -183,6 +183,46 @@ class Forms:
         column = column_of(v)
         return -constant - (column.transpose() * self.S.solve(column))[0, 0] / 4 > 0
 
+    def own_form(self, multipliers):
+        """[5.5] lambda'H lambda - h'lambda of multipliers mu, nu, alpha, beta."""
+        p, mixed = self.p, []
+        for i, (mu, nu, alpha, beta) in enumerate(zip(*multipliers, strict=True)):
+            mixed.append((i, mu, self.F[i] * (beta - alpha)))
+            mixed.append((p + i, nu, alpha + beta))
+        table, h = [[fmpq(0)] * (2 * p) for _ in range(2 * p)], [fmpq(0)] * (2 * p)
+        for k, normal, tangential in mixed:
+            i = k % p
+            row = [normal * a + tangential * b for a, b in zip(self.rows[i], self.rows[p + i], strict=True)]
+            h[k] = normal * self.g[i] + tangential * self.g[p + i]
+            for j, value in enumerate(row):
+                table[k][j] += value / 2
+                table[j][k] += value / 2
+        return fmpq_mat(table), h
+
+    def excludes_by(self, form, equations, terms):
+        """[5.5] Whether a form less multiples of rows is positive wherever some equations hold."""
+        H, h = form
+        affine = _affine(equations) if equations else ([fmpq(0)] * (2 * self.p), fmpq_mat(_unit(2 * self.p)).tolist())
+        if affine is None:
+            return True
+        origin, kernel = affine
+        slope, constant = [-x for x in h], fmpq(0)
+        for number, u in terms:
+            *a, a0 = self.row(*divmod(number, self.p))
+            slope = [x - u * y for x, y in zip(slope, a, strict=True)]
+            constant -= u * a0
+        moved = (H * column_of(origin)).entries()
+        constant += _value([*moved, 0], origin) + _value([*slope, 0], origin)
+        if not kernel:
+            return constant > 0
+        N = fmpq_mat(kernel).transpose()
+        bent = N.transpose() * H * N
+        for size in range(1, len(kernel) + 1):
+            if fmpq_mat([row[:size] for row in bent.tolist()[:size]]).det() <= 0:
+                return False
+        left = N.transpose() * column_of([2 * x + y for x, y in zip(moved, slope, strict=True)])
+        return constant - (left.transpose() * bent.solve(left))[0, 0] / 4 > 0
+
     def hull(self, *selections):
         """[5.3, D] Vertices of the common solutions of some selections."""
         affine = _affine([form for codes in selections for form in self.equations(codes)])
@@ -207,6 +247,10 @@ class Forms:
                     point = [x + a * y for x, y in zip(point, vector, strict=True)]
                 found.add(as_point(point))
         return sorted(found)
+
+
+def _unit(size):
+    return [[fmpq(int(i == j)) for j in range(size)] for i in range(size)]
 
 
 def _value(form, point, constant=1):

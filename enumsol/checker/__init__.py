@@ -21,7 +21,7 @@ What checker and search share
       positive definite;
     - ``kernel.point`` and ``kernel.interval``: the exclusion inequality, the verified solve of a selection and the
       contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled copy of
-      the inequality);
+      the inequality); ``kernel.forms``, the same with other forms than the energy at one alpha;
     - for the arcs of branch graphs: ``kernel.selection_rows``, the numbers of unknowns and conditions; ``kernel.arcs``,
       a selection over an interval as a series with bounds of its error; ``kernel.precise``, the same with many digits,
       loaded only where a box asks for it; ``kernel.ball_arrays``, linear systems of balls (in 3D, too);

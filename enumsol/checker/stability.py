@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from enumsol.checker.forms import FormLeaves
     from enumsol.proof.proof_file import Proof
 
 #: Largest radius that is tried; below 1 a positive friction coefficient stays positive.
@@ -153,6 +154,10 @@ class _WidenedChecker(Checker):
 
         if not self._passes(excluded):
             self.fail(f"leaves {numbers[0]} to {numbers[-1]}: the multipliers do not exclude them")
+
+    def _check_forms(self, leaves: FormLeaves) -> None:
+        if not self._passes(lambda system: not leaves.failing(system)):
+            self.fail("multipliers with forms do not exclude their leaves")
 
     def _solved(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         self.regular += record[0] == "r"

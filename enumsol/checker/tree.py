@@ -91,6 +91,10 @@ class TreeChecker:
         """Check one leaf; the reason when it proves nothing."""
         raise NotImplementedError
 
+    def _declare(self, record: list[Any]) -> None:
+        """Take note of what later leaves refer to."""
+        raise RefusedError(f"a record {shown(record)} that no leaf of this proof can refer to")
+
     def _flush(self, *, last: bool) -> None:
         """Check what waits, at the end or when it has become much."""
 
@@ -104,7 +108,7 @@ class TreeChecker:
 
     # -- the tree --------------------------------------------------------------------------------------------------
 
-    def _leaves(self, records: Iterator[Any]) -> Iterator[tuple[tuple[int, ...], list[Any]]]:
+    def _leaves(self, records: Iterator[Any], *, survey: bool = False) -> Iterator[tuple[tuple[int, ...], list[Any]]]:
         """The tree's leaves with the assignments that they stand for, which together cover all selections."""
         stack: list[tuple[int, ...]] = [(UNDECIDED,) * self.problem.p]
         while stack:
@@ -114,12 +118,16 @@ class TreeChecker:
                 raise RefusedError(f"{len(stack) + 1} subtrees are not accounted for: the tree breaks off")
             if record[0] == "b":
                 stack.extend(reversed(self._children(codes, record)))
+            elif record[0] == "q":
+                if not survey:
+                    self._declare(record)
+                stack.append(codes)
             else:
                 yield codes, record
 
     def _survey(self, records: Iterator[Any]) -> Any:
         """Walk the tree without a look at its leaves; gives the counts at the end."""
-        leaves = sum(1 for _ in self._leaves(records))
+        leaves = sum(1 for _ in self._leaves(records, survey=True))
         footer = next(records, _END)
         if not isinstance(footer, dict) or footer.get("leaves") != leaves:
             found = "missing" if footer is _END else shown(footer)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
+from enumsol.checker.forms import FormLeaves
 from enumsol.checker.graph import GraphChecker
 from enumsol.checker.reports import GraphVerificationReport, VerificationReport
 from enumsol.checker.tree import TreeChecker
@@ -121,6 +122,7 @@ class Checker(TreeChecker):
 
     polytopes: list[Polytope] = field(default_factory=list)
     _waiting: list[tuple[int, tuple[int, ...], Any, Any]] = field(default_factory=list)
+    _by_forms: FormLeaves = field(default_factory=FormLeaves)
 
     # -- header and tree -------------------------------------------------------------------------------------------
 
@@ -163,6 +165,9 @@ class Checker(TreeChecker):
 
     def _flush(self, *, last: bool) -> None:
         """Check the dual inequalities of the waiting leaves together."""
+        if len(self._by_forms) >= (1 if last else _BATCH):
+            self._check_forms(self._by_forms)
+            self._by_forms.clear()
         if not self._waiting or (not last and len(self._waiting) < _BATCH):
             return
         numbers, codes, rows, values = zip(*self._waiting, strict=True)
@@ -177,6 +182,13 @@ class Checker(TreeChecker):
         for number in numbers[~(margins > 0)]:
             self.fail(f"leaf {number}: its multipliers do not exclude it")
 
+    def _check_forms(self, leaves: FormLeaves) -> None:
+        for number in leaves.failing(self.system):
+            self.fail(f"leaf {number}: its form and multipliers do not exclude it")
+
+    def _declare(self, record: list[Any]) -> None:
+        self._by_forms.declare(record, self.problem.p)
+
     def _covering(self, code: int, node: int) -> tuple[int, ...]:
         return children_of(code, friction=self.friction[node])
 
@@ -189,6 +201,8 @@ class Checker(TreeChecker):
     def _leaf(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         """Check one leaf; the reason when it proves nothing."""
         kind = record[0]
+        if kind == "f":
+            return self._by_forms.add(self.leaves, codes, record)
         if not isinstance(kind, str) or kind not in _ENTRIES:
             return f"unknown kind of record {shown(kind)}"
         if len(record) != _ENTRIES[kind]:

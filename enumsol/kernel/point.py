@@ -8,7 +8,7 @@ in the search and in the checker alike. Codes and row kinds are plain integers w
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dtrtri
@@ -27,7 +27,7 @@ from enumsol.kernel.rows import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -79,21 +79,23 @@ def exclusion_margins(
 
 
 def margins(
-    ends: Sequence[EnclosedSystem],
+    ends: Sequence[Any],
     allowed: NDArray[np.int8],
     friction: tuple[Array, Array],
     leaf: NDArray[np.intp],
     rows: NDArray[np.intp],
     values: Array,
     errors: float,
+    bounds_of: Callable[[Any, Array, Array, Array, float], Array] | None = None,
 ) -> Array:
     """Bounds as of exclusion_margins that hold at all ``ends``, -inf where one is not finite.
 
     Parameters
     ----------
-    ends : systems that differ in g only, and in F, which enters by its bounds
+    ends : EnclosedSystems that differ in g only, and in F, which enters by its bounds; or an EnclosedForm
     allowed : (m, p, kinds) array, what the multipliers may be: seven kinds of rows, or nine over an interval
     friction : two (p,) arrays, the smallest and the largest coefficients; equal where friction is constant
+    bounds_of : what bounds one of ``ends``, by default energy_bounds
     """
     m, p, kinds = allowed.shape
     low, high = friction
@@ -126,7 +128,8 @@ def margins(
         c_rad = gamma((5 if kinds > ROW_KINDS else 4) * repeated + 8) * c_size
         # where friction is constant a cone row may be an equation, and its coefficient must be the exact one
         c_rad[:, :p] += np.max([end.F_rad for end in ends], axis=0) * (low == high) * cone_size
-        bounds = np.min([energy_bounds(end, y, c, c_rad * SAFE, errors) for end in ends], axis=0)
+        bounds_of = bounds_of or energy_bounds
+        bounds = np.min([bounds_of(end, y, c, c_rad * SAFE, errors) for end in ends], axis=0)
     return np.where(refused | ~np.isfinite(bounds), -np.inf, bounds)
 
 

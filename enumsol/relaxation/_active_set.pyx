@@ -89,11 +89,16 @@ cdef class QPData:
         self.value, self.rhs, self.norm = value, rhs, norm
         norm[:] = 1.0
         given = np.unique(np.searchsorted(self.start, np.flatnonzero(value), side="right") - 1)
-        for r in given:
-            a, b = row_start[r], row_start[r + 1]
-            norm[r] = self._norm(row_index[a:b], value[a:b])
-            value[a:b] /= norm[r]
-            rhs[r] /= norm[r]
+        if len(given):
+            start = np.asarray(row_start)
+            counts = np.diff(start)[given]
+            entries = np.concatenate([np.arange(start[r], start[r + 1]) for r in given])
+            # of x and w, a row each: their normals times L^{-1}
+            units = np.vstack([inverse.T, np.asarray(W) @ inverse.T])
+            terms = value[entries, None] * units[np.asarray(row_index)[entries]]
+            norm[given] = np.linalg.norm(np.add.reduceat(terms, np.cumsum(counts) - counts), axis=1)
+            value[entries] /= np.repeat(norm[given], counts)
+            rhs[given] /= norm[given]
 
     def _norm(self, index, value):
         """Length of a row's normal in the norm of (2 S)^{-1}."""

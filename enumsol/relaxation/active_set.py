@@ -8,14 +8,19 @@ import numpy as np
 
 from enumsol.relaxation.engine import BRANCHING_CANDIDATES, FEASIBILITY_TOLERANCE, PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.rows import EQUALITY, INEQUALITY, row_terms
-from enumsol.statuses import RowKind
+from enumsol.statuses import UNDECIDED, RowKind
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.relaxation._active_set import BranchingRule, QPData, QPState
     from enumsol.selections.solution import Codes
+
+
+#: Rows that become equations when a node is open, or in contact.
+_APART = (int(RowKind.NORMAL_FORCE), int(RowKind.PENETRATION))
 
 
 class CompiledEngine:
@@ -41,6 +46,9 @@ class CompiledEngine:
         self.data, self.rule, self.size, self.offset, self.always = data, rule, size, offset, always
         #: Most changes of the active set; a program that needs more has stalled.
         self.limit = 200 + 10 * size
+
+    #: The form that is minimised in place of the energy, if any.
+    form: EnclosedForm | None = None
 
     def root(self, rows: list[int], modes: list[int]) -> Relaxation:
         """The relaxation with the given rows on."""
@@ -82,10 +90,31 @@ class ActiveSetEngine(CompiledEngine):
         start, index, value = row_terms(p, system.F)
         rhs = np.zeros(len(start) - 1)
         H, h = (system.S, system.g) if form is None else form
-        data = _active_set.QPData(H, h, -system.S, system.g, start, index, value, rhs)
+        #: All rows, as sparse combinations of lambda and w.
+        self.rows = start, index, value, rhs
+        data = _active_set.QPData(H, h, -system.S, system.g, *self.rows)
         cones = np.array([RowKind.CONE_PLUS, RowKind.CONE_MINUS])[:, None] * p + np.arange(p)
         modes = np.full((2, p), EQUALITY, dtype=np.int8)
         super().__init__(data, _active_set.BranchingRule(system.F, cones, modes, candidates), 2 * p)
+
+
+class FormEngine(CompiledEngine):
+    """Relaxations with a form in place of the energy, which bound it from below.
+
+    Parameters
+    ----------
+    engine : ActiveSetEngine
+        Relaxations with the energy.
+    scaled : ScaledSystem
+    form : EnclosedForm
+    """
+
+    def __init__(self, engine: ActiveSetEngine, scaled: ScaledSystem, form: EnclosedForm) -> None:
+        from enumsol.relaxation._active_set import QPData
+
+        data = QPData(form.H, form.h, -scaled.S, scaled.g, *engine.rows)
+        super().__init__(data, engine.rule, engine.size, -form.k)
+        self.form = form
 
 
 class ActiveSetRelaxation:
@@ -100,6 +129,11 @@ class ActiveSetRelaxation:
         self.bound: float = state.bound - engine.offset
         self.pruned = status == 1
         self.stalled = status == 2
+
+    @property
+    def form(self) -> EnclosedForm | None:
+        """The form that ``bound`` is about; None for the energy."""
+        return self._engine.form
 
     @property
     def forces(self) -> NDArray[np.float64]:
@@ -128,6 +162,16 @@ class ActiveSetRelaxation:
         """Undecided contact nodes with at most one child that no known bound excludes."""
         engine = self._engine
         return self._state.forced(np.array(codes, dtype=np.int8), engine.rule, PRUNE_MARGIN + engine.offset)
+
+    def gap_closed(self, codes: Codes) -> float:
+        """Mean share of the gap to zero that one dual step closes in the better child of an undecided node."""
+        p, gap = len(codes), max(-self.bound, 1e-300)
+        shares = []
+        for node, code in enumerate(codes):
+            if code == UNDECIDED:
+                gains = [self._state.gain(kind * p + node, EQUALITY) for kind in _APART]
+                shares.append(min(1.0, max(gains) / gap))
+        return float(np.mean(shares)) if shares else 1.0
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""

@@ -11,6 +11,7 @@ from enumsol.statuses import CONTACT, UNDECIDED
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.selections.solution import Codes
 
 #: The compiled module of the active-set method.
@@ -29,6 +30,10 @@ class Relaxation(Protocol):
     pruned: bool  # the energy bound is above PRUNE_MARGIN: no solution
     stalled: bool  # the engine gave no answer: no conclusion
     bound: float
+
+    @property
+    def form(self) -> EnclosedForm | None:
+        """The form that ``bound`` is about; None for the energy."""
 
     @property
     def forces(self) -> NDArray[np.float64]:

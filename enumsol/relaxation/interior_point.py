@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.selections.solution import Codes
 
 
@@ -91,6 +92,8 @@ class InteriorPointEngine:
 
 class _InteriorPointRelaxation:
     """A relaxation that was solved, or not (``forces`` None)."""
+
+    form: EnclosedForm | None = None
 
     def __init__(
         self,

@@ -60,6 +60,22 @@ def row_terms(p: int, F: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray
     return np.array(start, dtype=np.intp), np.array(index, dtype=np.intp), np.array(value, dtype=np.float64)
 
 
+def row_normals(
+    p: int, F: NDArray[np.float64], S: NDArray[np.float64], numbers: NDArray[np.intp]
+) -> NDArray[np.float64]:
+    """Gradients by lambda of some rows, up to sign, one below the other; w = g - S lambda."""
+    kind, node = np.divmod(numbers, p)
+    normals = np.zeros((len(numbers), 2 * p))
+    for k, i, normal in zip(kind.tolist(), node.tolist(), normals, strict=True):
+        if k >= _R.PENETRATION:
+            normal[:] = S[i if k == _R.PENETRATION else p + i]
+        elif k in (_R.CONE_PLUS, _R.CONE_MINUS):
+            normal[i], normal[p + i] = F[i], -1.0 if k == _R.CONE_PLUS else 1.0
+        else:
+            normal[i if k == _R.NORMAL_FORCE else p + i] = 1.0
+    return normals
+
+
 def imposed_rows(code: int, *, friction: bool) -> dict[int, int]:
     """Mode of every row that holds in a (partial) status, those implied by others included (see with_implied)."""
     return with_implied(code, status_rows(code, friction=friction))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.space import SpaceSystem
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.kernel.space import Row
     from enumsol.relaxation._active_set import QPState
     from enumsol.selections.solution import Codes
@@ -156,6 +157,8 @@ class SpaceRelaxation:
     """A solved relaxation, with tangents put where its minimiser left the disc."""
 
     __slots__ = ("_engine", "_found", "_kept", "_state", "bound", "pruned", "stalled")
+
+    form: EnclosedForm | None = None
 
     def __init__(self, engine: SpaceEngine, state: QPState, rows: list[int], modes: list[int]) -> None:
         self._engine, self._state = engine, state

@@ -14,6 +14,7 @@ from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.search.certifiers.floats import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.search.forms import Forms
 from enumsol.search.proof_header import point_header, unit_exponents
 from enumsol.search.tree import TreeSearch
 from enumsol.selections.floats import FloatSelections
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.checks import Alpha
+    from enumsol.condensation.condensed import ScaledSystem
     from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Recorder
     from enumsol.search.certifiers.protocol import Certifier
@@ -111,9 +113,7 @@ class Solvers:
             pass
         if self.problem.n <= EXACT_DOF_LIMIT:
             return None, "problem"
-        zero = np.zeros_like
-        F_rad = 4 * np.spacing(system.F)
-        enclosed = EnclosedSystem(system.S, zero(system.S), system.g, zero(system.g), system.F, F_rad)
+        enclosed = as_computed(system)
         return (enclosed if _positive(enclosed) else None), "condensed"
 
     @property
@@ -152,7 +152,14 @@ class Solvers:
         progress: Callable[[SearchProgress], object] | None = None,
     ) -> TreeSearch:
         """A search of the tree with a certifier made here."""
-        return TreeSearch(self.scaled, certifier, engine=self.engine, limits=limits, progress=progress)
+        return TreeSearch(
+            self.scaled, certifier, engine=self.engine, limits=limits, progress=progress, forms=self._forms()
+        )
+
+    def _forms(self) -> Forms | None:
+        """Forms for a long search; None where the energy is the only one, or there are no balls to prove them by."""
+        system = as_computed(self.scaled) if self.arithmetic == "fast" else self.enclosed
+        return None if self.arithmetic == "exact" or system is None else Forms(self.scaled, system)
 
     def remake(self) -> Callable[[], Solvers]:
         """Makes the same again, also in another process."""
@@ -176,6 +183,12 @@ class Solvers:
         """
         units = unit_exponents(self.scaled.force, self.scaled.length)
         return point_header(self.problem, self.alpha, self.data, units)
+
+
+def as_computed(system: ScaledSystem) -> EnclosedSystem:
+    """S and g as computed, without radii."""
+    zero = np.zeros_like
+    return EnclosedSystem(system.S, zero(system.S), system.g, zero(system.g), system.F, 4 * np.spacing(system.F))
 
 
 def _positive(system: EnclosedSystem) -> bool:

@@ -124,6 +124,10 @@ class SpaceCertifier:
         self._roots |= part.verified
         self._leaves += part.leaves
 
+    def forget(self) -> None:
+        """Forget what was proven."""
+        self._roots, self._leaves = {}, 0
+
     def _leaf(self, kind: str, *record: object) -> None:
         self._leaves += 1
         self.recorder.write([kind, *record])

@@ -22,6 +22,7 @@ from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart
+from enumsol.search.forms import Forms, HeldRecords
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting, branching_node
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.selections.solution import Codes, SelectionSolution
@@ -99,6 +100,11 @@ class SearchOutcome:
     fallback_qps: int = 0
     presolved: int = 0
 
+    def forget(self) -> None:
+        """Forget what was found, as the search begins again; the work that it took still counts."""
+        self.solutions.clear()
+        self.undecided.clear()
+
     def add(self, part: SearchOutcome) -> None:
         """Add what the search of a subtree found."""
         self.solutions += part.solutions
@@ -160,6 +166,8 @@ class TreeSearch:
         How a status splits and which rows it imposes; by default those of the plane at one alpha.
     limits : SearchLimits
     progress : called with a SearchProgress now and then
+    forms : Forms, optional
+        What a long search may bound with in place of the energy.
     """
 
     def __init__(
@@ -171,6 +179,7 @@ class TreeSearch:
         splitting: Splitting | None = None,
         limits: SearchLimits | None = None,
         progress: Callable[[SearchProgress], object] | None = None,
+        forms: Forms | None = None,
     ) -> None:
         self.system = system
         self.certifier = certifier
@@ -179,6 +188,7 @@ class TreeSearch:
         self.engine: Any = engine
         self.limits = limits or SearchLimits()
         self.progress = progress
+        self.forms = forms
         self.outcome = SearchOutcome()
         self._fallback: InteriorPointEngine | None = None
         self.splitting: Splitting = splitting or PlaneSplitting(system.F)
@@ -194,17 +204,40 @@ class TreeSearch:
 
     def run(self, roots: Sequence[Codes] | None = None) -> SearchOutcome:
         """Examine the subtrees of the given partial assignments (default: the whole tree)."""
-        stack = [self.first()]
+        start = [self.first()]
         if roots is not None:
-            stack = [TreeNode(None, codes, -1, last=False, weight=1.0 / len(roots)) for codes in reversed(roots)]
-        outcome = self.outcome
+            start = [TreeNode(None, codes, -1, last=False, weight=1.0 / len(roots)) for codes in reversed(roots)]
+        if self.forms is None or len(start) > 1:
+            self._run(start)
+            return self.outcome
+        forms, certifier = self.forms, self.certifier
+        held = HeldRecords(certifier.recorder)
+        certifier.recorder = held
+        try:
+            stack = self._run(start, until=forms)
+            if stack and forms.pay(self.engine, start[0].codes, self._rows):
+                held.drop()
+                certifier.forget()
+                self.outcome.forget()
+                self._covered, stack = 0.0, start
+        finally:
+            certifier.recorder = held.recorder
+            held.release()
+        self._run(stack)
+        return self.outcome
+
+    def _run(self, stack: list[TreeNode], until: Forms | None = None) -> list[TreeNode]:
+        """Examine what waits, depth first; what still waits when it is time to try forms."""
+        stack = list(stack)
         while stack:
+            if until is not None and until.due(self.outcome.nodes, self._covered):
+                break
             if self.must_stop(len(stack)):
                 for item in reversed(stack):
                     self.skip(item.codes, "raise the limit")
-                break
+                return []
             stack.extend(reversed(list(self.examine(stack.pop()))))
-        return outcome
+        return stack
 
     def skip(self, codes: Codes, hint: str) -> None:
         """Leave a subtree undecided, because the search was stopped."""
@@ -277,8 +310,20 @@ class TreeSearch:
         if item.parent is not None:
             relaxation = item.parent.child(*self._rows.of(item.changed, codes[item.changed]), last=item.last)
         else:
-            relaxation = self.engine.root(*self._rows.over(codes, range(len(codes))))
-        return self._fall_back(codes) if relaxation.stalled else relaxation
+            relaxation = self._root(codes)
+        if relaxation.stalled:
+            return self._fall_back(codes)
+        if self.forms is not None and self.forms.in_use and not (relaxation.pruned or item.forced):
+            return self.forms.better(codes, relaxation, self._rows)
+        return relaxation
+
+    def _root(self, codes: Codes) -> Relaxation:
+        """The relaxation of a partial assignment without a parent's."""
+        engine = self.engine
+        if self.forms is not None and self.forms.in_use:
+            engine = self.forms.engine
+        relaxation: Relaxation = engine.root(*self._rows.over(codes, range(len(codes))))
+        return relaxation
 
     def _fall_back(self, codes: Codes) -> Relaxation | None:
         """The relaxation by the slower engine; None when that gives no answer either."""

@@ -50,6 +50,7 @@ SHARED = {
     "kernel.precise": None,
     "kernel.selection_rows": None,
     "kernel.point": {"VerifiedSelection", "exclusion_margin", "holds_no_root", "solve_selection"},
+    "kernel.forms": {"EnclosedForm", "Equations", "form_margin"},
     "kernel.rows": None,
     "kernel.space": None,
     "kernel.leaves": None,

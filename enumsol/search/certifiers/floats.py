@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.kernel.forms import form_margin
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.protocol import UndecidedPart, WithoutProof
 from enumsol.selections.solution import VertexLimitError
@@ -37,9 +38,12 @@ class FastCertifier(WithoutProof):
 
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         """Accept the pruning if conditions may be off by twice the tolerance."""
-        del codes
         rows, values = relaxation.multipliers()
         shift = float(np.abs(values) @ self._norms[rows])
+        if relaxation.form is not None:
+            # hardly convex: its bound is worth what is left of it after rounding
+            margin = form_margin(relaxation.form, codes, rows, values)
+            return margin > 2.0 * self._selections.tolerance * shift
         return relaxation.bound > PRUNE_MARGIN + 2.0 * self._selections.tolerance * shift
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:

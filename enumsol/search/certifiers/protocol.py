@@ -116,6 +116,9 @@ class Certifier(Protocol):
     def add(self, part: Certified) -> None:
         """Take over what the certifier of a subtree has proven; its records were written already."""
 
+    def forget(self) -> None:
+        """Forget what was proven, as the search begins again; its records were dropped already."""
+
 
 class Unrecorded:
     """A recorder for searches without a proof."""
@@ -133,4 +136,4 @@ class WithoutProof:
     def _nothing(self, *_: object, **__: object) -> None:
         """There is nothing to write, and nothing to take over."""
 
-    branching = skipped = unloaded = add = _nothing
+    branching = skipped = unloaded = add = forget = _nothing

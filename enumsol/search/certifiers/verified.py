@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.kernel.forms import form_margin
 from enumsol.kernel.point import VerifiedSelection, exclusion_margin, holds_no_root, solve_selection
 from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
 from enumsol.proof.proof_file import fraction_text, packed
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.rationals import ExactCertifier
@@ -42,6 +44,7 @@ class Leaf(enum.StrEnum):
 
     EXCLUDED = "x"
     EXCLUDED_IN_RATIONALS = "X"
+    EXCLUDED_BY_FORM = "f"
     NO_ROOT = "n"
     NO_ROOT_IN_RATIONALS = "N"
     REGULAR_ROOT = "r"
@@ -60,6 +63,8 @@ _ROW_NAMES = {
 }
 #: Begins the record of a branching, which is not a leaf.
 _BRANCHING = "b"
+#: Begins the record of a form, which is none either.
+_FORM = "q"
 
 
 class VerifiedCertifier:
@@ -94,6 +99,8 @@ class VerifiedCertifier:
         self._escalations = Escalations()
         self._verified: dict[Codes, VerifiedSelection] = {}
         self._leaves = 0
+        #: Forms in the order in which they were written.
+        self._forms: dict[EnclosedForm, int] = {}
 
     @property
     def certified(self) -> Certified:
@@ -103,6 +110,8 @@ class VerifiedCertifier:
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
         rows, values = relaxation.multipliers()
+        if relaxation.form is not None:
+            return self._excluded_by(relaxation.form, codes, rows, values)
         if self._margin is not None:
             if self._margin(codes, rows, values) > 0:
                 self._escalations.balls += 1
@@ -119,6 +128,19 @@ class VerifiedCertifier:
             return True
         self._escalations.refined += 1
         return False
+
+    def _excluded_by(self, form: EnclosedForm, codes: Codes, rows: NDArray[np.intp], values: Array) -> bool:
+        """The same with a form in place of the energy."""
+        if not form_margin(form, codes, rows, values, errors=2.0) > 0:
+            self._escalations.refined += 1
+            return False
+        if form not in self._forms:
+            self._forms[form] = len(self._forms)
+            codes_text = "".join(map(str, form.codes))
+            self.recorder.write([_FORM, codes_text, *form.multipliers.tolist(), form.weight])
+        self._escalations.balls += 1
+        self._leaf(Leaf.EXCLUDED_BY_FORM, len(self._forms) - self._forms[form], *packed(rows, values))
+        return True
 
     def branching(self, node: int, children: Sequence[int]) -> None:
         """Write a branching of the tree."""
@@ -163,6 +185,11 @@ class VerifiedCertifier:
         self._leaves += part.leaves
         if part.escalations is not None:
             self._escalations.add(part.escalations)
+
+    def forget(self) -> None:
+        """Forget what was proven."""
+        self._verified, self._escalations, self._leaves = {}, Escalations(), 0
+        self._forms.clear()
 
     def _regular(self, codes: Codes, ball: VerifiedSelection) -> SelectionSolution:
         self._verified[codes] = ball

@@ -1,0 +1,95 @@
+"""Forms declared in a proof, and the leaves that they exclude (docs/proof_format.md, under Forms)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.kernel.forms import EnclosedForm, form_margins
+from enumsol.kernel.rows import CONTACT, ROW_KINDS, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.proof.reading import RefusedError, codes_from, multipliers_from, numbers_from
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.enclosure import EnclosedSystem
+
+_RECORD, _LEAF = 7, 4
+_WITHIN = {UNDECIDED: frozenset(range(UNDECIDED + 1)), CONTACT: frozenset((STICK, SLIP_PLUS, SLIP_MINUS, CONTACT))}
+
+
+@dataclass(frozen=True)
+class _Declared:
+    codes: tuple[int, ...]
+    multipliers: NDArray[np.float64]
+    weight: float
+
+    def holds(self, codes: tuple[int, ...]) -> bool:
+        """Whether a partial assignment is part of the one that this form is made for."""
+        return all(code == mine or code in _WITHIN.get(mine, ()) for code, mine in zip(codes, self.codes, strict=True))
+
+
+class FormLeaves:
+    """Forms as they are declared, and leaves that wait to be checked."""
+
+    def __init__(self) -> None:
+        self._declared: list[_Declared] = []
+        self._waiting: dict[int, list[tuple[int, tuple[int, ...], Any, Any]]] = {}
+
+    def __len__(self) -> int:
+        return sum(map(len, self._waiting.values()))
+
+    def declare(self, record: list[Any], p: int) -> None:
+        """Read a form.
+
+        Raises
+        ------
+        RefusedError
+            The record makes no sense.
+        """
+        if len(record) != _RECORD:
+            raise RefusedError(f"a form has {len(record)} entries; expected {_RECORD}")
+        try:
+            codes = tuple(codes_from([record[1]], p)[0].tolist())
+            multipliers = np.array([numbers_from(values, p) for values in record[2:6]])
+            weight = float(numbers_from([record[6]], 1)[0])
+        except ValueError as error:
+            raise RefusedError(f"a form cannot be read: {error}") from None
+        if np.any(multipliers[2:] < 0) or weight < 0:
+            raise RefusedError("a multiplier of a form is negative and must not be")
+        self._declared.append(_Declared(codes, multipliers, weight))
+
+    def add(self, number: int, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        """Take a leaf, to be checked with others; the reason when it proves nothing."""
+        if len(record) != _LEAF:
+            return f"its record has {len(record)} entries; expected {_LEAF}"
+        back = record[1]
+        if type(back) is not int or not 1 <= back <= len(self._declared):
+            return "its form was not declared"
+        place = len(self._declared) - back
+        if not self._declared[place].holds(codes):
+            return "its form was made for another assignment"
+        rows, values = multipliers_from(record[2:], ROW_KINDS * len(codes))
+        self._waiting.setdefault(place, []).append((number, codes, rows, values))
+        return None
+
+    def clear(self) -> None:
+        """Let go of the leaves that wait."""
+        self._waiting.clear()
+
+    def failing(self, system: EnclosedSystem) -> list[int]:
+        """Check the leaves that wait, form by form; the numbers of those that are not excluded."""
+        failed: list[int] = []
+        for place, leaves in self._waiting.items():
+            declared = self._declared[place]
+            numbers, codes, rows, values = zip(*leaves, strict=True)
+            leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
+            with np.errstate(over="ignore", invalid="ignore"):
+                form = EnclosedForm.of(system, declared.codes, declared.multipliers, declared.weight)
+                margins = form_margins(
+                    form, np.array(codes, dtype=np.intp), leaf, np.concatenate(rows), np.concatenate(values)
+                )
+            failed += np.array(numbers)[~(margins > 0)].tolist()
+        return sorted(failed)

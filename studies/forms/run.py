@@ -1,0 +1,121 @@
+"""What do forms with four multipliers a node save in long searches, when should they be tried, and what do they cost?
+
+Verified searches of clamped blocks and wedges with the energy alone, with forms from the beginning (after 50 nodes),
+and as they are (tried after some thousand nodes): nodes, seconds, size of the proof, and seconds of its check. Then two
+of the blocks with other schedules: steps of the ascent, and the share of the contact nodes that is decided before a new
+form is looked for. All seconds of one problem are taken one after the other; read their ratios.
+
+Read "nodes" against "nodes, energy": the gain grows with p, and there is none on wedges, where the trial says so and
+costs what "seconds" has more than "seconds, energy".
+
+What else was tried, on prototypes of the same search (nodes with the energy, then with the variant; blocks at F = 0.3):
+
+- one-sided slip work in closed form, as far as the form stays convex, at every fourth decided node: blocks p = 16, 32
+  and 64: 208, 735, 4,735 -> 131, 380, 9,628; wedge p = 20: 4,488 -> 4,270. No ascent, but it does not grow with p.
+- products of rows of a node and its nearest neighbours as well (14 multipliers a node): wedge p = 14: 894 -> 418 with
+  75 programs of 18 ms, 60 times as long as the search with the energy; wedge p = 32: 22,606 -> 17,045 with 1,087.
+- the form of the root for the subtrees that were left when it was made, without beginning again: block p = 100 was not
+  finished at 200,000 nodes (5,062 with beginning again, 4,000 of them before).
+- barrier weights other than those in the code: 16, 64 and 256 times 2 p on the bound take more steps on blocks.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import enumsol
+from enumsol.search import forms as policy
+from shared.loads import DRAGGED, PRESSED, block, oblique_wedge, straight_wedge
+
+if TYPE_CHECKING:
+    from shared.results import Run
+
+PROBLEMS = (
+    *(block(p, PRESSED, 0.3) for p in (16, 32, 64, 100)),
+    block(64, PRESSED, 1.0),
+    block(64, DRAGGED, 0.3),
+    block(100, DRAGGED, 0.3),
+    block(100, PRESSED, 0.3, 2.0),
+    block(100, PRESSED, 1.0),
+    straight_wedge(14),
+    oblique_wedge(20),
+    oblique_wedge(32),
+)
+SMOKE_PROBLEMS = (block(16, PRESSED, 0.3), straight_wedge(8))
+SCHEDULES = {
+    "as it is": {},
+    "5 steps below": {"_BELOW": 5},
+    "20 steps below": {"_BELOW": 20},
+    "30 more steps at the root": {"_ROOT": 44},
+    "again after a sixth": {"_DEEPER": 0.16},
+    "again after a half": {"_DEEPER": 0.5},
+    "never again": {"_DEEPER": 2.0},
+}
+NEVER, EARLY = 10**9, 50
+MAX_NODES = 60_000
+
+
+@contextmanager
+def changed(values):
+    """The search with other constants."""
+    before = {name: getattr(policy, name) for name in values}
+    for name, value in values.items():
+        setattr(policy, name, value)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            setattr(policy, name, value)
+
+
+def searched(problem, loaded, **constants):
+    """Nodes, seconds, size of the proof, seconds of its check; a dash for nodes where the search was cut."""
+    with changed(constants):
+        start = time.perf_counter()
+        roots = enumsol.enumerate_roots(problem, loaded.alpha, max_nodes=MAX_NODES)
+        seconds = time.perf_counter() - start
+    start = time.perf_counter()
+    report = enumsol.verify(problem, roots.proof)
+    check = time.perf_counter() - start
+    assert report.ok
+    assert report.complete == roots.complete
+    nodes = roots.stats.nodes if roots.complete else "-"
+    return nodes, round(seconds, 3), round(roots.proof.size / 1e3), round(check, 3), len(roots)
+
+
+def row(loaded):
+    """One problem, three ways."""
+    problem = loaded.build()
+    problem.enclosure  # noqa: B018 (made once, outside the clock)
+    enumsol.enumerate_roots(problem, loaded.alpha, max_nodes=10)
+    line = {"problem": loaded.name, "F": loaded.alpha}
+    ways = {", energy": {"NODES": NEVER}, ", from the beginning": {"NODES": EARLY}, "": {}}
+    for way, constants in ways.items():
+        nodes, seconds, size, check, line["roots"] = searched(problem, loaded, **constants)
+        line |= {f"nodes{way}": nodes, f"seconds{way}": seconds, f"proof{way} [kB]": size, f"check{way} [s]": check}
+    return line
+
+
+def schedule(loaded):
+    """One block with all schedules."""
+    problem = loaded.build()
+    problem.enclosure  # noqa: B018
+    for name, constants in SCHEDULES.items():
+        nodes, seconds, *_ = searched(problem, loaded, NODES=EARLY, **constants)
+        yield {"problem": loaded.name, "F": loaded.alpha, "schedule": name, "nodes": nodes, "seconds": seconds}
+
+
+def main(run: Run) -> None:
+    problems = SMOKE_PROBLEMS if run.smoke else PROBLEMS
+    lines = [row(loaded) for loaded in problems]
+    known = [line for line in lines if "-" not in (line["nodes"], line["nodes, energy"])]
+    run.table(
+        "forms",
+        lines,
+        "seconds of a search as it is, by those with the energy: "
+        + ", ".join(f"{line['problem']} {line['seconds'] / line['seconds, energy']:.2f}" for line in known),
+    )
+    blocks = problems[:1] if run.smoke else (problems[1], problems[3])
+    run.table("schedules", [line for loaded in blocks for line in schedule(loaded)])

@@ -1,0 +1,311 @@
+"""Searches that bound with forms of their own in place of the energy: the same roots, proofs that hold, no forgery."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from flint import fmpq
+from generators import fe_compliance, from_condensed, integer_problem, random_problem
+from proof_tools import copied, proof_of, records_of
+from rational_checker import Refused, check_records
+from rational_forms import Data, Forms, _value
+
+from enumsol import enumerate_roots, gallery, verify
+from enumsol.checker.stability import stability_radius
+from enumsol.condensation.enclosure import CondensedEnclosure
+from enumsol.kernel.forms import EnclosedForm, Equations, form_margin
+from enumsol.search import forms as policy
+from enumsol.search.solvers import Solvers
+
+
+@pytest.fixture
+def eager(monkeypatch):
+    """Forms from the first node on, whether they pay or not, and again at every second contact node."""
+    monkeypatch.setattr(policy, "NODES", 1)
+    monkeypatch.setattr(policy, "_MORE", -2.0)
+    monkeypatch.setattr(policy, "_FEW", 2)
+    monkeypatch.setattr(policy, "_DEEPER", 0.0)
+
+
+def slipping(seed, p=3):
+    """A body most of whose nodes slip."""
+    rng = np.random.default_rng(seed)
+    S, F = fe_compliance(rng, p), rng.uniform(0.1, 0.6, size=p)
+    load = np.concatenate([rng.uniform(0.2, 1.0, size=p), rng.normal(size=p)])
+    return from_condensed(S, S @ load, F)
+
+
+def kinds_of(proof):
+    return [record[0] for record in records_of(proof) if isinstance(record, list)]
+
+
+def test_the_roots_are_the_same(eager, monkeypatch):
+    used = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        make = (random_problem, integer_problem, lambda _, p, seed=seed: slipping(seed, p))[seed % 3]
+        problem = make(rng, int(rng.integers(2, 5)))
+        found = enumerate_roots(problem, 1.0)
+        kinds = kinds_of(found.proof)
+        used += kinds.count("f")
+        with monkeypatch.context() as patch:
+            patch.setattr(policy, "NODES", 10**9)
+            plain = enumerate_roots(problem, 1.0)
+        assert [root.statuses for root in found] == [root.statuses for root in plain], seed
+        assert found.complete == plain.complete
+        assert verify(problem, found.proof).ok
+        counts = check_records(problem, records_of(found.proof))
+        assert counts["roots"] == len(found)
+        fast = enumerate_roots(problem, 1.0, arithmetic="fast")
+        assert len(fast) == len(plain), seed
+    assert used > 60
+
+
+def test_a_long_search_is_shorter_with_forms(monkeypatch):
+    problem = gallery.clamped_block(32, 16)
+    plain = enumerate_roots(problem, 0.3)
+    monkeypatch.setattr(policy, "NODES", 20)
+    found = enumerate_roots(problem, 0.3)
+    assert found.complete
+    assert kinds_of(found.proof).count("f") > 20
+    assert found.stats.nodes < 0.6 * plain.stats.nodes
+    assert [root.statuses for root in found] == [root.statuses for root in plain]
+    assert verify(problem, found.proof).complete
+
+
+def test_wedges_go_on_with_the_energy(monkeypatch):
+    entry = gallery.get("wedge-8-5")
+    plain = enumerate_roots(entry.build(), entry.alpha)
+    monkeypatch.setattr(policy, "NODES", 20)
+    found = enumerate_roots(entry.build(), entry.alpha)
+    assert records_of(found.proof) == records_of(plain.proof)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_forms_are_at_most_zero_at_every_solution(seed):
+    rng = np.random.default_rng(seed)
+    problem = (integer_problem if seed % 2 else random_problem)(rng, int(rng.integers(1, 4)))
+    data, p = Data(problem), problem.p
+    forms = Forms(data.S, data.load(fmpq(1)), data.friction(fmpq(1)))
+    multipliers = rng.normal(size=(4, p)) * 10.0 ** rng.uniform(-3, 3, size=(4, p))
+    multipliers[2:] = np.abs(multipliers[2:])
+    H, h = forms.own_form([[fmpq(*x.as_integer_ratio()) for x in row] for row in multipliers.tolist()])
+    codes = [(0, 1, 2, 3) if F > 0 else (0, 4) for F in forms.F]
+    points = 0
+    for number in range(4**p):
+        digits = [(number // 4**i) % 4 for i in range(p)]
+        if any(digit >= len(allowed) for digit, allowed in zip(digits, codes, strict=True)):
+            continue
+        for point in forms.hull(tuple(allowed[digit] for digit, allowed in zip(digits, codes, strict=True))):
+            at = [fmpq(x.numerator, x.denominator) for x in point]
+            value = _value([*_times(H, at), 0], at) - _value([*h, 0], at)
+            assert value <= 0
+            points += 1
+    assert points
+
+
+def _times(H, point):
+    return [sum((a * x for a, x in zip(row, point, strict=True)), fmpq(0)) for row in H.tolist()]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_enclosed_forms_hold_the_exact_ones(seed):
+    rng = np.random.default_rng(seed)
+    p = int(rng.integers(1, 4))
+    problem = random_problem(rng, p) if seed % 2 else gallery.clamped_block(p, 2)
+    alpha = float(rng.uniform(0.1, 2.0))
+    scaled = problem.condensed.at(alpha).scaled
+    system = CondensedEnclosure.from_problem(problem).at(alpha, scaled.force, scaled.length)
+    data = Data(problem)
+    exact_alpha = fmpq(*alpha.as_integer_ratio())
+    pair = [[fmpq(*float(force / length).as_integer_ratio()) for length in scaled.length] for force in scaled.force]
+    S = [[x * pair[j][i] for j, x in enumerate(row)] for i, row in enumerate(data.S.tolist())]
+    g = [
+        x / fmpq(*float(unit).as_integer_ratio()) for x, unit in zip(data.load(exact_alpha), scaled.length, strict=True)
+    ]
+    forms = Forms(type(data.S)(S), g, data.friction(exact_alpha))
+    codes = tuple(int(c) for c in rng.choice((0, 1, 2, 3, 5, 6), size=p))
+    multipliers = rng.normal(size=(4, p))
+    multipliers[2:] = np.abs(multipliers[2:])
+    form = EnclosedForm.of(system, codes, multipliers, 0.0)
+    H, h = forms.own_form([[fmpq(*x.as_integer_ratio()) for x in row] for row in multipliers.tolist()])
+    _inside(H.tolist(), form.H, form.H_rad)
+    _inside([h], form.h[None], form.h_rad[None])
+    # with equations: the same wherever they hold, more elsewhere
+    weight = float(rng.uniform(0.1, 10.0))
+    heavy = EnclosedForm.of(system, codes, multipliers, weight)
+    rows = Equations.of(system, codes)
+    factor = weight / np.maximum(np.einsum("ij,ij->i", rows.a, rows.a), 1e-300)
+    kinds = {0: (0, 1), 1: (4, 5), 2: (4, 2), 3: (4, 3), 5: (4,), 6: ()}
+    given = [forms.row(kind, i) for i, code in enumerate(codes) for kind in kinds[code]]
+    assert len(given) == len(rows.b)
+    order = _matching(given, rows)
+    square = [
+        [x + sum((_exact(factor[k]) * given[m][i] * given[m][j] for m, k in order), fmpq(0)) for j, x in enumerate(row)]
+        for i, row in enumerate(H.tolist())
+    ]
+    turned = [
+        x - 2 * sum((_exact(factor[k]) * given[m][i] * given[m][-1] for m, k in order), fmpq(0))
+        for i, x in enumerate(h)
+    ]
+    _inside(square, heavy.H, heavy.H_rad)
+    _inside([turned], heavy.h[None], heavy.h_rad[None])
+    constant = sum((_exact(factor[k]) * given[m][-1] ** 2 for m, k in order), fmpq(0))
+    assert abs(constant - _exact(heavy.k)) <= _exact(heavy.k_rad)
+
+
+def _exact(value):
+    return fmpq(*float(value).as_integer_ratio())
+
+
+def _inside(exact, mid, rad):
+    for row, centres, radii in zip(exact, mid.tolist(), rad.tolist(), strict=True):
+        for x, centre, radius in zip(row, centres, radii, strict=True):
+            assert abs(x - _exact(centre)) <= _exact(radius)
+
+
+def _matching(given, rows):
+    """Which exact equation each of the enclosed ones is, up to sign."""
+    found = []
+    for k, (a, b) in enumerate(zip(rows.a, rows.b, strict=True)):
+        ours = np.append(a, -b)
+        for m, form in enumerate(given):
+            theirs = np.array([float(int(x.p)) / float(int(x.q)) for x in form])
+            if any(np.allclose(ours, sign * theirs, rtol=1e-9, atol=1e-9 * np.max(np.abs(ours))) for sign in (-1, 1)):
+                found.append((m, k))
+                break
+    assert sorted(m for m, _ in found) == list(range(len(given)))
+    return found
+
+
+# -- forgeries ---------------------------------------------------------------------------------------------------------
+
+
+def proven(seed):
+    problem = slipping(seed)
+    return problem, records_of(enumerate_roots(problem, 1.0).proof)
+
+
+def of_kind(records, kind):
+    return [k for k, record in enumerate(records) if isinstance(record, list) and record[0] == kind]
+
+
+def agrees(problem, records):
+    """Accepted by the checker only if it proves what it says, in rationals."""
+    accepted = verify(problem, proof_of(records)).ok
+    if accepted:
+        check_records(problem, records)
+    return accepted
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_changed_forms_prove_nothing_false(eager, seed):
+    problem, records = proven(seed)
+    assert agrees(problem, records)
+    rng = np.random.default_rng(seed)
+    places = of_kind(records, "q")
+    assert places
+    for _ in range(60):
+        changed = copied(records)
+        k = int(rng.choice(places))
+        part, node = int(rng.integers(2, 6)), int(rng.integers(problem.p))
+        how = int(rng.integers(6))
+        if how == 0:
+            changed[k][part][node] *= float(rng.choice((-1.0, 0.0, 0.5, 2.0, 1e3)))
+        elif how == 1:
+            changed[k][part][node] += float(rng.normal())
+        elif how == 2:
+            changed[k][6] *= float(rng.choice((0.0, 1e-3, 1e3, -1.0)))
+        elif how == 3:
+            digits = list(changed[k][1])
+            digits[node] = str(rng.integers(7))
+            changed[k][1] = "".join(digits)
+        elif how == 4:
+            del changed[k]
+        else:
+            changed.insert(int(rng.integers(1, len(changed) - 1)), copied(changed[k]))
+        agrees(problem, changed)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_leaves_refer_to_forms_that_serve_them(eager, seed):
+    problem, records = proven(seed)
+    for k in of_kind(records, "f"):
+        for back in (0, -1, 10**6, 1.0, "1", None):
+            changed = copied(records)
+            changed[k][1] = back
+            assert not agrees(problem, changed)
+        changed = copied(records)
+        changed[k][1] += 1
+        agrees(problem, changed)
+        changed = copied(records)
+        del changed[k][3]
+        assert not agrees(problem, changed)
+    for k in of_kind(records, "q"):
+        spoilt = ((1, "66"), (1, 666), (1, "66é"), (2, [1.0]), (3, None), (4, [-1.0] * 3), (6, "1"), (6, -1.0))
+        for part, value in spoilt:
+            changed = copied(records)
+            changed[k][part] = value
+            assert not agrees(problem, changed)
+            with pytest.raises(Refused):
+                check_records(problem, changed)
+
+
+def test_forms_are_no_records_in_space():
+    problem = gallery.one_node_3d()
+    records = records_of(enumerate_roots(problem, 0).proof)
+    form = ["q", "6", [1.0], [0.0], [0.5], [0.5], 0.0]
+    assert verify(problem, proof_of(records)).ok
+    assert not verify(problem, proof_of([records[0], form, *records[1:]])).ok
+
+
+def test_an_indefinite_form_excludes_nothing():
+    problem = slipping(1)
+    solvers = Solvers(problem, 1.0, "verified", 1e-9)
+    multipliers = -np.ones((4, 3))
+    form = EnclosedForm.of(solvers.enclosed, (6, 6, 6), np.abs(multipliers) * [[-1], [0], [1], [1]], 0.0)
+    assert form_margin(form, (6, 6, 6), np.array([0]), np.array([1e6])) == -np.inf
+
+
+# -- limits, workers, robustness ---------------------------------------------------------------------------------------
+
+
+def test_a_search_that_is_stopped_after_it_began_again_claims_what_it_has(monkeypatch):
+    problem = gallery.clamped_block(32, 16)
+    monkeypatch.setattr(policy, "NODES", 20)
+    cut = enumerate_roots(problem, 0.3, max_nodes=100)
+    assert not cut.complete
+    report = verify(problem, cut.proof)
+    assert report.ok
+    assert not report.complete
+
+
+def test_workers_make_the_same_proof(monkeypatch):
+    problem = gallery.clamped_block(32, 16)
+    monkeypatch.setattr(policy, "NODES", 5)
+    monkeypatch.setattr(policy, "_MORE", -2.0)
+    found = []
+    for workers in (1, 2):
+        with ThreadPoolExecutor(workers) as executor:
+            found.append(enumerate_roots(problem, 0.3, executor=executor))
+    assert records_of(found[0].proof) == records_of(found[1].proof)
+    assert kinds_of(found[0].proof).count("f")
+    assert verify(problem, found[0].proof).complete
+
+
+def test_the_stability_radius_counts_leaves_with_forms(eager):
+    problem = slipping(2)
+    found = enumerate_roots(problem, 1.0)
+    assert kinds_of(found.proof).count("f")
+    radius = stability_radius(problem, found.proof)
+    assert 0 < radius < 0.5
+    rng = np.random.default_rng(0)
+    S, g = problem.condensed.S, problem.condensed.at(1.0).g
+    for _ in range(20):
+        root = np.sqrt(np.diag(S))
+        change = rng.uniform(-1, 1, size=S.shape)
+        other = S + 0.9 * radius * 0.5 * (change + change.T) * np.outer(root, root)
+        load = g + 0.9 * radius * rng.uniform(-1, 1, size=g.shape) * root * np.max(np.abs(g) / root)
+        F = problem.friction[0] * (1 + 0.9 * radius * rng.uniform(-1, 1, size=problem.p))
+        near = enumerate_roots(from_condensed(other, load, F), 1.0)
+        assert [root.statuses for root in near] == [root.statuses for root in found]
