@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
 
+#: Steps of refinement; forms may be hardly convex.
+_REFINEMENTS = 3
+
 
 @dataclass(frozen=True)
 class Equations:
@@ -226,8 +229,10 @@ def _form_bounds(form: EnclosedForm, y: Array, c: Array, c_rad: Array, errors: f
     size = np.abs(form.h) + np.abs(c) + y_abs @ np.abs(S)
     v_rad = (form.h_rad + c_rad + y_abs @ S_rad + k * size) * (1 + k) * SAFE
     x = v @ form.inverse.T
-    Hx = x @ form.H
-    x += (v - Hx) @ form.inverse.T
+    # until the rest is that of rounding, which its bound covers: a checker, which adds up in another order, then finds
+    # nearly the same
+    for _ in range(_REFINEMENTS):
+        x += (v - x @ form.H) @ form.inverse.T
     Hx = x @ form.H
     x_abs, rest = np.abs(x), v - Hx
     x_square, cross, x_form, first = _dots(x, x), _dots(x, v), _dots(x, Hx), y @ g

@@ -63,6 +63,8 @@ _ROW_NAMES = {
 }
 #: Begins the record of a branching, which is not a leaf.
 _BRANCHING = "b"
+#: How often the error bound of an exclusion with a form is subtracted.
+_FORM_ERRORS = 4.0
 #: Begins the record of a form, which is none either.
 _FORM = "q"
 
@@ -131,7 +133,7 @@ class VerifiedCertifier:
 
     def _excluded_by(self, form: EnclosedForm, codes: Codes, rows: NDArray[np.intp], values: Array) -> bool:
         """The same with a form in place of the energy."""
-        if not form_margin(form, codes, rows, values, errors=2.0) > 0:
+        if not form_margin(form, codes, rows, values, errors=_FORM_ERRORS) > 0:
             self._escalations.refined += 1
             return False
         if form not in self._forms:
