@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.bases import FLAT, HEXAHEDRON
 from enumsol.fem.mesh_checks import check_every_node_is_used, elements, positions
 
 if TYPE_CHECKING:
@@ -18,10 +19,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
 
-#: Corners of the reference hexahedron (0, 1)^3.
-HEXAHEDRON = np.array(
-    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=np.float64
-)
 #: Corners of each facet of a cell of positive volume, counterclockwise as seen from outside; by corners of the cell.
 CELL_FACETS = {
     4: np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
@@ -29,8 +26,6 @@ CELL_FACETS = {
 }
 #: Names of cells, by their corners.
 CELL_NAMES = {4: "tetrahedra", 8: "hexahedra"}
-#: A volume below this share of the cubed extent of its cell is rounding.
-FLAT = 1e-14
 _GAUSS_2 = (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)), (0.5, 0.5)
 _GAUSS_3 = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)), (5 / 18, 8 / 18, 5 / 18)
 
