@@ -69,11 +69,8 @@ def stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) ->
     >>> fem.stiffness(mesh.points, mesh.triangles, lame=(1, 1)).shape
     (12, 12)
     """
-    from skfem.models.elasticity import linear_elasticity  # as in nodal_basis
-
     lam, mu = lame_coefficients(lame, 2)
-    body = nodal_basis(*plane_mesh(points, cells))
-    return body.matrix(linear_elasticity(lam, mu).assemble(body.basis))
+    return nodal_basis(*plane_mesh(points, cells)).stiffness(lam, mu)
 
 
 def plane_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

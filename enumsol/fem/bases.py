@@ -28,7 +28,7 @@ HEXAHEDRON = np.array(
 #: An area or volume below this share of the squared or cubed extent of its cell is rounding.
 FLAT = 1e-14
 #: Degree of the quadrature on facets: tractions and normals of quadratic curved edges.
-_FACET_DEGREE = 5
+FACET_DEGREE = 5
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,18 @@ KINDS = {
     (2, 9): CellKind("quadratic quadrilaterals", "MeshQuad2", "ElementQuad2", 4, 2, 5),
     (3, 4): CellKind("tetrahedra", "MeshTet1", "ElementTetP1", 4, 3, 0, simplex=True),
     (3, 8): CellKind("hexahedra", "MeshHex1", "ElementHex1", 8, 4, 3),
+}
+
+
+#: Nodes of each facet of a cell: corners, in 3D counterclockwise as seen from outside a cell of positive volume, then
+#: the node between them. By dimension and nodes of a cell.
+CELL_FACETS = {
+    (2, 3): np.array([[0, 1], [1, 2], [2, 0]]),
+    (2, 4): np.array([[0, 1], [1, 2], [2, 3], [3, 0]]),
+    (2, 6): np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]]),
+    (2, 9): np.array([[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]]),
+    (3, 4): np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
+    (3, 8): np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]),
 }
 
 
@@ -121,7 +133,20 @@ class NodalBasis:
         """scikit-fem's basis on facets of these numbers."""
         from skfem import FacetBasis  # as below
 
-        return FacetBasis(self.basis.mesh, self.basis.elem, facets=numbers, intorder=_FACET_DEGREE)
+        return FacetBasis(self.basis.mesh, self.basis.elem, facets=numbers, intorder=FACET_DEGREE)
+
+    def stiffness(self, lam: float, mu: float) -> sp.csc_array:
+        """Stiffness of a linear elastic body with these Lame coefficients, in 2D in plane strain."""
+        from skfem import BilinearForm  # as below
+        from skfem.helpers import ddot, div, sym_grad
+        from skfem.models.elasticity import linear_elasticity
+
+        def energy(u: Any, v: Any, _: Any) -> Any:
+            # as linear_elasticity has it, which makes an identity of every quadrature point and is slow in 3D
+            return lam * div(u) * div(v) + 2.0 * mu * ddot(sym_grad(u), sym_grad(v))
+
+        plane = self.dofs.shape[1] == 2
+        return self.matrix((linear_elasticity(lam, mu) if plane else BilinearForm(energy)).assemble(self.basis))
 
     def volume_forces(self, density: Floats) -> Floats:
         """Nodal forces (N, dimension) of a force per volume that is constant on each cell, (M, dimension)."""
@@ -181,3 +206,11 @@ def _check_jacobians(mesh: Any, basis: Any) -> None:
             f"cells row {int(np.argmax(wrong))} is flat, folded or inside out at a corner; expected proper cells with "
             "their nodes in the order of VTK or gmsh"
         )
+
+
+def boundary_facets(dimension: int, cells: Integers) -> Integers:
+    """Facets (k, m) that belong to one cell only; in 3D counterclockwise as seen from outside the body."""
+    local = CELL_FACETS[dimension, cells.shape[1]]
+    facets = cells[:, local].reshape(-1, local.shape[1])
+    _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(facets[np.sort(first[count == 1])])

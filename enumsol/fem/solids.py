@@ -5,7 +5,7 @@ Degrees of freedom before constraints are ``3 node + component``.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -49,17 +49,8 @@ def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, floa
     >>> fem.solid_stiffness(mesh.points, mesh.cells, lame=(1, 1)).shape
     (36, 36)
     """
-    from skfem import BilinearForm  # as below
-    from skfem.helpers import ddot, div, sym_grad
-
     lam, mu = lame_coefficients(lame, 3)
-
-    def energy(u: Any, v: Any, _: Any) -> Any:
-        # as skfem.models.elasticity has it, which makes an identity of every quadrature point and is slow
-        return lam * div(u) * div(v) + 2.0 * mu * ddot(sym_grad(u), sym_grad(v))
-
-    body = nodal_basis(*solid_mesh(points, cells))
-    return body.matrix(BilinearForm(energy).assemble(body.basis))
+    return nodal_basis(*solid_mesh(points, cells)).stiffness(lam, mu)
 
 
 def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -> NDArray[np.float64]:
