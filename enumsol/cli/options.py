@@ -49,7 +49,7 @@ ProblemArgument = Annotated[
     str,
     typer.Argument(
         metavar="PROBLEM",
-        help="A file (.npz, .h5), a directory of MatrixMarket files, or gallery:NAME.",
+        help="A file (.npz, .h5, .toml), a directory of MatrixMarket files, or gallery:NAME.",
         show_default=False,
     ),
 ]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from enumsol.fem.assembly import body_forces, contact_problem, edge_forces, stiffness, triangle_stiffness
 from enumsol.fem.mesh_checks import lame
 from enumsol.fem.meshes import Mesh, edges_along, rectangle, trapezoid
-from enumsol.fem.parts import PlaneMesh
+from enumsol.fem.parts import PartedMesh
 
 if TYPE_CHECKING:
     from enumsol.fem.basis_problems import basis_contact_problem
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Mesh",
     "MeshNorms",
-    "PlaneMesh",
+    "PartedMesh",
     "SolidMesh",
     "basis_contact_problem",
     "blocks",

@@ -146,7 +146,9 @@ class NodalBasis:
             return lam * div(u) * div(v) + 2.0 * mu * ddot(sym_grad(u), sym_grad(v))
 
         plane = self.dofs.shape[1] == 2
-        return self.matrix((linear_elasticity(lam, mu) if plane else BilinearForm(energy)).assemble(self.basis))
+        form = linear_elasticity(lam, mu) if plane else BilinearForm(energy)
+        with np.errstate(over="ignore", invalid="ignore"):  # problems refuse what is not finite
+            return self.matrix(form.assemble(self.basis))
 
     def volume_forces(self, density: Floats) -> Floats:
         """Nodal forces (N, dimension) of a force per volume that is constant on each cell, (M, dimension)."""

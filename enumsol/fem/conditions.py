@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from enumsol.array_checks import real_array, short_vector
 from enumsol.checks import finite_number, one_of, shown
-from enumsol.errors import InvalidArgumentError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.restrained import Supports
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 #: Positions in a plane of symmetry may differ from it by this share of the extent of the body.
 _SAME = 1e-9
+#: Of the energies of rigid motions in the supports, the least as a share of the largest that holds a body.
+_HELD = 1e-10
 #: What stands for a component that is not given.
 FREE = "free"
 #: Numbers that an obstacle takes in 2D and 3D: a point and a normal, or a centre and a radius.
@@ -133,6 +136,50 @@ class Held:
         self._values[nodes, component] = value
 
 
+def check_held(mesh: PartedMesh, supports: Supports, springs: sp.csc_array) -> None:
+    """Refuse a body, or a part of it that hangs together with no other, that can move as a rigid body.
+
+    Raises
+    ------
+    InvalidProblemError
+        It says where.
+    """
+    points, cells = mesh.points, mesh.cells
+    first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
+    links = (np.ones(first.size), (first.ravel(), cells[:, 1:].ravel()))
+    _, piece_of = connected_components(sp.coo_array(links, shape=(len(points),) * 2), directed=False)
+    largest = np.max(springs.diagonal(), initial=0.0)
+    hold = sp.csc_array(sp.diags_array(supports.fixed.ravel().astype(np.float64)))
+    if largest > 0:
+        hold = sp.csc_array(hold + springs / largest)
+    for piece in range(piece_of.max() + 1):
+        inside = piece_of == piece
+        motions = _rigid_motions(points, inside)
+        values = np.linalg.eigvalsh(motions.T @ (hold @ motions))
+        if values[0] <= _HELD * max(values[-1], np.finfo(np.float64).tiny):
+            whole = (
+                "the body" if np.all(inside) else f"the part of the body around {points[np.argmax(inside)].tolist()}"
+            )
+            raise InvalidProblemError(
+                f"{whole} is free to move as a rigid body; expected clamp, symmetry, displacement or spring to hold "
+                "it (contact alone does not)"
+            )
+
+
+def _rigid_motions(points: Floats, inside: NDArray[np.bool_]) -> Floats:
+    """Displacements (d N, 3) or (d N, 6) by translations and rotations of nodes, in units of their extent."""
+    own = points[inside]
+    places = np.where(inside[:, None], (points - own.mean(axis=0)) / np.max(np.ptp(own, axis=0)), 0.0)
+    count, dimension = points.shape
+    motions = [np.outer(inside, axis) for axis in np.eye(dimension)]
+    for one in range(dimension):
+        for two in range(one):
+            turned = np.zeros((count, dimension))
+            turned[:, one], turned[:, two] = -places[:, two], places[:, one]
+            motions.append(turned)
+    return np.stack([motion.ravel() for motion in motions], axis=1)
+
+
 # -- loads and springs -----------------------------------------------------------------------------------------------
 
 
@@ -144,7 +191,7 @@ def part_forces(body: NodalBasis, mesh: PartedMesh, loads: Any, pressures: Any, 
     total, dimension = np.zeros(mesh.points.shape), mesh.points.shape[1]
     for part, value in by_part(loads, f"load{slope}").items():
         traction = short_vector(value, f"load{slope} of {part}", dimension)
-        form = LinearForm(lambda v, _, t=traction: dot(t[:, None, None] + 0 * v.value, v))
+        form = LinearForm(lambda v, _, t=traction: dot(t[:, None, None], v))
         total += body.vectors(form.assemble(body.on_facets(body.facet_numbers(mesh.part(part), part))))
     for part, value in by_part(pressures, f"pressure{slope}").items():
         pressure = finite_number(value, f"pressure{slope} of {part}")

@@ -16,7 +16,7 @@ from enumsol.checks import file_path, shown
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fem.bases import boundary_facets
 from enumsol.fem.mesh_checks import positions
-from enumsol.fem.parts import PlaneMesh
+from enumsol.fem.parts import PartedMesh
 
 if TYPE_CHECKING:
     import os
@@ -68,7 +68,7 @@ _DAMAGE = (
 )
 
 
-def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -> PlaneMesh | SolidMesh:
+def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -> PartedMesh:
     """Mesh of a body in 2D or 3D with its named parts, from a file that meshio reads or from a meshio.Mesh.
 
     In 2D the cells are triangles or quadrilaterals, of first or of second order (6 or 9 nodes), in 3D tetrahedra or
@@ -101,7 +101,7 @@ def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -
     >>> from enumsol import fem
     >>> points, cells = [[0, 0], [1, 0], [1, 1], [0, 1]], [("quad", [[0, 1, 2, 3]]), ("line", [[0, 1], [1, 2]])]
     >>> fem.read_mesh(meshio.Mesh(points, cells, cell_sets={"floor": [None, [0]], "wall": [None, [1]]}))
-    PlaneMesh with 4 nodes
+    PartedMesh with 4 nodes
       cells   1 quadrilaterals
       facets  floor (1), wall (1)
     """
@@ -134,7 +134,7 @@ def read_solid(source: str | os.PathLike[str] | Any, groups: str | None = None) 
     return cast("SolidMesh", _read(source, groups, 3))
 
 
-def _read(source: Any, groups: str | None, dimension: int | None) -> PlaneMesh | SolidMesh:
+def _read(source: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     try:
         import meshio  # an extra
     except ImportError as error:
@@ -161,7 +161,7 @@ def _read(source: Any, groups: str | None, dimension: int | None) -> PlaneMesh |
         raise InvalidArgumentError(f"{place}: {error}") from error
 
 
-def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PlaneMesh | SolidMesh:
+def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     kinds = list(dict.fromkeys(block.type for block in mesh.cells))
     if dimension is None:
         spatial = any(kind.startswith(("tetra", "hexa", "wedge", "pyramid", "polyhedron")) for kind in kinds)
@@ -204,9 +204,9 @@ def _made(
     cells: Integers,
     facets: dict[str, Integers],
     sets: dict[str, Integers],
-) -> PlaneMesh | SolidMesh:
+) -> PartedMesh:
     if dimension == 2:
-        return PlaneMesh(nodes, cells, MappingProxyType(facets), MappingProxyType(sets))
+        return PartedMesh(nodes, cells, MappingProxyType(facets), MappingProxyType(sets))
     from enumsol.fem.solid_meshes import SolidMesh  # not for plane meshes
 
     return SolidMesh(nodes, cells, MappingProxyType(facets), MappingProxyType(sets))

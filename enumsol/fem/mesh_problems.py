@@ -16,7 +16,7 @@ from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.assembly import plane_problem
 from enumsol.fem.bases import nodal_basis
 from enumsol.fem.basis_problems import nodal_normals, pressed, space_problem
-from enumsol.fem.conditions import Held, Obstacle, by_part, names_of, part_forces, part_springs
+from enumsol.fem.conditions import Held, Obstacle, by_part, check_held, names_of, part_forces, part_springs
 from enumsol.fem.mesh_checks import lame, unit_vectors
 from enumsol.fem.mesh_files import read_mesh
 from enumsol.fem.parts import PartedMesh
@@ -77,7 +77,7 @@ def mesh_problem(
 
     Parameters
     ----------
-    mesh : PlaneMesh, SolidMesh, path, or meshio.Mesh
+    mesh : PartedMesh, path, or meshio.Mesh
         What `read_mesh` returns or takes. Parts are called by their names.
     young, poisson : float
         Young's modulus [force / length^2] and Poisson's ratio [-].
@@ -117,14 +117,15 @@ def mesh_problem(
     Returns
     -------
     ContactProblem or ContactProblem3D
-        With ``coordinates`` and, as ``node_ids``, the numbers of the nodes in the mesh; in 3D also with ``mesh``.
+        With ``coordinates`` and, as ``node_ids``, the numbers of the nodes in the mesh; in 3D also with ``areas`` and,
+        unless a part is displaced, ``mesh``.
 
     Raises
     ------
     InvalidArgumentError
         The mesh cannot be used, a part does not exist (those that do are listed), or an argument is not of its form.
     InvalidProblemError
-        The body is free to move as a rigid body, or the data of the problem are not admissible.
+        Nothing but contact holds the body or a part of it, or the data of the problem are not admissible.
 
     Examples
     --------
@@ -148,7 +149,7 @@ def mesh_problem(
     if body_force is not None:
         density = short_vector(body_force, "body_force", dimension)
         forces = forces + body.volume_forces(np.tile(density, (len(parted.cells), 1)))
-    slope = part_forces(body, parted, load_slope, pressure_slope, "_slope") if load_slope or pressure_slope else None
+    slope = part_forces(body, parted, load_slope, pressure_slope, "_slope")
     more: dict[str, Any] = {
         "gap": gaps + finite_number(gap, "gap"),
         "node_ids": nodes.nodes.tolist(),
@@ -156,20 +157,15 @@ def mesh_problem(
         **_coefficients(dimension, friction, friction2),
     }
     if dimension == 3:
-        more |= _space_fields(parted, facets, nodes)
-    A = sp.csc_array(body.stiffness(*lame(young, poisson, plane)) + part_springs(body, parted, spring))
+        more |= _space_fields(parted, facets, nodes, displaced=bool(np.any(held.supports.values)))
+    springs = part_springs(body, parted, spring)
+    check_held(parted, held.supports, springs)
+    A = sp.csc_array(body.stiffness(*lame(young, poisson, plane)) + springs)
     build = plane_problem if dimension == 2 else space_problem
     dofs, tangents = plain_dofs(parted.points.shape), _axes(nodes, axis, dimension)
-    try:
-        return build(
-            A, forces.ravel(), None if slope is None else slope.ravel(), dofs, nodes, held.supports, tangents, **more
-        )
-    except InvalidProblemError as error:
-        if "rigid body" not in str(error):
-            raise
-        raise InvalidProblemError(
-            f"{error} by clamp, symmetry, displacement or spring; contact alone does not hold a body"
-        ) from error
+    return build(
+        A, forces.ravel(), None if slope is None else slope.ravel(), dofs, nodes, held.supports, tangents, **more
+    )
 
 
 def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProblem3D:
@@ -337,8 +333,8 @@ def _axes(nodes: ContactNodes, axis: Any, dimension: int) -> Any:
     return first, np.cross(nodes.normals, first)
 
 
-def _space_fields(mesh: PartedMesh, facets: Integers, nodes: ContactNodes) -> dict[str, Any]:
-    """Areas and the mesh, of which degrees of freedom are left is not known yet."""
+def _space_fields(mesh: PartedMesh, facets: Integers, nodes: ContactNodes, *, displaced: bool) -> dict[str, Any]:
+    """Areas, and the mesh as a function of the degrees of freedom that are left."""
     from enumsol.body3d import BodyMesh  # not for plane bodies
     from enumsol.fem.solid_geometry import outward
     from enumsol.fem.surfaces import ContactSurface
@@ -347,5 +343,5 @@ def _space_fields(mesh: PartedMesh, facets: Integers, nodes: ContactNodes) -> di
     areas = np.bincount(surface.facets.ravel(), surface.shares.ravel(), len(mesh.points))
     return {
         "areas": areas[nodes.nodes],
-        "mesh": lambda left: BodyMesh(mesh.points, mesh.cells, left, surface.facets),
+        "mesh": None if displaced else lambda left: BodyMesh(mesh.points, mesh.cells, left, surface.facets),
     }

@@ -21,16 +21,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PartedMesh:
-    """A mesh of one kind of cell with named parts: sets of facets, and sets of nodes.
+    """A mesh of one kind of cell with named parts: sets of facets, and sets of nodes. In 3D it is a `SolidMesh`.
 
     Attributes
     ----------
-    points : (N, dimension) array
+    points : (N, d) array
         Positions of the nodes [length].
     cells : (M, k) int array
-        Nodes of each cell.
+        Nodes of each cell, in the order of VTK and gmsh: its corners, then those on its edges, then that inside. In 2D
+        3 or 6 nodes of triangles, 4 or 9 of quadrilaterals; in 3D 4 of tetrahedra, 8 of hexahedra.
     facets : mapping of names to (k, m) int arrays
-        Nodes of the facets of parts of the boundary.
+        Nodes of the facets of parts of the boundary: corners, then, on edges of second order, the node between them.
     node_sets : mapping of names to (k,) int arrays
         Nodes of parts that are given by nodes.
     """
@@ -86,19 +87,3 @@ class PartedMesh:
         if self.node_sets:
             lines.append("  nodes   " + ", ".join(f"{name} ({len(part)})" for name, part in self.node_sets.items()))
         return "\n".join(lines)
-
-
-class PlaneMesh(PartedMesh):
-    """A plane mesh of triangles or quadrilaterals with named sets of edges.
-
-    Attributes
-    ----------
-    points : (N, 2) array
-        Positions of the nodes [length].
-    cells : (M, 3), (M, 4), (M, 6) or (M, 9) int array
-        Nodes of each cell: corners, then those on edges, then that inside.
-    facets : mapping of names to (k, 2) or (k, 3) int arrays
-        Ends of the edges of parts of the boundary, and for cells of second order the node between them.
-    node_sets : mapping of names to (k,) int arrays
-        Nodes of parts that are given by nodes.
-    """
