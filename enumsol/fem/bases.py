@@ -175,6 +175,7 @@ def nodal_basis(nodes: Floats, cells: Integers, degree: int = 0) -> NodalBasis:
     """
     # scikit-fem takes a while to import and is needed for meshes only
     import skfem
+    from skfem.quadrature import get_quadrature
 
     dimension = nodes.shape[1]
     kind = KINDS[dimension, cells.shape[1]]
@@ -184,23 +185,23 @@ def nodal_basis(nodes: Floats, cells: Integers, degree: int = 0) -> NodalBasis:
     if kind.corners == 8:  # scikit-fem has an order of its own
         places = skfem.ElementHex1.doflocs
         rows = rows[:, [int(np.argmin(np.linalg.norm(HEXAHEDRON - place, axis=1))) for place in places]]
+    element = getattr(skfem, kind.element)()
+    order = max(kind.degree, degree)
+    _check_jacobians(nodes[rows], element, get_quadrature(element, order)[0])
     mesh = getattr(skfem, kind.mesh)(np.ascontiguousarray(nodes.T), np.ascontiguousarray(rows.T))
-    element = skfem.ElementVector(getattr(skfem, kind.element)())
-    with np.errstate(all="ignore"):  # flat cells are refused below
-        basis = skfem.Basis(mesh, element, intorder=max(kind.degree, degree))
-        _check_jacobians(mesh, basis)
+    basis = skfem.Basis(mesh, skfem.ElementVector(element), intorder=order)
     dofs = np.empty(nodes.shape, dtype=np.int64)
     local = basis.element_dofs.reshape(cells.shape[1], dimension, len(cells))
     dofs[rows.T] = np.swapaxes(local, 1, 2)
     return NodalBasis(basis, dofs, np.unique(cells[:, : kind.corners]))
 
 
-def _check_jacobians(mesh: Any, basis: Any) -> None:
+def _check_jacobians(corners: Floats, element: Any, quadrature: Floats) -> None:
     """Refuse cells whose area or volume vanishes or changes its sign at a corner or a quadrature point."""
-    places = np.concatenate([mesh.init_refdom().p, basis.X], axis=1)
-    values = np.asarray(mesh.mapping().detDF(places)).reshape(mesh.nelements, -1)
-    corners = mesh.doflocs[:, mesh.t]
-    extents = np.max(np.ptp(corners, axis=1), axis=0) ** mesh.dim()
+    places = np.concatenate([element.refdom.init_refdom()[0], quadrature], axis=1)
+    slopes = [np.broadcast_to(element.lbasis(places, i)[1], places.shape) for i in range(corners.shape[1])]
+    values = np.linalg.det(np.einsum("mai,akq->mqik", corners, np.stack(slopes)))
+    extents = np.max(np.ptp(corners, axis=1), axis=1) ** corners.shape[2]
     wrong = np.min(np.abs(values), axis=1) <= FLAT * extents
     wrong |= np.abs(np.sum(np.sign(values), axis=1)) < values.shape[1]
     if np.any(wrong):

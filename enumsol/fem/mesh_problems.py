@@ -163,9 +163,8 @@ def mesh_problem(
     A = sp.csc_array(body.stiffness(*lame(young, poisson, plane)) + springs)
     build = plane_problem if dimension == 2 else space_problem
     dofs, tangents = plain_dofs(parted.points.shape), _axes(nodes, axis, dimension)
-    return build(
-        A, forces.ravel(), None if slope is None else slope.ravel(), dofs, nodes, held.supports, tangents, **more
-    )
+    slopes = slope.ravel() if np.any(slope) else None
+    return build(A, forces.ravel(), slopes, dofs, nodes, held.supports, tangents, **more)
 
 
 def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProblem3D:
