@@ -9,7 +9,7 @@ EDGES = {3: ((0, 1), (1, 2), (2, 0)), 4: ((0, 1), (1, 2), (2, 3), (3, 0))}
 
 
 def grid(nx, ny, kind, length=1.0, height=1.0, shake=0.0, seed=0):
-    """A rectangle of triangles (3, 6) or quadrilaterals (4, 9) with sides bottom, top, left, right; inside distorted."""
+    """A rectangle of triangles (3, 6) or quadrilaterals (4, 9) with four sides, distorted inside."""
     x, y = np.meshgrid(np.linspace(0, length, nx + 1), np.linspace(0, height, ny + 1))
     points = np.stack([x.ravel(), y.ravel()], axis=1)
     number = np.arange(len(points)).reshape(ny + 1, nx + 1)

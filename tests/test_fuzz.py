@@ -46,7 +46,21 @@ load.floor = [0.0, -1e-3]
 displacement.lid = ["free", 0.0]
 obstacle.plane = [0.0, -0.1, 0.0, 1.0]
 """
-TOKENS = [b"-1", b"0", b"1e308", b"nan", b"999999999999", b"4294967296", b"\0", b"\xff", b"[", b'"', b"\n\n", b"=", b"$End"]
+TOKENS = [
+    b"-1",
+    b"0",
+    b"1e308",
+    b"nan",
+    b"999999999999",
+    b"4294967296",
+    b"\0",
+    b"\xff",
+    b"[",
+    b'"',
+    b"\n\n",
+    b"=",
+    b"$End",
+]
 
 
 def damaged(content, seed):

@@ -37,7 +37,18 @@ $Elements
 6 3 2 1 1 2 3 6 5
 $EndElements
 """
-OPTIONS = ("--contact", "floor", "--young", "2.5", "--poisson", "0.25", "--spring", "lid=1,0.5", "--load", "lid=0.2,-0.5")
+OPTIONS = (
+    "--contact",
+    "floor",
+    "--young",
+    "2.5",
+    "--poisson",
+    "0.25",
+    "--spring",
+    "lid=1,0.5",
+    "--load",
+    "lid=0.2,-0.5",
+)
 TOML = """mesh = "body.msh"
 contact = "floor"
 young = 2.5
@@ -61,7 +72,9 @@ def run(capsys, *arguments):
 
 
 def test_from_a_mesh_to_the_roots(here, capsys):
-    status, out, err = run(capsys, "solve", "body.msh", *OPTIONS, "--alpha", "0.5", "-o", "body.npz", "--json", "r.json")
+    status, out, err = run(
+        capsys, "solve", "body.msh", *OPTIONS, "--alpha", "0.5", "-o", "body.npz", "--json", "r.json"
+    )
     assert status == 0
     assert "RootSet at alpha = 0.5: 1 root" in out
     assert out.endswith("complete: yes (proven)\n")
@@ -125,14 +138,20 @@ def test_options_of_supports_and_obstacles(here, capsys):
         (("solve", "body.msh"), "young, poisson, contact are missing"),
         (("solve", "body.msh", *OPTIONS[:4]), "poisson is missing"),
         (("solve", "body.msh", *OPTIONS), "--alpha is missing, on which friction or load depend"),
-        (("solve", "body.msh", *OPTIONS, "--contact", "flor", "--alpha", 1), "no facets named 'flor'; expected one of flo"),
+        (
+            ("solve", "body.msh", *OPTIONS, "--contact", "flor", "--alpha", 1),
+            "no facets named 'flor'; expected one of flo",
+        ),
         (("solve", "body.msh", *OPTIONS, "--load", "lid=1,2", "--alpha", 1), "--load is given twice for lid"),
         (("solve", "body.msh", *OPTIONS, "--load", "top", "--alpha", 1), "--load is top; expected NAME=NUMBERS"),
         (("solve", "body.msh", *OPTIONS, "--pressure", "lid=1,2", "--alpha", 1), "--pressure is 1,2; expected numbers"),
         (("solve", "body.msh", *OPTIONS, "--pressure", "lid=x", "--alpha", 1), "--pressure is x; expected numbers"),
         (("solve", "body.msh", *OPTIONS, "--gap", "nan", "--alpha", 1), "gap is nan; expected a finite number"),
         (("solve", "body.msh", *OPTIONS, "--obstacle", "wall=1", "--alpha", 1), "obstacle is 'wall'; expected one of"),
-        (("solve", "body.toml", "--young", "1", "--alpha", 1), "--young is given beside body.toml, which has all options"),
+        (
+            ("solve", "body.toml", "--young", "1", "--alpha", 1),
+            "--young is given beside body.toml, which has all options",
+        ),
         (("solve", "nowhere.msh", *OPTIONS, "--alpha", 1), "nowhere.msh: meshio cannot read it"),
         (("solve", "nowhere.toml", "--alpha", 1), "nowhere.toml: there is no such file"),
         (("roots", "body.tml", "--alpha", 1), "did you mean body.toml?"),

@@ -59,7 +59,9 @@ def test_the_same_as_mesh_problem(kind):
     )  # fmt: skip
     order = np.argsort(one.coordinates[:, 0])
     assert np.allclose(one.coordinates[order], two.coordinates)
-    rows = [np.where(np.abs(rows) > 0.5, sign, 0.0) for rows, sign in ((two.Bn.toarray(), -1.0), (two.Bt.toarray(), 1.0))]
+    rows = [
+        np.where(np.abs(rows) > 0.5, sign, 0.0) for rows, sign in ((two.Bn.toarray(), -1.0), (two.Bt.toarray(), 1.0))
+    ]
     two = enumsol.ContactProblem(two.A, *rows, two.f, friction=0.4, gap=0.01 * two.coordinates[:, 0])
     found = [enumsol.enumerate_roots(problem, 0) for problem in (one, two)]
     assert [len(roots) for roots in found] == [1, 1]
@@ -110,7 +112,9 @@ def test_what_is_refused():
         with pytest.raises(InvalidArgumentError, match=message):
             fem.basis_contact_problem(**(good | changes))
 
-    refused("basis is a CellBasis whose degrees of freedom are not vectors", basis=skfem.Basis(basis.mesh, basis.elem.elem))
+    refused(
+        "basis is a CellBasis whose degrees of freedom are not vectors", basis=skfem.Basis(basis.mesh, basis.elem.elem)
+    )
     refused("basis is a int", basis=3)
     refused(r"stiffness has shape .*; expected \(50, 50\), as the basis has", stiffness=np.eye(3))
     refused("contact is 'floor'; .* the name of a boundary .found left, bottom, right, top", contact="floor")

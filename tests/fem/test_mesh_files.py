@@ -101,7 +101,12 @@ def test_gmsh_version_2(tmp_path):
     assert mesh.nodes("corner").tolist() == [1]
     assert "nodes   corner (1)" in repr(mesh)
     problem = fem.mesh_problem(
-        str(tmp_path / "body.msh"), young=1, poisson=0, contact="floor", clamp="lid", displacement={"corner": (0, "free")}
+        str(tmp_path / "body.msh"),
+        young=1,
+        poisson=0,
+        contact="floor",
+        clamp="lid",
+        displacement={"corner": (0, "free")},
     )
     assert problem.node_ids == (0, 1)
 
@@ -133,9 +138,7 @@ def test_node_sets_of_abaqus(tmp_path):
 
 def test_sets_of_a_mesh_in_memory():
     cells = [("triangle", [[0, 1, 2], [0, 2, 3]]), ("line", [[0, 1], [1, 2]])]
-    mesh = fem.read_mesh(
-        meshio.Mesh(SQUARE, cells, cell_sets={"wall": [None, [1]]}, point_sets={"two": [0, 2]})
-    )
+    mesh = fem.read_mesh(meshio.Mesh(SQUARE, cells, cell_sets={"wall": [None, [1]]}, point_sets={"two": [0, 2]}))
     assert [*mesh.facets] == ["wall"]
     assert mesh.nodes("two").tolist() == [0, 2]
     assert [*fem.read_mesh(meshio.Mesh(SQUARE, cells)).facets] == ["boundary"]
@@ -151,7 +154,11 @@ def test_sets_of_a_mesh_in_memory():
         (SQUARE, [QUAD, ("triangle", [[0, 1, 2]]), LINE], r"type quad and triangle; .*Mesh\.SubdivisionAlgorithm = 1"),
         (SQUARE, [("quad8", [[0, 1, 2, 3] * 2]), LINE], r"type quad8; .*Mesh\.SecondOrderIncomplete = 0"),
         (SQUARE, [QUAD, ("line3", [[0, 1, 2]])], "the mesh has line3 cells beside quad; expected facets of type line"),
-        (np.c_[SQUARE, [0, 0, 0, 1]], [QUAD, LINE], "plane cells and z from 0 to 1; expected a plane mesh with the same"),
+        (
+            np.c_[SQUARE, [0, 0, 0, 1]],
+            [QUAD, LINE],
+            "plane cells and z from 0 to 1; expected a plane mesh with the same",
+        ),
         (SQUARE, [("quad", [[0, 1, 2, 9]]), LINE], "the cells name nodes from 0 to 9"),
         (SQUARE, [("triangle", [[0, 1, 2]]), ("line", [[0, 3]])], "facets of boundary have nodes of no cell"),
         (SQUARE, [QUAD, ("line", [[0, 77]])], r"boundary names nodes from 0 to 77; expected them in 0 \.\. 3"),

@@ -1,4 +1,4 @@
-"""From meshes with named parts to problems: closed forms, the same body turned or halved, matrices put together by hand."""
+"""From meshes with named parts to problems: closed forms, the same body turned or halved, matrices by hand."""
 
 import numpy as np
 import pytest
@@ -145,7 +145,7 @@ def test_a_turned_body_has_the_same_roots(kind):
     data = {**STEEL, "contact": ["left", "right"], "spring": {"top": (0.02, 0.02)}, "gap": -5e-4}
     plain = fem.mesh_problem(wedge, **data, load={"top": (1e-4, 1e-3)})
     turned = fem.mesh_problem(
-        moved(wedge, lambda p: p @ turn.T + [3, -2]), **data, load={"top": tuple(turn @ [1e-4, 1e-3])}
+        moved(wedge, lambda p: p @ turn.T + np.array([3, -2])), **data, load={"top": tuple(turn @ [1e-4, 1e-3])}
     )
     before, after = (enumsol.enumerate_roots(problem, 2.5, max_nodes=4000) for problem in (plain, turned))
     assert before.complete
@@ -200,8 +200,8 @@ def test_the_same_as_contact_problem():
         forces=forces, forces_slope=slope, gap=0.01, friction=(0.1, 0.5),
     )  # fmt: skip
     two = fem.mesh_problem(
-        mesh.parted(), **STEEL, contact="bottom", clamp="left", load={"top": (0.3, -1)}, load_slope={"right": (-0.1, 0)},
-        gap=0.01, friction=(0.1, 0.5),
+        mesh.parted(), **STEEL, contact="bottom", clamp="left", load={"top": (0.3, -1)},
+        load_slope={"right": (-0.1, 0)}, gap=0.01, friction=(0.1, 0.5),
     )  # fmt: skip
     assert (abs(one.A - two.A)).max() == 0
     assert np.allclose(one.f, two.f, rtol=1e-14, atol=1e-17)
@@ -308,7 +308,10 @@ GOOD = {**STEEL, "contact": "bottom", "clamp": "top"}
         ({"pressure": {"left": "a"}}, "pressure of left is 'a'; expected a finite number"),
         ({"displacement": {"left": (1,)}}, r"displacement of left is \(1,\); expected 2 components"),
         ({"displacement": {"left": ("fre", 0)}}, "displacement of left is 'fre'; expected a finite number"),
-        ({"displacement": {"left": (0.1, 0)}}, r"left moves node 6 by 0\.1 in x, and another part that shares it by 0;"),
+        (
+            {"displacement": {"left": (0.1, 0)}},
+            r"left moves node 6 by 0\.1 in x, and another part that shares it by 0;",
+        ),
         ({"displacement": {"bottom": (0.1, "free")}}, "contact node 0 is held or displaced in some components only"),
         ({"symmetry": "bottom"}, "normals at the plane of symmetry row 0 is zero|contact node 0 is held"),
         ({"spring": {"left": (-1, 0)}}, r"spring of left is \(-1, 0\); expected stiffnesses >= 0"),
@@ -358,7 +361,9 @@ def test_what_nothing_holds_is_named(holds):
 def test_a_part_that_hangs_together_with_no_other():
     one, two = grid(1, 1, 4), grid(1, 1, 4)
     mesh = fem.parts.PartedMesh(
-        np.concatenate([one.points, two.points + [5, 0]]), np.concatenate([one.cells, two.cells + 4]), one.facets
+        np.concatenate([one.points, two.points + np.array([5, 0])]),
+        np.concatenate([one.cells, two.cells + 4]),
+        one.facets,
     )
     with pytest.raises(InvalidProblemError, match=r"the part of the body around \[5.0, 0.0\] is free to move"):
         fem.mesh_problem(mesh, **STEEL, contact="bottom", clamp="top")
@@ -376,5 +381,7 @@ def test_a_folded_boundary_has_no_normal():
     points = [[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]]
     cells = [[0, 1, 4], [1, 2, 4], [2, 3, 4]]
     mesh = fem.parts.PartedMesh(np.array(points), np.array(cells), {"cut": np.array([[3, 4], [4, 0]])})
-    problem = fem.mesh_problem(mesh, **STEEL, contact="cut", displacement={"cut": ("free", "free")}, spring={"cut": (1, 1)})
+    problem = fem.mesh_problem(
+        mesh, **STEEL, contact="cut", displacement={"cut": ("free", "free")}, spring={"cut": (1, 1)}
+    )
     assert problem.p == 3
