@@ -34,6 +34,18 @@ $Elements
 3 3 2 1 1 1 2 3 4
 $EndElements
 """
+ABAQUS = """*NODE
+1, 0., 0.
+2, 1., 0.
+3, 1., 1.
+4, 0., 1.
+*ELEMENT, TYPE=CPS4, ELSET=BODY
+1, 1, 2, 3, 4
+*NSET, NSET=floor
+1, 2
+*NSET, NSET=lid
+3, 4
+"""
 OPTIONS = {"young": 2.5, "poisson": 0.25, "contact": "floor", "clamp": "lid"}
 TOML = """mesh = "square.msh"
 young = 2.5
@@ -121,11 +133,13 @@ def _meshes():
     )
 
 
-@pytest.fixture(params=["square22.msh", "binary.msh", "square.vtu"])
+@pytest.fixture(params=["square22.msh", "binary.msh", "square.vtu", "square.inp"])
 def mesh_file(request, tmp_path):
     place = tmp_path / request.param
     if request.param == "square22.msh":
         place.write_text(SQUARE)
+    elif request.param == "square.inp":
+        place.write_text(ABAQUS)
     elif request.param == "binary.msh":
         _meshes().write(place, file_format="gmsh22", binary=True)
     else:

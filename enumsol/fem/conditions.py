@@ -221,9 +221,10 @@ def part_springs(body: NodalBasis, mesh: PartedMesh, springs: Any) -> sp.csc_arr
                 )
             )
             blocks[:, :, k] += body.vectors(form.assemble(facets))
-    return (
-        sp.csc_array(sp.block_diag(list(blocks), format="csc")) if springs else sp.csc_array((count * dimension,) * 2)
-    )
+    shape = (count * dimension, count * dimension)
+    K = sp.csc_array(sp.bsr_array((blocks, np.arange(count), np.arange(count + 1)), shape=shape))
+    K.eliminate_zeros()
+    return K
 
 
 # -- obstacles -------------------------------------------------------------------------------------------------------

@@ -59,6 +59,7 @@ _DAMAGE = (
     LookupError,
     MemoryError,
     OSError,
+    RuntimeError,
     SyntaxError,
     SystemExit,
     TypeError,
@@ -140,7 +141,7 @@ def _read(source: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     except ImportError as error:
         raise MissingDependencyError.of("Meshes in files", "meshio", "meshes") from error
     if isinstance(source, meshio.Mesh):
-        return _parted(source, groups, dimension)
+        return _checked(source, groups, dimension)
     place = file_path(source, "source", "the name of a file or a meshio.Mesh")
     said = io.StringIO()
     try:
@@ -156,9 +157,19 @@ def _read(source: Any, groups: str | None, dimension: int | None) -> PartedMesh:
             f"{place}: meshio cannot read it ({reason}); expected a complete file of a format that it knows"
         ) from error
     try:
-        return _parted(mesh, groups, dimension)
+        return _checked(mesh, groups, dimension)
     except InvalidArgumentError as error:
         raise InvalidArgumentError(f"{place}: {error}") from error
+
+
+def _checked(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
+    try:
+        return _parted(mesh, groups, dimension)
+    except InvalidArgumentError:
+        raise
+    except (IndexError, KeyError, OverflowError, TypeError, ValueError) as error:  # what meshio does not check
+        reason = " ".join(str(error).split()).rstrip(".")
+        raise InvalidArgumentError(f"the arrays of the mesh do not fit together ({reason})") from error
 
 
 def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
