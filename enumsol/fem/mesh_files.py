@@ -17,6 +17,7 @@ from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fem.bases import boundary_facets
 from enumsol.fem.mesh_checks import positions
 from enumsol.fem.parts import PartedMesh
+from enumsol.texts import shortened
 
 if TYPE_CHECKING:
     import os
@@ -154,7 +155,7 @@ def _read(source: Any, groups: str | None, dimension: int | None) -> PartedMesh:
             reason = f"{type(error).__name__}: {reason}"
         reason = (reason or said.getvalue()).strip().split("\n")[0].rstrip(" .") or type(error).__name__
         raise InvalidArgumentError(
-            f"{place}: meshio cannot read it ({reason}); expected a complete file of a format that it knows"
+            f"{place}: meshio cannot read it ({shortened(reason)}); expected a complete file of a format that it knows"
         ) from error
     try:
         return _checked(mesh, groups, dimension)
@@ -168,7 +169,7 @@ def _checked(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh
     except InvalidArgumentError:
         raise
     except (IndexError, KeyError, OverflowError, TypeError, ValueError) as error:  # what meshio does not check
-        reason = " ".join(str(error).split()).rstrip(".")
+        reason = shortened(str(error)).rstrip(".")
         raise InvalidArgumentError(f"the arrays of the mesh do not fit together ({reason})") from error
 
 

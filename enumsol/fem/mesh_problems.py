@@ -21,6 +21,7 @@ from enumsol.fem.mesh_checks import lame, unit_vectors
 from enumsol.fem.mesh_files import read_mesh
 from enumsol.fem.parts import PartedMesh
 from enumsol.fem.restrained import ContactNodes, movable, plain_dofs
+from enumsol.texts import shortened
 
 if TYPE_CHECKING:
     import os
@@ -213,7 +214,7 @@ def _toml(place: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(content.decode("utf-8"))
     except (ValueError, RecursionError) as error:  # UnicodeDecodeError and TOMLDecodeError, too
-        reason = " ".join(str(error).split())[:200]
+        reason = shortened(str(error))
         raise InvalidArgumentError(
             f"it is no TOML file ({reason}); expected lines such as contact = 'floor'"
         ) from error

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 _LARGEST_VECTOR = 50_000_000
 #: Numbers to the end of a file; without backtracking.
 _NUMBERS = re.compile(
-    rb"(?:\s++|(?:[+-]?(?:\d++\.?\d*+|\.\d++)(?:e[+-]?\d++)?|[+-]?(?:nan|inf(?:inity)?))(?=\s|\Z))*+\Z", re.IGNORECASE
+    rb"\s*+(?:[+-]?(?:\d++(?:\.\d*+)?+(?:e[+-]?\d++)?+|\.\d++(?:e[+-]?\d++)?+|nan|inf(?:inity)?+)(?:\s++|\Z))*+\Z",
+    re.IGNORECASE,
 )
 _LABELS = "node_ids.json"
 #: Digits after which a float64 is read back as itself.
