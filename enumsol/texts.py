@@ -24,3 +24,9 @@ def html_table(heads: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     head = "".join(f"<th>{escape(name)}</th>" for name in heads)
     body = "".join("<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def shortened(text: str, most: int = 200) -> str:
+    """A text of another package in one line, cut off where it is longer: some quote whole files."""
+    line = " ".join(text.split())
+    return line if len(line) <= most else line[: most - 3] + "..."

@@ -28,7 +28,7 @@ def main(arguments: list[str]) -> None:
     known = questions()
     name, *rest = arguments or [""]
     if name not in known:
-        print("\n".join([__doc__, "", *(f"{study:22}{question}" for study, question in known.items())]))
+        print("\n".join([__doc__, "", *(f"{study:25}{question}" for study, question in known.items())]))
         sys.exit(f"\nthere is no study {name!r}" if name.strip("-") not in ("", "h", "help") else 0)
     study = import_module(f"{name}.run")
     parser = argparse.ArgumentParser(

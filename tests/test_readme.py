@@ -12,7 +12,9 @@ from enumsol.cli import main
 
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-COMMANDS = [shlex.split(line)[1:] for line in re.findall(r"^    (?:\.venv/bin/)?(enumsol .*)$", README, re.MULTILINE)]
+LINES = re.findall(r"^    (?:\.venv/bin/)?(enumsol (?:.*\\\n)*.*)$", README, re.MULTILINE)
+#: That on a mesh stands in docs/from_a_mesh.md, too, and is tested there.
+COMMANDS = [shlex.split(line)[1:] for line in LINES if "MESH.msh" not in line]
 
 
 @pytest.fixture
@@ -31,10 +33,19 @@ def test_enumeration(elsewhere):
     assert (elsewhere / "roots.proof").stat().st_size > 1000
 
 
-def test_branches_and_continuation(elsewhere):
-    assert len(BLOCKS) == 4
+def test_a_mesh():
     seen = {}
     exec(BLOCKS[1], seen)
+    assert seen["problem"].p == 6
+    text = (Path(__file__).parent.parent / "docs" / "from_a_mesh.md").read_text(encoding="utf-8")
+    (line,) = [line for line in LINES if "MESH.msh" in line]
+    assert line.replace("MESH.msh", "punch.msh").replace("problem.npz", "punch.npz") in text
+
+
+def test_branches_and_continuation(elsewhere):
+    assert len(BLOCKS) == 5
+    seen = {}
+    exec(BLOCKS[2], seen)
     graph, path = seen["graph"], seen["path"]
     assert graph.complete
     assert graph.multiplicity_at(3.5) == 5
@@ -49,7 +60,7 @@ def test_branches_and_continuation(elsewhere):
 
 def test_three_dimensions_and_fixed_points(elsewhere):
     seen = {}
-    exec(BLOCKS[2], seen)
+    exec(BLOCKS[3], seen)
     assert seen["limit"].converged
     assert seen["weakening"].converged
     assert (elsewhere / "block.vtu").stat().st_size > 1000
@@ -57,7 +68,7 @@ def test_three_dimensions_and_fixed_points(elsewhere):
 
 def test_all_solutions_in_three_dimensions(elsewhere):
     seen = {}
-    exec(BLOCKS[3], seen)
+    exec(BLOCKS[4], seen)
     assert [str(root.statuses[0]) for root in seen["roots"]] == ["stick", "slip", "open"]
     assert seen["roots"].complete
 

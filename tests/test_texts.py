@@ -3,7 +3,7 @@
 import pytest
 
 import enumsol
-from enumsol.texts import counted
+from enumsol.texts import counted, shortened
 
 
 @pytest.mark.parametrize(
@@ -26,3 +26,10 @@ def test_printed_results_count_one_of_a_kind():
     path = enumsol.follow(problem, graph.starting_points()[1], -1, interval=(0, 10))
     assert [line for line in repr(path).splitlines() if line.endswith("of them 1 fold")]
     assert "1 arcs" not in repr(graph)
+
+
+def test_texts_of_other_packages_are_one_short_line():
+    assert shortened("a\n  b") == "a b"
+    long = shortened("x" * 5000)
+    assert len(long) == 200
+    assert long.endswith("x...")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from enumsol.cli import audit, fixed_point, follow, gallery, graph, report, roots, table, verify
+from enumsol.cli import audit, fixed_point, follow, gallery, graph, report, roots, solve, table, verify
 from enumsol.cli.common import ExitStatus
 from enumsol.cli.quiet import loud_again
 from enumsol.cli.streams import guarded_streams
@@ -28,6 +28,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.command("solve")(solve.solve)
 app.command("roots")(roots.roots)
 app.command("table")(table.table)
 app.command("graph")(graph.graph)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 _GALLERY = "gallery:"
+#: Ending of files that describe a problem by a mesh and what acts on its parts.
+TOML = ".toml"
 #: As many processes as Windows lets one wait for.
 _MOST_ON_WINDOWS = 61
 
@@ -43,7 +45,7 @@ class ExitStatus(enum.IntEnum):
 
 
 def load_problem(name: str) -> ContactProblem:
-    """The problem in 2D in a file, or the one of the gallery for ``gallery:NAME``.
+    """The problem in 2D in a file or made of a mesh, or the one of the gallery for ``gallery:NAME``.
 
     Raises
     ------
@@ -69,6 +71,10 @@ def load_any_problem(name: str) -> ContactProblem | ContactProblem3D:
         from enumsol import gallery  # numpy and scipy: not for --help
 
         return gallery.get(name.removeprefix(_GALLERY)).build()
+    if name.endswith(TOML) and Path(name).is_file():
+        from enumsol.fem import read_mesh_problem  # as above
+
+        return read_mesh_problem(name)
     if not Path(name).exists() and (close := _close_names(name)):
         raise InvalidArgumentError(f"{name}: there is no such file or directory; did you mean {', '.join(close)}?")
     from enumsol.io import read_problem  # as above
@@ -85,7 +91,7 @@ def _close_names(name: str) -> list[str]:
 
     place = Path(name)
     try:
-        beside = [file.name for file in place.parent.iterdir() if file.suffix in SUFFIXES or file.is_dir()]
+        beside = [file.name for file in place.parent.iterdir() if file.suffix in (*SUFFIXES, TOML) or file.is_dir()]
     except OSError:
         beside = []  # no such directory either
     files = [str(place.with_name(file)) for file in difflib.get_close_matches(place.name, beside, cutoff=0.75)]

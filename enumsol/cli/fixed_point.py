@@ -130,7 +130,7 @@ def _vtu_writer(body: ContactProblem | ContactProblem3D, name: str, file: str) -
         raise InvalidArgumentError(f"--vtu is {file!r}; expected a name that ends in .vtu")
     if find_spec("meshio") is None:
         raise MissingDependencyError(
-            '--vtu needs meshio, which is not installed; install it with: pip install "enumsol[solids]"'
+            '--vtu needs meshio, which is not installed; install it with: pip install "enumsol[meshes]"'
         )
     return lambda found, path: write_vtu(body, found, path)
 

@@ -53,9 +53,11 @@ def problem_names(incomplete: str) -> list[str]:
     from glob import escape, glob  # for a shell that completes only
 
     from enumsol import gallery
+    from enumsol.cli.common import TOML
     from enumsol.io import SUFFIXES
 
-    files = [name for name in sorted(glob(escape(incomplete) + "*")) if isdir(name) or name.endswith(SUFFIXES)]
+    kinds = (*SUFFIXES, TOML)
+    files = [name for name in sorted(glob(escape(incomplete) + "*")) if isdir(name) or name.endswith(kinds)]
     # a shell that takes the colon for the end of a word asks for what follows it
     names = [f"gallery:{name}" for name in gallery.GALLERY]
     return files + [name for name in (*names, *gallery.GALLERY) if incomplete and name.startswith(incomplete)]
@@ -65,7 +67,7 @@ ProblemArgument = Annotated[
     str,
     typer.Argument(
         metavar="PROBLEM",
-        help="A file (.npz, .h5), a directory of MatrixMarket files, or gallery:NAME.",
+        help="A file (.npz, .h5, .toml), a directory of MatrixMarket files, or gallery:NAME.",
         autocompletion=problem_names,
         show_default=False,
     ),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 
@@ -46,18 +46,25 @@ HowExact = Annotated[
 HowSearched = Annotated[Method, typer.Option(help="Pruned search; or all 4^p selections, fast or exact, for small p.")]
 
 
+StopAfter = Annotated[int | None, count("Stop at N roots; 2 answers: is it unique?")]
+TimeLimit = Annotated[float | None, seconds("Stop after so long.")]
+Jobs = Annotated[int, count("Processes to search with (tree).")]
+ProofFile = Annotated[str | None, file("--proof", "Write the proof (verified).")]
+CsvFile = Annotated[str | None, csv("a root and contact node")]
+
+
 def roots(
     problem: ProblemArgument,
     alpha: AtAlpha,
     arithmetic: HowExact = "verified",
     method: HowSearched = "tree",
-    stop_after: Annotated[int | None, count("Stop at N roots; 2 answers: is it unique?")] = None,
+    stop_after: StopAfter = None,
     max_nodes: MaxNodes = None,
-    time_limit: Annotated[float | None, seconds("Stop after so long.")] = None,
-    jobs: Annotated[int, count("Processes to search with (tree).")] = 1,
-    proof_file: Annotated[str | None, file("--proof", "Write the proof (verified).")] = None,
+    time_limit: TimeLimit = None,
+    jobs: Jobs = 1,
+    proof_file: ProofFile = None,
     json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("a root and contact node")] = None,
+    csv_file: CsvFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
@@ -69,22 +76,45 @@ def roots(
     2 on bad input; 71 when a process of --jobs died, 130 on Ctrl-C, both after printing what was found so far; 74 when
     a result could not be written, 141 when nobody read it any more.
     """
+    if jobs > 1 and method != "tree":
+        raise InvalidArgumentError(f"--jobs is {jobs} with the exhaustive method; expected 1 job, or the method tree")
+    check_files(proof_file, json_file, csv_file)
+    limits: dict[str, Any] = {"stop_after": stop_after, "max_nodes": max_nodes, "time_limit": time_limit}
+    options = {"arithmetic": arithmetic, "method": method, "proof_path": proof_file, **limits}
+    value = parse_alpha(alpha)
+    answer(problem, load_any_problem(problem), value, jobs, options, json_file, csv_file)
+
+
+def check_files(proof_file: str | None, json_file: str | None, csv_file: str | None) -> None:
+    """Refuse results that cannot be written.
+
+    Raises
+    ------
+    InvalidArgumentError
+        As `check_outputs`, or the proof is to go to stdout.
+    """
     check_outputs(json=json_file, csv=csv_file)
     if proof_file == "-":
         raise InvalidArgumentError("--proof is -, but a proof is a binary file; expected the name of a file")
-    if jobs > 1 and method != "tree":
-        raise InvalidArgumentError(f"--jobs is {jobs} with the exhaustive method; expected 1 job, or the method tree")
     check_writable(proof_file, "--proof")
-    value, body = parse_alpha(alpha), load_any_problem(problem)
-    limits = {"stop_after": stop_after, "max_nodes": max_nodes, "time_limit": time_limit}
-    found, ended = so_far(
-        lambda: _search(body, value, jobs, arithmetic=arithmetic, method=method, proof_path=proof_file, **limits)
-    )
+
+
+def answer(
+    name: str,
+    problem: ContactProblem | ContactProblem3D,
+    alpha: Alpha,
+    jobs: int,
+    options: dict[str, Any],
+    json_file: str | None,
+    csv_file: str | None,
+) -> NoReturn:
+    """Search with the options of `enumerate_roots`, write what was found, and end the command."""
+    found, ended = so_far(lambda: _search(problem, alpha, jobs, **options))
     deliver(
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: root_report.as_text(found),
-        content=lambda: root_report.as_json(found, problem),
+        content=lambda: root_report.as_json(found, name),
         frame=found.to_frame,
     )
     if csv_file is not None and found.families:

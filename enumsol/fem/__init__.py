@@ -1,19 +1,25 @@
-"""Meshes and matrices, assembled by scikit-fem: bodies in plane strain and in 3D as contact problems.
+"""Meshes and matrices, assembled by scikit-fem: bodies in 2D and in 3D as contact problems.
 
-Plane strain (P1 triangles): `rectangle`, `trapezoid`, `stiffness`, `edge_forces`, `body_forces`, `contact_problem`. In
-3D (P1 tetrahedra, Q1 hexahedra): `box`, `read_solid`, `solid_stiffness`, `facet_forces`, `solid_body_forces`,
-`solid_contact_problem`, `h1_norms`; these are loaded when first used.
+From a mesh with named parts, of a file or in memory: `read_mesh`, `mesh_problem`, `read_mesh_problem`, `lame`. From a
+basis of scikit-fem: `basis_contact_problem`. From arrays, in the plane: `rectangle`, `trapezoid`, `stiffness`,
+`edge_forces`, `body_forces`, `contact_problem`; in 3D: `box`, `solid_stiffness`, `facet_forces`, `solid_body_forces`,
+`solid_contact_problem` (with multipliers on patches, too), `h1_norms`. What a plane body does not need is loaded when
+first used.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from enumsol.fem.assembly import body_forces, contact_problem, edge_forces, stiffness, triangle_stiffness
+from enumsol.fem.mesh_checks import lame
 from enumsol.fem.meshes import Mesh, edges_along, rectangle, trapezoid
+from enumsol.fem.parts import PartedMesh
 
 if TYPE_CHECKING:
+    from enumsol.fem.basis_problems import basis_contact_problem
+    from enumsol.fem.mesh_files import read_mesh, read_solid
+    from enumsol.fem.mesh_problems import mesh_problem, read_mesh_problem
     from enumsol.fem.norms import MeshNorms, h1_norms
-    from enumsol.fem.solid_files import read_solid
     from enumsol.fem.solid_meshes import SolidMesh, blocks, box
     from enumsol.fem.solid_problems import solid_contact_problem
     from enumsol.fem.solids import facet_forces, solid_body_forces, solid_stiffness
@@ -21,7 +27,9 @@ if TYPE_CHECKING:
 __all__ = [
     "Mesh",
     "MeshNorms",
+    "PartedMesh",
     "SolidMesh",
+    "basis_contact_problem",
     "blocks",
     "body_forces",
     "box",
@@ -30,6 +38,10 @@ __all__ = [
     "edges_along",
     "facet_forces",
     "h1_norms",
+    "lame",
+    "mesh_problem",
+    "read_mesh",
+    "read_mesh_problem",
     "read_solid",
     "rectangle",
     "solid_body_forces",
@@ -41,8 +53,10 @@ __all__ = [
 ]
 
 _HOMES = {
+    "basis_problems": ("basis_contact_problem",),
+    "mesh_problems": ("mesh_problem", "read_mesh_problem"),
+    "mesh_files": ("read_mesh", "read_solid"),
     "norms": ("MeshNorms", "h1_norms"),
-    "solid_files": ("read_solid",),
     "solid_meshes": ("SolidMesh", "blocks", "box"),
     "solid_problems": ("solid_contact_problem",),
     "solids": ("facet_forces", "solid_body_forces", "solid_stiffness"),

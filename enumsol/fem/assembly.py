@@ -1,5 +1,6 @@
-"""A plane-strain body of P1 triangles on a rigid foundation: stiffness by scikit-fem, loads, and the ContactProblem.
+"""A plane body on a rigid foundation: stiffness by scikit-fem, loads, and the ContactProblem.
 
+Cells are triangles or quadrilaterals of first or second order, with 3, 6, 4 or 9 nodes in the order of VTK and gmsh.
 Degrees of freedom before constraints are ``2 node + component``. A problem is put together from plain arrays::
 
     loads = edge_forces(points, top_edges, (0.3, -1.0))
@@ -17,8 +18,8 @@ import scipy.sparse as sp
 
 from enumsol.body2d import PlaneMesh
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.bases import FLAT, nodal_basis
 from enumsol.fem.mesh_checks import (
-    check_every_node_is_used,
     elements,
     held_mask,
     lame_coefficients,
@@ -29,26 +30,27 @@ from enumsol.fem.mesh_checks import (
     unit_vectors,
     vectors_of_all,
 )
-from enumsol.fem.numbering import by_nodes, gathered
+from enumsol.fem.numbering import gathered
+from enumsol.fem.restrained import ContactNodes, Supports, check_axes, movable, plain_dofs, restrained
 from enumsol.problem import ContactProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
 
-def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]) -> sp.csc_array:
+def stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) -> sp.csc_array:
     """Stiffness of the unconstrained body in plane strain, (2N, 2N), assembled by scikit-fem.
 
     Parameters
     ----------
     points : (N, 2) array_like
         Positions of the nodes [length].
-    triangles : (M, 3) array_like of int
-        Nodes of each triangle, in any orientation.
+    cells : (M, 3), (M, 4), (M, 6) or (M, 9) array_like of int
+        Nodes of each cell: its corners, then those on its edges, then that inside; edges of 6 or 9 may be curved.
     lame : (float, float)
-        Lame coefficients l, m [force / length^2].
+        Lame coefficients l, m [force / length^2]; for plane stress those of `lame`.
 
     Returns
     -------
@@ -58,7 +60,8 @@ def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]
     Raises
     ------
     InvalidArgumentError
-        The mesh is not valid (shapes, node numbers, a triangle without area) or the coefficients are not admissible.
+        The mesh is not valid (shapes, node numbers, a cell that is flat, folded or inside out) or the coefficients are
+        not admissible.
 
     Examples
     --------
@@ -67,19 +70,20 @@ def stiffness(points: ArrayLike, triangles: ArrayLike, lame: tuple[float, float]
     >>> fem.stiffness(mesh.points, mesh.triangles, lame=(1, 1)).shape
     (12, 12)
     """
-    # scikit-fem takes a while to import and is needed for meshes only
-    from skfem import Basis, ElementTriP1, ElementVector, MeshTri
-    from skfem.models.elasticity import linear_elasticity
-
     lam, mu = lame_coefficients(lame, 2)
+    return nodal_basis(*plane_mesh(points, cells)).stiffness(lam, mu)
+
+
+def plane_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points (N, 2) and cells as arrays.
+
+    Raises
+    ------
+    InvalidArgumentError
+        They are not of the form that `stiffness` takes.
+    """
     nodes = positions(points, 2)
-    cells = elements(triangles, "triangles", 3, len(nodes))
-    _check_areas(nodes, cells)
-    check_every_node_is_used(cells, len(nodes), "triangles", "triangle")
-    # sorted here, so that scikit-fem neither renumbers nor logs
-    mesh = MeshTri(np.ascontiguousarray(nodes.T), np.ascontiguousarray(np.sort(cells, axis=1).T))
-    basis = Basis(mesh, ElementVector(ElementTriP1()), intorder=0)
-    return by_nodes(linear_elasticity(lam, mu).assemble(basis), basis)
+    return nodes, elements(cells, "cells", (3, 4, 6, 9), len(nodes))
 
 
 def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> NDArray[np.float64]:
@@ -104,16 +108,18 @@ def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> NDArray
     [2.0, 1.0, -1.5, -0.5, -0.5, -0.5]
     """
     lam, mu = lame_coefficients(lame, 2)
-    nodes, cells = positions(corners, 2), np.array([[0, 1, 2]])
+    nodes = positions(corners, 2)
     if nodes.shape != (3, 2):
         raise InvalidArgumentError(f"corners has shape {nodes.shape}; expected (3, 2)")
-    _check_areas(nodes, cells)
+    doubled = float(abs(np.linalg.det(nodes[1:] - nodes[0])))
+    if doubled <= FLAT * np.max(np.ptp(nodes, axis=0)) ** 2:
+        raise InvalidArgumentError("corners span no area; expected a proper triangle")
     opposite = np.roll(nodes, -2, axis=0) - np.roll(nodes, -1, axis=0)
     # gradients of the shape functions times twice the area, up to a sign that all share
     g = np.stack([-opposite[:, 1], opposite[:, 0]], axis=1)
     K = lam * np.einsum("ai,bj->aibj", g, g) + mu * np.einsum("aj,bi->aibj", g, g)
     K += mu * np.einsum("ab,ij->aibj", g @ g.T, np.eye(2))
-    return np.asarray(K.reshape(6, 6) / (2.0 * abs(float(_double_areas(nodes, cells)[0]))))
+    return np.asarray(K.reshape(6, 6) / (2.0 * doubled))
 
 
 def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> NDArray[np.float64]:
@@ -123,10 +129,10 @@ def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> NDA
     ----------
     points : (N, 2) array_like
         Positions of the nodes [length].
-    edges : (k, 2) array_like of int
-        The two nodes of each loaded edge.
+    edges : (k, 2) or (k, 3) array_like of int
+        The two ends of each loaded edge, and of an edge of second order, which may be curved, the node between them.
     traction : (2,) or (k, 2) array_like
-        Force per length of edge in x and y, one for all or one for each edge [force / length].
+        Force per length of edge in x and y, one for all or one for each edge [force / length, per unit thickness].
 
     Raises
     ------
@@ -140,23 +146,33 @@ def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> NDA
     [[0.0, -1.0], [0.0, -1.0]]
     """
     nodes = positions(points, 2)
-    ends = elements(edges, "edges", 2, len(nodes))
+    ends = elements(edges, "edges", (2, 3), len(nodes))
     density = vectors_of_all(traction, "traction", (len(ends), 2))
+    if ends.shape[1] == 3:
+        return gathered(ends, _quadratic_shares(nodes[ends]), density, len(nodes))
     lengths = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
     return gathered(ends, np.tile(0.5 * lengths[:, None], 2), density, len(nodes))
 
 
-def body_forces(points: ArrayLike, triangles: ArrayLike, density: ArrayLike) -> NDArray[np.float64]:
-    """Nodal forces of a body force constant on each triangle, (N, 2) [force, per unit thickness].
+def _quadratic_shares(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Integrals (k, 3) of the shape functions over quadratic edges with nodes (k, 3, 2), by three Gauss points."""
+    shares = np.zeros(corners.shape[:2])
+    for place, weight in ((-np.sqrt(0.6), 5 / 9), (0.0, 8 / 9), (np.sqrt(0.6), 5 / 9)):
+        shapes = np.array([place * (place - 1) / 2, place * (place + 1) / 2, 1 - place**2])
+        along = np.array([place - 0.5, place + 0.5, -2 * place]) @ corners
+        shares += weight * np.linalg.norm(along, axis=1)[:, None] * shapes
+    return shares
+
+
+def body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -> NDArray[np.float64]:
+    """Nodal forces of a body force constant on each cell, (N, 2) [force, per unit thickness].
 
     Parameters
     ----------
-    points : (N, 2) array_like
-        Positions of the nodes [length].
-    triangles : (M, 3) array_like of int
-        Nodes of each triangle.
+    points, cells
+        The mesh, see `stiffness`.
     density : (2,) or (M, 2) array_like
-        Force per area in x and y, one for all or one for each triangle [force / length^2].
+        Force per area in x and y, one for all or one for each cell [force / length^2, per unit thickness].
 
     Raises
     ------
@@ -169,16 +185,18 @@ def body_forces(points: ArrayLike, triangles: ArrayLike, density: ArrayLike) -> 
     >>> fem.body_forces([[0, 0], [3, 0], [0, 2]], [[0, 1, 2]], density=(0, -1)).tolist()
     [[0.0, -1.0], [0.0, -1.0], [0.0, -1.0]]
     """
-    nodes = positions(points, 2)
-    cells = elements(triangles, "triangles", 3, len(nodes))
-    values = vectors_of_all(density, "density", (len(cells), 2))
-    third = np.abs(_double_areas(nodes, cells)) / 6.0
-    return gathered(cells, np.tile(third[:, None], 3), values, len(nodes))
+    nodes, bodies = plane_mesh(points, cells)
+    values = vectors_of_all(density, "density", (len(bodies), 2))
+    if bodies.shape[1] == 3:
+        corners = nodes[bodies]
+        third = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
+        return gathered(bodies, np.tile(third[:, None], 3), values, len(nodes))
+    return nodal_basis(nodes, bodies).volume_forces(values)
 
 
 def contact_problem(
     points: ArrayLike,
-    triangles: ArrayLike,
+    cells: ArrayLike,
     lame: tuple[float, float],
     *,
     contact: ArrayLike,
@@ -193,14 +211,17 @@ def contact_problem(
     slip_offset: ArrayLike = 0.0,
     node_ids: Sequence[Any] | None = None,
 ) -> ContactProblem:
-    """Contact problem of a plane-strain P1 body; the held degrees of freedom are eliminated.
+    """Contact problem of a plane body; the held degrees of freedom are eliminated.
+
+    `mesh_problem` does the same by the names of parts, and finds normals and gaps.
 
     Parameters
     ----------
-    points, triangles, lame
+    points, cells, lame
         Mesh and Lame coefficients, see `stiffness`.
     contact : (p,) array_like of int
-        The contact nodes, in the order of the rows of Bn and Bt. None of them may be held.
+        The contact nodes, in the order of the rows of Bn and Bt. None of them may be held, but for a component across
+        the normal, as on a plane of symmetry: that of a node stays in the problem, uncoupled and at rest.
     normals : (2,) or (p, 2) array_like
         Directions out of the body at the contact nodes, one for all or one each; scaled to length one.
     tangents : (2,) or (p, 2) array_like or None
@@ -240,41 +261,54 @@ def contact_problem(
     >>> problem.n, problem.p
     (24, 4)
     """
-    nodes = positions(points, 2)
-    free = np.flatnonzero(~held_mask(held, nodes.shape).ravel())
+    nodes, bodies = plane_mesh(points, cells)
+    supports = Supports.held(held_mask(held, nodes.shape))
     touching = node_numbers(contact, "contact", len(nodes))
-    A = stiffness(nodes, triangles, lame)
+    if np.any(entirely := np.all(supports.fixed[touching], axis=1)):
+        node = int(touching[np.argmax(entirely)])
+        raise InvalidArgumentError(f"contact names node {node}, which is held; expected free nodes only")
+    A = stiffness(nodes, bodies, lame)
     if springs is not None:
         A = sp.csc_array(A + sp.diags_array(spring_stiffnesses(springs, nodes.shape).ravel()))
     normal = unit_vectors(vectors_of_all(normals, "normals", (len(touching), 2)), "normals")
-    tangent = _tangents(tangents, normal)
-    return ContactProblem(
-        sp.csc_array(A[free][:, free]),
-        _contact_rows(touching, normal, free, len(nodes)),
-        _contact_rows(touching, tangent, free, len(nodes)),
-        nodal_vectors(forces, "forces", nodes.shape)[free],
+    return plane_problem(
+        A,
+        nodal_vectors(forces, "forces", nodes.shape),
+        None if forces_slope is None else nodal_vectors(forces_slope, "forces_slope", nodes.shape),
+        plain_dofs(nodes.shape),
+        movable(touching, normal, supports),
+        supports,
+        tangents,
         gap=gap,
         friction=friction,
-        load_slope=None if forces_slope is None else nodal_vectors(forces_slope, "forces_slope", nodes.shape)[free],
         slip_offset=slip_offset,
         node_ids=[int(node) for node in touching] if node_ids is None else node_ids,
         coordinates=nodes[touching],
-        mesh=PlaneMesh.of_dofs(nodes, triangles, free),
+        mesh=lambda left: PlaneMesh.of_dofs(nodes, bodies, left),
     )
 
 
-def _contact_rows(
-    contact: NDArray[np.int64], direction: NDArray[np.float64], free: NDArray[np.int64], count: int
-) -> sp.csr_array:
-    p = len(contact)
-    column = np.full(2 * count, -1, dtype=np.int64)
-    column[free] = np.arange(len(free))
-    where = column[np.stack([2 * contact, 2 * contact + 1], axis=1)]
-    if np.any(where < 0):
-        node = int(contact[np.argmax(np.any(where < 0, axis=1))])
-        raise InvalidArgumentError(f"contact names node {node}, which is held; expected free nodes only")
-    rows = np.repeat(np.arange(p), 2)
-    return sp.csr_array((direction.ravel(), (rows, where.ravel())), shape=(p, len(free)))
+def plane_problem(
+    A: sp.csc_array,
+    forces: NDArray[np.float64],
+    forces_slope: NDArray[np.float64] | None,
+    dofs: NDArray[np.int64],
+    contact: ContactNodes,
+    supports: Supports,
+    tangents: ArrayLike | None,
+    mesh: Callable[[NDArray[np.int64]], PlaneMesh] | None = None,
+    **more: Any,
+) -> ContactProblem:
+    """The problem of a body with these contact nodes; ``more`` as in `ContactProblem`, the rest as in `restrained`.
+
+    ``mesh`` makes what the problem keeps of its mesh from the degrees of freedom that are left.
+    """
+    tangent = _tangents(tangents, contact.normals)
+    check_axes(contact, (tangent,))
+    body = restrained(A, forces, forces_slope, dofs, supports, contact.apart)
+    Bn, Bt = (body.rows(contact, direction, dofs) for direction in (contact.normals, tangent))
+    kept = None if mesh is None else mesh(body.left)
+    return ContactProblem(body.A, Bn, Bt, body.f, load_slope=body.load_slope, mesh=kept, **more)
 
 
 def _tangents(tangents: ArrayLike | None, normal: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -286,18 +320,3 @@ def _tangents(tangents: ArrayLike | None, normal: NDArray[np.float64]) -> NDArra
         k = int(np.argmax(skew))
         raise InvalidArgumentError(f"tangents row {k} is not perpendicular to normals row {k}; expected right angles")
     return tangent
-
-
-def _double_areas(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.float64]:
-    first, second = nodes[cells[:, 1]] - nodes[cells[:, 0]], nodes[cells[:, 2]] - nodes[cells[:, 0]]
-    return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
-
-
-def _check_areas(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
-    areas = np.abs(_double_areas(nodes, cells))
-    corners = nodes[cells]
-    sides = np.max(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2), axis=1)
-    flat = areas <= 1e-14 * sides**2  # relative to the longest side: no area beyond rounding
-    if np.any(flat):
-        k = int(np.argmax(flat))
-        raise InvalidArgumentError(f"triangles row {k} has no area; expected proper triangles")

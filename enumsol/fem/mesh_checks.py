@@ -5,12 +5,12 @@ Each function gives the value in a plain type and raises InvalidArgumentError fo
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from enumsol.array_checks import plain_array, real_array, short_vector
-from enumsol.checks import shown
+from enumsol.checks import finite_number, one_of, positive_number, shown
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -77,6 +77,36 @@ def lame_coefficients(value: Any, dimension: int) -> tuple[float, float]:
             f"lame is {shown(value)}; expected Lame coefficients (l, m) with m > 0 and {bulk} > 0"
         )
     return lam, mu
+
+
+def lame(young: float, poisson: float, plane: Literal["strain", "stress"] = "strain") -> tuple[float, float]:
+    """Lame coefficients l, m of a material, as the functions of this package take them [force / length^2].
+
+    Parameters
+    ----------
+    young : float
+        Young's modulus, > 0 [force / length^2].
+    poisson : float
+        Poisson's ratio, above -1 and below 0.5 [-].
+    plane : {"strain", "stress"}
+        For plane stress l is the one with which the formulas of plane strain give the stiffness of a thin plate.
+
+    Raises
+    ------
+    InvalidArgumentError
+        One is not of that form.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> fem.lame(young=2.5, poisson=0.25)
+    (1.0, 1.0)
+    """
+    E, nu = positive_number(young, "young"), finite_number(poisson, "poisson")
+    if not -1 < nu < 0.5:
+        raise InvalidArgumentError(f"poisson is {nu:g}; expected Poisson's ratio, above -1 and below 0.5")
+    stress = one_of(plane, "plane", ("strain", "stress")) == "stress"
+    return E * nu / ((1 + nu) * (1 - (nu if stress else 2 * nu))), E / (2 * (1 + nu))
 
 
 def held_mask(held: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:

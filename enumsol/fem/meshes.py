@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from enumsol.array_checks import plain_array
 from enumsol.checks import positive_integer, positive_number
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.parts import PartedMesh
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -38,6 +40,11 @@ class Mesh:
     top: NDArray[np.int64]
     left: NDArray[np.int64]
     right: NDArray[np.int64]
+
+    def parted(self) -> PartedMesh:
+        """The same with its sides as parts named bottom, top, left and right, for `mesh_problem`."""
+        sides = {name: edges_along(getattr(self, name)) for name in ("bottom", "top", "left", "right")}
+        return PartedMesh(self.points, self.triangles, MappingProxyType(sides))
 
 
 def rectangle(nx: int, ny: int, length: float = 1.0, height: float = 1.0) -> Mesh:

@@ -12,8 +12,7 @@ import scipy.sparse as sp
 from enumsol.array_checks import real_array
 from enumsol.checks import instance_of
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.numbering import by_nodes
-from enumsol.fem.solids import vector_basis
+from enumsol.fem.bases import nodal_basis
 from enumsol.problem3d import ContactProblem3D
 
 if TYPE_CHECKING:
@@ -100,8 +99,8 @@ def h1_norms(problem: ContactProblem3D) -> MeshNorms:
         return dot(u, v) + ddot(grad(u), grad(v))
 
     # products of linear functions have degree two: exact on tetrahedra and parallelepipeds
-    basis = vector_basis(problem.mesh.points, problem.mesh.cells, degree=2)
-    G = by_nodes(BilinearForm(product).assemble(basis), basis)
+    body = nodal_basis(problem.mesh.points, problem.mesh.cells, degree=2)
+    G = body.matrix(BilinearForm(product).assemble(body.basis))
     dofs = problem.mesh.dofs
     return MeshNorms(sp.csc_array(G[dofs][:, dofs]), problem.Bn, problem.areas)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.bases import FLAT, HEXAHEDRON, KINDS, boundary_facets
 from enumsol.fem.mesh_checks import check_every_node_is_used, elements, positions
 
 if TYPE_CHECKING:
@@ -18,19 +19,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
 
-#: Corners of the reference hexahedron (0, 1)^3.
-HEXAHEDRON = np.array(
-    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=np.float64
-)
-#: Corners of each facet of a cell of positive volume, counterclockwise as seen from outside; by corners of the cell.
-CELL_FACETS = {
-    4: np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
-    8: np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]),
-}
-#: Names of cells, by their corners.
-CELL_NAMES = {4: "tetrahedra", 8: "hexahedra"}
-#: A volume below this share of the cubed extent of its cell is rounding.
-FLAT = 1e-14
 _GAUSS_2 = (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)), (0.5, 0.5)
 _GAUSS_3 = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)), (5 / 18, 8 / 18, 5 / 18)
 
@@ -97,14 +85,6 @@ def shape_volumes(nodes: Floats, cells: Integers) -> Floats:
     return total
 
 
-def boundary_facets(cells: Integers) -> Integers:
-    """Facets (k, 3) or (k, 4) that belong to one cell only, counterclockwise as seen from outside the body."""
-    local = CELL_FACETS[cells.shape[1]]
-    facets = cells[:, local].reshape(-1, local.shape[1])
-    _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
-    return np.asarray(facets[np.sort(first[count == 1])])
-
-
 def outward(facets: Integers, cells: Integers) -> Integers:
     """The same facets with the corners in the body's order: counterclockwise as seen from outside.
 
@@ -113,7 +93,7 @@ def outward(facets: Integers, cells: Integers) -> Integers:
     InvalidArgumentError
         One is no facet on the boundary of the body, or comes twice; they have another number of corners.
     """
-    boundary = boundary_facets(cells)
+    boundary = boundary_facets(3, cells)
     if facets.shape[1] != boundary.shape[1]:
         raise InvalidArgumentError(
             f"contact has facets of {facets.shape[1]} nodes; expected {boundary.shape[1]}, as {_name(cells)} have"
@@ -132,7 +112,7 @@ def outward(facets: Integers, cells: Integers) -> Integers:
 
 
 def _name(cells: Integers) -> str:
-    return CELL_NAMES[cells.shape[1]]
+    return KINDS[3, cells.shape[1]].name
 
 
 def facet_vectors(nodes: Floats, facets: Integers) -> Floats:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,12 +10,11 @@ import numpy as np
 from enumsol.array_checks import short_vector
 from enumsol.checks import one_of, positive_integer, shown
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.bases import KINDS, boundary_facets
 from enumsol.fem.mesh_checks import elements, positions
-from enumsol.fem.solid_geometry import CELL_NAMES, boundary_facets
+from enumsol.fem.parts import PartedMesh
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import ArrayLike, NDArray
 
     Cells = Literal["hexahedra", "tetrahedra"]
@@ -30,8 +27,7 @@ _SAME = 1e-9
 _PATHS = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
 
 
-@dataclass(frozen=True)
-class SolidMesh:
+class SolidMesh(PartedMesh):
     """A mesh of tetrahedra or hexahedra with named sets of facets.
 
     Attributes
@@ -42,43 +38,9 @@ class SolidMesh:
         Nodes of each tetrahedron, or of each hexahedron in the order of VTK.
     facets : mapping of names to (k, 3) or (k, 4) int arrays
         Nodes of the triangles or quadrilaterals of parts of the boundary.
+    node_sets : mapping of names to (k,) int arrays
+        Nodes of parts that are given by nodes.
     """
-
-    points: NDArray[np.float64]
-    cells: NDArray[np.int64]
-    facets: Mapping[str, NDArray[np.int64]]
-
-    def part(self, name: str) -> NDArray[np.int64]:
-        """Facets of this name.
-
-        Raises
-        ------
-        InvalidArgumentError
-            There are none.
-        """
-        if name not in self.facets:
-            close = difflib.get_close_matches(str(name), self.facets, n=1)
-            found = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(self.facets) or 'none'}"
-            raise InvalidArgumentError(f"the mesh has no facets named {shown(name)}; {found}")
-        return self.facets[name]
-
-    def nodes(self, name: str) -> NDArray[np.int64]:
-        """Nodes of the facets of this name, in order.
-
-        Raises
-        ------
-        InvalidArgumentError
-            There are none.
-        """
-        return np.unique(self.part(name))
-
-    def __repr__(self) -> str:
-        parts = ", ".join(f"{name} ({len(part)})" for name, part in self.facets.items()) or "none"
-        return (
-            f"SolidMesh with {len(self.points)} nodes\n"
-            f"  cells   {len(self.cells)} {CELL_NAMES[self.cells.shape[1]]}\n"
-            f"  facets  {parts}"
-        )
 
 
 def box(nx: int, ny: int, nz: int, size: ArrayLike = (1.0, 1.0, 1.0), cells: Cells = "hexahedra") -> SolidMesh:
@@ -115,7 +77,7 @@ def box(nx: int, ny: int, nz: int, size: ArrayLike = (1.0, 1.0, 1.0), cells: Cel
     lengths = short_vector(size, "size", 3)
     if np.min(lengths) <= 0:
         raise InvalidArgumentError(f"size is {shown(size)}; expected three lengths > 0")
-    one_of(cells, "cells", tuple(CELL_NAMES.values()))
+    one_of(cells, "cells", (KINDS[3, 8].name, KINDS[3, 4].name))
     z, y, x = np.meshgrid(*(np.linspace(0.0, lengths[k], counts[k] + 1) for k in (2, 1, 0)), indexing="ij")
     points = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
     number = np.arange(len(points)).reshape(z.shape)
@@ -127,7 +89,7 @@ def box(nx: int, ny: int, nz: int, size: ArrayLike = (1.0, 1.0, 1.0), cells: Cel
 
 
 def _sides(points: NDArray[np.float64], cells: NDArray[np.int64], size: NDArray[np.float64]) -> Any:
-    facets = boundary_facets(cells)
+    facets = boundary_facets(3, cells)
     corners = points[facets]
     names = (("left", "right"), ("front", "back"), ("bottom", "top"))
     return MappingProxyType(

@@ -5,14 +5,15 @@ Degrees of freedom before constraints are ``3 node + component``.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.fem.bases import nodal_basis
 from enumsol.fem.mesh_checks import elements, lame_coefficients, positions, vectors_of_all
-from enumsol.fem.numbering import by_nodes, gathered
-from enumsol.fem.solid_geometry import HEXAHEDRON, facet_quadrature, shape_volumes, solid_mesh
+from enumsol.fem.numbering import gathered
+from enumsol.fem.solid_geometry import facet_quadrature, shape_volumes, solid_mesh
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -48,36 +49,8 @@ def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, floa
     >>> fem.solid_stiffness(mesh.points, mesh.cells, lame=(1, 1)).shape
     (36, 36)
     """
-    from skfem import BilinearForm  # as below
-    from skfem.helpers import ddot, div, sym_grad
-
     lam, mu = lame_coefficients(lame, 3)
-
-    def energy(u: Any, v: Any, _: Any) -> Any:
-        # as skfem.models.elasticity has it, which makes an identity of every quadrature point and is slow
-        return lam * div(u) * div(v) + 2.0 * mu * ddot(sym_grad(u), sym_grad(v))
-
-    basis = vector_basis(*solid_mesh(points, cells))
-    return by_nodes(BilinearForm(energy).assemble(basis), basis)
-
-
-def vector_basis(nodes: NDArray[np.float64], cells: NDArray[np.int64], degree: int = 0) -> Any:
-    """scikit-fem's basis of nodal vectors, with quadrature of that degree on tetrahedra.
-
-    On hexahedra it is Gauss quadrature with two points a direction.
-    """
-    # scikit-fem takes a while to import and is needed for meshes only
-    from skfem import Basis, ElementHex1, ElementTetP1, ElementVector, MeshHex, MeshTet
-
-    points = np.ascontiguousarray(nodes.T)
-    if cells.shape[1] == 4:
-        # sorted here, so that scikit-fem neither renumbers nor logs
-        mesh = MeshTet(points, np.ascontiguousarray(np.sort(cells, axis=1).T))
-        return Basis(mesh, ElementVector(ElementTetP1()), intorder=degree)
-    # scikit-fem has an order of its own
-    order = [int(np.argmin(np.linalg.norm(HEXAHEDRON - corner, axis=1))) for corner in ElementHex1.doflocs]
-    mesh = MeshHex(points, np.ascontiguousarray(cells[:, order].T))
-    return Basis(mesh, ElementVector(ElementHex1()), intorder=3)
+    return nodal_basis(*solid_mesh(points, cells)).stiffness(lam, mu)
 
 
 def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -> NDArray[np.float64]:

@@ -227,9 +227,7 @@ def local_axes(multipliers: Multipliers, normals: ArrayLike | None, axes: Any) -
             k = int(np.argmax(inward))
             raise InvalidArgumentError(f"normals row {k} does not point out of the body; expected outward normals")
     if axes is None:
-        start = np.where(np.abs(normal[:, :1]) > _NEAR_X, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
-        first = unit_vectors(start - np.sum(start * normal, axis=1)[:, None] * normal, "axes")
-        return normal, first, np.cross(normal, first)
+        return normal, *default_axes(normal)
     both = axes if isinstance(axes, tuple) and len(axes) == 2 else (axes,)
     given = [_field(field, multipliers.places) for field in both]
     triples = [normal, *given]
@@ -240,6 +238,13 @@ def local_axes(multipliers: Multipliers, normals: ArrayLike | None, axes: Any) -
             if not np.all(off <= AXES_TOLERANCE):
                 raise _not_orthonormal(i, j, int(np.argmax(off)), one, two)
     return normal, given[0], given[1] if len(given) == 2 else np.cross(normal, given[0])
+
+
+def default_axes(normal: Floats) -> tuple[Floats, Floats]:
+    """Axes t1, t2 for normals (p, 3): the x axis projected, or the y axis where the normal is near the x axis."""
+    start = np.where(np.abs(normal[:, :1]) > _NEAR_X, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
+    first = unit_vectors(start - np.sum(start * normal, axis=1)[:, None] * normal, "axes")
+    return first, np.cross(normal, first)
 
 
 def _field(value: Any, places: Floats) -> Floats:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidProblemError
+from enumsol.texts import shortened
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -146,7 +147,7 @@ def refusing(errors: tuple[type[Exception], ...], found: str, expected: str) -> 
         raise
     except errors as error:
         reason = str(error).strip().split("\n")[0].split(". ")[0].rstrip(" .:") or type(error).__name__
-        raise InvalidProblemError(f"{found} ({reason}); expected {expected}") from error
+        raise InvalidProblemError(f"{found} ({shortened(reason)}); expected {expected}") from error
 
 
 def check_names(found: Collection[str], layout: Layout, suffix: str = "") -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,13 @@ if TYPE_CHECKING:
     from enumsol.problem import ContactProblem
     from enumsol.problem3d import ContactProblem3D
 
+#: Most entries of a vector, or of a table that is stored densely.
+_LARGEST_VECTOR = 50_000_000
+#: Numbers to the end of a file; without backtracking.
+_NUMBERS = re.compile(
+    rb"\s*+(?:[+-]?(?:\d++(?:\.\d*+)?+(?:e[+-]?\d++)?+|\.\d++(?:e[+-]?\d++)?+|nan|inf(?:inity)?+)(?:\s++|\Z))*+\Z",
+    re.IGNORECASE,
+)
 _LABELS = "node_ids.json"
 #: Digits after which a float64 is read back as itself.
 _DIGITS = 17
@@ -77,16 +85,29 @@ def _values(name: str, file: Path, layout: Layout) -> sp.coo_array | NDArray[Any
     with refusing(
         (ValueError, OverflowError, OSError), f"{file.name} is no readable MatrixMarket file", "a complete one"
     ):
-        rows, columns = mminfo(file)[:2]
+        content = file.read_bytes()
+        rows, columns, entries = mminfo(BytesIO(content))[:3]
+        _check(content, rows, columns, entries, dense=name not in layout.matrices)
         if name not in layout.matrices and name not in layout.tables and 1 not in (rows, columns):
             raise InvalidProblemError(f"{file.name} holds a {rows} x {columns} matrix; expected a vector in one column")
-        values: Any = mmread(file, spmatrix=False)
+        values: Any = mmread(BytesIO(content), spmatrix=False)
     if name in layout.matrices:
         return values
     dense = np.asarray(values.toarray() if sp.issparse(values) else values)
     if name in layout.tables:
         return dense
     return dense.reshape(()) if name in layout.broadcast and dense.size == 1 else dense.ravel()
+
+
+def _check(content: bytes, rows: int, columns: int, entries: int, *, dense: bool) -> None:
+    """Refuse what scipy's reader crashes on or takes memory for: words that are no numbers, and counts out of range."""
+    start = 0
+    while content[start : start + 1] in (b"%", b"\n", b"\r"):
+        start = content.find(b"\n", start) + 1 or len(content)
+    if _NUMBERS.match(content, start) is None:
+        raise ValueError("a word in it is no number")
+    if entries > len(content) or (dense and rows * columns > _LARGEST_VECTOR):
+        raise ValueError(f"it cannot hold {rows} x {columns} entries")
 
 
 def _labels(file: Path) -> list[Any]:

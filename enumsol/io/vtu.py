@@ -160,7 +160,7 @@ def _meshio() -> Any:
     try:
         import meshio  # an extra
     except ImportError as error:
-        raise MissingDependencyError.of("VTU files", "meshio", "solids") from error
+        raise MissingDependencyError.of("VTU files", "meshio", "meshes") from error
     return meshio
 
 

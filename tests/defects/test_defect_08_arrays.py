@@ -291,10 +291,10 @@ MESH = {
     "points masked": ({"points": np.ma.array(POINTS, mask=True)}, "points is not an array of real numbers"),
     "points huge": ({"points": np.array(POINTS) * 1e200}, r"points has the coordinate 1e\+200, whose square overflows"),
     "points rounded": ({"points": [[0, 0], [LARGE, 0], [0, 1]]}, "points has the value 9007199254740993 at index"),
-    "triangles ragged": ({"triangles": [[0, 1, 2], [0]]}, "triangles is not an array of real numbers"),
-    "triangles floats": ({"triangles": [[0.0, 1.0, 2.0]]}, "triangles has .* type float64; expected at least one node"),
-    "triangles masked": ({"triangles": np.ma.array(TRIANGLES, mask=True)}, "triangles is not an array"),
-    "triangles huge": ({"triangles": [[2**64 - 1] * 3]}, "triangles has node numbers from 18446744073709551615"),
+    "cells ragged": ({"cells": [[0, 1, 2], [0]]}, "cells is not an array of real numbers"),
+    "cells floats": ({"cells": [[0.0, 1.0, 2.0]]}, "cells has .* type float64; expected at least one node"),
+    "cells masked": ({"cells": np.ma.array(TRIANGLES, mask=True)}, "cells is not an array"),
+    "cells huge": ({"cells": [[2**64 - 1] * 3]}, "cells has node numbers from 18446744073709551615"),
     "lame texts": ({"lame": ("1", "1")}, r"lame is \('1', '1'\); expected two finite numbers"),
     "lame complex": ({"lame": (1, 1 + 0j)}, r"lame is \(1, .*; expected two finite numbers"),
 }
@@ -304,7 +304,7 @@ MESH = {
 def test_meshes_are_checked_alike(case):
     changes, pattern = MESH[case]
     with pytest.raises(InvalidArgumentError, match=pattern) as caught:
-        fem.stiffness(**({"points": POINTS, "triangles": TRIANGLES, "lame": (1, 1)} | changes))
+        fem.stiffness(**({"points": POINTS, "cells": TRIANGLES, "lame": (1, 1)} | changes))
     assert "\n" not in str(caught.value)
 
 

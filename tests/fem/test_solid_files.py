@@ -219,5 +219,5 @@ def test_other_arguments(tmp_path, monkeypatch):
     with pytest.raises(InvalidArgumentError, match="source is a int; expected the name of a file or a meshio"):
         fem.read_solid(3)
     monkeypatch.setitem(sys.modules, "meshio", None)
-    with pytest.raises(MissingDependencyError, match=r'need the package meshio, .* "enumsol\[solids\]"'):
+    with pytest.raises(MissingDependencyError, match=r'need the package meshio, .* "enumsol\[meshes\]"'):
         fem.read_solid(tmp_path / "p.msh")

@@ -165,7 +165,7 @@ def test_box_fills_its_outline(kind):
 
 def test_a_name_that_is_close_is_offered():
     mesh = fem.box(1, 1, 1)
-    with pytest.raises(InvalidArgumentError, match=r"no facets named 'botom'; did you mean bottom\?"):
+    with pytest.raises(InvalidArgumentError, match=r"no facets named 'botom'; .* \(did you mean bottom\?\)"):
         mesh.part("botom")
     with pytest.raises(InvalidArgumentError, match="no facets named 'xyz'; expected one of left, right"):
         mesh.nodes("xyz")

@@ -313,6 +313,24 @@ def test_wrong_places(tmp_path, name, pattern):
             "%%MatrixMarket matrix array real general\n2 2\n1\n2\n3\n4\n",
             r"f\.mtx holds a 2 x 2 matrix; expected a vec",
         ),
+        # the first three crash the reader of scipy 1.17
+        (
+            "gap.mtx",
+            "%%MatrixMarket matrix array real general\n%\n2 1\n0.0=000000000000000e+",
+            r"gap\.mtx is no readable",
+        ),
+        ("gap.mtx", "%%MatrixMarket matrix array real general\n%\n2 1\n0.0\n0.x0\n", "a word in it is no number"),
+        ("A.mtx", "%%MatrixMarket matrix coordinate real general\n4 4 2\n1 1 2.0\n2 2 1.0e", r"A\.mtx is no readable"),
+        (
+            "A.mtx",
+            "%%MatrixMarket matrix coordinate real general\n4 4 99999999999\n1 1 2\n",
+            "cannot hold 4 x 4 entries",
+        ),
+        (
+            "f.mtx",
+            "%%MatrixMarket matrix array real general\n99999999999 1\n1\n",
+            "cannot hold 99999999999 x 1 entries",
+        ),
         ("f.mtx", "%%MatrixMarket matrix array real general\n3 1\n1\n2\n3\n", r"f has shape \(3,\); expected \(4,\)"),
         ("f.mtx", "%%MatrixMarket matrix array real general\n4 1\n1\nnan\n3\n4\n", "f has the value nan"),
         ("gaps.mtx", "x", r"gaps\.mtx is not known \(is gap\.mtx meant\?\)"),

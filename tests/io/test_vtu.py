@@ -192,5 +192,5 @@ def test_a_full_disk_is_named(tmp_path):
 
 def test_meshio_is_an_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "meshio", None)
-    with pytest.raises(MissingDependencyError, match=r'VTU files need the package meshio, .* "enumsol\[solids\]"'):
+    with pytest.raises(MissingDependencyError, match=r'VTU files need the package meshio, .* "enumsol\[meshes\]"'):
         write_vtu(PATCHES, some_state(PATCHES), tmp_path / "p.vtu")

@@ -32,6 +32,7 @@ CONCLUSIONS = {
     "fixed_points_scaling": ("all converged: yes", "Newton needed no help: yes"),
     "paper_examples": ("all 19 facts hold", "no arc or continuum missed, no jump"),
     "requirements": ("both interpreters import the same enumsol", "import enumsol: "),
+    "same_body_by_other_codes": ("the same roots to 1e-09, all complete: yes",),
     "samples_vs_graph": ("branches of length 0.001 are missed by 50 samples", "40 of 40 root sets agree"),
     "search_profile": ("both interpreters import the same enumsol", "the times"),
     "uniqueness_vs_mesh": ("bound on F: 2D, nodes H^0.58, 0.54 between the finest (paper 0.5)",),

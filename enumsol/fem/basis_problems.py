@@ -1,0 +1,254 @@
+"""From a basis and a matrix of scikit-fem to a contact problem."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.array_checks import plain_array, real_array, real_matrix
+from enumsol.checks import shown
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem.assembly import plane_problem
+from enumsol.fem.bases import FACET_DEGREE
+from enumsol.fem.mesh_checks import unit_vectors, vectors_of_all
+from enumsol.fem.restrained import ContactNodes, Supports, check_axes, movable, restrained
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from enumsol.problem import ContactProblem
+    from enumsol.problem3d import ContactProblem3D
+
+    Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
+
+#: Of two places of one node, as a share of the extent of the mesh.
+_SAME = 1e-9
+#: Nodal integrals of normals below this share of the largest are rounding.
+_NO_PRESSURE = 1e-6
+
+
+def basis_contact_problem(
+    basis: Any,
+    stiffness: Any,
+    *,
+    contact: Any,
+    held: Any = (),
+    displacements: ArrayLike | None = None,
+    normals: ArrayLike | Callable[[Floats], ArrayLike] | None = None,
+    tangents: Any = None,
+    forces: ArrayLike | None = None,
+    forces_slope: ArrayLike | None = None,
+    gap: ArrayLike | Callable[[Floats], float] = 0.0,
+    **more: Any,
+) -> ContactProblem | ContactProblem3D:
+    """Contact problem of a body that scikit-fem assembled, in 2D or 3D; the held degrees of freedom are eliminated.
+
+    ``u`` of the problem and of its roots holds the degrees of freedom of the basis that are not held, in their order.
+    The contact nodes are all nodes of the contact facets that are not held, corners first, then those on edges.
+
+    Parameters
+    ----------
+    basis : skfem.CellBasis
+        Of vectors by nodes, such as ``Basis(mesh, ElementVector(ElementTriP2()))``, with m degrees of freedom.
+    stiffness : (m, m) array_like or sparse
+        Of the body before its supports, with springs if there are any [force / length].
+    contact : name, array of facet numbers, or callable
+        The contact boundary, as scikit-fem's ``mesh.normalize_facets`` takes it.
+    held : array of int or bool, or skfem.DofsView
+        Numbers of degrees of freedom with given displacements, a mask of them, or what ``basis.get_dofs`` returns.
+    displacements : (m,) array_like or None
+        Displacements of the held degrees of freedom, other entries are not read; default 0 [length].
+    normals : (d,) or (p, d) array_like, callable of a position, or None
+        Directions out of the body, scaled to length one; default the outward normals of the facets around, averaged
+        with the node's shape function as weight.
+    tangents : array_like or None
+        In 2D as in `contact_problem`; in 3D a pair of (3,) or (p, 3) arrays, by default as in `solid_contact_problem`.
+    forces, forces_slope : (m,) array_like or None
+        Load vector and its derivative with respect to alpha [force].
+    gap : float, (p,) array_like, or callable of a position
+        Initial gap along the normals [length].
+    **more
+        friction, slip_offset, node_ids and, in 3D, friction_slope and areas, as in `ContactProblem` and
+        `ContactProblem3D`.
+
+    Returns
+    -------
+    ContactProblem or ContactProblem3D
+        With ``coordinates`` the positions of the contact nodes.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument has the wrong shape; the basis has no vectors at nodes; facets are not on the boundary; a contact
+        node is held in some components only; in 3D the facets are of second order, whose corners carry no pressure.
+    InvalidProblemError
+        The body is free to move as a rigid body, or the data are not admissible.
+
+    Examples
+    --------
+    >>> from skfem import Basis, ElementTriP2, ElementVector, MeshTri
+    >>> from skfem.models.elasticity import linear_elasticity
+    >>> from enumsol import fem
+    >>> mesh = MeshTri().refined(2).with_defaults()
+    >>> basis = Basis(mesh, ElementVector(ElementTriP2()))
+    >>> problem = fem.basis_contact_problem(
+    ...     basis, linear_elasticity(1, 1).assemble(basis), contact="bottom", held=basis.get_dofs("left"), friction=0.5
+    ... )
+    >>> problem.n, problem.p
+    (144, 8)
+    """
+    dofs, places = _nodes_of(basis)
+    A = real_matrix(stiffness, "stiffness", error=InvalidArgumentError)
+    if A.shape != (dofs.size, dofs.size):
+        raise InvalidArgumentError(
+            f"stiffness has shape {A.shape}; expected {(dofs.size, dofs.size)}, as the basis has"
+        )
+    fixed = _held(held, dofs.size)
+    moved = np.where(fixed, _vector(displacements, "displacements", dofs.size), 0.0)
+    supports = Supports(fixed[dofs], moved[dofs])
+    facets = _facets(basis.mesh, contact)
+    touching = _touching(basis, facets, dofs)
+    nodes = movable(touching, _normals(basis, facets, touching, dofs, places, normals), supports)
+    at = places[nodes.nodes]
+    more = {"gap": [gap(place) for place in at] if callable(gap) else gap, "coordinates": at, **more}
+    more.setdefault("node_ids", nodes.nodes.tolist())
+    slope = None if forces_slope is None else _vector(forces_slope, "forces_slope", dofs.size)
+    build = plane_problem if dofs.shape[1] == 2 else space_problem
+    return build(A, _vector(forces, "forces", dofs.size), slope, dofs, nodes, supports, tangents, **more)
+
+
+def space_problem(
+    A: sp.csc_array,
+    forces: Floats,
+    forces_slope: Floats | None,
+    dofs: Integers,
+    contact: ContactNodes,
+    supports: Supports,
+    tangents: Any,
+    **more: Any,
+) -> ContactProblem3D:
+    """As `plane_problem`, in 3D; ``mesh`` may be a function of the degrees of freedom that are left."""
+    from enumsol.fem.surfaces import default_axes  # not for problems in 2D
+    from enumsol.problem3d import ContactProblem3D
+
+    if tangents is None:
+        axes = default_axes(contact.normals)
+    else:
+        if not (isinstance(tangents, (tuple, list)) and len(tangents) == 2):
+            raise InvalidArgumentError(f"tangents is {shown(tangents)}; expected a pair of directions (t1, t2)")
+        shape = contact.normals.shape
+        one, two = (unit_vectors(vectors_of_all(axis, "tangents", shape), "tangents") for axis in tangents)
+        products = [np.sum(a * b, axis=1) for a, b in ((one, two), (one, contact.normals), (two, contact.normals))]
+        if np.max(np.abs(products)) > 1e-10:
+            raise InvalidArgumentError("tangents are not perpendicular to each other and to the normals")
+        axes = (one, two)
+    check_axes(contact, axes)
+    body = restrained(A, forces, forces_slope, dofs, supports, contact.apart)
+    if callable(mesh := more.get("mesh")):
+        more["mesh"] = mesh(body.left)
+    Bn, Bt1, Bt2 = (body.rows(contact, direction, dofs) for direction in (contact.normals, *axes))
+    return ContactProblem3D(body.A, Bn, Bt1, Bt2, body.f, load_slope=body.load_slope, **more)
+
+
+def _nodes_of(basis: Any) -> tuple[Integers, Floats]:
+    """Degrees of freedom of every node (N, d), and the positions of the nodes (N, d)."""
+    try:
+        dimension = int(basis.mesh.dim())
+        blocks = (basis.nodal_dofs, basis.facet_dofs, basis.edge_dofs, basis.interior_dofs)
+        parts = [np.asarray(block).T.reshape(-1, dimension) for block in blocks if np.size(block)]
+        dofs = np.concatenate(parts).astype(np.int64)
+        where = np.asarray(basis.doflocs)[:, dofs]  # (d, N, components)
+        apart = np.max(np.abs(where - where[:, :, :1]))
+        vectors = (
+            dofs.size == basis.N and dimension in (2, 3) and apart <= _SAME * np.max(np.ptp(where[:, :, 0], axis=1))
+        )
+    except (AttributeError, TypeError, ValueError, IndexError):
+        vectors = False
+    if not vectors:
+        raise InvalidArgumentError(
+            f"basis is a {type(basis).__name__} whose degrees of freedom are not vectors at nodes; "
+            "expected skfem.Basis(mesh, ElementVector(...)) in 2D or 3D"
+        )
+    return dofs, np.ascontiguousarray(where[:, :, 0].T)
+
+
+def _held(held: Any, count: int) -> NDArray[np.bool_]:
+    numbers = held.flatten() if hasattr(held, "nodal_ix") else held
+    array = plain_array(numbers, "held", error=InvalidArgumentError)
+    mask = np.zeros(count, dtype=bool)
+    if array.size == 0:
+        return mask
+    if array.dtype == bool and array.shape == (count,):
+        return array
+    if array.dtype.kind not in "iu" or array.ndim != 1 or array.min() < 0 or array.max() >= count:
+        raise InvalidArgumentError(
+            f"held has shape {array.shape} and type {array.dtype}; expected numbers of degrees of freedom, "
+            f"below {count}, or a mask of them"
+        )
+    mask[array] = True
+    return mask
+
+
+def _facets(mesh: Any, contact: Any) -> Integers:
+    try:
+        facets = np.unique(np.asarray(mesh.normalize_facets(contact)))
+        known = facets.dtype.kind in "iu" and facets.size > 0 and 0 <= facets[0] <= facets[-1] < mesh.nfacets
+    except (AttributeError, KeyError, TypeError, ValueError, IndexError, NotImplementedError):
+        known = False
+    if not known:
+        names = ", ".join(mesh.boundaries or ()) or "none"
+        raise InvalidArgumentError(
+            f"contact is {shown(contact)}; expected facets as scikit-fem takes them: numbers, a function of "
+            f"positions or the name of a boundary (found {names})"
+        )
+    if np.any(mesh.f2t[1, facets] != -1):
+        raise InvalidArgumentError("contact has facets inside the body; expected facets on its boundary")
+    return facets.astype(np.int64)
+
+
+def _touching(basis: Any, facets: Integers, dofs: Integers) -> Integers:
+    """Nodes of facets."""
+    on_facets = np.zeros(dofs.size, dtype=bool)
+    on_facets[basis.get_dofs(facets).flatten()] = True
+    return np.flatnonzero(np.all(on_facets[dofs], axis=1))
+
+
+def _normals(basis: Any, facets: Integers, touching: Integers, dofs: Integers, places: Floats, given: Any) -> Floats:
+    if given is not None:
+        values = [given(place) for place in places[touching]] if callable(given) else given
+        return unit_vectors(vectors_of_all(values, "normals", (len(touching), dofs.shape[1])), "normals")
+    return unit_vectors(pressed(nodal_normals(basis, facets)[dofs[touching]], touching), "normals of the boundary")
+
+
+def nodal_normals(basis: Any, facets: Integers) -> Floats:
+    """Integrals over facets of the outward normals times each node's shape function, by degrees of freedom."""
+    from skfem import FacetBasis, LinearForm  # here, too
+    from skfem.helpers import dot
+
+    on_facets = FacetBasis(basis.mesh, basis.elem, facets=facets, intorder=FACET_DEGREE)
+    return np.asarray(LinearForm(lambda v, w: dot(w.n, v)).assemble(on_facets))
+
+
+def pressed(vectors: Floats, nodes: Integers) -> Floats:
+    """Nodal normals (p, d), which must not vanish: a pressure would act on none of these nodes."""
+    lengths = np.linalg.norm(vectors, axis=1)
+    if np.min(lengths) <= _NO_PRESSURE * np.max(lengths):
+        raise InvalidArgumentError(
+            f"the normals around contact node {nodes[np.argmin(lengths)]} cancel, or no pressure acts on it (as on "
+            "corners of quadratic facets in 3D); expected normals, or parts of the boundary without a fold"
+        )
+    return vectors
+
+
+def _vector(value: Any, name: str, size: int) -> Floats:
+    if value is None:
+        return np.zeros(size)
+    array = real_array(value, name, error=InvalidArgumentError)
+    if array.shape != (size,):
+        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected ({size},), as the basis has")
+    return array

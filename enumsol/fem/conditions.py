@@ -1,0 +1,300 @@
+"""What acts on the named parts of a mesh: supports, loads, springs and obstacles.
+
+Each function checks its argument, names it in messages, and gives plain arrays by nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from enumsol.array_checks import real_array, short_vector
+from enumsol.checks import finite_number, one_of, shown
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.fem.restrained import Supports
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.fem.bases import NodalBasis
+    from enumsol.fem.parts import PartedMesh
+
+    Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
+
+#: Positions in a plane of symmetry may differ from it by this share of the extent of the body.
+_SAME = 1e-9
+#: Of the energies of rigid motions in the supports, the least as a share of the largest that holds a body.
+_HELD = 1e-10
+#: What stands for a component that is not given.
+FREE = "free"
+#: Numbers that an obstacle takes in 2D and 3D: a point and a normal, or a centre and a radius.
+_OBSTACLES: dict[str, dict[int, tuple[str, ...]]] = {
+    "plane": {2: ("x", "y", "nx", "ny"), 3: ("x", "y", "z", "nx", "ny", "nz")},
+    "circle": {2: ("x", "y", "r")},
+    "sphere": {3: ("x", "y", "z", "r")},
+    "hole": {2: ("x", "y", "r"), 3: ("x", "y", "z", "r")},
+}
+
+
+def names_of(value: Any, name: str) -> list[str]:
+    """Value as names of parts: a text, or several."""
+    names = [value] if isinstance(value, str) else value
+    if not isinstance(names, (list, tuple)) or not all(isinstance(part, str) for part in names):
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected the name of a part, or a list of names")
+    return list(names)
+
+
+def by_part(value: Any, name: str) -> dict[str, Any]:
+    """Value as a mapping of names of parts."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping) or not all(isinstance(part, str) for part in value):
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected names of parts with their values")
+    return dict(value)
+
+
+# -- supports --------------------------------------------------------------------------------------------------------
+
+
+class Held:
+    """Displacements that are given, collected part by part.
+
+    Parameters
+    ----------
+    mesh : PartedMesh
+    """
+
+    def __init__(self, mesh: PartedMesh) -> None:
+        self._mesh = mesh
+        self._fixed = np.zeros(mesh.points.shape, dtype=bool)
+        self._values = np.zeros(mesh.points.shape)
+        #: Components across a plane of symmetry.
+        self.mirrored = np.zeros(mesh.points.shape, dtype=bool)
+
+    @property
+    def supports(self) -> Supports:
+        """All of them."""
+        return Supports(self._fixed, self._values)
+
+    def clamp(self, part: str) -> None:
+        """Hold the nodes of a part."""
+        for component in range(self._mesh.points.shape[1]):
+            self._fix(part, self._mesh.nodes(part), component, 0.0)
+
+    def displace(self, part: str, value: Any) -> None:
+        """Move the nodes of a part by given components; ``free`` or None leaves one free.
+
+        Raises
+        ------
+        InvalidArgumentError
+            They are not that, or differ from what holds a node already.
+        """
+        dimension = self._mesh.points.shape[1]
+        name, nodes = f"displacement of {part}", self._mesh.nodes(part)
+        if not isinstance(value, (list, tuple, np.ndarray)) or len(value) != dimension:
+            raise InvalidArgumentError(
+                f"{name} is {shown(value)}; expected {dimension} components, each a number or {FREE!r}"
+            )
+        for component, entry in enumerate(value):
+            if entry is not None and not (isinstance(entry, str) and entry == FREE):
+                self._fix(part, nodes, component, finite_number(entry, name))
+
+    def mirror(self, part: str) -> None:
+        """Hold the nodes of a part in the direction of the axis that it is perpendicular to.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There is no such axis, or several.
+        """
+        points, nodes = self._mesh.points, self._mesh.nodes(part)
+        extent = float(np.max(np.ptp(points, axis=0)))
+        flat = np.flatnonzero(np.ptp(points[nodes], axis=0) <= _SAME * extent)
+        if len(flat) != 1:
+            raise InvalidArgumentError(
+                f"symmetry {part} lies in {len(flat)} planes perpendicular to an axis; expected a part of the boundary "
+                "in one such plane"
+            )
+        self._fix(part, nodes, int(flat[0]), 0.0)
+        self.mirrored[nodes, flat[0]] = True
+
+    def _fix(self, part: str, nodes: Integers, component: int, value: float) -> None:
+        differ = self._fixed[nodes, component] & (self._values[nodes, component] != value)
+        if np.any(differ):
+            node = int(nodes[np.argmax(differ)])
+            raise InvalidArgumentError(
+                f"{part} moves node {node} by {value:g} in {'xyz'[component]}, and another part that shares it by "
+                f"{self._values[node, component]:g}; expected one displacement"
+            )
+        self._fixed[nodes, component] = True
+        self._values[nodes, component] = value
+
+
+def check_held(mesh: PartedMesh, supports: Supports, springs: sp.csc_array) -> None:
+    """Refuse a body, or a part of it that hangs together with no other, that can move as a rigid body.
+
+    Raises
+    ------
+    InvalidProblemError
+        It says where.
+    """
+    points, cells = mesh.points, mesh.cells
+    first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
+    links = (np.ones(first.size), (first.ravel(), cells[:, 1:].ravel()))
+    _, piece_of = connected_components(sp.coo_array(links, shape=(len(points),) * 2), directed=False)
+    largest = np.max(springs.diagonal(), initial=0.0)
+    hold = sp.csc_array(sp.diags_array(supports.fixed.ravel().astype(np.float64)))
+    if largest > 0:
+        hold = sp.csc_array(hold + springs / largest)
+    for piece in range(piece_of.max() + 1):
+        inside = piece_of == piece
+        motions = _rigid_motions(points, inside)
+        values = np.linalg.eigvalsh(motions.T @ (hold @ motions))
+        if values[0] <= _HELD * max(values[-1], np.finfo(np.float64).tiny):
+            whole = (
+                "the body" if np.all(inside) else f"the part of the body around {points[np.argmax(inside)].tolist()}"
+            )
+            raise InvalidProblemError(
+                f"{whole} is free to move as a rigid body; expected clamp, symmetry, displacement or spring to hold "
+                "it (contact alone does not)"
+            )
+
+
+def _rigid_motions(points: Floats, inside: NDArray[np.bool_]) -> Floats:
+    """Displacements (d N, 3) or (d N, 6) by translations and rotations of nodes, in units of their extent."""
+    own = points[inside]
+    places = np.where(inside[:, None], (points - own.mean(axis=0)) / np.max(np.ptp(own, axis=0)), 0.0)
+    count, dimension = points.shape
+    motions = [np.outer(inside, axis) for axis in np.eye(dimension)]
+    for one in range(dimension):
+        for two in range(one):
+            turned = np.zeros((count, dimension))
+            turned[:, one], turned[:, two] = -places[:, two], places[:, one]
+            motions.append(turned)
+    return np.stack([motion.ravel() for motion in motions], axis=1)
+
+
+# -- loads and springs -----------------------------------------------------------------------------------------------
+
+
+def part_forces(body: NodalBasis, mesh: PartedMesh, loads: Any, pressures: Any, slope: str = "") -> Floats:
+    """Nodal forces (N, d) of tractions and of pressures, which push into the body, on parts."""
+    from skfem import LinearForm  # as in nodal_basis
+    from skfem.helpers import dot
+
+    total, dimension = np.zeros(mesh.points.shape), mesh.points.shape[1]
+    for part, value in by_part(loads, f"load{slope}").items():
+        traction = short_vector(value, f"load{slope} of {part}", dimension)
+        form = LinearForm(lambda v, _, t=traction: dot(t[:, None, None], v))
+        total += body.vectors(form.assemble(body.on_facets(body.facet_numbers(mesh.part(part), part))))
+    for part, value in by_part(pressures, f"pressure{slope}").items():
+        pressure = finite_number(value, f"pressure{slope} of {part}")
+        form = LinearForm(lambda v, w, p=pressure: -p * dot(w.n, v))
+        total += body.vectors(form.assemble(body.on_facets(body.facet_numbers(mesh.part(part), part))))
+    return total
+
+
+def part_springs(body: NodalBasis, mesh: PartedMesh, springs: Any) -> sp.csc_array:
+    """Stiffness (dN, dN) of springs between parts and the ground, lumped at the nodes."""
+    from skfem import LinearForm  # as above
+    from skfem.helpers import dot
+
+    count, dimension = mesh.points.shape
+    blocks = np.zeros((count, dimension, dimension))
+    for part, value in by_part(springs, "spring").items():
+        normal, tangential = short_vector(value, f"spring of {part}", 2)
+        if min(normal, tangential) < 0:
+            raise InvalidArgumentError(
+                f"spring of {part} is {shown(value)}; expected stiffnesses >= 0 along the normal and across it"
+            )
+        facets = body.on_facets(body.facet_numbers(mesh.part(part), part))
+        for k, axis in enumerate(np.eye(dimension)):
+            form = LinearForm(
+                lambda v, w, e=axis[:, None, None], k=k, kn=normal, kt=tangential: dot(
+                    kt * e + (kn - kt) * w.n[k] * w.n, v
+                )
+            )
+            blocks[:, :, k] += body.vectors(form.assemble(facets))
+    shape = (count * dimension, count * dimension)
+    K = sp.csc_array(sp.bsr_array((blocks, np.arange(count), np.arange(count + 1)), shape=shape))
+    K.eliminate_zeros()
+    return K
+
+
+# -- obstacles -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A rigid obstacle in the way of the body.
+
+    Attributes
+    ----------
+    kind : "plane", "circle" or "sphere" outside of which, or "hole" inside of which the body is
+    place : (d,) array
+        A point of the plane, or the centre [length].
+    normal : (d,) array or None
+        Direction from the plane to the body.
+    radius : float
+        [length].
+    """
+
+    kind: str
+    place: Floats
+    normal: Floats | None = None
+    radius: float = 0.0
+
+    @classmethod
+    def of(cls, value: Any, dimension: int) -> Obstacle:
+        """The obstacle that a mapping of its kind to numbers describes.
+
+        Raises
+        ------
+        InvalidArgumentError
+            It describes none.
+        """
+        given = by_part(value, "obstacle")
+        if len(given) != 1:
+            raise InvalidArgumentError(f"obstacle is {shown(value)}; expected one of {_kinds(dimension)}")
+        ((kind, numbers),) = given.items()
+        one_of(kind, "obstacle", [known for known, form in _OBSTACLES.items() if dimension in form])
+        form = _OBSTACLES[kind][dimension]
+        entries = real_array(numbers, f"obstacle {kind}", error=InvalidArgumentError)
+        if entries.shape != (len(form),):
+            raise InvalidArgumentError(f"obstacle {kind} is {shown(numbers)}; expected {', '.join(form)}")
+        if kind == "plane":
+            length = float(np.linalg.norm(entries[dimension:]))
+            if not length > 0:
+                raise InvalidArgumentError(f"obstacle plane is {shown(numbers)}; expected a direction to the body")
+            return cls(kind, entries[:dimension], entries[dimension:] / length)
+        if not entries[-1] > 0:
+            raise InvalidArgumentError(f"obstacle {kind} has the radius {entries[-1]:g}; expected a length > 0")
+        return cls(kind, entries[:dimension], None, float(entries[-1]))
+
+    def normals_and_gaps(self, points: Floats) -> tuple[Floats, Floats]:
+        """Directions (p, d) from points to the obstacle, and the distances (p,) to it, negative inside it.
+
+        Raises
+        ------
+        InvalidArgumentError
+            A point is the centre.
+        """
+        offset = points - self.place
+        if self.normal is not None:
+            return np.tile(-self.normal, (len(points), 1)), offset @ self.normal
+        distances = np.linalg.norm(offset, axis=1)
+        if not np.min(distances) > 0:
+            raise InvalidArgumentError(f"obstacle {self.kind} has its centre at a contact node; expected it elsewhere")
+        outward = offset / distances[:, None]
+        return (outward, self.radius - distances) if self.kind == "hole" else (-outward, distances - self.radius)
+
+
+def _kinds(dimension: int) -> str:
+    forms = {kind: form[dimension] for kind, form in _OBSTACLES.items() if dimension in form}
+    return ", ".join(f"{kind} = [{', '.join(form)}]" for kind, form in forms.items())

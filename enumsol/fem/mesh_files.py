@@ -1,0 +1,320 @@
+"""Meshes of bodies from files of mesh generators, read by meshio."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import struct
+import warnings
+import zlib
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from enumsol.checks import file_path, shown
+from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.fem.bases import boundary_facets
+from enumsol.fem.mesh_checks import positions
+from enumsol.fem.parts import PartedMesh
+from enumsol.texts import shortened
+
+if TYPE_CHECKING:
+    import os
+
+    from numpy.typing import NDArray
+
+    from enumsol.fem.solid_meshes import SolidMesh
+
+    Integers = NDArray[np.int64]
+
+#: By dimension: the facets of each kind of cell, by meshio's names.
+_FACET_OF = {
+    2: {"triangle": "line", "quad": "line", "triangle6": "line3", "quad9": "line3"},
+    3: {"tetra": "triangle", "hexahedron": "quad"},
+}
+#: By dimension: other cells that files may hold.
+_IGNORED = {2: ("vertex",), 3: ("vertex", "line")}
+_EXPECTED = {
+    2: "either triangle or quad with line, or triangle6 or quad9 with line3",
+    3: "either tetra with triangle or hexahedron with quad (of first order)",
+}
+_BODIES = {2: "triangles or quadrilaterals", 3: "tetrahedra or hexahedra"}
+#: What makes gmsh write other cells.
+_HINTS = {
+    ("quad8",): " (for quad9 set Mesh.SecondOrderIncomplete = 0 in gmsh)",
+    ("quad", "triangle"): " (for quad alone set Mesh.SubdivisionAlgorithm = 1 in gmsh)",
+    ("quad9", "triangle6"): " (for quad9 alone set Mesh.SubdivisionAlgorithm = 1 in gmsh)",
+}
+#: Third coordinates of a plane mesh may differ by this share of its extent.
+_PLANE = 1e-9
+_PHYSICAL = "gmsh:physical"
+#: The name of all facets where nothing names groups of them.
+_ALL = "boundary"
+#: What meshio raises on damaged files or files of another kind; it may also exit.
+_DAMAGE = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    EOFError,
+    LookupError,
+    MemoryError,
+    OSError,
+    RuntimeError,
+    SyntaxError,
+    SystemExit,
+    TypeError,
+    ValueError,
+    struct.error,
+    zlib.error,
+)
+
+
+def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -> PartedMesh:
+    """Mesh of a body in 2D or 3D with its named parts, from a file that meshio reads or from a meshio.Mesh.
+
+    In 2D the cells are triangles or quadrilaterals, of first or of second order (6 or 9 nodes), in 3D tetrahedra or
+    hexahedra of first order. The third coordinate of a plane mesh is left out; it must be the same everywhere.
+
+    Parts are the lines (in 3D triangles or quadrilaterals) that the file holds, by the names of their cell sets or
+    physical groups (a group without a name gets its number); without any groups all of them are named "boundary".
+    Named points and point sets are parts given by nodes; where all nodes of a facet on the boundary belong to a point
+    set, the facet is a part of this name, too. Nodes that belong to no cell are left out, and the others numbered from
+    0 in the order of the file.
+
+    Parameters
+    ----------
+    source : str, path-like or meshio.Mesh
+        A gmsh (.msh) or .vtu file, or any other that meshio knows by its suffix.
+    groups : str or None
+        Name of cell data (integers) by which facets are grouped instead, for formats without named groups.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file cannot be read; it holds no cells of these kinds, several kinds, or others; it has no facets, or facets
+        that belong to no cell; a plane mesh is not in the x-y plane. The message begins with the path.
+    MissingDependencyError
+        meshio is not installed.
+
+    Examples
+    --------
+    >>> import meshio
+    >>> from enumsol import fem
+    >>> points, cells = [[0, 0], [1, 0], [1, 1], [0, 1]], [("quad", [[0, 1, 2, 3]]), ("line", [[0, 1], [1, 2]])]
+    >>> fem.read_mesh(meshio.Mesh(points, cells, cell_sets={"floor": [None, [0]], "wall": [None, [1]]}))
+    PartedMesh with 4 nodes
+      cells   1 quadrilaterals
+      facets  floor (1), wall (1)
+    """
+    return _read(source, groups, None)
+
+
+def read_solid(source: str | os.PathLike[str] | Any, groups: str | None = None) -> SolidMesh:
+    """As `read_mesh`, of bodies in 3D alone; triangles and quadrilaterals are facets whatever else the file holds.
+
+    Parameters
+    ----------
+    source, groups
+        As in `read_mesh`.
+
+    Raises
+    ------
+    InvalidArgumentError, MissingDependencyError
+        As in `read_mesh`, or the mesh is a plane one, or its cells are not admissible (see `solid_stiffness`).
+
+    Examples
+    --------
+    >>> import meshio
+    >>> from enumsol import fem
+    >>> mesh = fem.box(2, 1, 1)
+    >>> fem.read_solid(meshio.Mesh(mesh.points, [("hexahedron", mesh.cells), ("quad", mesh.facets["bottom"])]))
+    SolidMesh with 12 nodes
+      cells   2 hexahedra
+      facets  boundary (2)
+    """
+    return cast("SolidMesh", _read(source, groups, 3))
+
+
+def _read(source: Any, groups: str | None, dimension: int | None) -> PartedMesh:
+    try:
+        import meshio  # an extra
+    except ImportError as error:
+        raise MissingDependencyError.of("Meshes in files", "meshio", "meshes") from error
+    if isinstance(source, meshio.Mesh):
+        return _checked(source, groups, dimension)
+    place = file_path(source, "source", "the name of a file or a meshio.Mesh")
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of numpy, about files that end too early
+            mesh = meshio.read(place)
+    except (*_DAMAGE, meshio.ReadError) as error:
+        reason = "" if isinstance(error, SystemExit) else str(error)
+        if isinstance(error, LookupError):  # its text is the key alone
+            reason = f"{type(error).__name__}: {reason}"
+        reason = (reason or said.getvalue()).strip().split("\n")[0].rstrip(" .") or type(error).__name__
+        raise InvalidArgumentError(
+            f"{place}: meshio cannot read it ({shortened(reason)}); expected a complete file of a format that it knows"
+        ) from error
+    try:
+        return _checked(mesh, groups, dimension)
+    except InvalidArgumentError as error:
+        raise InvalidArgumentError(f"{place}: {error}") from error
+
+
+def _checked(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
+    try:
+        return _parted(mesh, groups, dimension)
+    except InvalidArgumentError:
+        raise
+    except (IndexError, KeyError, OverflowError, TypeError, ValueError) as error:  # what meshio does not check
+        reason = shortened(str(error)).rstrip(".")
+        raise InvalidArgumentError(f"the arrays of the mesh do not fit together ({reason})") from error
+
+
+def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
+    kinds = list(dict.fromkeys(block.type for block in mesh.cells))
+    if dimension is None:
+        spatial = any(kind.startswith(("tetra", "hexa", "wedge", "pyramid", "polyhedron")) for kind in kinds)
+        dimension = 3 if spatial else 2
+    body, facet = _kinds(kinds, dimension)
+    cells = np.concatenate([np.asarray(block.data) for block in mesh.cells if block.type == body]).astype(np.int64)
+    used = np.unique(cells)
+    if len(used) and not 0 <= used[0] <= used[-1] < len(mesh.points):
+        raise InvalidArgumentError(
+            f"the cells name nodes from {used[0]} to {used[-1]}; expected them in 0 .. {len(mesh.points) - 1}"
+        )
+    points = np.asarray(mesh.points)[used]
+    nodes = positions(points, 3) if dimension == 3 else _plane(points)
+    number = np.full(len(mesh.points), -1)
+    number[used] = np.arange(len(used))
+    inside = number[cells]
+    if dimension == 3:
+        from enumsol.fem.solid_geometry import solid_mesh  # not for plane meshes
+
+        nodes, inside = solid_mesh(nodes, inside)
+    sets = {name: kept for name, rows in _node_sets(mesh).items() if len(kept := _inside(number, rows, name))}
+    facets = {name: _inside(number, rows, name) for name, rows in _named(mesh, facet, groups, dimension).items()}
+    lost = [name for name, rows in facets.items() if np.any(rows < 0)]
+    if lost:
+        raise InvalidArgumentError(f"facets of {lost[0]} have nodes of no cell; expected facets on the boundary")
+    if not facets:
+        facets = _facets_of_sets(nodes, inside, sets)
+    if not facets:
+        raise InvalidArgumentError(
+            f"the mesh has no contact facets: no {facet} cells on its boundary; "
+            f"expected {facet} cells, best in groups with names"
+        )
+    sets = {name: rows[rows >= 0] for name, rows in sets.items() if np.any(rows >= 0)}
+    return _made(dimension, nodes, inside, facets, sets)
+
+
+def _made(
+    dimension: int,
+    nodes: NDArray[np.float64],
+    cells: Integers,
+    facets: dict[str, Integers],
+    sets: dict[str, Integers],
+) -> PartedMesh:
+    if dimension == 2:
+        return PartedMesh(nodes, cells, MappingProxyType(facets), MappingProxyType(sets))
+    from enumsol.fem.solid_meshes import SolidMesh  # not for plane meshes
+
+    return SolidMesh(nodes, cells, MappingProxyType(facets), MappingProxyType(sets))
+
+
+def _kinds(kinds: list[str], dimension: int) -> tuple[str, str]:
+    """Kind of the cells of the body, and of its facets."""
+    facet_of, expected = _FACET_OF[dimension], _EXPECTED[dimension]
+    others = [kind for kind in kinds if not kind.startswith(_IGNORED[dimension])]
+    bodies = [kind for kind in others if kind in facet_of]
+    strange = [kind for kind in others if kind not in facet_of and kind not in facet_of.values()]
+    if strange or len(bodies) > 1:
+        hint = _HINTS.get(tuple(sorted(strange or bodies)), "")
+        raise InvalidArgumentError(
+            f"the mesh has cells of type {' and '.join(strange or bodies)}; expected {expected}{hint}"
+        )
+    if not bodies:
+        raise InvalidArgumentError(f"the mesh has no {_BODIES[dimension]}; expected a body in {dimension}D")
+    facet = facet_of[bodies[0]]
+    other = [kind for kind in others if kind not in (bodies[0], facet)]
+    if other:
+        raise InvalidArgumentError(f"the mesh has {other[0]} cells beside {bodies[0]}; expected facets of type {facet}")
+    return bodies[0], facet
+
+
+def _plane(points: NDArray[Any]) -> NDArray[np.float64]:
+    """Points (N, 2) of a plane mesh."""
+    if points.ndim == 2 and points.shape[1] == 3:
+        nodes = positions(points, 3)
+        extents = np.ptp(nodes, axis=0)
+        if extents[2] > _PLANE * np.max(extents):
+            raise InvalidArgumentError(
+                f"the mesh has plane cells and z from {nodes[:, 2].min():g} to {nodes[:, 2].max():g}; "
+                "expected a plane mesh with the same z everywhere, or cells of a body in 3D"
+            )
+        return np.ascontiguousarray(nodes[:, :2])
+    return positions(points, 2)
+
+
+def _inside(number: Integers, rows: Integers, name: str) -> Integers:
+    """Nodes by their new numbers, -1 for those of no cell."""
+    if len(rows) and not 0 <= np.min(rows) <= np.max(rows) < len(number):
+        raise InvalidArgumentError(
+            f"{name} names nodes from {np.min(rows)} to {np.max(rows)}; expected them in 0 .. {len(number) - 1}"
+        )
+    return np.asarray(number[rows])
+
+
+def _facets_of_sets(nodes: NDArray[np.float64], cells: Integers, sets: dict[str, Integers]) -> dict[str, Integers]:
+    """Facets on the boundary all of whose nodes belong to a set, by the set's name."""
+    if not sets:
+        return {}
+    outer = boundary_facets(nodes.shape[1], cells)
+    found = {name: outer[np.all(np.isin(outer, rows), axis=1)] for name, rows in sets.items()}
+    return {name: rows for name, rows in found.items() if len(rows)}
+
+
+def _node_sets(mesh: Any) -> dict[str, Integers]:
+    """Nodes by the name of their point set or of the group of their points, in the numbers of the file."""
+    sets = {str(name): np.asarray(rows, dtype=np.int64).ravel() for name, rows in mesh.point_sets.items()}
+    points = {name: rows.ravel() for name, rows in _grouped(mesh, "vertex", None, 0).items()}
+    return sets | points
+
+
+def _named(mesh: Any, facet: str, groups: str | None, dimension: int) -> dict[str, Integers]:
+    """Facets by the name of their group, in the numbers of the file."""
+    if groups is not None and groups not in mesh.cell_data:
+        known = ", ".join(mesh.cell_data) or "none"
+        raise InvalidArgumentError(f"groups is {shown(groups)}; expected the name of cell data (found {known})")
+    rows = [np.asarray(block.data).astype(np.int64) for block in mesh.cells if block.type == facet]
+    named = _grouped(mesh, facet, groups, dimension - 1)
+    if named or not rows or _node_sets(mesh):
+        return named
+    return {_ALL: np.concatenate(rows)}
+
+
+def _grouped(mesh: Any, kind: str, groups: str | None, dimension: int) -> dict[str, Integers]:
+    """Cells of a kind by the name of their cell set or group."""
+    blocks = [k for k, block in enumerate(mesh.cells) if block.type == kind]
+    rows = {k: np.asarray(mesh.cells[k].data).astype(np.int64) for k in blocks}
+    named: dict[str, list[Integers]] = {}
+    if groups is None:
+        for name, sets in mesh.cell_sets.items():
+            for k in blocks:
+                if not name.startswith("gmsh:") and sets[k] is not None and len(sets[k]):
+                    named.setdefault(name, []).append(rows[k][np.asarray(sets[k], dtype=np.int64)])
+    data = _PHYSICAL if groups is None else groups
+    if not named and data in mesh.cell_data:
+        names = {
+            int(entry[0]): name for name, entry in mesh.field_data.items() if len(entry) > 1 and entry[1] == dimension
+        }
+        for k in blocks:
+            tags = np.asarray(mesh.cell_data[data][k])
+            for tag in np.unique(tags):
+                if kind == "vertex" and int(tag) not in names:
+                    continue  # gmsh keeps points of no group, too
+                name = names.get(int(tag), f"{tag:g}") if groups is None else f"{tag:g}"
+                named.setdefault(name, []).append(rows[k][tags == tag])
+    return {name: np.concatenate(parts) for name, parts in named.items()}

@@ -1,0 +1,350 @@
+"""From a mesh with named parts to its contact problem, by a call or by a TOML file."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import tomllib
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.array_checks import short_vector
+from enumsol.body2d import PlaneMesh
+from enumsol.checks import exact_number, file_path, finite_number, shown
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.fem.assembly import plane_problem
+from enumsol.fem.bases import nodal_basis
+from enumsol.fem.basis_problems import nodal_normals, pressed, space_problem
+from enumsol.fem.conditions import Held, Obstacle, by_part, check_held, names_of, part_forces, part_springs
+from enumsol.fem.mesh_checks import lame, unit_vectors
+from enumsol.fem.mesh_files import read_mesh
+from enumsol.fem.parts import PartedMesh
+from enumsol.fem.restrained import ContactNodes, movable, plain_dofs
+from enumsol.texts import shortened
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from enumsol.fem.bases import NodalBasis
+    from enumsol.problem import ContactProblem
+    from enumsol.problem3d import ContactProblem3D
+
+    Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
+    Names = str | Sequence[str]
+    Vectors = Mapping[str, ArrayLike] | None
+
+#: Largest TOML file that is read; one that describes a problem has a thousandth of that [bytes].
+LARGEST_FILE = 1_000_000
+
+
+def mesh_problem(
+    mesh: PartedMesh | str | os.PathLike[str] | Any,
+    *,
+    young: float,
+    poisson: float,
+    contact: Names,
+    plane: Literal["strain", "stress"] = "strain",
+    friction: float | Sequence[float] = (0.0, 1.0),
+    friction2: float | Sequence[float] | None = None,
+    axis: ArrayLike | None = None,
+    clamp: Names = (),
+    symmetry: Names = (),
+    displacement: Mapping[str, Sequence[Any]] | None = None,
+    spring: Vectors = None,
+    load: Vectors = None,
+    load_slope: Vectors = None,
+    pressure: Mapping[str, float] | None = None,
+    pressure_slope: Mapping[str, float] | None = None,
+    body_force: ArrayLike | None = None,
+    gap: float = 0.0,
+    obstacle: Mapping[str, Sequence[float]] | None = None,
+    groups: str | None = None,
+) -> ContactProblem | ContactProblem3D:
+    """Contact problem of a body whose mesh has named parts.
+
+    Contact is by nodes: every node of the contact parts that is not held has a row, on edges of second order the nodes
+    between the ends as well. Rows are displacements of nodes, not weighted, and lambda are the nodal forces that do the
+    work on them. In 2D rows are in the order of the nodes along the boundary.
+
+    Normals are those of the boundary, averaged around each node with its shape function as weight, or those of the
+    obstacle. At nodes on a plane of symmetry they are projected on it; the component across it stays in the problem,
+    uncoupled and at rest.
+
+    Parameters
+    ----------
+    mesh : PartedMesh, path, or meshio.Mesh
+        What `read_mesh` returns or takes. Parts are called by their names.
+    young, poisson : float
+        Young's modulus [force / length^2] and Poisson's ratio [-].
+    contact : name or names
+        The contact boundary.
+    plane : {"strain", "stress"}
+        In 2D; all forces and stiffnesses are per unit thickness.
+    friction : float or (F0, F1)
+        Coefficient F0 + alpha F1 [-].
+    friction2 : float or (F0, F1), optional
+        In 3D, coefficient along the second axis; default as the first.
+    axis : (3,) array_like, optional
+        In 3D, direction whose projection on the tangent plane is the first axis; default as `solid_contact_problem`.
+    clamp : name or names
+        Parts that are held in all components.
+    symmetry : name or names
+        Parts in planes perpendicular to an axis, held in the direction of that axis: planes of symmetry, rollers.
+    displacement : mapping of names to components
+        Given displacements in x, y (and z), each a number [length], or ``"free"`` or None where it is not given.
+    spring : mapping of names to (kn, kt)
+        Springs to the ground along the normal and across it, per area (in 2D per length) [force / length^3].
+    load, load_slope : mapping of names to vectors
+        Force per area (in 2D per length) in x, y (and z), and its derivative with respect to alpha [force / length^2].
+    pressure, pressure_slope : mapping of names to float
+        Force per area along the inward normal, and its derivative with respect to alpha [force / length^2].
+    body_force : vector, optional
+        Force per volume, such as the weight [force / length^3].
+    gap : float
+        Initial gap along the normals, in addition to the distance to the obstacle; negative is a press fit [length].
+    obstacle : mapping of one kind to numbers, optional
+        The rigid foundation, where it does not have the shape of the body: ``{"plane": (x, y, nx, ny)}`` by a point and
+        the direction from it to the body, ``{"circle": (x, y, r)}``, or ``{"hole": (x, y, r)}``, a circle that the body
+        is inside of; in 3D ``plane`` with six numbers, ``sphere`` and ``hole`` with four.
+    groups : str, optional
+        As in `read_mesh`.
+
+    Returns
+    -------
+    ContactProblem or ContactProblem3D
+        With ``coordinates`` and, as ``node_ids``, the numbers of the nodes in the mesh; in 3D also with ``areas`` and,
+        unless a part is displaced, ``mesh``.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The mesh cannot be used, a part does not exist (those that do are listed), or an argument is not of its form.
+    InvalidProblemError
+        Nothing but contact holds the body or a part of it, or the data of the problem are not admissible.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> mesh = fem.rectangle(4, 2).parted()
+    >>> problem = fem.mesh_problem(
+    ...     mesh, young=2.5, poisson=0.25, clamp="left", contact="bottom", load={"top": (0.3, -1)}, friction=0.5
+    ... )
+    >>> problem.n, problem.p
+    (24, 4)
+    """
+    parted = mesh if isinstance(mesh, PartedMesh) else read_mesh(mesh, groups)
+    dimension = parted.points.shape[1]
+    if dimension == 3 and plane != "strain":
+        raise InvalidArgumentError(f"plane is {shown(plane)} of a body in 3D; expected it for plane meshes only")
+    body = nodal_basis(parted.points, parted.cells)
+    held = _held(parted, clamp, symmetry, displacement)
+    facets = _facets(body, parted, names_of(contact, "contact"))
+    nodes, gaps = _contact(body, parted, facets, held, obstacle)
+    forces = part_forces(body, parted, load, pressure)
+    if body_force is not None:
+        density = short_vector(body_force, "body_force", dimension)
+        forces = forces + body.volume_forces(np.tile(density, (len(parted.cells), 1)))
+    slope = part_forces(body, parted, load_slope, pressure_slope, "_slope")
+    more: dict[str, Any] = {
+        "gap": gaps + finite_number(gap, "gap"),
+        "node_ids": nodes.nodes.tolist(),
+        "coordinates": parted.points[nodes.nodes],
+        **_coefficients(dimension, friction, friction2),
+    }
+    if dimension == 3:
+        more |= _space_fields(parted, facets, nodes, displaced=bool(np.any(held.supports.values)))
+    else:
+        more["mesh"] = lambda left: PlaneMesh.of_dofs(parted.points, parted.cells, left, held.supports.values)
+    springs = part_springs(body, parted, spring)
+    check_held(parted, held.supports, springs)
+    A = sp.csc_array(body.stiffness(*lame(young, poisson, plane)) + springs)
+    build = plane_problem if dimension == 2 else space_problem
+    dofs, tangents = plain_dofs(parted.points.shape), _axes(nodes, axis, dimension)
+    slopes = slope.ravel() if np.any(slope) else None
+    return build(A, forces.ravel(), slopes, dofs, nodes, held.supports, tangents, **more)
+
+
+def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProblem3D:
+    r"""Contact problem that a TOML file describes: the options of `mesh_problem`, with ``mesh`` a path from its folder.
+
+    Parameters
+    ----------
+    path : str or path-like
+
+    Raises
+    ------
+    InvalidProblemError
+        The file cannot be read, is no TOML, lacks a key or has one that is not known, or describes no problem. The
+        message begins with the path.
+    MissingDependencyError
+        meshio is not installed.
+
+    Examples
+    --------
+    >>> import meshio, pathlib
+    >>> from enumsol import fem
+    >>> cells = [("quad", [[0, 1, 2, 3]]), ("line", [[0, 1], [2, 3]])]
+    >>> meshio.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], cells, cell_data={"part": [[0], [1, 2]]}).write("square.vtu")
+    >>> text = "mesh = 'square.vtu'\ngroups = 'part'\nyoung = 2.5\npoisson = 0.25\nclamp = '2'\ncontact = '1'"
+    >>> _ = pathlib.Path("square.toml").write_text(text)
+    >>> fem.read_mesh_problem("square.toml").p
+    2
+    """
+    place = file_path(path, "path")
+    try:
+        options = _toml(place)
+        name = file_path(options.pop("mesh", None), "mesh", "the name of a mesh file in quotes")
+        check_keys(options)
+        return mesh_problem(place.parent / name, **options)
+    except OSError as error:
+        raise InvalidProblemError(f"{place}: it cannot be read ({error.strerror or error})") from error
+    except (InvalidArgumentError, InvalidProblemError) as error:
+        raise InvalidProblemError(f"{place}: {error}") from error
+
+
+def _toml(place: Path) -> dict[str, Any]:
+    with place.open("rb") as file:
+        content = file.read(LARGEST_FILE + 1)
+    if len(content) > LARGEST_FILE:
+        raise InvalidArgumentError(f"it has more than {LARGEST_FILE} bytes; expected a TOML file of options")
+    try:
+        return tomllib.loads(content.decode("utf-8"))
+    except (ValueError, RecursionError) as error:  # UnicodeDecodeError and TOMLDecodeError, too
+        reason = shortened(str(error))
+        raise InvalidArgumentError(
+            f"it is no TOML file ({reason}); expected lines such as contact = 'floor'"
+        ) from error
+
+
+def check_keys(options: Mapping[str, Any]) -> None:
+    """Refuse options that `mesh_problem` does not have, and the lack of those that it must have.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The closest name is given, or what is missing.
+    """
+    known = {name: p.default for name, p in inspect.signature(mesh_problem).parameters.items() if name != "mesh"}
+    for name in options:
+        if name not in known:
+            close = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean {close[0]}?" if close else f"expected some of mesh, {', '.join(known)}"
+            raise InvalidArgumentError(f"there is no option {shown(name)}; {hint}")
+    missing = [name for name, default in known.items() if default is inspect.Parameter.empty and name not in options]
+    if missing:
+        raise InvalidArgumentError(f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing")
+
+
+def _held(mesh: PartedMesh, clamp: Any, symmetry: Any, displacement: Any) -> Held:
+    held = Held(mesh)
+    for part in names_of(clamp, "clamp"):
+        held.clamp(part)
+    for part in names_of(symmetry, "symmetry"):
+        held.mirror(part)
+    for part, value in by_part(displacement, "displacement").items():
+        held.displace(part, value)
+    return held
+
+
+def _facets(body: NodalBasis, mesh: PartedMesh, parts: list[str]) -> Integers:
+    """Facets of the contact parts, each once."""
+    if not parts:
+        raise InvalidArgumentError("contact names no part; expected the contact boundary")
+    for part in parts:
+        body.facet_numbers(mesh.part(part), part)  # on the boundary?
+    facets = np.concatenate([mesh.part(part) for part in parts])
+    _, first = np.unique(np.sort(facets, axis=1), axis=0, return_index=True)
+    return np.asarray(facets[np.sort(first)])
+
+
+def _contact(
+    body: NodalBasis, mesh: PartedMesh, facets: Integers, held: Held, obstacle: Any
+) -> tuple[ContactNodes, Floats]:
+    """Contact nodes with their normals, and the distances to the obstacle."""
+    touching = along(facets) if mesh.points.shape[1] == 2 else np.unique(facets)
+    if np.all(held.supports.fixed[touching]):
+        raise InvalidArgumentError("contact has no node that clamp or displacement leave free; expected some")
+    if obstacle is None:
+        integrals = body.vectors(nodal_normals(body.basis, body.facet_numbers(facets, "contact")))
+        normals, gaps = pressed(integrals[touching], touching), np.zeros(len(touching))
+    else:
+        normals, gaps = Obstacle.of(obstacle, mesh.points.shape[1]).normals_and_gaps(mesh.points[touching])
+    normals = unit_vectors(normals, "normals of the boundary")
+    if obstacle is None:  # what averages with the other half of the body would be
+        normals = unit_vectors(np.where(held.mirrored[touching], 0.0, normals), "normals at the plane of symmetry")
+    nodes = movable(touching, normals, held.supports)
+    return nodes, gaps[nodes.kept]
+
+
+def along(edges: Integers) -> Integers:
+    """Nodes of edges (k, 2) or (k, 3), each line of edges from one end to the other; closed lines from any node."""
+    pairs = edges if edges.shape[1] == 2 else np.concatenate([edges[:, [0, 2]], edges[:, [2, 1]]])
+    beside: dict[int, list[int]] = {}
+    for one, two in pairs.tolist():
+        beside.setdefault(one, []).append(two)
+        beside.setdefault(two, []).append(one)
+    ordered: dict[int, None] = {}
+    # ends first, then what is left: closed lines
+    for start in sorted(beside, key=lambda node: (len(beside[node]) != 1, node)):
+        node: int | None = start
+        while node is not None and node not in ordered:
+            ordered[node] = None
+            node = next((after for after in beside[node] if after not in ordered), None)
+    return np.array(list(ordered), dtype=np.int64)
+
+
+def _coefficients(dimension: int, friction: Any, second: Any) -> dict[str, Any]:
+    """F0 + alpha F1 as the arguments of the problem."""
+    F0, F1 = _line(friction, "friction")
+    if dimension == 2:
+        if second is not None:
+            raise InvalidArgumentError("friction2 is given for a plane body, which has one tangent; expected it in 3D")
+        return {"friction": (F0, F1)}
+    G0, G1 = (F0, F1) if second is None else _line(second, "friction2")
+    return {"friction": (F0, G0), "friction_slope": (F1, G1)}
+
+
+def _line(value: Any, name: str) -> tuple[float, float]:
+    if exact_number(value) is not None:
+        return finite_number(value, name), 0.0
+    try:
+        F0, F1 = short_vector(value, name, 2)
+    except InvalidArgumentError:
+        raise InvalidArgumentError(
+            f"{name} is {shown(value)}; expected a number, or two: F0 and F1 of F0 + alpha F1"
+        ) from None
+    return float(F0), float(F1)
+
+
+def _axes(nodes: ContactNodes, axis: Any, dimension: int) -> Any:
+    if axis is None:
+        return None
+    if dimension == 2:
+        raise InvalidArgumentError("axis is given for a plane body, which has one tangent; expected it in 3D")
+    direction = short_vector(axis, "axis", 3)
+    first = direction - (nodes.normals @ direction)[:, None] * nodes.normals
+    if np.min(np.linalg.norm(first, axis=1)) <= 1e-6 * np.linalg.norm(direction):
+        raise InvalidArgumentError(f"axis is {shown(axis)}, a normal of the contact boundary; expected a tangent")
+    first = unit_vectors(first, "axis")
+    return first, np.cross(nodes.normals, first)
+
+
+def _space_fields(mesh: PartedMesh, facets: Integers, nodes: ContactNodes, *, displaced: bool) -> dict[str, Any]:
+    """Areas, and the mesh as a function of the degrees of freedom that are left."""
+    from enumsol.body3d import BodyMesh  # not for plane bodies
+    from enumsol.fem.solid_geometry import outward
+    from enumsol.fem.surfaces import ContactSurface
+
+    surface = ContactSurface(mesh.points, outward(facets, mesh.cells))
+    areas = np.bincount(surface.facets.ravel(), surface.shares.ravel(), len(mesh.points))
+    return {
+        "areas": areas[nodes.nodes],
+        "mesh": None if displaced else lambda left: BodyMesh(mesh.points, mesh.cells, left, surface.facets),
+    }

@@ -1,0 +1,157 @@
+"""What holds a body: degrees of freedom with given displacements are eliminated, at contact nodes set apart.
+
+A contact row needs both components of its node. Where one of them is held at zero, as on a plane of symmetry, it stays
+in the problem as a degree of freedom of its own that nothing moves: it is uncoupled from the body, its displacement is
+zero in every solution, and so is the tangential force along it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.errors import InvalidArgumentError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
+    Mask = NDArray[np.bool_]
+
+#: Components of unit normals below this are rounding of a right angle.
+RIGHT_ANGLE = 1e-9
+
+
+@dataclass(frozen=True)
+class Supports:
+    """Displacements that are given, by nodes and components.
+
+    Attributes
+    ----------
+    fixed : (N, dimension) bool array
+    values : (N, dimension) array
+        Displacements of the fixed components, 0 elsewhere [length].
+    """
+
+    fixed: Mask
+    values: Floats
+
+    @classmethod
+    def held(cls, mask: Mask) -> Supports:
+        """Held at zero."""
+        return cls(mask, np.zeros(mask.shape))
+
+
+@dataclass(frozen=True)
+class ContactNodes:
+    """Contact nodes that can move, and their normals.
+
+    Attributes
+    ----------
+    nodes : (p,) int array
+    normals : (p, dimension) array
+        Of length one.
+    apart : (N, dimension) bool array
+        Fixed components that stay in the problem.
+    kept : (p,) int array
+        Which of the nodes that were asked for these are.
+    """
+
+    nodes: Integers
+    normals: Floats
+    apart: Mask
+    kept: Integers
+
+
+def movable(nodes: Integers, normals: Floats, supports: Supports) -> ContactNodes:
+    """Contact nodes without those that are held entirely.
+
+    Raises
+    ------
+    InvalidArgumentError
+        All are held, or one is held in a component that is not perpendicular to its normal, or displaced in one.
+    """
+    fixed = supports.fixed[nodes]
+    kept = np.flatnonzero(~np.all(fixed, axis=1))
+    if not len(kept):
+        raise InvalidArgumentError("contact has held nodes only; expected free ones")
+    nodes, fixed, normals = nodes[kept], fixed[kept], normals[kept]
+    wrong = np.any(fixed & ((np.abs(normals) > RIGHT_ANGLE) | (supports.values[nodes] != 0)), axis=1)
+    if np.any(wrong):
+        raise InvalidArgumentError(
+            f"contact node {nodes[np.argmax(wrong)]} is held or displaced in some components only, which makes its "
+            "rows dependent; expected contact nodes that are free, held entirely, or held at zero across their normal "
+            "(as on a plane of symmetry)"
+        )
+    touched = np.any(fixed, axis=1)
+    normals = np.where(fixed, 0.0, normals)
+    normals[touched] /= np.linalg.norm(normals[touched], axis=1)[:, None]
+    apart = np.zeros_like(supports.fixed)
+    apart[nodes] = fixed
+    return ContactNodes(nodes, normals, apart, kept)
+
+
+def check_axes(contact: ContactNodes, tangents: tuple[Floats, ...]) -> None:
+    """Refuse tangential axes at planes of symmetry that are neither along nor across them."""
+    apart = contact.apart[contact.nodes]
+    for tangent in tangents:
+        across = np.linalg.norm(np.where(apart, tangent, 0.0), axis=1)
+        oblique = (across > RIGHT_ANGLE) & (np.linalg.norm(np.where(apart, 0.0, tangent), axis=1) > RIGHT_ANGLE)
+        if np.any(oblique):
+            raise InvalidArgumentError(
+                f"axes are oblique to the plane of symmetry at contact node {contact.nodes[np.argmax(oblique)]}; "
+                "expected one along it and one across it"
+            )
+
+
+@dataclass(frozen=True)
+class Restrained:
+    """Matrices and vectors by the degrees of freedom that are left.
+
+    Attributes
+    ----------
+    A, f, load_slope : as in `ContactProblem`
+    left : (n,) int array
+        The degree of freedom of the body that each is.
+    """
+
+    A: sp.csc_array
+    f: Floats
+    load_slope: Floats | None
+    left: Integers
+
+    def rows(self, contact: ContactNodes, directions: Floats, dofs: Integers) -> sp.csr_array:
+        """Displacements of the contact nodes along directions (p, dimension)."""
+        places = np.searchsorted(self.left, dofs[contact.nodes])
+        rows = np.repeat(np.arange(len(contact.nodes)), dofs.shape[1])
+        return sp.csr_array((directions.ravel(), (rows, places.ravel())), shape=(len(contact.nodes), len(self.left)))
+
+
+def restrained(
+    A: sp.csc_array, forces: Floats, forces_slope: Floats | None, dofs: Integers, supports: Supports, apart: Mask
+) -> Restrained:
+    """The body by the degrees of freedom that are left, in the order of the rows of A.
+
+    ``dofs`` (N, dimension) are the rows of A that the components of the nodes are.
+    """
+    fixed, uncoupled, moved = np.zeros(len(forces), bool), np.zeros(len(forces), bool), np.zeros(len(forces))
+    fixed[dofs], uncoupled[dofs], moved[dofs] = supports.fixed, apart, np.where(supports.fixed, supports.values, 0.0)
+    left = np.flatnonzero(~fixed | uncoupled)
+    load = forces - A @ moved if np.any(moved) else forces
+    kept = np.where(uncoupled, 0.0, 1.0)[left]
+    stiffness = sp.csc_array(A[left][:, left])
+    if np.any(uncoupled):
+        coupled = sp.diags_array(kept)
+        own = sp.diags_array(np.where(kept == 0, stiffness.diagonal(), 0.0))
+        stiffness = sp.csc_array(coupled @ stiffness @ coupled + own)
+    slope = None if forces_slope is None else kept * forces_slope[left]
+    return Restrained(stiffness, kept * load[left], slope, left)
+
+
+def plain_dofs(shape: tuple[int, ...]) -> Integers:
+    """Degrees of freedom ``dimension node + component``, of shape (N, dimension)."""
+    return np.arange(shape[0] * shape[1]).reshape(shape)

@@ -1,0 +1,146 @@
+"""Are the roots the same when the same body is assembled by scikit-fem, FEniCSx and GetFEM?
+
+A wedge of P1 triangles, pressed into a notch and pulled at its top, which springs hold. Each code's script
+(``by_scikit_fem.py``, ``by_dolfinx.py``, ``by_getfem.py``) reads the mesh, assembles stiffness and load in its own way
+and its own order of the degrees of freedom, and writes A, Bn, Bt and f to a .npz file, as a user of that code would;
+the scripts import nothing of this package. All solutions of each file are then enumerated and proven.
+
+A code is looked for in this Python, in the ``python3`` of the system (where Debian's python3-dolfinx and
+python3-getfem are) and in ``--python``; one that is nowhere is left out. ``difference`` is the largest one between
+contact forces and those of scikit-fem, relative to the largest force.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import enumsol
+from enumsol import fem
+from shared.results import yes
+
+if TYPE_CHECKING:
+    import argparse
+
+    from enumsol import RootSet
+    from shared.results import Run
+
+HERE = Path(__file__).parent
+#: Script of each code, and what it imports.
+CODES = {
+    "scikit-fem": ("by_scikit_fem", "skfem"),
+    "dolfinx": ("by_dolfinx", "dolfinx"),
+    "GetFEM": ("by_getfem", "getfem"),
+}
+#: Cells along and across the wedge, and alphas at which its roots are enumerated.
+SIZES, SMOKE_SIZES = ((4, 4), (6, 7), (10, 10)), ((4, 4),)
+ALPHAS, SMOKE_ALPHAS = (1.5, 2.5, 4.0), (2.5,)
+#: How near forces are to be.
+CLOSE = 1e-9
+#: The search of the largest wedge stops here; only what is complete is compared.
+MOST_NODES = 20_000
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--python", metavar="PYTHON", help="another interpreter to look for the codes in")
+
+
+def interpreter(library: str, more: str | None) -> str | None:
+    """A Python that has a library."""
+    found = [sys.executable, more, shutil.which("python3", path="/usr/bin"), shutil.which("python3")]
+    for python in filter(None, found):
+        if call(python, "-c", f"import {library}").returncode == 0:
+            return python
+    return None
+
+
+def call(*command: str) -> subprocess.CompletedProcess[str]:
+    hidden = ("PYTHONPATH", "PYTHONWARNINGS", "VIRTUAL_ENV")
+    environment = {name: value for name, value in os.environ.items() if name not in hidden}
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def write_mesh(place: Path, nx: int, ny: int) -> None:
+    """The wedge, with what acts on it."""
+    mesh = fem.trapezoid(nx, ny, bottom=1.0, top=1.7, height=1.0)
+    # the top row stands in the mouth of the notch
+    sides = (mesh.left[:-1], mesh.right[:-1])
+    normal = np.array([-1.0, -0.35]) / np.hypot(1.0, 0.35)
+    np.savez(
+        place,
+        points=mesh.points,
+        triangles=mesh.triangles,
+        contact=np.concatenate(sides),
+        normals=np.repeat([normal, normal * [-1, 1]], len(sides[0]), axis=0),
+        lame=[1.0, 1.0],
+        spring=0.02,
+        traction=[1e-4, 1e-3],
+        gap=-5e-4,
+    )
+
+
+def problems(size: tuple[int, int], pythons: dict[str, str]) -> dict[str, Any]:
+    """The problem by each code."""
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        mesh = Path(folder, "mesh.npz")
+        write_mesh(mesh, *size)
+        for code, python in pythons.items():
+            file = Path(folder, f"{CODES[code][0]}.npz")
+            done = call(python, str(HERE / f"{CODES[code][0]}.py"), str(mesh), str(file))
+            if done.returncode:
+                sys.exit(f"{code}: {done.stderr}")
+            found[code] = enumsol.read_problem(file)
+    return found
+
+
+def forces(roots: RootSet) -> np.ndarray:
+    return np.array([[root.lambda_n, root.lambda_t] for root in roots])
+
+
+def compared(size: tuple[int, int], alpha: float, by_code: dict[str, Any]) -> list[dict[str, Any]]:
+    rows = []
+    roots = {code: enumsol.enumerate_roots(body, alpha, max_nodes=MOST_NODES) for code, body in by_code.items()}
+    first = next(iter(roots.values()))
+    for code, found in roots.items():
+        same = len(found) == len(first) and all(a.statuses == b.statuses for a, b in zip(found, first, strict=True))
+        scale = np.max(np.abs(forces(first)))
+        rows.append(
+            {
+                "cells": f"{size[0]}x{size[1]}",
+                "p": by_code[code].p,
+                "alpha": alpha,
+                "code": code,
+                "roots": len(found),
+                "complete": yes(found.complete),
+                "same statuses": yes(same),
+                "difference": float(np.max(np.abs(forces(found) - forces(first))) / scale) if same else np.inf,
+            }
+        )
+    return rows
+
+
+def main(run: Run) -> None:
+    more = getattr(run.options, "python", None)
+    found = {code: interpreter(library, more) for code, (_, library) in CODES.items()}
+    pythons = {code: python for code, python in found.items() if python is not None}
+    rows = []
+    for size in SMOKE_SIZES if run.smoke else SIZES:
+        by_code = problems(size, pythons)
+        for alpha in SMOKE_ALPHAS if run.smoke else ALPHAS:
+            rows += compared(size, alpha, by_code)
+    same = all(row["same statuses"] == row["complete"] == "yes" and row["difference"] < CLOSE for row in rows)
+    run.table(
+        "same_body_by_other_codes",
+        rows,
+        f"the same roots to {CLOSE:g}, all complete: {yes(same)}",
+        f"largest difference {max(row['difference'] for row in rows):.1e}; codes: {', '.join(pythons)}",
+        *(f"{code} is not installed: it is left out" for code in CODES if code not in pythons),
+    )

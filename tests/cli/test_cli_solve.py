@@ -1,0 +1,176 @@
+"""``enumsol solve``: the same roots from options, from a TOML file, and from what --output wrote; one sentence else."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from enumsol import enumerate_roots, fem, read_problem
+from enumsol.cli import main
+from enumsol.cli.app import app
+
+BODY = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+3
+1 7 "floor"
+1 9 "lid"
+2 1 "body"
+$EndPhysicalNames
+$Nodes
+6
+1 0 0 0
+2 1 0 0
+3 2 0 0
+4 0 1 0
+5 1 1 0
+6 2 1 0
+$EndNodes
+$Elements
+6
+1 1 2 7 3 1 2
+2 1 2 7 3 2 3
+3 1 2 9 4 4 5
+4 1 2 9 4 5 6
+5 3 2 1 1 1 2 5 4
+6 3 2 1 1 2 3 6 5
+$EndElements
+"""
+OPTIONS = (
+    "--contact",
+    "floor",
+    "--young",
+    "2.5",
+    "--poisson",
+    "0.25",
+    "--spring",
+    "lid=1,0.5",
+    "--load",
+    "lid=0.2,-0.5",
+)
+TOML = """mesh = "body.msh"
+contact = "floor"
+young = 2.5
+poisson = 0.25
+spring.lid = [1, 0.5]
+load.lid = [0.2, -0.5]
+"""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "body.msh").write_text(BODY)
+    (tmp_path / "body.toml").write_text(TOML)
+    return tmp_path
+
+
+def run(capsys, *arguments):
+    status = main([str(argument) for argument in arguments])
+    return status, *capsys.readouterr()
+
+
+def test_from_a_mesh_to_the_roots(here, capsys):
+    status, out, err = run(
+        capsys, "solve", "body.msh", *OPTIONS, "--alpha", "0.5", "-o", "body.npz", "--json", "r.json"
+    )
+    assert status == 0
+    assert "RootSet at alpha = 0.5: 1 root" in out
+    assert out.endswith("complete: yes (proven)\n")
+    assert err == "enumsol: note: wrote a problem with 12 degrees of freedom and 3 contact nodes to body.npz\n"
+    problem = read_problem("body.npz")
+    direct = fem.mesh_problem(
+        "body.msh", contact="floor", young=2.5, poisson=0.25, spring={"lid": (1, 0.5)}, load={"lid": (0.2, -0.5)}
+    )
+    assert problem.fingerprint == direct.fingerprint
+    (root,) = enumerate_roots(problem, 0.5)
+    assert json.loads((here / "r.json").read_text())["roots"][0]["lambda_n"] == pytest.approx(root.lambda_n.tolist())
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("solve", "body.toml", "--alpha", "0.5"),
+        ("roots", "body.toml", "--alpha", "0.5"),
+        ("table", "body.toml", "--alphas", "0.5"),
+        ("graph", "body.toml", "--from", "0", "--to", "1"),
+        ("follow", "body.toml", "--from", "0", "--to", "1", "--start", "0.5"),
+        ("fixed-point", "body.toml", "--alpha", "0.2"),
+    ],
+)
+def test_every_command_takes_the_toml_file(here, capsys, command):
+    status, out, err = run(capsys, *command)
+    assert (status, err) == (0, "")
+    assert out
+
+
+def test_friction_and_loads_may_depend_on_alpha(here, capsys):
+    command = ("solve", "body.msh", *OPTIONS, "--load-slope", "lid=0,-1", "--pressure-slope", "lid=-0.5")
+    status, out, _ = run(capsys, *command, "--friction", "0.2,0.3", "-o", "p.npz")
+    assert (status, out) == (0, "")  # it depends on alpha and is written only
+    problem = read_problem("p.npz")
+    assert problem.friction[0].tolist() == [0.2] * 3
+    assert problem.friction[1].tolist() == [0.3] * 3
+    assert problem.load_slope.sum() == pytest.approx(-2 + 1)
+    status, out, _ = run(capsys, "solve", "body.msh", *OPTIONS, "--friction", "0.5")
+    assert status == 0
+    assert "RootSet at alpha = 0: 1 root" in out
+
+
+def test_options_of_supports_and_obstacles(here, capsys):
+    status, out, _ = run(
+        capsys, "solve", "body.msh", "--contact", "floor", "--young", 1, "--poisson", 0, "--displacement",
+        "lid=free,-0.2", "--spring", "lid=0,1", "--obstacle", "plane=0,-0.1,0,1", "--gap", "-0.05", "--friction", "0.3",
+        "--plane", "stress", "--body-force", "0,-0.01", "-o", "p.npz",
+    )  # fmt: skip
+    assert status == 0
+    problem = read_problem("p.npz")
+    assert problem.gap == pytest.approx([0.05] * 3)
+    assert problem.n == 9
+    assert "complete: yes" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (("solve",), "missing argument 'MESH'"),
+        (("solve", "body.msh"), "young, poisson, contact are missing"),
+        (("solve", "body.msh", *OPTIONS[:4]), "poisson is missing"),
+        (("solve", "body.msh", *OPTIONS), "--alpha is missing, on which friction or load depend"),
+        (
+            ("solve", "body.msh", *OPTIONS, "--contact", "flor", "--alpha", 1),
+            "no facets named 'flor'; expected one of flo",
+        ),
+        (("solve", "body.msh", *OPTIONS, "--load", "lid=1,2", "--alpha", 1), "--load is given twice for lid"),
+        (("solve", "body.msh", *OPTIONS, "--load", "top", "--alpha", 1), "--load is top; expected NAME=NUMBERS"),
+        (("solve", "body.msh", *OPTIONS, "--pressure", "lid=1,2", "--alpha", 1), "--pressure is 1,2; expected numbers"),
+        (("solve", "body.msh", *OPTIONS, "--pressure", "lid=x", "--alpha", 1), "--pressure is x; expected numbers"),
+        (("solve", "body.msh", *OPTIONS, "--gap", "nan", "--alpha", 1), "gap is nan; expected a finite number"),
+        (("solve", "body.msh", *OPTIONS, "--obstacle", "wall=1", "--alpha", 1), "obstacle is 'wall'; expected one of"),
+        (
+            ("solve", "body.toml", "--young", "1", "--alpha", 1),
+            "--young is given beside body.toml, which has all options",
+        ),
+        (("solve", "nowhere.msh", *OPTIONS, "--alpha", 1), "nowhere.msh: meshio cannot read it"),
+        (("solve", "nowhere.toml", "--alpha", 1), "nowhere.toml: there is no such file"),
+        (("roots", "body.tml", "--alpha", 1), "did you mean body.toml?"),
+        (("solve", "body.msh", *OPTIONS, "--alpha", 1, "-o", "p.txt"), "p.txt: its name ends in '.txt'"),
+        (("solve", "body.msh", *OPTIONS, "--alpha", 1, "--proof", "-"), "a proof is a binary file"),
+        (("solve", "body.msh", *OPTIONS[:6], "--alpha", 1), "the body is free to move as a rigid body; expected clamp"),
+    ],
+)
+def test_bad_calls_get_one_sentence(here, capsys, arguments, part):
+    status, out, err = run(capsys, *arguments)
+    assert (status, out) == (2, "")
+    assert err.startswith("enumsol: error: ")
+    assert err.count("\n") == 1
+    assert part in err
+
+
+def test_help_names_every_option_of_mesh_problem():
+    said = CliRunner().invoke(app, ["solve", "--help"], env={"COLUMNS": "200"}).stdout
+    from inspect import signature
+
+    names = [name for name in signature(fem.mesh_problem).parameters if name != "mesh"]
+    assert [name for name in names if f"--{name.replace('_', '-')} " not in said] == []

@@ -1,0 +1,132 @@
+"""From bases of scikit-fem: against matrices put together by hand, and against the mesh's own way."""
+
+import numpy as np
+import pytest
+import skfem
+from parted_meshes import grid
+from skfem.helpers import dot
+from skfem.models.elasticity import lame_parameters, linear_elasticity
+
+import enumsol
+from enumsol import InvalidArgumentError, fem
+
+LAME = lame_parameters(2.0, 0.3)
+
+
+def basis_of(element, mesh=None):
+    mesh = (skfem.MeshTri() if mesh is None else mesh).refined(2).with_defaults()
+    basis = skfem.Basis(mesh, skfem.ElementVector(element))
+    return basis, linear_elasticity(*LAME).assemble(basis)
+
+
+def test_written_out_by_hand():
+    """What a user of scikit-fem does without this package."""
+    basis, K = basis_of(skfem.ElementTriP1())
+    push = skfem.LinearForm(lambda v, _: -0.1 * v[1] + 0.05 * v[0]).assemble(basis.boundary("top"))
+    problem = fem.basis_contact_problem(
+        basis, K, contact="bottom", held=basis.get_dofs("left"), forces=push, friction=0.4, gap=0.01
+    )
+    free = basis.complement_dofs(basis.get_dofs("left"))
+    floor = basis.mesh.facets[:, basis.mesh.boundaries["bottom"]]
+    nodes = [node for node in np.unique(floor) if basis.mesh.p[0, node] > 0]
+    Bn, Bt = np.zeros((2, len(nodes), len(free)))
+    for row, node in enumerate(nodes):
+        x, y = (int(np.flatnonzero(free == dof)[0]) for dof in basis.nodal_dofs[:, node])
+        Bn[row, y], Bt[row, x] = -1, 1
+    byhand = enumsol.ContactProblem(K[free][:, free], Bn, Bt, push[free], gap=0.01, friction=0.4)
+    one, two = enumsol.enumerate_roots(problem, 0), enumsol.enumerate_roots(byhand, 0)
+    assert len(one) == len(two) == 1
+    assert np.allclose(one[0].lambda_n, two[0].lambda_n, rtol=1e-12)
+    assert np.allclose(one[0].u, two[0].u, rtol=1e-10)
+    assert list(problem.node_ids) == nodes
+
+
+@pytest.mark.parametrize("kind", [3, 4, 6, 9])
+def test_the_same_as_mesh_problem(kind):
+    """Degrees of freedom come in another order; roots are the same at the same places."""
+    mesh = grid(3, 2, kind, 2.0, 1.0)
+    element = {3: skfem.ElementTriP1, 4: skfem.ElementQuad1, 6: skfem.ElementTriP2, 9: skfem.ElementQuad2}[kind]
+    kinds = {3: skfem.MeshTri1, 4: skfem.MeshQuad1, 6: skfem.MeshTri2, 9: skfem.MeshQuad2}
+    given = kinds[kind](mesh.points.T.copy(), mesh.cells.T.copy()).with_defaults()
+    basis = skfem.Basis(given, skfem.ElementVector(element()), intorder=4)
+    push = skfem.LinearForm(lambda v, w: dot(np.array([0.05, -0.1])[:, None, None], v)).assemble(basis.boundary("top"))
+    one = fem.basis_contact_problem(
+        basis, linear_elasticity(*LAME).assemble(basis), contact="bottom", held=basis.get_dofs("left"), forces=push,
+        friction=0.4, gap=lambda place: 0.01 * place[0],
+    )  # fmt: skip
+    two = fem.mesh_problem(
+        mesh, young=2.0, poisson=0.3, contact="bottom", clamp="left", load={"top": (0.05, -0.1)}, friction=0.4,
+    )  # fmt: skip
+    order = np.argsort(one.coordinates[:, 0])
+    assert np.allclose(one.coordinates[order], two.coordinates)
+    rows = [
+        np.where(np.abs(rows) > 0.5, sign, 0.0) for rows, sign in ((two.Bn.toarray(), -1.0), (two.Bt.toarray(), 1.0))
+    ]
+    two = enumsol.ContactProblem(two.A, *rows, two.f, friction=0.4, gap=0.01 * two.coordinates[:, 0])
+    found = [enumsol.enumerate_roots(problem, 0) for problem in (one, two)]
+    assert [len(roots) for roots in found] == [1, 1]
+    assert np.allclose(found[0][0].lambda_n[order], found[1][0].lambda_n, rtol=1e-8, atol=1e-12)
+    assert np.allclose(found[0][0].lambda_t[order], found[1][0].lambda_t, rtol=1e-8, atol=1e-12)
+
+
+def test_given_displacements():
+    """A body that is moved as a whole: no forces but those of the obstacle, which it has not reached."""
+    basis, K = basis_of(skfem.ElementTriP2())
+    moved = np.zeros(basis.N)
+    moved[basis.get_dofs("top").all(["u^2"])] = -0.25
+    problem = fem.basis_contact_problem(
+        basis, K, contact="bottom", held=basis.get_dofs("top"), displacements=moved, gap=0.3, friction=0.5
+    )
+    (root,) = enumsol.enumerate_roots(problem, 0)
+    assert np.all(root.lambda_n == 0)
+    assert np.allclose(root.u_n, -0.05)
+
+
+def test_three_dimensions():
+    mesh = fem.box(2, 2, 1)
+    given = skfem.MeshHex.init_tensor(*(np.linspace(0, 1, n) for n in (3, 3, 2))).with_defaults()
+    basis = skfem.Basis(given, skfem.ElementVector(skfem.ElementHex1()), intorder=3)
+    floor = given.facets_satisfying(lambda x: np.isclose(x[2], 0))
+    lid = given.facets_satisfying(lambda x: np.isclose(x[2], 1))
+    wall = given.facets_satisfying(lambda x: np.isclose(x[0], 0))
+    push = skfem.LinearForm(lambda v, _: 0.3 * v[0] + 0.1 * v[1] - 0.6 * v[2]).assemble(basis.boundary(lid))
+    one = fem.basis_contact_problem(
+        basis, linear_elasticity(*LAME).assemble(basis), contact=floor, held=basis.get_dofs(wall), forces=push,
+        friction=(0.5, 0.3), tangents=((1, 0, 0), (0, -1, 0)),
+    )  # fmt: skip
+    two = fem.mesh_problem(
+        mesh, young=2.0, poisson=0.3, contact="bottom", clamp="left", load={"top": (0.3, 0.1, -0.6)}, friction=0.5,
+        friction2=0.3,
+    )  # fmt: skip
+    places = [int(np.argmin(np.linalg.norm(two.coordinates - place, axis=1))) for place in one.coordinates]
+    found = [enumsol.successive_approximations(problem, 0) for problem in (one, two)]
+    assert np.allclose(found[0].lambda_n, found[1].lambda_n[places], rtol=1e-7)
+    assert np.allclose(found[0].lambda_t, found[1].lambda_t[places], rtol=1e-6, atol=1e-9)
+
+
+def test_what_is_refused():
+    basis, K = basis_of(skfem.ElementTriP1())
+    good = {"basis": basis, "stiffness": K, "contact": "bottom", "held": basis.get_dofs("top")}
+
+    def refused(message, **changes):
+        with pytest.raises(InvalidArgumentError, match=message):
+            fem.basis_contact_problem(**(good | changes))
+
+    refused(
+        "basis is a CellBasis whose degrees of freedom are not vectors", basis=skfem.Basis(basis.mesh, basis.elem.elem)
+    )
+    refused("basis is a int", basis=3)
+    refused(r"stiffness has shape .*; expected \(50, 50\), as the basis has", stiffness=np.eye(3))
+    refused("contact is 'floor'; .* the name of a boundary .found left, bottom, right, top", contact="floor")
+    refused("contact has facets inside the body", contact=np.flatnonzero(basis.mesh.f2t[1] >= 0)[:2])
+    refused("contact is .*; expected facets", contact=np.array([10_000]))
+    refused("held has shape .* below 50, or a mask", held=[99])
+    refused("contact has held nodes only", held=np.ones(50, dtype=bool))
+    refused("contact node 0 is held or displaced in some components only", held=basis.get_dofs("bottom").all(["u^2"]))
+    refused(r"forces has shape \(3,\); expected \(50,\)", forces=[1, 2, 3])
+    refused("normals row 0 is zero", normals=(0, 0))
+    solid, matrix = basis_of(skfem.ElementTetP2(), skfem.MeshTet())
+    refused(
+        "no pressure acts on it .as on corners of quadratic facets in 3D", basis=solid, stiffness=matrix,
+        held=solid.get_dofs("top"),
+    )  # fmt: skip

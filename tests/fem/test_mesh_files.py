@@ -1,0 +1,255 @@
+"""Plane meshes from files: gmsh by hand in two versions, node sets, groups of points, files that are no plane body."""
+
+import meshio
+import numpy as np
+import pytest
+
+from enumsol import InvalidArgumentError, fem
+
+GMSH_2 = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+4
+0 4 "corner"
+1 7 "floor"
+1 9 "lid"
+2 1 "body"
+$EndPhysicalNames
+$Nodes
+5
+10 0 0 0
+20 1 0 0
+30 1 1 0
+40 0 1 0
+50 9 9 0
+$EndNodes
+$Elements
+6
+1 15 2 0 1 50
+2 15 2 4 2 20
+3 1 2 7 3 10 20
+4 1 2 9 4 30 40
+5 2 2 1 1 10 20 30
+6 2 2 1 1 10 30 40
+$EndElements
+"""
+
+#: Edges of second order, in the order of the file: ends, then the node between.
+GMSH_4 = """$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$PhysicalNames
+2
+1 7 "floor"
+2 1 "body"
+$EndPhysicalNames
+$Entities
+0 1 1 0
+3 0 0 0 1 0 0 1 7 0
+1 0 0 0 1 1 0 1 1 1 3
+$EndEntities
+$Nodes
+1 6 1 6
+2 1 0 6
+1
+2
+3
+4
+5
+6
+0 0 0
+1 0 0
+0 1 0
+0.5 -0.1 0
+0.5 0.5 0
+0 0.5 0
+$EndNodes
+$Elements
+2 2 1 2
+1 3 8 1
+1 1 2 4
+2 1 9 1
+2 1 2 3 4 5 6
+$EndElements
+"""
+
+ABAQUS = """*HEADING
+made by hand
+*NODE
+1, 0., 0.
+2, 1., 0.
+3, 1., 1.
+4, 0., 1.
+*ELEMENT, TYPE=CPS4, ELSET=BODY
+1, 1, 2, 3, 4
+*NSET, NSET=FLOOR
+1, 2
+*NSET, NSET=POINT
+3
+"""
+
+SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+QUAD, LINE = ("quad", [[0, 1, 2, 3]]), ("line", [[0, 1]])
+
+
+def test_gmsh_version_2(tmp_path):
+    (tmp_path / "body.msh").write_text(GMSH_2)
+    mesh = fem.read_mesh(tmp_path / "body.msh")
+    assert mesh.points.tolist() == SQUARE.tolist()  # the lone node is left out, and z
+    assert {name: part.tolist() for name, part in mesh.facets.items()} == {"floor": [[0, 1]], "lid": [[2, 3]]}
+    assert mesh.nodes("corner").tolist() == [1]
+    assert "nodes   corner (1)" in repr(mesh)
+    problem = fem.mesh_problem(
+        str(tmp_path / "body.msh"),
+        young=1,
+        poisson=0,
+        contact="floor",
+        clamp="lid",
+        displacement={"corner": (0, "free")},
+    )
+    assert problem.node_ids == (0, 1)
+
+
+def test_gmsh_version_4_of_second_order(tmp_path):
+    (tmp_path / "body.msh").write_text(GMSH_4)
+    mesh = fem.read_mesh(tmp_path / "body.msh")
+    assert mesh.cells.tolist() == [[0, 1, 2, 3, 4, 5]]
+    assert mesh.part("floor").tolist() == [[0, 1, 3]]
+    problem = fem.mesh_problem(mesh, young=1, poisson=0, contact="floor", spring={"floor": (1, 1)})
+    # the curved edge bulges downward: its middle normal is straight, the others lean outward
+    assert problem.node_ids == (0, 3, 1)
+    normals = problem.Bn.toarray()[[0, 1, 2], :].reshape(3, 6, 2)
+    assert np.allclose(normals[1, 3], [0, -1])
+    assert normals[0, 0, 0] < -0.1
+    assert np.allclose(normals[0, 0] * [-1, 1], normals[2, 1])
+
+
+def test_node_sets_of_abaqus(tmp_path):
+    (tmp_path / "body.inp").write_text(ABAQUS)
+    mesh = fem.read_mesh(tmp_path / "body.inp")
+    assert mesh.nodes("POINT").tolist() == [2]
+    assert np.sort(mesh.part("FLOOR"), axis=1).tolist() == [[0, 1]]
+    with pytest.raises(InvalidArgumentError, match="no facets named 'POINT'; expected one of FLOOR"):
+        mesh.part("POINT")
+    with pytest.raises(InvalidArgumentError, match="no facets or nodes named 'lid'; expected one of FLOOR, POINT"):
+        mesh.nodes("lid")
+
+
+def test_sets_of_a_mesh_in_memory():
+    cells = [("triangle", [[0, 1, 2], [0, 2, 3]]), ("line", [[0, 1], [1, 2]])]
+    mesh = fem.read_mesh(meshio.Mesh(SQUARE, cells, cell_sets={"wall": [None, [1]]}, point_sets={"two": [0, 2]}))
+    assert [*mesh.facets] == ["wall"]
+    assert mesh.nodes("two").tolist() == [0, 2]
+    assert [*fem.read_mesh(meshio.Mesh(SQUARE, cells)).facets] == ["boundary"]
+    lifted = fem.read_mesh(meshio.Mesh(np.c_[SQUARE, np.full(4, 3.0)], cells))
+    assert lifted.points.tolist() == SQUARE.tolist()
+
+
+@pytest.mark.parametrize(
+    ("points", "cells", "message"),
+    [
+        (SQUARE, [QUAD], "the mesh has no contact facets: no line cells on its boundary"),
+        (SQUARE, [LINE], "the mesh has no triangles or quadrilaterals; expected a body in 2D"),
+        (SQUARE, [QUAD, ("triangle", [[0, 1, 2]]), LINE], r"type quad and triangle; .*Mesh\.SubdivisionAlgorithm = 1"),
+        (SQUARE, [("quad8", [[0, 1, 2, 3] * 2]), LINE], r"type quad8; .*Mesh\.SecondOrderIncomplete = 0"),
+        (SQUARE, [QUAD, ("line3", [[0, 1, 2]])], "the mesh has line3 cells beside quad; expected facets of type line"),
+        (
+            np.c_[SQUARE, [0, 0, 0, 1]],
+            [QUAD, LINE],
+            "plane cells and z from 0 to 1; expected a plane mesh with the same",
+        ),
+        (SQUARE, [("quad", [[0, 1, 2, 9]]), LINE], "the cells name nodes from 0 to 9"),
+        (SQUARE, [("triangle", [[0, 1, 2]]), ("line", [[0, 3]])], "facets of boundary have nodes of no cell"),
+        (SQUARE, [QUAD, ("line", [[0, 77]])], r"boundary names nodes from 0 to 77; expected them in 0 \.\. 3"),
+        (SQUARE[:, :1], [QUAD, LINE], r"points has shape \(4, 1\)"),
+        (SQUARE * np.nan, [QUAD, LINE], "points has the value nan"),
+    ],
+)
+def test_meshes_that_are_no_plane_body(points, cells, message):
+    with pytest.raises(InvalidArgumentError, match=message):
+        fem.read_mesh(meshio.Mesh(points, cells))
+
+
+@pytest.mark.parametrize(
+    ("points", "cell"),
+    [
+        (SQUARE, [0, 2, 1, 3]),
+        (SQUARE[[0, 1, 2, 1]], [0, 1, 2, 3]),
+        ([[0, 0], [1, 0], [0.1, 0.1], [0, 1]], [0, 1, 2, 3]),
+        ([[0, 0], [1, 0], [2, 0], [3, 0]], [0, 1, 2, 3]),
+    ],
+)
+def test_cells_that_are_folded_or_flat(points, cell):
+    mesh = fem.read_mesh(meshio.Mesh(points, [("quad", [cell]), LINE]))
+    with pytest.raises(InvalidArgumentError, match="cells row 0 is flat, folded or inside out at a corner"):
+        fem.mesh_problem(mesh, young=1, poisson=0, contact="boundary", spring={"boundary": (1, 1)})
+
+
+def test_a_curved_edge_that_folds_its_cell():
+    points = [[0, 0], [1, 0], [0, 1], [0.5, 0.6], [0.5, 0.5], [0, 0.5]]
+    with pytest.raises(InvalidArgumentError, match="cells row 0 is flat, folded or inside out"):
+        fem.stiffness(points, [[0, 1, 2, 3, 4, 5]], (1, 1))
+
+
+# -- TOML ------------------------------------------------------------------------------------------------------------
+
+TOML = """
+mesh = "body.msh"
+young = 2.5
+poisson = 0.25
+contact = "floor"
+clamp = ["lid"]
+friction = [0.1, 0.5]
+load.floor = [0.0, -1e-3]
+"""
+
+
+@pytest.fixture
+def toml(tmp_path):
+    (tmp_path / "body.msh").write_text(GMSH_2)
+
+    def written(text):
+        (tmp_path / "body.toml").write_bytes(text if isinstance(text, bytes) else text.encode())
+        return tmp_path / "body.toml"
+
+    return written
+
+
+def test_a_toml_file_is_a_call(toml, tmp_path):
+    one = fem.read_mesh_problem(toml(TOML))
+    two = fem.mesh_problem(
+        tmp_path / "body.msh", young=2.5, poisson=0.25, contact="floor", clamp=["lid"], friction=(0.1, 0.5),
+        load={"floor": (0, -1e-3)},
+    )  # fmt: skip
+    assert one.fingerprint == two.fingerprint
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("young", "yuong", "there is no option 'yuong'; did you mean young?"),
+        ("clamp", "xyzzy", "there is no option 'xyzzy'; expected some of mesh, young"),
+        ("young = 2.5\n", "", "young is missing"),
+        ('mesh = "body.msh"\n', "", "mesh is a NoneType; expected the name of a mesh file in quotes"),
+        ("body.msh", "other.msh", r"other\.msh: meshio cannot read it .*not found"),
+        ("2.5", "'2.5'", r"young is '2\.5'; expected a finite number"),
+        ("2.5", "true", "young is True; expected"),
+        ("2.5", "1979-05-27", "young is datetime"),
+        ("young", "young young", "it is no TOML file"),
+        ("floor = [0.0", "floor = [nan", "load of floor is .*; expected two finite numbers"),
+    ],
+)
+def test_toml_files_that_describe_no_problem(toml, old, new, message):
+    place = toml(TOML.replace(old, new, 1))
+    with pytest.raises(fem.mesh_problems.InvalidProblemError, match=message) as caught:
+        fem.read_mesh_problem(place)
+    assert str(caught.value).startswith(f"{place}: ")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", [b"\xff\xfe", b"a = " + b"[" * 100_000, b"a" * 2_000_000, b"a = " + b"9" * 9_000])
+def test_hostile_toml_files(toml, text):
+    with pytest.raises(fem.mesh_problems.InvalidProblemError) as caught:
+        fem.read_mesh_problem(toml(text))
+    assert len(str(caught.value)) < 700
