@@ -16,12 +16,15 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from enumsol.branches.parts import Trace
     from enumsol.branches.traced import TracedProblem
-    from enumsol.branches.tracing import Trace
     from enumsol.search.interval import SearchedPiece
     from enumsol.selections.solution import Codes
 
     Bounds = tuple[Fraction, Fraction]
+
+#: Selections that are followed side by side.
+_TOGETHER = 64
 
 
 @dataclass
@@ -77,13 +80,17 @@ def follow(
         for codes in found.selections:
             where.setdefault(codes, []).append((found.piece.a, found.piece.b))
     followed = Followed(traced.force, traced.length)
-    for k, codes in enumerate(sorted(where)):
+    waiting = sorted(where)
+    for first in range(0, len(waiting), _TOGETHER):
+        group = waiting[first : first + _TOGETHER]
         try:
-            followed.traces += traced.trace(codes, [traced.interval] if cut_short else where[codes])
+            followed.traces += traced.trace(
+                {codes: [traced.interval] if cut_short else where[codes] for codes in group}
+            )
             if tick is not None:
-                tick((k + 1) / len(where))
+                tick(min(first + _TOGETHER, len(waiting)) / len(waiting))
         except KeyboardInterrupt:
-            followed.interrupted = Stop(StopReason.INTERRUPTED, k, arcs_of=len(where))
+            followed.interrupted = Stop(StopReason.INTERRUPTED, first, arcs_of=len(waiting))
             break
     followed.joined = join(followed.traces, traced.interval, traced.origin, traced.sharpen)
     return followed

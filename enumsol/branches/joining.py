@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from networkx.utils import UnionFind
 
-from enumsol.branches.tracing import PartKind
+from enumsol.branches.parts import PartKind
 from enumsol.kernel.selection_rows import (
     CONE_MINUS,
     CONE_PLUS,
@@ -28,7 +28,7 @@ from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from enumsol.branches.tracing import Part, Trace
+    from enumsol.branches.parts import Part, Trace
     from enumsol.selections.solution import Codes
 
     Bounds = tuple[Fraction, Fraction]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +35,8 @@ PRECISION, _ZERO_BITS = 320, 200
 #: Steps of Newton's method from the middle of an interval, enlargements of a zero's bounds, bound of how much M may
 #: change over an interval, and of rises that count as none where norms are chosen.
 _STEPS, _WIDENINGS, _LARGEST_SHIFT, _NO_RISE = 8, 6, 0.5, 1e-250
+#: Intervals shorter than this share of alpha are narrow beside the distances at which conditions bend.
+_NEAR = Fraction(1, 2**30)
 #: Covers underflow of some products.
 _SUBNORMAL = 2.0**-1070
 
@@ -143,6 +146,25 @@ class PreciseSelection:
             slope.append(row1 + [arb(0)] * len(stick))
         return constant, slope
 
+    @cached_property
+    def _lines(self) -> tuple[Any, Any] | None:
+        """Conditions c0 + a c1, where neither M nor what they are made of depends on alpha; else None."""
+        rows, F1 = self.rows, self.system.F1
+        if any(F1[i] != 0 for i in (*rows.slip.tolist(), *rows.stick.tolist())):
+            return None
+        if not len(rows.unknown):
+            return self._c
+        try:
+            y0, y1 = (self._M[0].solve(g) for g in self._g)
+        except ZeroDivisionError:
+            return None
+        return self._c[0] + self._C[0] * y0, self._c[1] + self._C[0] * y1
+
+    @cached_property
+    def _constant_index(self) -> int:
+        """Sign of det M where M does not depend on alpha."""
+        return _sign(self._M[0].det()) if self._M[0].nrows() else 1
+
     def solve(self, a: Any) -> tuple[Any, Any] | None:
         """Unknowns for every alpha in a ball, and the matrix; None where that is not proven regular."""
         M = self._M[0] + self._M[1] * a
@@ -169,8 +191,11 @@ class PreciseSelection:
         if alpha not in self._signs:
             with _precision():
                 a = _ball(alpha)
-                solved = self.solve(a)
-                self._signs[alpha] = None if solved is None else _signs(self.values(a, solved[0]))
+                if self._lines is not None:
+                    self._signs[alpha] = _signs(self._lines[0] + self._lines[1] * a)
+                else:
+                    solved = self.solve(a)
+                    self._signs[alpha] = None if solved is None else _signs(self.values(a, solved[0]))
         return self._signs[alpha]
 
     def expansion(self, low: Number, high: Number) -> PreciseExpansion | None:
@@ -178,6 +203,10 @@ class PreciseSelection:
         first, last = Fraction(low), Fraction(high)
         with _precision():
             middle, radius = _ball((first + last) / 2), _ball((last - first) / 2)
+            if self._lines is not None:
+                constant, slope = self._lines
+                values = constant + slope * _ball(first).union(_ball(last))
+                return PreciseExpansion(self, first, last, values, slope * radius, self._constant_index)
             solved = self.solve(middle)
             if solved is None:
                 return None
@@ -194,11 +223,16 @@ class PreciseSelection:
             slopes = (self._c[1] + self._C[1] * y) * radius + (self._C[0] + self._C[1] * a) * rise
             return PreciseExpansion(self, first, last, self.values(a, y), slopes, index)
 
-    def newton(self, condition: int, low: Fraction, high: Fraction, width: Fraction) -> Fraction | None:
+    def newton(
+        self, condition: int, low: Fraction, high: Fraction, width: Fraction, steps: int = _STEPS
+    ) -> Fraction | None:
         """Where a condition seems to vanish between two alphas, to a part of ``width``; no claim rests on it."""
         with _precision():
             alpha, unit = (low + high) / 2, width / 2**8
-            for _ in range(_STEPS):
+            if self._lines is not None:
+                constant, slope = (part[condition, 0].mid() for part in self._lines)
+                return None if slope == 0 else _rounded(_fraction((-constant / slope).mid()), low, high, unit)
+            for _ in range(steps):
                 a = _ball(alpha)
                 solved = self.solve(a)
                 if solved is None:
@@ -208,8 +242,7 @@ class PreciseSelection:
                 if not rise.is_finite() or rise == 0:
                     return None
                 step = _fraction((self.values(a, y)[condition, 0] / rise).mid())
-                # a multiple of the unit: ends of enclosures keep few digits
-                alpha = min(max(low + round((alpha - step - low) / unit) * unit, low), high)
+                alpha = _rounded(alpha - step, low, high, unit)
                 # the next step is about the square of this one
                 if step * step <= unit * (high - low):
                     break
@@ -223,15 +256,19 @@ class PreciseSelection:
         They are about ``width`` apart, by default as close as zeros are told apart.
         """
         width = Fraction(1, 2**_ZERO_BITS) * (high - low) if width is None else width
-        alpha = self.newton(condition, low, high, width)
-        if alpha is None:
-            return None
-        for _ in range(_WIDENINGS):
-            ends = max(alpha - width, low), min(alpha + width, high)
-            signs = [self.signs_at(end) for end in ends]
-            if all(found is not None for found in signs) and _opposite(signs, condition):
-                return ends
-            width *= 2**20
+        # bounds that are narrow already are so near that one step is enough
+        near = high - low <= _NEAR * max(abs(low), abs(high))
+        for steps, widenings in ((1, 1), (_STEPS, _WIDENINGS)) if near else ((_STEPS, _WIDENINGS),):
+            alpha = self.newton(condition, low, high, width, steps)
+            if alpha is None:
+                return None
+            reach = width
+            for _ in range(widenings):
+                ends = max(alpha - reach, low), min(alpha + reach, high)
+                signs = [self.signs_at(end) for end in ends]
+                if all(found is not None for found in signs) and _opposite(signs, condition):
+                    return ends
+                reach *= 2**20
         return None
 
     def forces(self, alpha: Fraction) -> tuple[list[Any], list[Any]] | None:
@@ -279,23 +316,20 @@ class PreciseExpansion:
 
     def over(self, low: Number, high: Number) -> OverInterval:
         """What is known over a part of the interval."""
-        signs = self._whole.copy()
-        ends = [self._selection.signs_at(Fraction(alpha)) for alpha in (low, high)]
-        if ends[0] is not None and ends[1] is not None:
+        signs, unknown = self._whole.copy(), np.zeros_like(self._whole)
+        found = [self._selection.signs_at(Fraction(alpha)) for alpha in (low, high)]
+        ends = tuple(unknown if end is None else end for end in found)
+        if found[0] is not None and found[1] is not None:
             # without a change of the slope's sign, values lie between those at the ends
             same = (signs == 0) & (ends[0] == ends[1]) & ((self._rises != 0) | (low == high))
             signs[same] = ends[0][same]
-        return OverInterval(signs, regular=bool(self._index), none=bool(np.any(signs < 0)))
+        none = bool(np.any(signs < 0))
+        return OverInterval(signs, bool(self._index), none, self._index, (ends[0], ends[1]), self._rises)
 
-    def slopes(self, low: Number, high: Number) -> Signs:
-        """1 or -1 where a condition grows or falls with alpha, else 0."""
-        del low, high
-        return self._rises
-
-    def index(self, low: Number, high: Number) -> int:
-        """Sign of det M, 0 where it is not proven."""
-        del low, high
-        return self._index
+    def near(self, condition: int, low: Number, high: Number) -> tuple[Number, Number]:
+        """As in arcs.Expansion; bounds are found at once, by ``zero_bounds``."""
+        del condition, high
+        return low, low
 
     def zeros(self, condition: int) -> list[Fraction]:
         """Alphas inside the interval at which a condition seems to vanish; no claim rests on them."""
@@ -351,6 +385,11 @@ class _precision:  # noqa: N801 (a context manager, used like a function)
 
     def __exit__(self, *error: object) -> None:
         ctx.prec = self._before
+
+
+def _rounded(alpha: Fraction, low: Fraction, high: Fraction, unit: Fraction) -> Fraction:
+    """An alpha within bounds at a multiple of a unit from the first: ends of enclosures keep few digits."""
+    return min(max(low + round((alpha - low) / unit) * unit, low), high)
 
 
 def _matrix(rows: list[list[Any]]) -> Any:

@@ -9,7 +9,7 @@ from flint import arb, arb_mat, fmpq, fmpq_mat
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge, rational_between, real_roots
 from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.exact import ExactCondensed
-from enumsol.kernel.arcs import ArcSystem
+from enumsol.kernel.arc_selections import ArcSystem
 from enumsol.kernel.ball_arrays import Ball
 from enumsol.kernel.precise import PreciseSystem, _precision
 from enumsol.kernel.selection_rows import SelectionRows

@@ -51,16 +51,16 @@ def check_claims(count, start=0):
             assert truth.is_true(known, a, b), (selection.rows.codes, a, b, known)
             made["none"] += known.none
             made["conditions"] += int(known.regular) * int(np.count_nonzero(known.conditions))
-            index = expansion.index(a, b)
+            index = known.index
             if not index:
                 continue
             made["index"] += 1
             assert truth.signs(truth.det, a, b) == {index}
-            slopes = expansion.slopes(a, b)
+            slopes = known.slopes
             for k in np.flatnonzero(slopes).tolist():
                 made["slopes"] += 1
                 assert truth.only_zero(k, int(slopes[k]), a, b)
-                signs = [int(expansion.over(end, end).conditions[k]) for end in (a, b)]
+                signs = [int(end[k]) for end in known.ends]
                 if a < b and signs == [-slopes[k], slopes[k]]:
                     made["zeros"] += 1
                     first, last = expansion.zero_bounds(k, int(slopes[k]), a, b)
@@ -154,5 +154,5 @@ def test_two_zeros_close_together_are_not_missed(gap):
         known = expansion.over(1 - width, 1 + width)
         assert known.regular
         assert known.conditions[condition] <= 0
-        assert expansion.slopes(1 - width, 1 + width)[condition] == 0
+        assert known.slopes[condition] == 0
         assert expansion.over(1 - width, 1 - width).conditions[condition] == np.sign(float(width**2) - gap)
