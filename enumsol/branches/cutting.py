@@ -47,6 +47,9 @@ class AlphaExpansion(Protocol):
     def near(self, condition: int, low: Any, high: Any) -> tuple[Any, Any]:
         """What should be bounds of the only zero in a part, without proof."""
 
+    def split(self) -> Any:
+        """Where to cut first, so that nothing holds on either side; or None."""
+
     def zeros(self, condition: int) -> list[Any]:
         """Where a condition seems to vanish."""
 
@@ -92,6 +95,12 @@ class Cutting:
         self, whole: OverInterval
     ) -> Generator[list[Interval], list[OverInterval], tuple[list[Part], list[Interval]]]:
         """Parts, and the intervals behind them."""
+        middle = self._expansion.split()
+        if middle is not None:
+            halves = [(self.low, middle), (middle, self.high)]
+            known = yield halves
+            if all(found.none for found in known):
+                return [Part(PartKind.NONE, *half) for half in halves], []
         doubtful = _in_doubt(whole)
         self._flat = [k for k in doubtful if self._expansion.flat(k)]
         # where the others seem to vanish

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     Bounds = tuple[Fraction, Fraction]
 
-#: Selections that are followed side by side.
-_TOGETHER = 64
+#: Selections that are followed side by side, and where the user waits for an end.
+_TOGETHER, _FEW = 64, 8
 
 
 @dataclass
@@ -65,6 +65,7 @@ def follow(
     tick: Callable[[float], object] | None = None,
     *,
     cut_short: bool = False,
+    most: int | None = None,
 ) -> Followed:
     """Trace all selections handed on, where they were; after a search that was cut short, over the whole interval.
 
@@ -74,6 +75,8 @@ def follow(
     pieces : sequence of SearchedPiece
     tick : called with the share of the selections done
     cut_short : the search was stopped before it had looked everywhere
+    most : int, optional
+        No further selections are followed after so many boxes, as if Ctrl-C had been pressed.
     """
     where: dict[Codes, list[Bounds]] = {}
     for found in pieces:
@@ -81,15 +84,19 @@ def follow(
             where.setdefault(codes, []).append((found.piece.a, found.piece.b))
     followed = Followed(traced.force, traced.length)
     waiting = sorted(where)
-    for first in range(0, len(waiting), _TOGETHER):
-        group = waiting[first : first + _TOGETHER]
+    together = _TOGETHER if most is None else _FEW
+    for first in range(0, len(waiting), together):
+        group = waiting[first : first + together]
         try:
-            followed.traces += traced.trace(
-                {codes: [traced.interval] if cut_short else where[codes] for codes in group}
-            )
-            if tick is not None:
-                tick(min(first + _TOGETHER, len(waiting)) / len(waiting))
+            enough = most is not None and sum(len(trace.boxes) for trace in followed.traces) >= most
+            if not enough:
+                places = {codes: [traced.interval] if cut_short else where[codes] for codes in group}
+                followed.traces += traced.trace(places)
+                if tick is not None:
+                    tick(min(first + together, len(waiting)) / len(waiting))
         except KeyboardInterrupt:
+            enough = True
+        if enough:
             followed.interrupted = Stop(StopReason.INTERRUPTED, first, arcs_of=len(waiting))
             break
     followed.joined = join(followed.traces, traced.interval, traced.origin, traced.sharpen)

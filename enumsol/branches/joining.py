@@ -8,6 +8,7 @@ that no numbers need be compared (theory, section 7.14).
 from __future__ import annotations
 
 import enum
+from bisect import bisect_right
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -270,10 +271,11 @@ class _Joining:
         """One place for what was left open and may be connected."""
         left = sorted((found for found in self._found.values() if found.place is None), key=lambda f: (f.low, f.codes))
         union: UnionFind = UnionFind(range(len(left)))
+        lows = [found.low for found in left]
         for j, one in enumerate(left):
-            for k in range(j + 1, len(left)):
-                other = left[k]
-                if other.low <= one.high and _connected(one, other):
+            # in the order of their beginnings
+            for k in range(j + 1, bisect_right(lows, one.high)):
+                if _connected(one, left[k]):
                     union.union(j, k)
         groups: dict[int, list[_Found]] = {}
         for k, found in enumerate(left):

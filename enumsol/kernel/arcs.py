@@ -166,6 +166,9 @@ class Expansion:
             width *= 2.0
         return low, high
 
+    def split(self) -> None:
+        """Cuts are made around zeros; see precise.PreciseExpansion."""
+
     def near(self, condition: int, low: float, high: float) -> tuple[float, float]:
         """What should be bounds of the only zero of a condition in a part; no claim rests on them."""
         value, slope = self.series.coefficients[condition].tolist(), self.slope[condition].tolist()

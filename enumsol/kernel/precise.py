@@ -17,7 +17,7 @@ from flint import arb, arb_mat, ctx, fmpq
 
 from enumsol.arithmetic.balls import SAFE, UNIT, upper_sum
 from enumsol.kernel.arcs import OverInterval
-from enumsol.kernel.rows import SLIP_MINUS, SLIP_PLUS
+from enumsol.kernel.rows import SLIP_PLUS
 from enumsol.kernel.selection_rows import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, SelectionRows
 
 if TYPE_CHECKING:
@@ -37,6 +37,8 @@ PRECISION, _ZERO_BITS = 320, 200
 _STEPS, _WIDENINGS, _LARGEST_SHIFT, _NO_RISE = 8, 6, 0.5, 1e-250
 #: Intervals shorter than this share of alpha are narrow beside the distances at which conditions bend.
 _NEAR = Fraction(1, 2**30)
+#: Zeros are farther apart (tau), or the rounding of floats hides it.
+_LEAST_SPLIT = 1e-12
 #: Covers underflow of some products.
 _SUBNORMAL = 2.0**-1070
 
@@ -80,6 +82,11 @@ class PreciseSystem:
             g1 = [product[i, size + 1] for i in range(size)]
             F0, F1 = ([arb(float(x)) for x in part] for part in problem.friction)
             return cls(S, g0, g1, F0, F1)
+
+    @cached_property
+    def rows(self) -> list[list[Any]]:
+        """S by its rows."""
+        return [[self.S[i, j] for j in range(self.S.ncols())] for i in range(self.S.nrows())]
 
     def constant_load(self, side: float) -> PreciseSystem:
         """For the constant load g1 or -g1 (see kernel.interval)."""
@@ -129,21 +136,23 @@ class PreciseSelection:
                     part.append(value)
             self._C, self._c = (_matrix(parts[0]), _matrix(parts[1])), (_column(parts[2]), _column(parts[3]))
 
-    def _columns(self) -> tuple[list[list[Any]], list[list[Any]]]:
-        """S dlambda/dy by its rows: the constant part, and what alpha is multiplied by."""
-        system, codes = self.system, self.rows.codes
-        p, closed, stick = len(codes), self.rows.closed.tolist(), self.rows.stick.tolist()
-        signs = [{SLIP_PLUS: 1, SLIP_MINUS: -1}.get(codes[i], 0) for i in closed]
-        constant, slope = [], []
-        for r in range(2 * p):
-            row0, row1 = [system.S[r, i] for i in closed], [arb(0)] * len(closed)
-            for j, (i, sign) in enumerate(zip(closed, signs, strict=True)):
-                if sign:
-                    turning = system.S[r, p + i] * sign
-                    row0[j] += system.F0[i] * turning
-                    row1[j] = system.F1[i] * turning
-            constant.append(row0 + [system.S[r, p + i] for i in stick])
-            slope.append(row1 + [arb(0)] * len(stick))
+    def _columns(self) -> tuple[dict[int, list[Any]], dict[int, list[Any]]]:
+        """The rows of S dlambda/dy that count: the constant part, and what alpha is multiplied by."""
+        system, rows, p = self.system, self.rows, len(self.rows.codes)
+        closed, stick, zero = rows.closed.tolist(), rows.stick.tolist(), arb(0)
+        slipping = [
+            (j, p + i, arb(sign) * system.F0[i], arb(sign) * system.F1[i])
+            for j, i, sign in zip(rows.slip_columns.tolist(), rows.slip.tolist(), rows.slip_signs.tolist(), strict=True)
+        ]
+        constant, slope = {}, {}
+        for r in {*rows.unknown.tolist(), *rows.moving.tolist()}:
+            whole = system.rows[r]
+            row0, row1 = [whole[i] for i in closed], [zero] * len(closed)
+            for j, i, F0, F1 in slipping:
+                row0[j] += F0 * whole[i]
+                row1[j] = F1 * whole[i]
+            constant[r] = row0 + [whole[p + i] for i in stick]
+            slope[r] = row1 + [zero] * len(stick)
         return constant, slope
 
     @cached_property
@@ -206,12 +215,13 @@ class PreciseSelection:
             if self._lines is not None:
                 constant, slope = self._lines
                 values = constant + slope * _ball(first).union(_ball(last))
-                return PreciseExpansion(self, first, last, values, slope * radius, self._constant_index)
+                near = constant + slope * middle
+                return PreciseExpansion(self, first, last, values, slope * radius, self._constant_index, near)
             solved = self.solve(middle)
             if solved is None:
                 return None
             y, M = solved
-            a, index = _ball(first).union(_ball(last)), 1
+            a, index, near = _ball(first).union(_ball(last)), 1, self.values(middle, y)
             rise = arb_mat(0, 1)
             if M.nrows():
                 index = _sign(M.det())
@@ -221,7 +231,7 @@ class PreciseSelection:
                     return None
                 y, rise = found
             slopes = (self._c[1] + self._C[1] * y) * radius + (self._C[0] + self._C[1] * a) * rise
-            return PreciseExpansion(self, first, last, self.values(a, y), slopes, index)
+            return PreciseExpansion(self, first, last, self.values(a, y), slopes, index, near)
 
     def newton(
         self, condition: int, low: Fraction, high: Fraction, width: Fraction, steps: int = _STEPS
@@ -306,13 +316,36 @@ class PreciseExpansion:
     rough, final = False, True
 
     def __init__(
-        self, selection: PreciseSelection, low: Fraction, high: Fraction, values: Any, slopes: Any, index: int
+        self,
+        selection: PreciseSelection,
+        low: Fraction,
+        high: Fraction,
+        values: Any,
+        slopes: Any,
+        index: int,
+        near: Any,
     ) -> None:
         self.low, self.high = low, high
         self.apart = (high - low) * Fraction(4, 2**_ZERO_BITS)
         self._selection, self._index = selection, index
         self._whole, self._rises = _signs(values), _signs(slopes)
         self._small = [bool(abs(values[k, 0]) < arb(2) ** -_ZERO_BITS) for k in range(values.nrows())]
+        # about where conditions vanish, by tau in [-1, 1]
+        self._crossings = [
+            -float((near[k, 0] / slopes[k, 0]).mid()) if self._rises[k] else np.nan for k in range(values.nrows())
+        ]
+
+    def split(self) -> Fraction | None:
+        """An alpha below which one condition seems to be negative, and above which another; None where there is none.
+
+        No claim rests on it.
+        """
+        rising = [tau for tau, rise in zip(self._crossings, self._rises, strict=True) if rise > 0]
+        falling = [tau for tau, rise in zip(self._crossings, self._rises, strict=True) if rise < 0]
+        if not rising or not falling or max(rising) - min(falling) < _LEAST_SPLIT:
+            return None
+        tau = 0.5 * (max(rising) + min(falling))
+        return self.low + Fraction(1 + tau) * (self.high - self.low) / 2 if abs(tau) < 1.0 else None
 
     def over(self, low: Number, high: Number) -> OverInterval:
         """What is known over a part of the interval."""
