@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     Result = tuple[Box, list[Interval]]
     Shared = frozenset[Any]
 
-#: Bounds of a zero that are wider, relative to alpha, are looked for at single alphas.
-_NARROW = 2.0**-36
+#: Bounds of a zero that are wider, relative to alpha, are looked for at single alphas; if they are sharpened later.
+_NARROW, _NARROW_ENOUGH = 2.0**-44, 2.0**-16
 #: Halvings of a part that is not decided.
 _HALVINGS = 5
 
@@ -72,9 +72,14 @@ class Cutting:
         The box is not to be cut further: what is not decided stays open.
     flat : bool
         Nor is it where a condition is flat.
+    sharpened : bool
+        Bounds of events will be made narrower.
     """
 
-    def __init__(self, rows: SelectionRows, expansion: AlphaExpansion, *, whole: bool, flat: bool) -> None:
+    def __init__(
+        self, rows: SelectionRows, expansion: AlphaExpansion, *, whole: bool, flat: bool, sharpened: bool
+    ) -> None:
+        self._narrow = _NARROW_ENOUGH if sharpened else _NARROW
         self._rows, self._expansion, self._whole, self._keep_flat = rows, expansion, whole, flat
         self.low: Number
         self.high: Number
@@ -165,7 +170,7 @@ class Cutting:
         """What has to be known to join neighbours, or about what should be an event's bounds."""
         if first.kind is PartKind.EVENT:
             low, high = self._expansion.near(first.condition, first.low, first.high)
-            narrow = first.low <= low < high <= first.high and high - low <= _NARROW * max(abs(low), abs(high))
+            narrow = first.low <= low < high <= first.high and high - low <= self._narrow * max(abs(low), abs(high))
             return [(low, low), (high, high)] if narrow else []
         return [(first.low, last.high)] if first is not last and first.kind is not PartKind.OPEN else []
 

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
     Bounds = tuple[Fraction, Fraction]
 
-#: Selections that are followed side by side, and where the user waits for an end.
-_TOGETHER, _FEW = 64, 8
+#: Selections that are followed side by side: so many at least, at most, and for one contact node; and where the user
+#: waits for an end.
+_LEAST, _MOST, _TOGETHER, _FEW = 16, 256, 2**16, 8
 
 
 @dataclass
@@ -84,7 +85,8 @@ def follow(
             where.setdefault(codes, []).append((found.piece.a, found.piece.b))
     followed = Followed(traced.force, traced.length)
     waiting = sorted(where)
-    together = _TOGETHER if most is None else _FEW
+    # their matrices grow with the square of the number of nodes
+    together = min(max(_LEAST, _TOGETHER // traced.problem.p**2), _MOST) if most is None else _FEW
     for first in range(0, len(waiting), together):
         group = waiting[first : first + together]
         try:

@@ -110,7 +110,8 @@ class TracedProblem:
                 (self.selection(codes, side), low, high, partial(self.precise, codes, side), side)
                 for codes, pieces in where.items()
                 for low, high, side in self.spans(pieces)
-            ]
+            ],
+            sharpened=self.problem.n <= EXACT_DOF_LIMIT,
         )
 
     def sharpen(self, found: Trace, part: Part) -> Bounds | None:

@@ -45,7 +45,7 @@ _FLAT_BOX = 2.0**-12
 
 
 def trace(
-    asked: Sequence[tuple[ArcSelection, float, float, Precise, float]],
+    asked: Sequence[tuple[ArcSelection, float, float, Precise, float]], *, sharpened: bool = False
 ) -> list[Trace]:
     """Cut intervals into boxes and parts, of every selection its own.
 
@@ -54,9 +54,10 @@ def trace(
     asked : sequence of (selection, low, high, precise, side)
         ``precise`` gives the same selection in balls of many digits, for short boxes, or None where there is none;
         ``side`` is that of the selection's system.
+    sharpened : bounds of events will be made narrower
     """
     found = [Trace(selection, low, high, side) for selection, low, high, _, side in asked]
-    _answer([_Tracing(trace, part[3]).run() for trace, part in zip(found, asked, strict=True)])
+    _answer([_Tracing(trace, part[3], sharpened=sharpened).run() for trace, part in zip(found, asked, strict=True)])
     return found
 
 
@@ -88,7 +89,8 @@ def _answers(questions: list[Question]) -> list[Any]:
 class _Tracing:
     """One selection being traced."""
 
-    def __init__(self, found: Trace, precise: Precise) -> None:
+    def __init__(self, found: Trace, precise: Precise, *, sharpened: bool) -> None:
+        self._sharpened = sharpened
         self._found, self._selection, self._precise = found, found.selection, precise
         self._length = found.high - found.low
         self._spacing = _SMALLEST_UNITS * float(np.spacing(max(abs(found.low), abs(found.high))))
@@ -143,7 +145,7 @@ class _Tracing:
         self, expansion: AlphaExpansion, *, whole: bool, flat: bool
     ) -> Generator[list[Question], list[Any], tuple[Box, list[Interval]]]:
         """The box of an expansion, and what is left of it."""
-        cutting = Cutting(self._selection.rows, expansion, whole=whole, flat=flat).run()
+        cutting = Cutting(self._selection.rows, expansion, whole=whole, flat=flat, sharpened=self._sharpened).run()
         parts = next(cutting)
         while True:
             if isinstance(expansion, Expansion):

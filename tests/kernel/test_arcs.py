@@ -9,7 +9,7 @@ from kernel.exact_arcs import Truth, arc_system, beside, exact_of, interval_at, 
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.kernel.arc_selections import ArcSelection
-from enumsol.kernel.arcs import expansions
+from enumsol.kernel.arcs import expansions, over_parts
 from enumsol.kernel.bernstein import bernstein_values, signs_beyond, to_bernstein
 from enumsol.kernel.rows import FRICTIONLESS
 
@@ -121,6 +121,27 @@ def check_errors(count, start=0):
                 assert abs(near - values[k]) <= Fraction(float(series.error[k]))
                 assert abs(rise - slopes[k] * radius) <= Fraction(float(series.slope_error[k]))
     return compared
+
+
+def test_a_stack_says_of_each_what_it_says_alone():
+    """Selections of all sizes, singular and overflowing ones among them, and parts of series of both lengths."""
+    asked = [(selection, *interval_at(rng, truth)) for rng, selection, truth in selections(200)]
+    asked += [(selection, 1e300, 1.7e308) for selection, _, _ in asked[::20]]
+    alone = [expansion_of(*one) for one in asked]
+    together = expansions(asked)
+    pairs = [pair for pair in zip(together, alone, strict=True) if pair != (None, None)]
+    assert 100 < len(pairs) < len(asked)
+    assert {one.series.coefficients.shape[1] for one, _ in pairs} == {3, 17}
+    for one, other in pairs:
+        off = np.sum(np.abs(one.series.coefficients - other.series.coefficients), axis=1)
+        assert np.all(off <= one.series.error + other.series.error)
+    parts = [(one, one.low, 0.5 * one.low + 0.5 * one.high) for one, _ in pairs]
+    for part, known in zip(parts, over_parts(parts), strict=True):
+        other = part[0].over(*part[1:])
+        assert (known.regular, known.none, known.index) == (other.regular, other.none, other.index)
+        for ours, theirs in ((known.conditions, other.conditions), (known.slopes, other.slopes)):
+            assert np.array_equal(ours, theirs)
+        assert all(np.array_equal(*ends) for ends in zip(known.ends, other.ends, strict=True))
 
 
 def test_series_and_their_slopes_lie_within_their_errors():
