@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     Result = tuple[Box, list[Interval]]
     Shared = frozenset[Any]
 
-#: Bounds of a zero that are wider, relative to alpha, are looked for at single alphas; if they are sharpened later.
+#: Bounds of a zero that are wider, relative to alpha, are looked for anew at single alphas; the second where they are
+#: sharpened later.
 _NARROW, _NARROW_ENOUGH = 2.0**-44, 2.0**-16
 #: Halvings of a part that is not decided.
 _HALVINGS = 5
@@ -104,8 +105,9 @@ class Cutting:
         if middle is not None:
             halves = [(self.low, middle), (middle, self.high)]
             known = yield halves
+            decided = [self._decided(*half, found) for half, found in zip(halves, known, strict=True)]
             if all(found.none for found in known):
-                return [Part(PartKind.NONE, *half) for half in halves], []
+                return [part for part in decided if part is not None], []
         doubtful = _in_doubt(whole)
         self._flat = [k for k in doubtful if self._expansion.flat(k)]
         # where the others seem to vanish
