@@ -56,6 +56,9 @@ if TYPE_CHECKING:
 
 Arithmetic = Literal["fast", "verified", "exact"]
 
+#: Boxes in which arcs are followed when the search was interrupted.
+_BOXES_AFTER_INTERRUPT = 500
+
 
 def branch_graph(
     problem: ContactProblem,
@@ -113,7 +116,8 @@ def branch_graph(
         The compiled solver of the relaxations is not installed.
     Interrupted
         On Ctrl-C during the search, or while arcs are worked out; ``partial`` is the graph of what was found so far,
-        which is not complete.
+        which is not complete. Beyond 24 degrees of freedom only the arcs of some of the selections found are in it, if
+        there are many: ``partial.reasons`` says how many.
     WorkerError
         A worker of the executor died; ``partial`` likewise.
 
@@ -200,7 +204,9 @@ def _make(
     """Arcs in ball arithmetic; without rounding where there is no such way, or it leaves something open."""
     made = _Made(exact, None, [] if search.stopped is None else [search.stopped])
     if traced is not None:
-        made.followed = follow(traced, search.pieces, tick, cut_short=bool(made.stops))
+        # after Ctrl-C only as much as takes a moment
+        most = _BOXES_AFTER_INTERRUPT if any(stop.interrupted for stop in made.stops) else None
+        made.followed = follow(traced, search.pieces, tick, cut_short=bool(made.stops), most=most)
         joined, interrupted = made.followed.joined, made.followed.interrupted
         made.stops += [] if interrupted is None else [interrupted]
         if (joined.ordered and not joined.open) or made.stops or problem.n > EXACT_DOF_LIMIT:

@@ -16,12 +16,16 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from enumsol.branches.parts import Trace
     from enumsol.branches.traced import TracedProblem
-    from enumsol.branches.tracing import Trace
     from enumsol.search.interval import SearchedPiece
     from enumsol.selections.solution import Codes
 
     Bounds = tuple[Fraction, Fraction]
+
+#: Selections that are followed side by side: so many at least, at most, and for one contact node; and where the user
+#: waits for an end.
+_LEAST, _MOST, _TOGETHER, _FEW = 16, 256, 2**16, 8
 
 
 @dataclass
@@ -62,6 +66,7 @@ def follow(
     tick: Callable[[float], object] | None = None,
     *,
     cut_short: bool = False,
+    most: int | None = None,
 ) -> Followed:
     """Trace all selections handed on, where they were; after a search that was cut short, over the whole interval.
 
@@ -71,19 +76,30 @@ def follow(
     pieces : sequence of SearchedPiece
     tick : called with the share of the selections done
     cut_short : the search was stopped before it had looked everywhere
+    most : int, optional
+        No further selections are followed after so many boxes, as if Ctrl-C had been pressed.
     """
     where: dict[Codes, list[Bounds]] = {}
     for found in pieces:
         for codes in found.selections:
             where.setdefault(codes, []).append((found.piece.a, found.piece.b))
     followed = Followed(traced.force, traced.length)
-    for k, codes in enumerate(sorted(where)):
+    waiting = sorted(where)
+    # their matrices grow with the square of the number of nodes
+    together = min(max(_LEAST, _TOGETHER // traced.problem.p**2), _MOST) if most is None else _FEW
+    for first in range(0, len(waiting), together):
+        group = waiting[first : first + together]
         try:
-            followed.traces += traced.trace(codes, [traced.interval] if cut_short else where[codes])
-            if tick is not None:
-                tick((k + 1) / len(where))
+            enough = most is not None and sum(len(trace.boxes) for trace in followed.traces) >= most
+            if not enough:
+                places = {codes: [traced.interval] if cut_short else where[codes] for codes in group}
+                followed.traces += traced.trace(places)
+                if tick is not None:
+                    tick(min(first + together, len(waiting)) / len(waiting))
         except KeyboardInterrupt:
-            followed.interrupted = Stop(StopReason.INTERRUPTED, k, arcs_of=len(where))
+            enough = True
+        if enough:
+            followed.interrupted = Stop(StopReason.INTERRUPTED, first, arcs_of=len(waiting))
             break
     followed.joined = join(followed.traces, traced.interval, traced.origin, traced.sharpen)
     return followed

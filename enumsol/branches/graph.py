@@ -64,7 +64,8 @@ class BranchGraph(Immutable):
         The search's leaves with their multipliers, piece by piece of the interval (empty after ``load``).
     proof : Proof or None
         In verified arithmetic: the search's leaves and the arcs of the selections handed on, for ``enumsol.verify``
-        (None after ``load``, for a search that was cut short, and where rationals had to decide about leaves).
+        (None after ``load``, for a search that was cut short, where rationals had to decide about leaves, and without
+        any load, where no search is needed: lambda = 0 by (5.3)).
 
     Examples
     --------

@@ -8,13 +8,14 @@ that no numbers need be compared (theory, section 7.14).
 from __future__ import annotations
 
 import enum
+from bisect import bisect_right
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from networkx.utils import UnionFind
 
-from enumsol.branches.tracing import PartKind
+from enumsol.branches.parts import PartKind
 from enumsol.kernel.selection_rows import (
     CONE_MINUS,
     CONE_PLUS,
@@ -28,7 +29,7 @@ from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from enumsol.branches.tracing import Part, Trace
+    from enumsol.branches.parts import Part, Trace
     from enumsol.selections.solution import Codes
 
     Bounds = tuple[Fraction, Fraction]
@@ -270,10 +271,11 @@ class _Joining:
         """One place for what was left open and may be connected."""
         left = sorted((found for found in self._found.values() if found.place is None), key=lambda f: (f.low, f.codes))
         union: UnionFind = UnionFind(range(len(left)))
+        lows = [found.low for found in left]
         for j, one in enumerate(left):
-            for k in range(j + 1, len(left)):
-                other = left[k]
-                if other.low <= one.high and _connected(one, other):
+            # in the order of their beginnings
+            for k in range(j + 1, bisect_right(lows, one.high)):
+                if _connected(one, left[k]):
                     union.union(j, k)
         groups: dict[int, list[_Found]] = {}
         for k, found in enumerate(left):

@@ -6,7 +6,7 @@ import enum
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from enumsol.branches.tracing import PartKind
+from enumsol.branches.parts import PartKind
 from enumsol.proof.proof_file import Proof, ProofWriter, packed
 from enumsol.proof.reading import fits
 from enumsol.search.proof_header import unit_exponents
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from enumsol.branches.following import Followed
-    from enumsol.branches.tracing import Part
+    from enumsol.branches.parts import Part
     from enumsol.problem import ContactProblem
     from enumsol.search.interval import SearchedPiece
     from enumsol.selections.solution import Codes

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.tracing import Trace, trace
+from enumsol.branches.tracing import trace
 from enumsol.condensation.data import EXACT_DOF_LIMIT
-from enumsol.kernel.arcs import ArcSelection, ArcSystem
+from enumsol.kernel.arc_selections import ArcSelection, ArcSystem
 from enumsol.kernel.precise import PreciseSelection, PreciseSystem
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.branches.tracing import Part
+    from enumsol.branches.parts import Part, Trace
     from enumsol.problem import ContactProblem
     from enumsol.selections.solution import Codes
 
@@ -103,12 +103,16 @@ class TracedProblem:
                 found.append((_down(x), -_down(-y), side))
         return found
 
-    def trace(self, codes: Codes, pieces: Iterable[Bounds]) -> list[Trace]:
-        """Where a selection holds on some pieces of the interval."""
-        return [
-            trace(self.selection(codes, side), low, high, partial(self.precise, codes, side), side)
-            for low, high, side in self.spans(pieces)
-        ]
+    def trace(self, where: Mapping[Codes, Iterable[Bounds]]) -> list[Trace]:
+        """Where selections hold on pieces of the interval, of every selection its own."""
+        return trace(
+            [
+                (self.selection(codes, side), low, high, partial(self.precise, codes, side), side)
+                for codes, pieces in where.items()
+                for low, high, side in self.spans(pieces)
+            ],
+            sharpened=self.problem.n <= EXACT_DOF_LIMIT,
+        )
 
     def sharpen(self, found: Trace, part: Part) -> Bounds | None:
         """Narrower bounds of an event's zero; None where there is no need or no means."""

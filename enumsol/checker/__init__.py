@@ -22,9 +22,10 @@ What checker and search share
     - ``kernel.point`` and ``kernel.interval``: the exclusion inequality, the verified solve of a selection and the
       contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled copy of
       the inequality); ``kernel.forms``, the same with other forms than the energy at one alpha;
-    - for the arcs of branch graphs: ``kernel.selection_rows``, the numbers of unknowns and conditions; ``kernel.arcs``,
-      a selection over an interval as a series with bounds of its error; ``kernel.precise``, the same with many digits,
-      loaded only where a box asks for it; ``kernel.ball_arrays``, linear systems of balls (in 3D, too);
+    - for the arcs of branch graphs: ``kernel.selection_rows``, the numbers of unknowns and conditions;
+      ``kernel.arc_selections``, ``kernel.arc_series``, ``kernel.bernstein`` and ``kernel.arcs``, a selection over an
+      interval as a series with bounds of its error; ``kernel.precise`` and ``kernel.many_digits``, the same with many
+      digits, loaded only where a box asks for it; ``kernel.ball_arrays``, linear systems of balls (in 3D, too);
     - for problems in 3D, and loaded for their proofs only: ``kernel.space``, the rows and branchings and the
       exclusion inequality; ``kernel.leaves``, what a complete assignment holds and which leaves share a root;
       ``sectors``, the ends of sectors; ``condensation.space``, balls for S and g in the variables in which friction is

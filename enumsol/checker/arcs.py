@@ -4,9 +4,9 @@ Records (see docs/proof_format.md, under Arcs): ``{"traces", "force", "length"}`
 interval on which it was handed on ``["t", codes, low, high, side]``, then its boxes ``["b", low, high, precise,
 parts]``.
 
-Every box is expanded anew by the trusted kernel, and every part of it is tested. Then events are paired by the
-condition that vanishes: each must have exactly one partner, arcs end at events, at the interval's ends or where g
-vanishes, and indices balance. What a proof leaves open is counted.
+Every box is expanded anew by the trusted kernel, and every part of it is tested (``arc_boxes``). Then events are paired
+by the condition that vanishes: each must have exactly one partner, arcs end at events, at the interval's ends or where
+g vanishes, and indices balance. What a proof leaves open is counted.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.kernel.arcs import ArcSelection, ArcSystem
+from enumsol.checker.arc_boxes import Boxes, BoxSelection, check_entries, inside, number
+from enumsol.kernel.arc_selections import ArcSelection, ArcSystem
 from enumsol.kernel.rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.kernel.selection_rows import (
     CONE_MINUS,
@@ -29,7 +30,7 @@ from enumsol.kernel.selection_rows import (
     SLIP_BACKWARD,
     SLIP_FORWARD,
 )
-from enumsol.proof.reading import RefusedError, codes_from, rational_from, shown, units_from
+from enumsol.proof.reading import RefusedError, codes_from, shown, units_from
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -43,8 +44,6 @@ if TYPE_CHECKING:
 _END: Any = object()
 #: Most boxes of a trace, and most parts of a box.
 _MOST_BOXES, _MOST_PARTS = 1000, 1000
-#: Entries of a part, by its kind.
-_ENTRIES = {"h": 3, "n": 2, "e": 7, "u": 2}
 #: Conditions that vanish together where a node changes from one status to another: status, condition.
 _PAIRS = (
     ((OPEN, PENETRATION), (SLIP_PLUS, NORMAL_FORCE)),
@@ -115,6 +114,7 @@ class ArcChecker:
         self._systems: dict[int, ArcSystem] = {}
         self._events: list[_Event] = []
         self._count = ArcCount()
+        self._boxes = Boxes(fail)
         self.traces = 0
         # sums of the indices of arcs that begin there
         self._degrees = {"first": 0}
@@ -136,6 +136,7 @@ class ArcChecker:
                 record = self._trace(record, records)
             except (ValueError, OverflowError) as error:
                 raise RefusedError(f"trace {self.traces} cannot be read: {error}") from None
+        self._boxes.check()
         if self.traces != head.get("traces"):
             self._fail(f"there are {self.traces} traces; the arcs begin with {shown(head.get('traces'))}")
         if self._due:
@@ -168,13 +169,13 @@ class ArcChecker:
         if len(record) != 5 or record[0] != "t" or record[4] not in (-1, 0, 1):
             raise ValueError(f"{shown(record)} begins no trace")
         codes = tuple(codes_from([record[1]], self._problem.p)[0].tolist())
-        low, high, side = _number(record[2]), _number(record[3]), int(record[4])
+        low, high, side = number(record[2]), number(record[3]), int(record[4])
         spans = (d for d in self._due if d[0] == codes and d[3] == side)
         due = next((d for d in spans if _is_next(-low, -d[1]) and _is_next(high, d[2])), None)
         if due is None:
             raise ValueError("it is about no selection that was handed on there, or repeated")
         self._due.remove(due)
-        selection = _Selection(self, ArcSelection(self._systems[side], codes), side)
+        selection = BoxSelection(self, ArcSelection(self._systems[side], codes), side)
         follower = _Follower(self, selection.conditions, codes, side, (low, high))
         end, boxes = low, 0
         record = next(records, _END)
@@ -189,32 +190,27 @@ class ArcChecker:
         follower.finish()
         return record
 
-    def _box(self, record: list[Any], selection: _Selection, follower: _Follower, start: Fraction) -> Fraction:
-        """Check the parts of a box; the end of the last one."""
+    def _box(self, record: list[Any], selection: BoxSelection, follower: _Follower, start: Fraction) -> Fraction:
+        """Follow the arcs through the parts of a box, and keep what they say; the end of the last one."""
         if len(record) != 5 or record[3] not in (0, 1) or not isinstance(record[4], list):
             raise ValueError(f"{shown(record)} is no box")
-        low, high = _number(record[1]), _number(record[2])
+        low, high = number(record[1]), number(record[2])
         if not low == start < high or not 0 < len(record[4]) <= _MOST_PARTS:
             raise ValueError("a box does not begin where the one before ends, or has no parts or too many")
-        nothing = all(isinstance(part, list) and part[:1] == ["u"] for part in record[4])
-        expansion = None if nothing else selection.expansion(record[1], record[2], precise=bool(record[3]))
         end: Any = record[1]
+        said: list[tuple[list[Any], Any, Any]] = []
         for part in record[4]:
-            kind = part[0] if isinstance(part, list) and part else None
-            if not isinstance(kind, str) or kind not in _ENTRIES or len(part) != _ENTRIES[kind]:
-                raise ValueError(f"{shown(part)} is no part of a box")
+            check_entries(part, len(selection.conditions))
             before, end = end, part[1]
-            first, last = _number(before), _number(end)
+            first, last = number(before), number(end)
             if not first < last <= high:
                 raise ValueError("the parts of a box are not in order")
-            _check_entries(part, len(selection.conditions))
-            if kind != "u" and (expansion is None or not _proven(expansion, part, before, end)):
-                where = f"[{float(first)}, {float(last)}]"
-                self._fail(f"selection {_text(follower.codes)}: what is said of {where} is not proven")
-            if kind == "e" and not selection.signs_differ(part):
-                self._fail(f"selection {_text(follower.codes)}: bounds of an event near {float(first)} are not proven")
-            follower.part(kind, part, (first, last))
-        return _number(end)
+            if part[0] != "u":
+                said.append((part, before, end))
+            follower.part(part[0], part, (first, last))
+        if said:
+            self._boxes.add(selection, record[1], record[2], said, precise=bool(record[3]))
+        return number(end)
 
     # -- all of them -----------------------------------------------------------------------------------------------
 
@@ -267,7 +263,7 @@ class ArcChecker:
                     continue
                 codes = (*event.codes[:node], other[0], *event.codes[node + 1 :])
                 for found in by_codes.get((codes, event.side, (node, other[1])), ()):
-                    if _inside(event.zero, found.part) or _inside(found.zero, event.part):
+                    if inside(event.zero, found.part) or inside(found.zero, event.part):
                         event.partners.append(found)
         for event in self._events:
             if len(event.partners) == 1:
@@ -281,47 +277,6 @@ class ArcChecker:
                 self._fail(f"an event of {where} has {len(event.partners)} partners")
             else:
                 self._count.open += 1  # bounds too wide to find the partner, or it was left open
-
-
-class _Selection:
-    """A selection in both arithmetics."""
-
-    def __init__(self, checker: ArcChecker, plain: ArcSelection, side: int) -> None:
-        self._checker, self._plain, self._side = checker, plain, side
-
-    @cached_property
-    def _precise(self) -> Any:
-        from enumsol.kernel.precise import PreciseSelection  # as above
-
-        system = self._checker.precise_system
-        system = system.constant_load(float(self._side)) if self._side else system
-        return PreciseSelection(system, self._plain.rows.codes)
-
-    @property
-    def conditions(self) -> tuple[tuple[int, int], ...]:
-        """Those of the selection, by their numbers."""
-        return self._plain.rows.conditions
-
-    def expansion(self, low: Any, high: Any, *, precise: bool) -> Any:
-        """The expansion over a box, or None."""
-        if precise:
-            return self._precise.expansion(_number(low), _number(high))
-        if not isinstance(low, float) or not isinstance(high, float):
-            raise ValueError("the ends of a box in double arithmetic are floats")  # noqa: TRY004 (as in reading)
-        return self._plain.expansion(low, high)
-
-    def signs_differ(self, part: list[Any]) -> bool:
-        """Whether the bounds of an event's zero lie on both sides of it."""
-        condition, rising, bounds = part[3], bool(part[4]), part[5:7]
-        slope = 1 if rising else -1
-        signs = []
-        for bound in bounds:
-            if isinstance(bound, float):
-                signs.append(self._plain.sign_at(bound, condition))
-            else:
-                found = self._precise.signs_at(_number(bound))
-                signs.append(0 if found is None else int(found[condition]))
-        return signs == [-slope, slope]
 
 
 class _Follower:
@@ -368,7 +323,7 @@ class _Follower:
             self._checker.fail(self.codes, ends[0])
         self._holds, self._index = not (kind == "e" and part[4] == 0), part[2]
         if kind == "e":
-            zero = (_number(part[5]), _number(part[6]))
+            zero = (number(part[5]), number(part[6]))
             condition = self._conditions[part[3]]
             self._checker.event(_Event(self.codes, self._side, condition, ends, zero, rising, part[2]))
 
@@ -378,56 +333,9 @@ class _Follower:
             self._checker.fail(self.codes, self._ends[1])
 
 
-def _proven(expansion: Any, part: list[Any], low: Any, high: Any) -> bool:
-    """Whether the expansion shows what a part says."""
-    kind = part[0]
-    ends = (low, high) if isinstance(low, float) and isinstance(high, float) else (_number(low), _number(high))
-    known = expansion.over(*ends)
-    if kind == "n":
-        return bool(known.none)
-    if expansion.index(*ends) != part[2]:
-        return False
-    if kind == "h":
-        return bool(known.holds)
-    condition = part[3]
-    zero = _number(part[5]), _number(part[6])
-    slope = 1 if part[4] else -1
-    others = [k for k in known.doubtful.tolist() if k != condition]
-    at = [int(expansion.over(end, end).conditions[condition]) for end in ends]
-    return bool(
-        known.regular
-        and not others
-        and not any(k < 0 for k in known.conditions.tolist())
-        and int(expansion.slopes(*ends)[condition]) == slope
-        and at == [-slope, slope]
-        and _inside(zero, (_number(low), _number(high)))
-    )
-
-
-def _check_entries(part: list[Any], conditions: int) -> None:
-    """Refuse a part whose entries are none of those that its kind has."""
-    if part[0] in ("h", "e") and (type(part[2]) is not int or part[2] not in (-1, 1)):
-        raise ValueError("an index is neither 1 nor -1")
-    if part[0] == "e" and not (
-        type(part[3]) is int and 0 <= part[3] < conditions and type(part[4]) is int and part[4] in (0, 1)
-    ):
-        raise ValueError("an event names no condition")
-
-
 def _is_next(value: Fraction, end: Fraction) -> bool:
     """Whether it is the smallest float that is not smaller than ``end``: what is beyond would not be about it."""
     return value == end or (value > end and Fraction(np.nextafter(float(value), -np.inf)) < end)
-
-
-def _inside(zero: tuple[Fraction, Fraction], part: tuple[Fraction, Fraction]) -> bool:
-    return part[0] <= zero[0] < zero[1] <= part[1]
-
-
-def _number(value: Any) -> Fraction:
-    """An alpha: a float, or a fraction as text."""
-    if type(value) is float or isinstance(value, Fraction):
-        return Fraction(value)
-    return rational_from(value)
 
 
 def _text(codes: Codes) -> str:

@@ -1,22 +1,33 @@
 """Selections over short intervals of alpha in balls of many digits (theory, section 7.14).
 
 Where several conditions vanish within the rounding of double arithmetic, S and g are computed from the problem's own
-data in arithmetic of PRECISION bits, and the events are told apart there. Over a short interval the unknowns and their
-slopes are enclosed at once; conditions whose slopes have one sign are known from their values at both ends.
+data in balls of many_digits.PRECISION bits, and the events are told apart there. Over a short interval the unknowns and
+their slopes are enclosed at once; conditions whose slopes have one sign are known from their values at both ends.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from flint import arb, arb_mat, ctx, fmpq
+from flint import arb, arb_mat
 
-from enumsol.arithmetic.balls import SAFE, UNIT, upper_sum
 from enumsol.kernel.arcs import OverInterval
-from enumsol.kernel.rows import SLIP_MINUS, SLIP_PLUS
+from enumsol.kernel.many_digits import (
+    ball_of,
+    column,
+    fraction_of,
+    matrix,
+    precision,
+    rounded,
+    sign_of,
+    signs_of,
+    solutions_around,
+)
+from enumsol.kernel.rows import SLIP_PLUS
 from enumsol.kernel.selection_rows import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, SelectionRows
 
 if TYPE_CHECKING:
@@ -29,13 +40,14 @@ if TYPE_CHECKING:
     Signs = NDArray[np.int8]
     Number = float | Fraction
 
-#: Bits of the arithmetic; zeros are enclosed to 2^-_ZERO_BITS relative to the interval, and closer ones are one.
-PRECISION, _ZERO_BITS = 320, 200
-#: Steps of Newton's method from the middle of an interval, enlargements of a zero's bounds, bound of how much M may
-#: change over an interval, and of rises that count as none where norms are chosen.
-_STEPS, _WIDENINGS, _LARGEST_SHIFT, _NO_RISE = 8, 6, 0.5, 1e-250
-#: Covers underflow of some products.
-_SUBNORMAL = 2.0**-1070
+#: Zeros are enclosed to 2^-_ZERO_BITS relative to the interval, and closer ones are one.
+_ZERO_BITS = 200
+#: Steps of Newton's method from the middle of an interval, enlargements of a zero's bounds.
+_STEPS, _WIDENINGS = 8, 6
+#: Intervals shorter than this share of alpha are narrow beside the distances at which conditions bend.
+_NEAR = Fraction(1, 2**30)
+#: Zeros are farther apart (tau), or the rounding of floats hides it.
+_LEAST_SPLIT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +73,7 @@ class PreciseSystem:
 
         A is inverted as a dense matrix: some 0.02 s for 80 degrees of freedom, and 0.3 s for 250.
         """
-        with _precision():
+        with precision():
             rows = problem.contact_rows.toarray()
             slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
             right = np.column_stack([rows.T, problem.f, slope])
@@ -77,6 +89,11 @@ class PreciseSystem:
             g1 = [product[i, size + 1] for i in range(size)]
             F0, F1 = ([arb(float(x)) for x in part] for part in problem.friction)
             return cls(S, g0, g1, F0, F1)
+
+    @cached_property
+    def rows(self) -> list[list[Any]]:
+        """S by its rows."""
+        return [[self.S[i, j] for j in range(self.S.ncols())] for i in range(self.S.nrows())]
 
     def constant_load(self, side: float) -> PreciseSystem:
         """For the constant load g1 or -g1 (see kernel.interval)."""
@@ -100,12 +117,12 @@ class PreciseSelection:
         self.system = system
         self.rows = rows = SelectionRows(codes)
         self._signs: dict[Fraction, Signs | None] = {}
-        with _precision():
+        with precision():
             p = len(rows.codes)
             constant, slope = self._columns()
             unknown = rows.unknown.tolist()
-            self._M = tuple(_matrix([part[r] for r in unknown]) for part in (constant, slope))
-            self._g = tuple(_column([part[r] for r in unknown]) for part in (system.g0, system.g1))
+            self._M = tuple(matrix([part[r] for r in unknown]) for part in (constant, slope))
+            self._g = tuple(column([part[r] for r in unknown]) for part in (system.g0, system.g1))
             # conditions c0 + a c1 + (C0 + a C1) y
             place = {i: j for j, i in enumerate(rows.closed.tolist())}
             stuck = {i: len(place) + j for j, i in enumerate(rows.stick.tolist())}
@@ -124,24 +141,45 @@ class PreciseSelection:
                     at0, at1 = sign * system.g0[r], sign * system.g1[r]
                 for part, value in zip(parts, (row0, row1, at0, at1), strict=True):
                     part.append(value)
-            self._C, self._c = (_matrix(parts[0]), _matrix(parts[1])), (_column(parts[2]), _column(parts[3]))
+            self._C, self._c = (matrix(parts[0]), matrix(parts[1])), (column(parts[2]), column(parts[3]))
 
-    def _columns(self) -> tuple[list[list[Any]], list[list[Any]]]:
-        """S dlambda/dy by its rows: the constant part, and what alpha is multiplied by."""
-        system, codes = self.system, self.rows.codes
-        p, closed, stick = len(codes), self.rows.closed.tolist(), self.rows.stick.tolist()
-        signs = [{SLIP_PLUS: 1, SLIP_MINUS: -1}.get(codes[i], 0) for i in closed]
-        constant, slope = [], []
-        for r in range(2 * p):
-            row0, row1 = [system.S[r, i] for i in closed], [arb(0)] * len(closed)
-            for j, (i, sign) in enumerate(zip(closed, signs, strict=True)):
-                if sign:
-                    turning = system.S[r, p + i] * sign
-                    row0[j] += system.F0[i] * turning
-                    row1[j] = system.F1[i] * turning
-            constant.append(row0 + [system.S[r, p + i] for i in stick])
-            slope.append(row1 + [arb(0)] * len(stick))
+    def _columns(self) -> tuple[dict[int, list[Any]], dict[int, list[Any]]]:
+        """The rows of S dlambda/dy that count: the constant part, and what alpha is multiplied by."""
+        system, rows, p = self.system, self.rows, len(self.rows.codes)
+        closed, stick, zero = rows.closed.tolist(), rows.stick.tolist(), arb(0)
+        slipping = [
+            (j, p + i, arb(sign) * system.F0[i], arb(sign) * system.F1[i])
+            for j, i, sign in zip(rows.slip_columns.tolist(), rows.slip.tolist(), rows.slip_signs.tolist(), strict=True)
+        ]
+        constant, slope = {}, {}
+        for r in {*rows.unknown.tolist(), *rows.moving.tolist()}:
+            whole = system.rows[r]
+            row0, row1 = [whole[i] for i in closed], [zero] * len(closed)
+            for j, i, F0, F1 in slipping:
+                row0[j] += F0 * whole[i]
+                row1[j] = F1 * whole[i]
+            constant[r] = row0 + [whole[p + i] for i in stick]
+            slope[r] = row1 + [zero] * len(stick)
         return constant, slope
+
+    @cached_property
+    def _lines(self) -> tuple[Any, Any] | None:
+        """Conditions c0 + a c1, where neither M nor what they are made of depends on alpha; else None."""
+        rows, F1 = self.rows, self.system.F1
+        if any(F1[i] != 0 for i in (*rows.slip.tolist(), *rows.stick.tolist())):
+            return None
+        if not len(rows.unknown):
+            return self._c
+        try:
+            y0, y1 = (self._M[0].solve(g) for g in self._g)
+        except ZeroDivisionError:
+            return None
+        return self._c[0] + self._C[0] * y0, self._c[1] + self._C[0] * y1
+
+    @cached_property
+    def _constant_index(self) -> int:
+        """Sign of det M where M does not depend on alpha."""
+        return sign_of(self._M[0].det()) if self._M[0].nrows() else 1
 
     def solve(self, a: Any) -> tuple[Any, Any] | None:
         """Unknowns for every alpha in a ball, and the matrix; None where that is not proven regular."""
@@ -167,39 +205,52 @@ class PreciseSelection:
     def signs_at(self, alpha: Fraction) -> Signs | None:
         """1 or -1 where a condition is positive or negative at an alpha, else 0; None where it is not regular."""
         if alpha not in self._signs:
-            with _precision():
-                a = _ball(alpha)
-                solved = self.solve(a)
-                self._signs[alpha] = None if solved is None else _signs(self.values(a, solved[0]))
+            with precision():
+                a = ball_of(alpha)
+                if self._lines is not None:
+                    self._signs[alpha] = signs_of(self._lines[0] + self._lines[1] * a)
+                else:
+                    solved = self.solve(a)
+                    self._signs[alpha] = None if solved is None else signs_of(self.values(a, solved[0]))
         return self._signs[alpha]
 
     def expansion(self, low: Number, high: Number) -> PreciseExpansion | None:
         """The conditions over [low, high]; None where the interval is too long."""
         first, last = Fraction(low), Fraction(high)
-        with _precision():
-            middle, radius = _ball((first + last) / 2), _ball((last - first) / 2)
+        with precision():
+            middle, radius = ball_of((first + last) / 2), ball_of((last - first) / 2)
+            if self._lines is not None:
+                constant, slope = self._lines
+                values = constant + slope * ball_of(first).union(ball_of(last))
+                near = constant + slope * middle
+                return PreciseExpansion(self, first, last, values, slope * radius, self._constant_index, near)
             solved = self.solve(middle)
             if solved is None:
                 return None
             y, M = solved
-            a, index = _ball(first).union(_ball(last)), 1
+            a, index, near = ball_of(first).union(ball_of(last)), 1, self.values(middle, y)
             rise = arb_mat(0, 1)
             if M.nrows():
-                index = _sign(M.det())
+                index = sign_of(M.det())
                 rise = M.solve((self._g[1] - self._M[1] * y) * radius)
-                found = _around(y, rise, M.solve(self._M[1] * radius))
+                found = solutions_around(y, rise, M.solve(self._M[1] * radius))
                 if found is None:
                     return None
                 y, rise = found
             slopes = (self._c[1] + self._C[1] * y) * radius + (self._C[0] + self._C[1] * a) * rise
-            return PreciseExpansion(self, first, last, self.values(a, y), slopes, index)
+            return PreciseExpansion(self, first, last, self.values(a, y), slopes, index, near)
 
-    def newton(self, condition: int, low: Fraction, high: Fraction, width: Fraction) -> Fraction | None:
+    def newton(
+        self, condition: int, low: Fraction, high: Fraction, width: Fraction, steps: int = _STEPS
+    ) -> Fraction | None:
         """Where a condition seems to vanish between two alphas, to a part of ``width``; no claim rests on it."""
-        with _precision():
+        with precision():
             alpha, unit = (low + high) / 2, width / 2**8
-            for _ in range(_STEPS):
-                a = _ball(alpha)
+            if self._lines is not None:
+                constant, slope = (part[condition, 0].mid() for part in self._lines)
+                return None if slope == 0 else rounded(fraction_of((-constant / slope).mid()), low, high, unit)
+            for _ in range(steps):
+                a = ball_of(alpha)
                 solved = self.solve(a)
                 if solved is None:
                     return None
@@ -207,9 +258,8 @@ class PreciseSelection:
                 rise = self.slope(a, y, M)[condition, 0].mid()
                 if not rise.is_finite() or rise == 0:
                     return None
-                step = _fraction((self.values(a, y)[condition, 0] / rise).mid())
-                # a multiple of the unit: ends of enclosures keep few digits
-                alpha = min(max(low + round((alpha - step - low) / unit) * unit, low), high)
+                step = fraction_of((self.values(a, y)[condition, 0] / rise).mid())
+                alpha = rounded(alpha - step, low, high, unit)
                 # the next step is about the square of this one
                 if step * step <= unit * (high - low):
                     break
@@ -223,23 +273,27 @@ class PreciseSelection:
         They are about ``width`` apart, by default as close as zeros are told apart.
         """
         width = Fraction(1, 2**_ZERO_BITS) * (high - low) if width is None else width
-        alpha = self.newton(condition, low, high, width)
-        if alpha is None:
-            return None
-        for _ in range(_WIDENINGS):
-            ends = max(alpha - width, low), min(alpha + width, high)
-            signs = [self.signs_at(end) for end in ends]
-            if all(found is not None for found in signs) and _opposite(signs, condition):
-                return ends
-            width *= 2**20
+        # bounds that are narrow already are so near that one step is enough
+        near = high - low <= _NEAR * max(abs(low), abs(high))
+        for steps, widenings in ((1, 1), (_STEPS, _WIDENINGS)) if near else ((_STEPS, _WIDENINGS),):
+            alpha = self.newton(condition, low, high, width, steps)
+            if alpha is None:
+                return None
+            reach = width
+            for _ in range(widenings):
+                ends = max(alpha - reach, low), min(alpha + reach, high)
+                signs = [self.signs_at(end) for end in ends]
+                if all(found is not None for found in signs) and _opposite(signs, condition):
+                    return ends
+                reach *= 2**20
         return None
 
     def forces(self, alpha: Fraction) -> tuple[list[Any], list[Any]] | None:
         """lambda and w as 2p arb each."""
         system, rows = self.system, self.rows
         p = len(rows.codes)
-        with _precision():
-            a = _ball(alpha)
+        with precision():
+            a = ball_of(alpha)
             solved = self.solve(a)
             if solved is None:
                 return None
@@ -249,7 +303,7 @@ class PreciseSelection:
                 forces[row] = value
             for i, sign in zip(rows.slip.tolist(), rows.slip_signs.tolist(), strict=True):
                 forces[p + i] = arb(sign) * (system.F0[i] + a * system.F1[i]) * forces[i]
-            moved = system.S * _column(forces)
+            moved = system.S * column(forces)
             w = [system.g0[r] + a * system.g1[r] - moved[r, 0] for r in range(2 * p)]
             return forces, w
 
@@ -269,33 +323,53 @@ class PreciseExpansion:
     rough, final = False, True
 
     def __init__(
-        self, selection: PreciseSelection, low: Fraction, high: Fraction, values: Any, slopes: Any, index: int
+        self,
+        selection: PreciseSelection,
+        low: Fraction,
+        high: Fraction,
+        values: Any,
+        slopes: Any,
+        index: int,
+        near: Any,
     ) -> None:
         self.low, self.high = low, high
         self.apart = (high - low) * Fraction(4, 2**_ZERO_BITS)
         self._selection, self._index = selection, index
-        self._whole, self._rises = _signs(values), _signs(slopes)
+        self._whole, self._rises = signs_of(values), signs_of(slopes)
         self._small = [bool(abs(values[k, 0]) < arb(2) ** -_ZERO_BITS) for k in range(values.nrows())]
+        # about where conditions vanish, by tau in [-1, 1]
+        self._crossings = [
+            -float((near[k, 0] / slopes[k, 0]).mid()) if self._rises[k] else np.nan for k in range(values.nrows())
+        ]
+
+    def split(self) -> Fraction | None:
+        """An alpha below which one condition seems to be negative, and above which another; None where there is none.
+
+        No claim rests on it.
+        """
+        rising = [tau for tau, rise in zip(self._crossings, self._rises, strict=True) if rise > 0]
+        falling = [tau for tau, rise in zip(self._crossings, self._rises, strict=True) if rise < 0]
+        if not rising or not falling or max(rising) - min(falling) < _LEAST_SPLIT:
+            return None
+        tau = 0.5 * (max(rising) + min(falling))
+        return self.low + Fraction(1 + tau) * (self.high - self.low) / 2 if abs(tau) < 1.0 else None
 
     def over(self, low: Number, high: Number) -> OverInterval:
         """What is known over a part of the interval."""
-        signs = self._whole.copy()
-        ends = [self._selection.signs_at(Fraction(alpha)) for alpha in (low, high)]
-        if ends[0] is not None and ends[1] is not None:
+        signs, unknown = self._whole.copy(), np.zeros_like(self._whole)
+        found = [self._selection.signs_at(Fraction(alpha)) for alpha in (low, high)]
+        ends = tuple(unknown if end is None else end for end in found)
+        if found[0] is not None and found[1] is not None:
             # without a change of the slope's sign, values lie between those at the ends
             same = (signs == 0) & (ends[0] == ends[1]) & ((self._rises != 0) | (low == high))
             signs[same] = ends[0][same]
-        return OverInterval(signs, regular=bool(self._index), none=bool(np.any(signs < 0)))
+        none = bool(np.any(signs < 0))
+        return OverInterval(signs, bool(self._index), none, self._index, (ends[0], ends[1]), self._rises)
 
-    def slopes(self, low: Number, high: Number) -> Signs:
-        """1 or -1 where a condition grows or falls with alpha, else 0."""
-        del low, high
-        return self._rises
-
-    def index(self, low: Number, high: Number) -> int:
-        """Sign of det M, 0 where it is not proven."""
-        del low, high
-        return self._index
+    def near(self, condition: int, low: Number, high: Number) -> tuple[Number, Number]:
+        """As in arcs.Expansion; bounds are found at once, by ``zero_bounds``."""
+        del condition, high
+        return low, low
 
     def zeros(self, condition: int) -> list[Fraction]:
         """Alphas inside the interval at which a condition seems to vanish; no claim rests on them."""
@@ -316,68 +390,5 @@ class PreciseExpansion:
         return self._selection.enclosed(condition, *part) or part
 
 
-def _around(y: Any, rise: Any, P: Any) -> tuple[Any, Any] | None:
-    """Balls of the unknowns and of their slopes with tau in [-1, 1], given both at tau = 0 and P = M(0)^{-1} M'.
-
-    They are y + tau (I + tau P)^{-1} rise and (I + tau P)^{-2} rise. With k = |P| < 1 in the norm max |x| / u they
-    differ from y + tau rise and from rise by at most 1 / (1 - k) - 1 and 1 / (1 - k)^2 - 1 times |rise|. None where k
-    is too large.
-    """
-    size = np.array([_upper(rise[i, 0]) for i in range(rise.nrows())])
-    largest = float(np.max(size))
-    u = size / largest + 1e-3 if largest > _NO_RISE else np.ones(len(size))
-    rows = np.array([[_upper(P[i, j]) for j in range(P.ncols())] for i in range(P.nrows())])
-    k = float(np.max(upper_sum(rows * u, axis=1) / u)) * SAFE
-    if not k < _LARGEST_SHIFT:
-        return None
-    norm = float(np.max(size / u)) * SAFE
-    growths = (1.0 / (1.0 - k) ** power - 1.0 + 8 * UNIT for power in (1, 2))
-    first, second = (u * (norm * growth * SAFE) + _SUBNORMAL for growth in growths)
-    values = [y[i, 0] + arb(0, 1) * rise[i, 0] + arb(0, float(e)) for i, e in enumerate(first)]
-    return _column(values), _column([rise[i, 0] + arb(0, float(e)) for i, e in enumerate(second)])
-
-
-def _upper(value: Any) -> float:
-    """At least the size of all numbers in a ball."""
-    return float(np.nextafter(float(abs(value).upper()), np.inf))
-
-
-class _precision:  # noqa: N801 (a context manager, used like a function)
-    """The precision of flint's balls, for a while."""
-
-    def __enter__(self) -> None:
-        self._before = ctx.prec
-        ctx.prec = PRECISION
-
-    def __exit__(self, *error: object) -> None:
-        ctx.prec = self._before
-
-
-def _matrix(rows: list[list[Any]]) -> Any:
-    return arb_mat(len(rows), len(rows[0]) if rows else 0, [x for row in rows for x in row])
-
-
-def _column(values: Sequence[Any]) -> Any:
-    return arb_mat(len(values), 1, list(values))
-
-
-def _ball(alpha: Fraction) -> Any:
-    return arb(fmpq(alpha.numerator, alpha.denominator))
-
-
-def _sign(value: Any) -> int:
-    return int(value > 0) - int(value < 0)
-
-
-def _signs(column: Any) -> Signs:
-    return np.array([_sign(column[k, 0]) for k in range(column.nrows())], dtype=np.int8)
-
-
 def _opposite(signs: Sequence[Any], condition: int) -> bool:
     return int(signs[0][condition]) * int(signs[1][condition]) < 0
-
-
-def _fraction(value: Any) -> Fraction:
-    """The exact value of an arb without radius."""
-    mantissa, exponent = (int(part) for part in value.man_exp())
-    return Fraction(mantissa) * Fraction(2) ** exponent

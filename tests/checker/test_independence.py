@@ -45,6 +45,7 @@ SHARED = {
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
     "condensation.space": {"EnclosedSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "vanishing_alpha"},
+    "kernel.arc_selections": None,
     "kernel.arcs": None,
     "kernel.interval": {"EnclosedPiece", "as_computed", "interval_exclusion_margin"},
     "kernel.precise": None,

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from cli.test_cli_solve import BODY, TOML
 
 from enumsol import gallery
 from enumsol.cli import main
@@ -27,10 +28,13 @@ def proof(tmp_path, capsys):
 
 
 def verbs(proof, folder):
+    (folder / "body.msh").write_text(BODY)
+    (folder / "body.toml").write_text(TOML)
     points = str(folder / "points.csv")
     assert main(["follow", SQUARE, "--from", "0", "--to", "10", "--start", "3.5", "--csv", points, "--quiet"]) == 0
     return {
         "roots": ["roots", SQUARE, "--alpha", "3.5"],
+        "solve": ["solve", str(folder / "body.toml"), "--alpha", "0.5"],
         "table": ["table", SQUARE, "--alphas", "1,3.5"],
         "graph": ["graph", SQUARE, "--from", "0", "--to", "10"],
         "report": ["report", SQUARE, "--from", "0", "--to", "10", "-o", str(folder / "page.html")],

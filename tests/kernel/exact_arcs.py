@@ -9,9 +9,10 @@ from flint import arb, arb_mat, fmpq, fmpq_mat
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge, rational_between, real_roots
 from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.exact import ExactCondensed
-from enumsol.kernel.arcs import ArcSystem
+from enumsol.kernel.arc_selections import ArcSystem
 from enumsol.kernel.ball_arrays import Ball
-from enumsol.kernel.precise import PreciseSystem, _precision
+from enumsol.kernel.many_digits import precision
+from enumsol.kernel.precise import PreciseSystem
 from enumsol.kernel.selection_rows import SelectionRows
 from enumsol.selections.functions import SelectionFunctions
 from enumsol.statuses import RowKind
@@ -61,7 +62,7 @@ def widened(rng, data, width):
 def precise_system(data):
     """In balls of many digits."""
     S, g0, g1, F0, F1 = data
-    with _precision():
+    with precision():
         lists = ([arb(float(x)) for x in part] for part in (g0, g1, F0, F1))
         return PreciseSystem(arb_mat(S.tolist()), *lists)
 

@@ -1,13 +1,16 @@
 """What the kernel says of a selection over alpha is true: against rationals at points, and isolated roots."""
 
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 import pytest
 from kernel.exact_arcs import Truth, arc_system, beside, exact_of, interval_at, random_data, two_zeros, widened
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.kernel.arcs import ArcSelection, _bernstein_signs, _to_bernstein
+from enumsol.kernel.arc_selections import ArcSelection
+from enumsol.kernel.arcs import expansions, over_parts
+from enumsol.kernel.bernstein import bernstein_values, signs_beyond, to_bernstein
 from enumsol.kernel.rows import FRICTIONLESS
 
 
@@ -27,6 +30,11 @@ def selections(count, start=0):
         yield rng, ArcSelection(system, codes.tolist()), Truth(exact, tuple(codes.tolist()))
 
 
+def expansion_of(selection, low, high):
+    """That of one selection over one interval."""
+    return expansions([(selection, low, high)])[0]
+
+
 def parts(rng, low, high, count=4):
     """Some parts of an interval, the whole one and points among them."""
     yield low, high
@@ -36,12 +44,18 @@ def parts(rng, low, high, count=4):
         yield ends[0], ends[1]
 
 
+def index_at(truth, alpha):
+    """Sign of det M at an alpha."""
+    (index,) = truth.signs(truth.det, alpha, alpha)
+    return index
+
+
 def check_claims(count, start=0):
     """Numbers of claims of every kind that were made; all are true."""
-    made = dict.fromkeys(("conditions", "regular", "none", "slopes", "index", "zeros"), 0)
+    made = dict.fromkeys(("conditions", "regular", "none", "slopes", "index", "ends", "zeros"), 0)
     for rng, selection, truth in selections(count, start):
         low, high = interval_at(rng, truth)
-        expansion = selection.expansion(low, high)
+        expansion = expansion_of(selection, low, high)
         if expansion is None:
             continue
         for a, b in (*parts(rng, low, high), *beside(rng, truth, low, high)):
@@ -50,17 +64,21 @@ def check_claims(count, start=0):
             made["regular"] += known.regular
             made["none"] += known.none
             made["conditions"] += int(known.regular) * int(np.count_nonzero(known.conditions))
-            index = expansion.index(a, b)
-            if index:
+            if known.index:
                 made["index"] += 1
-                assert truth.signs(truth.det, a, b) == {index}
+                assert truth.signs(truth.det, a, b) == {known.index}
             if not known.regular:
                 continue
-            slopes = expansion.slopes(a, b)
+            slopes = known.slopes
+            for k, end in product(range(len(slopes)), (0, 1)):
+                sign = int(known.ends[end][k])
+                made["ends"] += sign != 0
+                alpha = (a, b)[end]
+                assert not sign or truth.signs(truth.conditions[k], alpha, alpha) == {sign * index_at(truth, alpha)}
             for k in np.flatnonzero(slopes).tolist():
                 made["slopes"] += 1
                 assert truth.only_zero(k, int(slopes[k]), a, b)
-                signs = [int(expansion.over(end, end).conditions[k]) for end in (a, b)]
+                signs = [int(end[k]) for end in known.ends]
                 if a < b and signs == [-slopes[k], slopes[k]]:
                     made["zeros"] += 1
                     first, last = expansion.zero_bounds(k, int(slopes[k]), a, b)
@@ -85,23 +103,45 @@ def check_errors(count, start=0):
     compared = 0
     for rng, selection, truth in selections(count, start):
         low, high = interval_at(rng, truth)
-        expansion = selection.expansion(low, high)
+        expansion = expansion_of(selection, low, high)
         if expansion is None:
             continue
-        v = expansion._bordered.mid[-1]
-        middle, radius = Fraction(expansion._middle), Fraction(expansion._radius)
+        series = expansion.series
+        v = series.bordered.mid[-1]
+        middle, radius = Fraction(series.middle), Fraction(series.radius)
         for tau in (Fraction(-1), Fraction(1), Fraction(float(rng.uniform(-1, 1)))):
             found = truth.conditions_at(rational(middle + tau * radius), v)
             assert found is not None  # N is regular throughout
             compared += 1
             values, slopes = ([Fraction(int(x.p), int(x.q)) for x in part] for part in found)
-            for k, row in enumerate(expansion._coefficients.tolist()):
-                series = [Fraction(x) for x in row]
-                near = sum(c * tau**j for j, c in enumerate(series))
-                rise = sum(j * c * tau ** (j - 1) for j, c in enumerate(series) if j)
-                assert abs(near - values[k]) <= Fraction(float(expansion._error[k]))
-                assert abs(rise - slopes[k] * radius) <= Fraction(float(expansion._slope_error[k]))
+            for k, row in enumerate(series.coefficients.tolist()):
+                polynomial = [Fraction(x) for x in row]
+                near = sum(c * tau**j for j, c in enumerate(polynomial))
+                rise = sum(j * c * tau ** (j - 1) for j, c in enumerate(polynomial) if j)
+                assert abs(near - values[k]) <= Fraction(float(series.error[k]))
+                assert abs(rise - slopes[k] * radius) <= Fraction(float(series.slope_error[k]))
     return compared
+
+
+def test_a_stack_says_of_each_what_it_says_alone():
+    """Selections of all sizes, singular and overflowing ones among them, and parts of series of both lengths."""
+    asked = [(selection, *interval_at(rng, truth)) for rng, selection, truth in selections(200)]
+    asked += [(selection, 1e300, 1.7e308) for selection, _, _ in asked[::20]]
+    alone = [expansion_of(*one) for one in asked]
+    together = expansions(asked)
+    pairs = [pair for pair in zip(together, alone, strict=True) if pair != (None, None)]
+    assert 100 < len(pairs) < len(asked)
+    assert {one.series.coefficients.shape[1] for one, _ in pairs} == {3, 17}
+    for one, other in pairs:
+        off = np.sum(np.abs(one.series.coefficients - other.series.coefficients), axis=1)
+        assert np.all(off <= one.series.error + other.series.error)
+    parts = [(one, one.low, 0.5 * one.low + 0.5 * one.high) for one, _ in pairs]
+    for part, known in zip(parts, over_parts(parts), strict=True):
+        other = part[0].over(*part[1:])
+        assert (known.regular, known.none, known.index) == (other.regular, other.none, other.index)
+        for ours, theirs in ((known.conditions, other.conditions), (known.slopes, other.slopes)):
+            assert np.array_equal(ours, theirs)
+        assert all(np.array_equal(*ends) for ends in zip(known.ends, other.ends, strict=True))
 
 
 def test_series_and_their_slopes_lie_within_their_errors():
@@ -125,9 +165,10 @@ def test_signs_from_bernstein_polynomials_are_right_to_the_last_bit():
         coefficients[0] -= float(sum(Fraction(float(c)) * at**k for k, c in enumerate(coefficients)))
         exact = [Fraction(float(c)) for c in coefficients]
         error = np.array([136 * 2.0**-53 * np.sum(np.abs(coefficients)) * 1.001])
-        sign = int(_bernstein_signs(coefficients[None], error, float(low), float(high))[0])
+        ends = np.array([low]), np.array([high])
+        sign = int(signs_beyond(bernstein_values(coefficients[None, None], *ends), error)[0, 0])
         proven += sign != 0
-        values = _to_bernstein(16, float(low), float(high))
+        (values,) = to_bernstein(16, *ends)
         for j in range(17):
             x = Fraction(float(low)) + (Fraction(float(high)) - Fraction(float(low))) * Fraction(j, 16)
             value = sum(c * x**k for k, c in enumerate(exact))
@@ -157,7 +198,7 @@ def test_single_alphas():
 def test_an_interval_of_two_neighbouring_floats_and_one_of_any_length():
     for _, selection, truth in selections(60):
         for low, high in ((1.0, float(np.nextafter(1.0, 2.0))), (-1e6, 1e9), (0.0, 5e-324), (1e300, 1.7e308)):
-            expansion = selection.expansion(low, high)
+            expansion = expansion_of(selection, low, high)
             if expansion is not None:
                 assert truth.is_true(expansion.over(low, high), low, high)
 
@@ -167,12 +208,12 @@ def test_two_zeros_close_together_are_not_missed(gap):
     data, codes, condition = two_zeros(gap)
     selection = ArcSelection(arc_system(data), codes)
     for width in (2.0**-30, 2.0**-20, 2.0**-10, 0.5):
-        expansion = selection.expansion(1.0 - width, 1.0 + width)
+        expansion = expansion_of(selection, 1.0 - width, 1.0 + width)
         assert expansion is not None
         known = expansion.over(1.0 - width, 1.0 + width)
         assert known.regular
         assert known.conditions[condition] == (-1 if width**2 < gap > 2.0**-48 else 0)
         if width**2 > gap:  # else a multiple of the condition may fall
-            assert expansion.slopes(1.0 - width, 1.0 + width)[condition] == 0
+            assert known.slopes[condition] == 0
         if width**2 > 16 * gap:
-            assert expansion.slopes(1.0 + width / 2, 1.0 + width)[condition] == 1
+            assert expansion.over(1.0 + width / 2, 1.0 + width).slopes[condition] == 1

@@ -9,7 +9,8 @@ from flint import arb, arb_mat
 from kernel.exact_arcs import Truth, beside, exact_of, interval_at, precise_system, random_data, two_zeros
 
 from enumsol.condensation.exact import ExactCondensed
-from enumsol.kernel.precise import PreciseSelection, PreciseSystem, _around, _ball, _precision, _upper
+from enumsol.kernel.many_digits import ball_of, precision, solutions_around, upper
+from enumsol.kernel.precise import PreciseSelection, PreciseSystem
 from enumsol.kernel.rows import FRICTIONLESS
 
 
@@ -51,16 +52,16 @@ def check_claims(count, start=0):
             assert truth.is_true(known, a, b), (selection.rows.codes, a, b, known)
             made["none"] += known.none
             made["conditions"] += int(known.regular) * int(np.count_nonzero(known.conditions))
-            index = expansion.index(a, b)
+            index = known.index
             if not index:
                 continue
             made["index"] += 1
             assert truth.signs(truth.det, a, b) == {index}
-            slopes = expansion.slopes(a, b)
+            slopes = known.slopes
             for k in np.flatnonzero(slopes).tolist():
                 made["slopes"] += 1
                 assert truth.only_zero(k, int(slopes[k]), a, b)
-                signs = [int(expansion.over(end, end).conditions[k]) for end in (a, b)]
+                signs = [int(end[k]) for end in known.ends]
                 if a < b and signs == [-slopes[k], slopes[k]]:
                     made["zeros"] += 1
                     first, last = expansion.zero_bounds(k, int(slopes[k]), a, b)
@@ -84,20 +85,20 @@ def test_balls_over_an_interval_hold_the_unknowns_and_their_slopes():
     compared = 0
     for rng, selection, truth in selections(250):
         low, high = short_interval(rng, truth)
-        with _precision():
+        with precision():
             middle, radius = (low + high) / 2, (high - low) / 2
-            solved = selection.solve(_ball(middle))
+            solved = selection.solve(ball_of(middle))
             if solved is None or not solved[1].nrows():
                 continue
             y, M = solved
-            rise = M.solve((selection._g[1] - selection._M[1] * y) * _ball(radius))
-            found = _around(y, rise, M.solve(selection._M[1] * _ball(radius)))
+            rise = M.solve((selection._g[1] - selection._M[1] * y) * ball_of(radius))
+            found = solutions_around(y, rise, M.solve(selection._M[1] * ball_of(radius)))
             if found is None:
                 continue
             for tau in (Fraction(-1), Fraction(1), Fraction(int(rng.integers(-99, 100)), 100)):
                 alpha = middle + tau * radius
-                there = selection.solve(_ball(alpha))
-                slope = there[1].solve(selection._g[1] - selection._M[1] * there[0]) * _ball(radius)
+                there = selection.solve(ball_of(alpha))
+                slope = there[1].solve(selection._g[1] - selection._M[1] * there[0]) * ball_of(radius)
                 compared += 1
                 for ours, exact in zip(found, (there[0], slope), strict=True):
                     for i in range(ours.nrows()):
@@ -107,11 +108,11 @@ def test_balls_over_an_interval_hold_the_unknowns_and_their_slopes():
 
 
 def test_balls_around_the_smallest_and_largest_numbers():
-    with _precision():
+    with precision():
         for exponent in (-2000, -1074, -1000, 0, 1000):
             size = arb(2) ** exponent
             for rate in (arb(1) / 4, arb(2) ** -30, arb(2) ** -300):
-                found = _around(arb_mat([[arb(0)]]), arb_mat([[size]]), arb_mat([[rate]]))
+                found = solutions_around(arb_mat([[arb(0)]]), arb_mat([[size]]), arb_mat([[rate]]))
                 assert found is not None
                 for tau in (-1, 1):
                     assert found[0][0, 0].contains((tau * size / (1 + tau * rate)).mid())
@@ -119,12 +120,12 @@ def test_balls_around_the_smallest_and_largest_numbers():
 
 
 def test_floats_are_upper_bounds():
-    with _precision():
+    with precision():
         for mid, rad in ((1, 0), (-1, 0.5), (0, 0), (arb(1) / 3, 1e-30), (arb(2) ** -2000, 0), (arb(2) ** 900, 1.0)):
             ball = arb(mid, rad)
-            assert arb(_upper(ball)) >= abs(ball).upper()
-        assert _upper(arb(2) ** 2000) == np.inf
-        assert not _upper(arb("nan")) < np.inf
+            assert arb(upper(ball)) >= abs(ball).upper()
+        assert upper(arb(2) ** 2000) == np.inf
+        assert not upper(arb("nan")) < np.inf
 
 
 def test_condensed_data_lie_in_their_balls():
@@ -133,7 +134,7 @@ def test_condensed_data_lie_in_their_balls():
         problem = generic_problem(rng, int(rng.integers(1, 4)), ("friction", "load", "both")[seed % 3])
         ours, exact = PreciseSystem.of(problem), ExactCondensed.from_problem(problem)
         assert ours is not None
-        with _precision():
+        with precision():
             for r, row in enumerate(exact.rows):
                 pairs = [(ours.S[r, k], x) for k, x in enumerate(row)]
                 pairs += [(ours.g0[r], exact.g0[r]), (ours.g1[r], exact.g1[r])]
@@ -154,5 +155,5 @@ def test_two_zeros_close_together_are_not_missed(gap):
         known = expansion.over(1 - width, 1 + width)
         assert known.regular
         assert known.conditions[condition] <= 0
-        assert expansion.slopes(1 - width, 1 + width)[condition] == 0
+        assert known.slopes[condition] == 0
         assert expansion.over(1 - width, 1 - width).conditions[condition] == np.sign(float(width**2) - gap)

@@ -9,7 +9,7 @@ from branches.problems import generic_problem, one_node
 from flint import fmpq
 
 from enumsol import ContactProblem, gallery
-from enumsol.branches import branch_graph
+from enumsol.branches import branch_graph, construction
 from enumsol.branches.gluing import glue
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError, Interrupted, InvalidArgumentError, TooLargeError
@@ -182,6 +182,25 @@ def test_an_interrupted_search_keeps_its_arcs():
     assert not partial.complete
     assert any("interrupted" in reason for reason in partial.reasons)
     assert partial.proof is None
+
+
+@pytest.mark.parametrize(("boxes", "followed"), [(500, False), (1, True)])
+def test_after_an_interrupted_search_not_all_is_followed(boxes, followed, monkeypatch):
+    """Only until so many boxes are made, and the graph says so."""
+    monkeypatch.setattr(construction, "_BOXES_AFTER_INTERRUPT", boxes)
+    found = []
+
+    def stop(stage, share):
+        found.append(stage)
+        if stage == "search" and len(found) == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted) as caught:
+        branch_graph(gallery.get("wedge-8-3").build(), (0.0, 3.0), progress=stop)
+    reasons = caught.value.partial.reasons
+    assert any("interrupted after" in reason and "nodes" in reason for reason in reasons)
+    assert any("the arcs of 8 of" in reason for reason in reasons) == followed
+    assert caught.value.partial.arcs
 
 
 @pytest.mark.parametrize("nodes", [20, 60, 150, 300, 600])

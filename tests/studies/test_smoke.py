@@ -14,7 +14,7 @@ import enumsol
 STUDIES = Path(__file__).parents[2] / "studies"
 NAMES = sorted(file.parent.name for file in STUDIES.glob("*/run.py"))
 #: Studies that compare versions; this interpreter stands for that of an older one.
-VERSIONS = ("requirements", "search_profile")
+VERSIONS = ("proven_graphs", "requirements", "search_profile")
 #: Study -> the library of its peer, what it says when that is not installed, and a column that is there all the same.
 PEERS = {
     "against_scip": ("pyscipopt", "pyscipopt is not installed: SCIP is left out", "roots"),

@@ -1,0 +1,205 @@
+"""What the boxes of a graph's proof say of selections, tested by the trusted kernel, many boxes at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from enumsol.kernel.arcs import expansions, over_parts
+from enumsol.proof.reading import rational_from, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from enumsol.kernel.arc_selections import ArcSelection
+    from enumsol.kernel.arcs import OverInterval
+
+    #: A part as it is in the proof, and both its ends.
+    Said = tuple[list[Any], Any, Any]
+
+#: Entries of a part, by its kind.
+_ENTRIES = {"h": 3, "n": 2, "e": 7, "u": 2}
+#: Boxes and parts that are tested together.
+_BOXES, _PARTS = 256, 2048
+
+
+class BoxSelection:
+    """A selection in both arithmetics.
+
+    Parameters
+    ----------
+    precise : has the problem in many digits as ``precise_system``
+    plain : ArcSelection
+    side : int
+    """
+
+    def __init__(self, precise: Any, plain: ArcSelection, side: int) -> None:
+        self._owner, self.plain, self._side = precise, plain, side
+
+    @cached_property
+    def precise(self) -> Any:
+        """The selection in many digits."""
+        from enumsol.kernel.precise import PreciseSelection  # python-flint, not for all proofs
+
+        system = self._owner.precise_system
+        system = system.constant_load(float(self._side)) if self._side else system
+        return PreciseSelection(system, self.plain.rows.codes)
+
+    @property
+    def conditions(self) -> tuple[tuple[int, int], ...]:
+        """Those of the selection, by their numbers."""
+        return self.plain.rows.conditions
+
+    def signs_differ(self, part: list[Any]) -> bool:
+        """Whether the bounds of an event's zero lie on both sides of it."""
+        condition, bounds = part[3], part[5:7]
+        signs = []
+        for bound in bounds:
+            if isinstance(bound, float):
+                signs.append(self.plain.sign_at(bound, condition))
+            else:
+                found = self.precise.signs_at(number(bound))
+                signs.append(0 if found is None else int(found[condition]))
+        return signs == _expected(part)
+
+
+@dataclass
+class _Box:
+    """A box that waits for its test."""
+
+    selection: BoxSelection
+    low: Any
+    high: Any
+    said: list[Said]
+
+
+class Boxes:
+    """Boxes to be tested.
+
+    Parameters
+    ----------
+    fail : called with a sentence for every claim that is not proven
+    """
+
+    def __init__(self, fail: Callable[[str], None]) -> None:
+        self._fail = fail
+        self._waiting: list[_Box] = []
+        self._parts = 0
+
+    def add(self, selection: BoxSelection, low: Any, high: Any, said: list[Said], *, precise: bool) -> None:
+        """Test a box, at once or together with others; ValueError if it can not be tested at all."""
+        if precise:
+            expansion = selection.precise.expansion(number(low), number(high))
+            known = [expansion and expansion.over(number(x), number(y)) for _, x, y in said]
+            for one, what in zip(said, known, strict=True):
+                self._test(selection, one, what, [])
+            return
+        if not isinstance(low, float) or not isinstance(high, float):
+            raise ValueError("the ends of a box in double arithmetic are floats")  # noqa: TRY004 (as in reading)
+        self._waiting.append(_Box(selection, low, high, [(part, _plain(x), _plain(y)) for part, x, y in said]))
+        self._parts += len(said)
+        if len(self._waiting) >= _BOXES or self._parts >= _PARTS:
+            self.check()
+
+    def check(self) -> None:
+        """Test all that wait."""
+        boxes, self._waiting, self._parts = self._waiting, [], 0
+        found = expansions([(box.selection.plain, box.low, box.high) for box in boxes])
+        asked = [
+            [(expansion, *part) for part in _questions(one)]
+            for box, expansion in zip(boxes, found, strict=True)
+            for one in box.said
+        ]
+        known = iter(over_parts([(one, x, y) for questions in asked for one, x, y in questions if one is not None]))
+        claims = ((box.selection, one) for box in boxes for one in box.said)
+        for (selection, one), questions in zip(claims, asked, strict=True):
+            answers = [next(known) for expansion, *_ in questions if expansion is not None]
+            self._test(selection, one, answers[0] if answers else None, answers[1:])
+        for box in boxes:
+            box.selection.plain.forget()
+
+    def _test(
+        self, selection: BoxSelection, one: Said, known: OverInterval | None, bounds: Sequence[OverInterval]
+    ) -> None:
+        """Fail where a part's claim does not follow from what is known of the part, and at bounds of its zero."""
+        part, low, high = one
+        if known is None or not _proven(known, part, number(low), number(high)):
+            where = f"[{float(number(low))}, {float(number(high))}]"
+            self._fail(f"selection {_text(selection)}: what is said of {where} is not proven")
+        if part[0] != "e":
+            return
+        seen = [int(found.ends[0][part[3]]) for found in bounds] == _expected(part)
+        if not seen and not selection.signs_differ(part):
+            near = float(number(low))
+            self._fail(f"selection {_text(selection)}: bounds of an event near {near} are not proven")
+
+
+def _questions(one: Said) -> Iterator[tuple[Any, Any]]:
+    """Over what an expansion is needed: a part and, where they lie in it, the bounds of its zero."""
+    part, low, high = one
+    yield low, high
+    if part[0] == "e" and all(isinstance(bound, float) for bound in part[5:7]):
+        zero = number(part[5]), number(part[6])
+        if inside(zero, (number(low), number(high))):
+            yield from ((bound, bound) for bound in part[5:7])
+
+
+def _expected(part: list[Any]) -> list[int]:
+    """Signs of an event's condition at the bounds of its zero, and at the ends of its part."""
+    return [-1, 1] if part[4] else [1, -1]
+
+
+def _proven(known: OverInterval, part: list[Any], low: Fraction, high: Fraction) -> bool:
+    """Whether what is known shows what a part says."""
+    kind = part[0]
+    if kind == "n":
+        return bool(known.none)
+    if known.index != part[2] or not known.regular:
+        return False
+    if kind == "h":
+        return bool(known.holds)
+    condition = part[3]
+    others = [k for k in known.doubtful.tolist() if k != condition]
+    return bool(
+        not others
+        and not any(k < 0 for k in known.conditions.tolist())
+        and int(known.slopes[condition]) == (1 if part[4] else -1)
+        and [int(end[condition]) for end in known.ends] == _expected(part)
+        and inside((number(part[5]), number(part[6])), (low, high))
+    )
+
+
+def check_entries(part: Any, conditions: int) -> None:
+    """Refuse what is no part, or has entries that its kind has not."""
+    kind = part[0] if isinstance(part, list) and part else None
+    if not isinstance(kind, str) or kind not in _ENTRIES or len(part) != _ENTRIES[kind]:
+        raise ValueError(f"{shown(part)} is no part of a box")
+    if kind in ("h", "e") and (type(part[2]) is not int or part[2] not in (-1, 1)):
+        raise ValueError("an index is neither 1 nor -1")
+    if kind == "e" and not (
+        type(part[3]) is int and 0 <= part[3] < conditions and type(part[4]) is int and part[4] in (0, 1)
+    ):
+        raise ValueError("an event names no condition")
+
+
+def inside(zero: tuple[Fraction, Fraction], part: tuple[Fraction, Fraction]) -> bool:
+    """Whether the bounds of a zero lie in a part, in their order."""
+    return part[0] <= zero[0] < zero[1] <= part[1]
+
+
+def number(value: Any) -> Fraction:
+    """An alpha: a float, or a fraction as text."""
+    if type(value) is float or isinstance(value, Fraction):
+        return Fraction(value)
+    return rational_from(value)
+
+
+def _plain(value: Any) -> float | Fraction:
+    """An alpha for an expansion in double arithmetic, as a float if it is one."""
+    return value if isinstance(value, float) else number(value)
+
+
+def _text(selection: BoxSelection) -> str:
+    return "".join(map(str, selection.plain.rows.codes))
