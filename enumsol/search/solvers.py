@@ -14,6 +14,7 @@ from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.search.certifiers.floats import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.search.closing import Closer
 from enumsol.search.proof_header import point_header, unit_exponents
 from enumsol.search.tree import TreeSearch
 from enumsol.selections.floats import FloatSelections
@@ -98,7 +99,7 @@ class Solvers:
             return None
         from enumsol.search.certifiers.rationals import ExactCertifier  # python-flint
 
-        return ExactCertifier(self.exact, self.scaled)
+        return ExactCertifier(self.exact, self.scaled, self.enclosed)
 
     @cached_property
     def _enclosed(self) -> tuple[EnclosedSystem | None, str]:
@@ -140,7 +141,7 @@ class Solvers:
         if self.arithmetic == "exact":
             from enumsol.search.certifiers.rationals import ExactCertifier  # python-flint
 
-            return ExactCertifier(_present(self.exact), self.scaled)
+            return ExactCertifier(_present(self.exact), self.scaled, self.enclosed)
         return VerifiedCertifier(
             self.scaled, self.enclosed, lambda: self.exact_certifier, _present(recorder), self.problem.node_ids
         )
@@ -152,7 +153,10 @@ class Solvers:
         progress: Callable[[SearchProgress], object] | None = None,
     ) -> TreeSearch:
         """A search of the tree with a certifier made here."""
-        return TreeSearch(self.scaled, certifier, engine=self.engine, limits=limits, progress=progress)
+        closer = None if self.arithmetic == "fast" else Closer(certifier)
+        return TreeSearch(
+            self.scaled, certifier, engine=self.engine, limits=limits, progress=progress, closer=closer
+        )
 
     def remake(self) -> Callable[[], Solvers]:
         """Makes the same again, also in another process."""

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space import SpaceSystem
     from enumsol.search.certifiers.protocol import Certifier
+    from enumsol.search.closing import Closer
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
@@ -98,6 +99,7 @@ class SearchOutcome:
     qps: int = 0
     fallback_qps: int = 0
     presolved: int = 0
+    closed: int = 0
 
     def add(self, part: SearchOutcome) -> None:
         """Add what the search of a subtree found."""
@@ -110,6 +112,7 @@ class SearchOutcome:
         self.qps += part.qps
         self.fallback_qps += part.fallback_qps
         self.presolved += part.presolved
+        self.closed += part.closed
 
 
 @dataclass(slots=True)
@@ -160,6 +163,8 @@ class TreeSearch:
         How a status splits and which rows it imposes; by default those of the plane at one alpha.
     limits : SearchLimits
     progress : called with a SearchProgress now and then
+    closer : Closer, optional
+        Closes subtrees by their only possible solution.
     """
 
     def __init__(
@@ -171,6 +176,7 @@ class TreeSearch:
         splitting: Splitting | None = None,
         limits: SearchLimits | None = None,
         progress: Callable[[SearchProgress], object] | None = None,
+        closer: Closer | None = None,
     ) -> None:
         self.system = system
         self.certifier = certifier
@@ -179,6 +185,7 @@ class TreeSearch:
         self.engine: Any = engine
         self.limits = limits or SearchLimits()
         self.progress = progress
+        self.closer = closer
         self.outcome = SearchOutcome()
         self._fallback: InteriorPointEngine | None = None
         self.splitting: Splitting = splitting or PlaneSplitting(system.F)
@@ -222,6 +229,11 @@ class TreeSearch:
             self._covered += item.weight
             return
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
+        if self.closer is not None and (found := self.closer.closed(codes, usable)) is not None:
+            outcome.closed += 1
+            outcome.solutions += found
+            self._covered += item.weight
+            return
         node, forced = branching_node(codes, item.forced, usable)
         if node < 0:
             node = self._settle(codes)
@@ -241,6 +253,8 @@ class TreeSearch:
         outcome = self.outcome
         outcome.selections += 1
         answer = self.certifier.selection(codes)
+        if self.closer is not None:
+            self.closer.met(answer)
         if isinstance(answer, Refine):
             return answer.node
         if isinstance(answer, UndecidedPart):

@@ -113,7 +113,7 @@ class ExactSelections:
                 columns.append(column)
         return rows, columns
 
-    def _solve_reduced(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
+    def solve_equations(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
         """The selection's forces for the right-hand side ``target`` and sign det, or None when it is singular."""
         rows, columns = self.reduced(codes)
         if not rows:
@@ -128,7 +128,7 @@ class ExactSelections:
 
     def solve(self, codes: Codes) -> SelectionSolution | None:
         """All roots in the selection, or None."""
-        regular = self._solve_reduced(codes, self.system.g)
+        regular = self.solve_equations(codes, self.system.g)
         equations, inequalities = self.forms(codes)
         if regular is not None:
             point, sign = regular
@@ -159,6 +159,15 @@ class ExactSelections:
             result.append(frozenset(code for code in FINAL[friction] if n >= 0 and _holds(CONDITIONS[code], rows)))
         return tuple(result)
 
+    def resting(self, point: Point) -> tuple[bool, ...]:
+        """Nodes that the test of (6.10) need not count: lambda = 0 and w_n + F |w_t| <= 0, or lambda_t = 0 and w = 0."""
+        p, w = self.p, self._w(point)
+        return tuple(
+            point[p + i] == 0
+            and ((point[i] == 0 and w[i] + F * abs(w[p + i]) <= 0) or (w[i] == 0 and w[p + i] == 0))
+            for i, F in enumerate(self.system.F)
+        )
+
     def equal(self, a: Point, b: Point) -> bool:
         """Exact equality."""
         return a == b
@@ -173,7 +182,7 @@ class ExactSelections:
         if solution.det_sign == 0:
             return 0
         push = tuple(fmpq(int(v)) for v in direction)
-        moved = self._solve_reduced(solution.codes, push)
+        moved = self.solve_equations(solution.codes, push)
         if moved is None:  # det_sign says otherwise
             raise AssertionError("a regular selection became singular")
         step, sign = moved

@@ -4,31 +4,77 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from enumsol.kernel.closing import definite_sign
 from enumsol.relaxation.rows import imposed_rows
 from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
 from enumsol.search.certifiers.floats import solve_or_open
 from enumsol.search.certifiers.protocol import WithoutProof
-from enumsol.statuses import RowKind
+from enumsol.search.closing import propose
+from enumsol.selections.solution import SelectionSolution
+from enumsol.statuses import CONTACT, OPEN, UNDECIDED, RowKind
 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.protocol import UndecidedPart
+    from enumsol.search.closing import Proposal
     from enumsol.selections.rationals import ExactSelections
-    from enumsol.selections.solution import Codes, SelectionSolution
+    from enumsol.selections.solution import Codes
+
+
+def holds_below(code: int, held: frozenset[int]) -> bool:
+    """Whether one of the final codes that hold at a node refines a (partial) code."""
+    if code == UNDECIDED:
+        return bool(held)
+    return bool(held - {OPEN}) if code == CONTACT else code in held
 
 
 class ExactCertifier(WithoutProof):
     """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, (6.1))."""
 
-    def __init__(self, selections: ExactSelections, scaled: ScaledSystem) -> None:
+    def __init__(
+        self, selections: ExactSelections, scaled: ScaledSystem, enclosed: EnclosedSystem | None = None
+    ) -> None:
         self._selections = selections
         self._scaled = scaled
+        self._enclosed = enclosed
         self._inverse: Any = None
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in the selection."""
         return solve_or_open(self._selections, codes)
+
+    def closed(self, codes: Codes, relaxation: Relaxation) -> list[SelectionSolution] | None:
+        """The solutions below a partial assignment, where its only possible solution is found."""
+        found = self.closing(codes, relaxation)
+        return None if found is None else found[1]
+
+    def closing(self, codes: Codes, relaxation: Relaxation) -> tuple[Proposal, list[SelectionSolution]] | None:
+        """What closes a subtree, and the solutions in it (theory, section 6.11)."""
+        if self._enclosed is None:
+            return None
+        proposal = propose(self._scaled, codes, relaxation.forces, relaxation.displacements, exactly=True)
+        if proposal is None:
+            return None
+        sign = definite_sign(self._enclosed, proposal.selection, proposal.free, proposal.tau)
+        solver = self._selections
+        solved = solver.solve_equations(proposal.selection, solver.system.g) if sign else None
+        if solved is None:
+            return None
+        point, determinant = solved
+        active, resting = solver.active(point), solver.resting(point)
+        free = zip(proposal.free, proposal.tau, strict=True)
+        uncounted = [not F or rests for F, rests in zip(solver.F_positive, resting, strict=True)]
+        if not all(proposal.selection[i] in active[i] and (tau > 0 or uncounted[i]) for i, tau in free):
+            return None
+        if not all(holds_below(code, held) for code, held in zip(codes, active, strict=True)):
+            return proposal, []
+        fixed = [active[i] for i in range(solver.p) if i not in proposal.free]
+        index = sign if all(len(held) == 1 for held in fixed) else None
+        strict = all(len(held) == 1 for held in active)
+        solution = SelectionSolution(proposal.selection, (point,), 0, determinant, strict, exact=True, index=index)
+        return proposal, [solution]
 
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         """Whether the multipliers prove a positive lower bound on the energy."""

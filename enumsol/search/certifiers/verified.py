@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.kernel.closing import ClosedSolution, closed_solution, same_solution
 from enumsol.kernel.point import VerifiedSelection, exclusion_margin, holds_no_root, solve_selection
 from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
 from enumsol.proof.proof_file import fraction_text, packed
 from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
+from enumsol.search.closing import propose
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import CONDITIONS, RowKind
 
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.rationals import ExactCertifier
+    from enumsol.search.closing import Proposal
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -48,6 +51,8 @@ class Leaf(enum.StrEnum):
     POLYTOPE = "D"
     UNLOADED = "z"
     UNDECIDED = "u"
+    CLOSED = "m"
+    CLOSED_IN_RATIONALS = "M"
 
 
 _ROW_NAMES = {
@@ -92,7 +97,7 @@ class VerifiedCertifier:
         self.recorder = recorder
         self._node_ids = node_ids
         self._escalations = Escalations()
-        self._verified: dict[Codes, VerifiedSelection] = {}
+        self._verified: dict[Codes, VerifiedSelection | ClosedSolution] = {}
         self._leaves = 0
 
     @property
@@ -141,6 +146,8 @@ class VerifiedCertifier:
             return None
         certifier = self._exact()
         if certifier is None:
+            if ball is not None and (found := self._closed(codes, ball.force, ball.w)) is not None:
+                return found[0] if found else None
             return self._undecided(codes, *_reason(codes, ball, self._node_ids))
         solution = certifier.selection(codes)
         if isinstance(solution, UndecidedPart):
@@ -152,6 +159,67 @@ class VerifiedCertifier:
             points = [[_fraction(v) for v in vertex] for vertex in solution.vertices]
             self._leaf(Leaf.POLYTOPE, points, solution.dimension)
         return solution
+
+    # -- subtrees closed by their only possible solution (theory, section 6.11) ---------------------------------------
+
+    def closed(self, codes: Codes, relaxation: Relaxation) -> list[SelectionSolution] | None:
+        """The solutions below a partial assignment, where its only possible solution is found."""
+        if self._enclosed is None:
+            return None
+        force, w = relaxation.forces, relaxation.displacements
+        proposal = propose(self._scaled, codes, force, w, exactly=False)
+        # statuses that do not hold strictly are told by rationals, where there are any
+        if proposal is not None and proposal.strict and (found := self._closed_by(proposal)) is not None:
+            return found
+        certifier = self._exact()
+        if certifier is not None and (exact := certifier.closing(codes, relaxation)) is not None:
+            closing, solutions = exact
+            self._escalations.rationals += 1
+            self._leaf(Leaf.CLOSED_IN_RATIONALS, closing.selection, closing.tau.tolist(), len(solutions))
+            return solutions
+        return None if proposal is None or proposal.strict else self._closed_by(proposal)
+
+    def _closed(self, codes: Codes, force: Array, w: Array) -> list[SelectionSolution] | None:
+        proposal = propose(self._scaled, codes, force, w, exactly=False)
+        return None if proposal is None else self._closed_by(proposal)
+
+    def _closed_by(self, proposal: Proposal) -> list[SelectionSolution] | None:
+        """The solutions of what is proposed to close a subtree, None where balls do not prove it."""
+        ball = closed_solution(
+            _present(self._enclosed), proposal.selection, proposal.free, proposal.tau, proposal.force
+        )
+        if ball is None or not (ball.is_root or ball.is_excluded):
+            return None
+        record = [proposal.selection, proposal.free, proposal.tau.tolist(), (ball.force * self._scaled.force).tolist()]
+        if ball.is_excluded:
+            self._escalations.balls += 1
+            self._leaf(Leaf.CLOSED, *record)
+            return []
+        solution = self._regular_one(ball)
+        if solution is None:
+            known = [other for other in self._verified.items() if isinstance(other[1], ClosedSolution)]
+            alike = [same_solution(ball.core, ball.possible, core, other.possible) for core, other in known]
+            if None in alike:
+                return None
+            self._verified[ball.core] = ball
+            solution = SelectionSolution(
+                ball.core, (ball.force,), 0, 0, strict=False, index=ball.sign, possible=ball.possible
+            )
+        self._escalations.balls += 1
+        radius = ball.force_rad * self._scaled.force * _WIDEN
+        self._leaf(Leaf.CLOSED, *record, radius.tolist(), ball.sign)
+        return [solution]
+
+    def _regular_one(self, ball: ClosedSolution) -> SelectionSolution | None:
+        """The solution in its only selection, if there is one only and it is regular."""
+        if any(len(codes) > 1 for codes in ball.possible):
+            return None
+        codes = tuple(code for (code,) in ball.possible)
+        regular = solve_selection(_present(self._enclosed), codes)
+        if regular is None or not regular.is_root:
+            return None
+        self._verified[codes] = regular
+        return SelectionSolution(codes, (regular.force,), 0, regular.det_sign, strict=True)
 
     def unloaded(self) -> None:
         """Write the proof of the unloaded body."""
@@ -188,6 +256,12 @@ def _margins(system: EnclosedSystem) -> Callable[[Codes, NDArray[np.intp], Array
     except ImportError:
         return partial(exclusion_margin, system, errors=2.0)
     return Margins((system,), system.F, system.F).margin
+
+
+def _present(system: EnclosedSystem | None) -> EnclosedSystem:
+    if system is None:
+        raise AssertionError("there are no balls")
+    return system
 
 
 def _fraction(value: Any) -> str:
