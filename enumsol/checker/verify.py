@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.checker.rational import RationalSystem
+    from enumsol.kernel.closing import ClosedSolution
     from enumsol.problem3d import ContactProblem3D
 
     #: codes of a selection, the vertices of its root set, and its dimension
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
 #: Exclusion leaves checked together.
 _BATCH = 256
 #: Entries of a leaf's record, by its kind.
-_ENTRIES = {"x": 3, "X": 3, "n": 1, "r": 4, "N": 1, "D": 3, "z": 1, "u": 2}
+_ENTRIES = {"x": 3, "X": 3, "n": 1, "r": 4, "N": 1, "D": 3, "z": 1, "u": 2, "M": 4}
 #: Covers underflow of one product.
 _SUBNORMAL = 2.0**-1070
 
@@ -120,6 +121,10 @@ class Checker(TreeChecker):
     """Checks one proof of a problem in 2D."""
 
     polytopes: list[Polytope] = field(default_factory=list)
+    closed: dict[tuple[int, ...], ClosedSolution] = field(default_factory=dict)
+    #: Codes of the strict roots of complete selections.
+    strict: list[tuple[int, ...]] = field(default_factory=list)
+    _in_doubt: int = 0
     _waiting: list[tuple[int, tuple[int, ...], Any, Any]] = field(default_factory=list)
 
     # -- header and tree -------------------------------------------------------------------------------------------
@@ -189,8 +194,10 @@ class Checker(TreeChecker):
     def _leaf(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         """Check one leaf; the reason when it proves nothing."""
         kind = record[0]
-        if not isinstance(kind, str) or kind not in _ENTRIES:
+        if not isinstance(kind, str) or kind not in (*_ENTRIES, "m"):
             return f"unknown kind of record {shown(kind)}"
+        if kind == "m":
+            return self._closed(codes, record)
         if len(record) != _ENTRIES[kind]:
             return f"its record has {len(record)} entries; expected {_ENTRIES[kind]}"
         if kind == "x":
@@ -201,6 +208,12 @@ class Checker(TreeChecker):
         if kind == "u":
             self.undecided += 1
             return None if isinstance(record[1], str) else "its reason is no text"
+        if kind == "M":
+            from enumsol.checker.closing import closed_in_rationals
+
+            reason, selection, points = closed_in_rationals(self.system, self.rational, codes, record)
+            self.polytopes += [(selection, points, 0)] if points else []
+            return reason
         if kind == "z":
             unloaded = all(c == UNDECIDED for c in codes) and self.problem.is_unloaded(self.alpha)
             # g = 0: the energy bound reads lambda' S lambda <= 0
@@ -221,6 +234,7 @@ class Checker(TreeChecker):
         if not ball.is_root:
             return "its candidate is not proven to be a root"
         self.regular += 1
+        self.strict.append(codes)
         _, mid, rad, index = record
         centre, radius = (numbers_from(values, len(ball.force)) for values in (mid, rad))
         with np.errstate(over="ignore", invalid="ignore"):
@@ -229,6 +243,14 @@ class Checker(TreeChecker):
         if not np.all(inside):
             return "its enclosure does not hold the root"
         return None if type(index) is int and index == ball.det_sign else "its index is wrong"
+
+    def _closed(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        from enumsol.checker.closing import closed_by_balls
+
+        reason, ball = closed_by_balls(self.system, codes, record, self.force)
+        if ball is not None:
+            self.closed[ball.core] = ball
+        return reason
 
     def _rational_exclusion(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         p = self.problem.p
@@ -252,6 +274,10 @@ class Checker(TreeChecker):
             return "its roots are not those that are claimed"
         self.polytopes.append((codes, hull.points, hull.dimension))
         return None
+
+    @property
+    def _doubtful(self) -> int:
+        return self._in_doubt
 
     # -- counting --------------------------------------------------------------------------------------------------
 
@@ -278,7 +304,12 @@ class Checker(TreeChecker):
                     groups[group_of(k)] = group_of(m)
         found = {group_of(k) for k in range(len(groups))}
         families = {group_of(k) for k, polytope in enumerate(self.polytopes) if polytope[2] > 0}
-        return len(found) - len(families), len(families)
+        apart = 0
+        if self.closed:
+            from enumsol.checker.closing import count_apart
+
+            apart, self._in_doubt = count_apart(self.closed, self.strict + [codes for codes, _, _ in self.polytopes])
+        return len(found) - len(families) + apart, len(families)
 
     def _meet(self, k: int, m: int) -> bool:
         """Whether two root sets have a point in common."""

@@ -194,7 +194,9 @@ def _component(
                 for node, codes in enumerate(solver.active(vertex)):
                     sets[node] |= codes
     active = tuple(frozenset(s) for s in sets)
-    index = _index(group, solver) if whole else (degree(active) if degree is not None else None)
+    index = next((solution.index for solution in group if solution.index is not None), None)
+    if index is None:
+        index = _index(group, solver) if whole else (degree(active) if degree is not None else None)
     if dimension > 0:
         group = _maximal(group, solver)
     return RootComponent(tuple(group), active, dimension, index, whole)
