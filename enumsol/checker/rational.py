@@ -31,6 +31,7 @@ class RationalSystem:
     ----------
     problem : ContactProblem
     alpha : Fraction
+    definite : S is proven positive definite already
 
     Raises
     ------
@@ -39,11 +40,11 @@ class RationalSystem:
         EXACT_DOF_LIMIT degrees of freedom.
     """
 
-    def __init__(self, problem: ContactProblem, alpha: Fraction) -> None:
+    def __init__(self, problem: ContactProblem, alpha: Fraction, *, definite: bool = False) -> None:
         self.p, a = problem.p, rational(alpha)
         A, B = exact_matrices(problem)
         self.S = B * solved(A, B.transpose())
-        if not is_positive_definite(self.S):
+        if not definite and not is_positive_definite(self.S):
             raise NotEnclosedError("the condensed compliance S is not positive definite in rational arithmetic")
         self.g: Vector = [x + a * y for x, y in zip(*free_displacements(problem), strict=True)]
         self.F: Vector = [rational(F) for F in exactly_at(alpha, *problem.friction)]

@@ -19,7 +19,7 @@ from enumsol.checker.graph import GraphChecker
 from enumsol.checker.reports import GraphVerificationReport, VerificationReport
 from enumsol.checker.tree import TreeChecker
 from enumsol.checks import instance_of, optional_callable
-from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
+from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
 from enumsol.kernel.rows import FRICTIONLESS, ROW_KINDS, UNDECIDED, children_of, row_signs
 from enumsol.problem import ContactProblem
@@ -164,7 +164,11 @@ class Checker(TreeChecker):
             raise RefusedError("a rational leaf in a proof about S and g as computed")
         from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
 
-        return RationalSystem(self.problem, self.alpha)
+        try:
+            definite = self.system.smallest_eigenvalue > 0
+        except (NotEnclosedError, RefusedError):
+            definite = False
+        return RationalSystem(self.problem, self.alpha, definite=definite)
 
     def _flush(self, *, last: bool) -> None:
         """Check the dual inequalities of the waiting leaves together."""

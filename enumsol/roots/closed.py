@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from enumsol.kernel.closing import same_solution
@@ -10,7 +11,7 @@ from enumsol.roots.components import RootComponent
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
+    from enumsol.selections.solution import Codes, SelectionSolution
 
 Kept = tuple[list["SelectionSolution"], list["SelectionSolution"], list["Codes"]]
 
@@ -18,8 +19,8 @@ Kept = tuple[list["SelectionSolution"], list["SelectionSolution"], list["Codes"]
 def apart(solutions: Iterable[SelectionSolution]) -> Kept:
     """Solutions of selections, closed roots that are none of them, each once, and the cores of those in doubt.
 
-    Neither depends on the order of the solutions. A closed root in doubt may be the same as another one (theory,
-    section 6.11).
+    Neither depends on the order of the solutions. A closed root that is a degenerate solution of a selection gives it
+    its index; one in doubt may be the same as another one (theory, section 6.11).
     """
     single, closed = [], {}
     for solution in solutions:
@@ -27,20 +28,24 @@ def apart(solutions: Iterable[SelectionSolution]) -> Kept:
             single.append(solution)
         else:
             closed[solution.codes] = solution
-    known: list[tuple[Codes, ActiveSets]] = [
-        (s.codes, tuple(frozenset((code,)) for code in s.codes)) for s in single if closed
-    ]
-    kept, doubtful = [], []
+    kept: list[SelectionSolution] = []
+    doubtful = []
     for core, solution in sorted(closed.items()):
-        possible = solution.possible or ()
-        answers = [same_solution(core, possible, *other) for other in known]
-        if True in answers:
+        same = [_same(solution, other) for other in single]
+        for k in (k for k, answer in enumerate(same) if answer and not single[k].strict):
+            single[k] = replace(single[k], index=solution.index)
+        same += [_same(solution, other) for other in kept]
+        if True in same:
             continue
-        if None in answers:
+        if None in same:
             doubtful.append(core)
-        known.append((core, possible))
         kept.append(solution)
     return single, kept, doubtful
+
+
+def _same(closed: SelectionSolution, other: SelectionSolution) -> bool | None:
+    possible = other.possible or tuple(frozenset((code,)) for code in other.codes)
+    return same_solution(closed.codes, closed.possible or (), other.codes, possible)
 
 
 def closed_component(solution: SelectionSolution) -> RootComponent:

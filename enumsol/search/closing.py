@@ -73,7 +73,8 @@ class Closer:
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions of a subtree that can be closed, None where it has to be searched."""
         # at a solution without slip the energy is zero, and it is the minimum
-        if relaxation is None or not (self._alert or abs(relaxation.bound) <= NEAR) or max(codes) < CONTACT:
+        promising = self._alert or (relaxation is not None and abs(relaxation.bound) <= NEAR)
+        if not promising or max(codes) < CONTACT:
             return None
         if self._wait > 0:
             self._wait -= 1
@@ -224,9 +225,14 @@ class Reduction:
         return None
 
 
-def propose(
-    system: ScaledSystem, codes: Codes, force: Array, w: Array, *, exactly: bool
-) -> Proposal | None:
+def start(system: ScaledSystem, relaxation: Relaxation | None) -> tuple[Array, Array]:
+    """lambda and w from which the solution of a reduced problem is sought."""
+    if relaxation is None:
+        return np.zeros(2 * system.p), system.g
+    return relaxation.forces, relaxation.displacements
+
+
+def propose(system: ScaledSystem, codes: Codes, force: Array, w: Array, *, exactly: bool) -> Proposal | None:
     """What may close a subtree, or None.
 
     Parameters
@@ -253,7 +259,7 @@ def propose(
             selection[i] = code
         slack = _slack(system, selection, force, w)
         fixed = np.array([i for i in range(system.p) if i not in set(free)], dtype=np.intp)
-        loose = [i for i in fixed if abs(slack[i]) <= NEAR]
+        loose = [int(i) for i in fixed if abs(slack[i]) <= NEAR]
         if exactly or not loose or np.min(slack[fixed]) < -NEAR:
             break
         free = tuple(sorted({*free, *loose}))

@@ -104,7 +104,7 @@ class Certifier(Protocol):
     def selection(self, codes: Codes) -> Any:
         """All roots in a complete selection, None when it holds none, why that is open, or what to split further."""
 
-    def closed(self, codes: Codes, relaxation: Relaxation) -> list[SelectionSolution] | None:
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, none or one, where its only possible solution is found; or None."""
 
     def branching(self, node: int, children: Sequence[int]) -> None:
@@ -136,7 +136,7 @@ class WithoutProof:
     def _nothing(self, *_: object, **__: object) -> None:
         """There is nothing to write, and nothing to take over."""
 
-    def closed(self, codes: Codes, relaxation: Relaxation) -> list[SelectionSolution] | None:
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """No subtree is closed."""
         del codes, relaxation
         return None

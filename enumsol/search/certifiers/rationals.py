@@ -9,11 +9,14 @@ from enumsol.relaxation.rows import imposed_rows
 from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
 from enumsol.search.certifiers.floats import solve_or_open
 from enumsol.search.certifiers.protocol import WithoutProof
-from enumsol.search.closing import propose
+from enumsol.search.closing import propose, start
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import CONTACT, OPEN, UNDECIDED, RowKind
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.relaxation.engine import Relaxation
@@ -21,6 +24,8 @@ if TYPE_CHECKING:
     from enumsol.search.closing import Proposal
     from enumsol.selections.rationals import ExactSelections
     from enumsol.selections.solution import Codes
+
+    Array = NDArray[np.float64]
 
 
 def holds_below(code: int, held: frozenset[int]) -> bool:
@@ -45,16 +50,16 @@ class ExactCertifier(WithoutProof):
         """All roots in the selection."""
         return solve_or_open(self._selections, codes)
 
-    def closed(self, codes: Codes, relaxation: Relaxation) -> list[SelectionSolution] | None:
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, where its only possible solution is found."""
-        found = self.closing(codes, relaxation)
+        found = self.closing(codes, *start(self._scaled, relaxation))
         return None if found is None else found[1]
 
-    def closing(self, codes: Codes, relaxation: Relaxation) -> tuple[Proposal, list[SelectionSolution]] | None:
-        """What closes a subtree, and the solutions in it (theory, section 6.11)."""
+    def closing(self, codes: Codes, force: Array, w: Array) -> tuple[Proposal, list[SelectionSolution]] | None:
+        """What closes a subtree, and the solutions in it, sought near a point (theory, section 6.11)."""
         if self._enclosed is None:
             return None
-        proposal = propose(self._scaled, codes, relaxation.forces, relaxation.displacements, exactly=True)
+        proposal = propose(self._scaled, codes, force, w, exactly=True)
         if proposal is None:
             return None
         sign = definite_sign(self._enclosed, proposal.selection, proposal.free, proposal.tau)

@@ -17,7 +17,7 @@ from enumsol.kernel.point import VerifiedSelection, exclusion_margin, holds_no_r
 from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
 from enumsol.proof.proof_file import fraction_text, packed
 from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
-from enumsol.search.closing import propose
+from enumsol.search.closing import propose, start
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import CONDITIONS, RowKind
 
@@ -99,6 +99,8 @@ class VerifiedCertifier:
         self._escalations = Escalations()
         self._verified: dict[Codes, VerifiedSelection | ClosedSolution] = {}
         self._leaves = 0
+        #: Selections of the roots found in rationals.
+        self._known: list[Codes] = []
 
     @property
     def certified(self) -> Certified:
@@ -146,7 +148,7 @@ class VerifiedCertifier:
             return None
         certifier = self._exact()
         if certifier is None:
-            if ball is not None and (found := self._closed(codes, ball.force, ball.w)) is not None:
+            if (found := self._closed_selection(codes, ball)) is not None:
                 return found[0] if found else None
             return self._undecided(codes, *_reason(codes, ball, self._node_ids))
         solution = certifier.selection(codes)
@@ -156,40 +158,51 @@ class VerifiedCertifier:
         if solution is None:
             self._leaf(Leaf.NO_ROOT_IN_RATIONALS)
         else:
+            self._known.append(codes)
             points = [[_fraction(v) for v in vertex] for vertex in solution.vertices]
             self._leaf(Leaf.POLYTOPE, points, solution.dimension)
         return solution
 
     # -- subtrees closed by their only possible solution (theory, section 6.11) ---------------------------------------
 
-    def closed(self, codes: Codes, relaxation: Relaxation) -> list[SelectionSolution] | None:
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, where its only possible solution is found."""
         if self._enclosed is None:
             return None
-        force, w = relaxation.forces, relaxation.displacements
-        proposal = propose(self._scaled, codes, force, w, exactly=False)
+        near = start(self._scaled, relaxation)
+        proposal = propose(self._scaled, codes, *near, exactly=False)
+        ball = None if proposal is None else self._proven(proposal)
         # statuses that do not hold strictly are told by rationals, where there are any
-        if proposal is not None and proposal.strict and (found := self._closed_by(proposal)) is not None:
-            return found
+        if proposal is not None and ball is not None and (proposal.strict or ball.is_excluded or self._is_known(ball)):
+            return self._closed_by(proposal, ball)
         certifier = self._exact()
-        if certifier is not None and (exact := certifier.closing(codes, relaxation)) is not None:
+        if certifier is not None and (exact := certifier.closing(codes, *near)) is not None:
             closing, solutions = exact
+            self._known += [solution.codes for solution in solutions]
             self._escalations.rationals += 1
             self._leaf(Leaf.CLOSED_IN_RATIONALS, closing.selection, closing.tau.tolist(), len(solutions))
             return solutions
-        return None if proposal is None or proposal.strict else self._closed_by(proposal)
+        return None if proposal is None or ball is None else self._closed_by(proposal, ball)
 
-    def _closed(self, codes: Codes, force: Array, w: Array) -> list[SelectionSolution] | None:
-        proposal = propose(self._scaled, codes, force, w, exactly=False)
-        return None if proposal is None else self._closed_by(proposal)
-
-    def _closed_by(self, proposal: Proposal) -> list[SelectionSolution] | None:
-        """The solutions of what is proposed to close a subtree, None where balls do not prove it."""
-        ball = closed_solution(
-            _present(self._enclosed), proposal.selection, proposal.free, proposal.tau, proposal.force
-        )
-        if ball is None or not (ball.is_root or ball.is_excluded):
+    def _closed_selection(self, codes: Codes, near: VerifiedSelection | None) -> list[SelectionSolution] | None:
+        """The same for a selection whose conditions are not decided, without rationals."""
+        if near is None:
             return None
+        proposal = propose(self._scaled, codes, near.force, near.w, exactly=False)
+        ball = None if proposal is None else self._proven(proposal)
+        return None if proposal is None or ball is None else self._closed_by(proposal, ball)
+
+    def _proven(self, proposal: Proposal) -> ClosedSolution | None:
+        system, tau = _present(self._enclosed), proposal.tau
+        ball = closed_solution(system, proposal.selection, proposal.free, tau, proposal.force)
+        return ball if ball is not None and (ball.is_root or ball.is_excluded) else None
+
+    def _is_known(self, ball: ClosedSolution) -> bool:
+        """Whether it is a root that was found in rationals before."""
+        return any(same_solution(ball.core, ball.possible, codes, _only(codes)) for codes in self._known)
+
+    def _closed_by(self, proposal: Proposal, ball: ClosedSolution) -> list[SelectionSolution] | None:
+        """Write a leaf and give its solutions; None where a root could not be told from another one."""
         record = [proposal.selection, proposal.free, proposal.tau.tolist(), (ball.force * self._scaled.force).tolist()]
         if ball.is_excluded:
             self._escalations.balls += 1
@@ -199,7 +212,7 @@ class VerifiedCertifier:
         if solution is None:
             known = [other for other in self._verified.items() if isinstance(other[1], ClosedSolution)]
             alike = [same_solution(ball.core, ball.possible, core, other.possible) for core, other in known]
-            if None in alike:
+            if None in alike and True not in alike:
                 return None
             self._verified[ball.core] = ball
             solution = SelectionSolution(
@@ -262,6 +275,10 @@ def _present(system: EnclosedSystem | None) -> EnclosedSystem:
     if system is None:
         raise AssertionError("there are no balls")
     return system
+
+
+def _only(codes: Codes) -> tuple[frozenset[int], ...]:
+    return tuple(frozenset((code,)) for code in codes)
 
 
 def _fraction(value: Any) -> str:
