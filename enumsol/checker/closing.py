@@ -150,7 +150,7 @@ def _displacements(rational: RationalSystem, point: list[Any]) -> list[Any]:
 
 
 def _rests(rational: RationalSystem, point: list[Any], w: list[Any], node: int) -> bool:
-    """Whether the test of definiteness need not count a node (theory, (6.10))."""
+    """Whether the test of definiteness need not count a node (theory, (6.9))."""
     n, t = node, rational.p + node
     if point[t] != 0:
         return False

@@ -80,7 +80,7 @@ class ClosedSolution:
         return bool(np.any(self.slack < -self.slack_rad))
 
 
-def final_codes(friction: bool) -> tuple[int, ...]:  # noqa: FBT001 (a node has friction or not)
+def final_codes(friction: bool) -> tuple[int, ...]:
     """The final codes of a node."""
     return (OPEN, STICK, SLIP_PLUS, SLIP_MINUS) if friction else (OPEN, FRICTIONLESS)
 
@@ -95,7 +95,7 @@ def closed_solution(
     system : EnclosedSystem
     selection : final codes; those of the free nodes only name a point near the solution
     free : ascending nodes
-    tau : one number a free node, positive, or 0 where it is open by more than its slip bound (theory, (6.10))
+    tau : one number a free node, positive, or 0 where it is open by more than its slip bound (theory, (6.9))
     force : (2p,) array, lambda near the solution; only that of the free nodes is read
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -106,7 +106,7 @@ def closed_solution(
 def definite_sign(system: EnclosedSystem, selection: Codes, free: Sequence[int], tau: Array) -> int:
     """The determinant's sign of the fixed nodes' equations if the reduced form with tau is definite, 0 if not proven.
 
-    Where ``tau`` is zero nothing is asked of the node: that it may be so is to be shown otherwise (theory, (6.10)).
+    Where ``tau`` is zero nothing is asked of the node: that it may be so is to be shown otherwise (theory, (6.9)).
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         reduced = Reduced.of(system, selection, free)
@@ -180,7 +180,8 @@ class Reduced:
         S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
         M = S[rows] @ forms
         sign = determinant_sign(M)
-        right = Ball(*(np.column_stack([a[rows], b[np.ix_(rows, places)]]) for a, b in zip(_pair(g), _pair(S))))
+        across = S[np.ix_(rows, places)]
+        right = Ball(np.column_stack([g.mid[rows], across.mid]), np.column_stack([g.rad[rows], across.rad]))
         Z = solution(M, right) if sign else None
         if Z is None:
             return None
@@ -189,17 +190,17 @@ class Reduced:
         return cls(system, selection, nodes, places, np.arange(len(nodes)), tangential, rows, forms, Z, R, h, sign)
 
     @cached_property
-    def _F(self) -> Array:
+    def _slope(self) -> Array:
         """Upper bounds of the free nodes' friction coefficients."""
         return np.asarray((self.system.F + self.system.F_rad)[self.free] * SAFE)
 
     def least(self, tau: Array) -> float:
-        """Lower bound of the smallest eigenvalue of the form of (6.10), at most 0 where none positive is proven."""
+        """Lower bound of the smallest eigenvalue of Q (theory, (6.9)), at most 0 where none positive is proven."""
         if not len(self.places):
             return 1.0
         used = np.flatnonzero((self.tangential >= 0) & (tau > 0))
         # weights at least F / sqrt(tau), for any rounding
-        weight = self._F[used] / np.sqrt(tau[used]) * SAFE
+        weight = self._slope[used] / np.sqrt(tau[used]) * SAFE
         T = self.R[self.tangential[used]] * Ball.exact(np.repeat(weight[:, None], len(self.places), axis=1))
         square = Ball(T.mid.T, T.rad.T) @ T
         Q = self.R - Ball.exact(np.diag(self._diagonal(used, tau))) - Ball(0.5 * square.mid, 0.5 * square.rad)
@@ -239,7 +240,7 @@ class Reduced:
     def _far_from_contact(self, nodes: NDArray[np.intp], w: Ball) -> bool:
         """Whether nodes are open with w_n + F |w_t| < 0."""
         n, t = self.normal[nodes], self.tangential[nodes]
-        across = self._F[nodes] * w.size[t]
+        across = self._slope[nodes] * w.size[t]
         largest = w.mid[n] + w.rad[n] + across + 8 * UNIT * (np.abs(w.mid[n]) + w.rad[n] + across) + TINY
         named_open = all(self.selection[node] == OPEN for node in self.free[nodes])
         return named_open and bool(np.all(largest < 0))
@@ -263,7 +264,7 @@ class Reduced:
         return Ball(mid, rad)
 
     def _distance(self, w: Ball) -> float:
-        """Bound of ||d|| + ||F d_t|| with d the change of h for which the point is a solution (theory, (6.11))."""
+        """Bound of ||d|| + ||F d_t|| with d the change of h for which the point is a solution (theory, (6.10))."""
         size, change = w.size, np.zeros(len(self.places))
         up, down = np.maximum(w.mid + w.rad, 0.0) * SAFE, np.maximum(w.rad - w.mid, 0.0) * SAFE
         for i, node in enumerate(self.free):
@@ -272,7 +273,7 @@ class Reduced:
             if t >= 0:
                 change[t] = {OPEN: 0.0, STICK: size[t], SLIP_PLUS: down[t], SLIP_MINUS: up[t]}[code]
         rubbing = self.tangential >= 0
-        return float((upper_norm(change) + upper_norm(self._F[rubbing] * change[self.tangential[rubbing]])) * SAFE)
+        return float((upper_norm(change) + upper_norm(self._slope[rubbing] * change[self.tangential[rubbing]])) * SAFE)
 
     def _solution(self, x: Ball, w_free: Ball) -> ClosedSolution:
         system, p = self.system, self.system.p
@@ -306,7 +307,3 @@ class Reduced:
             if all(low[k] <= 0 <= high[k] for k in CONDITIONS[code][0])
             and all(high[k] >= 0 for k in CONDITIONS[code][1])
         )
-
-
-def _pair(ball: Ball) -> tuple[Array, Array]:
-    return ball.mid, ball.rad

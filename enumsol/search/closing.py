@@ -6,7 +6,7 @@ Nothing here is trusted: the certifier proves what is proposed, or the subtree i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.certifiers.protocol import Certifier
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -51,16 +50,22 @@ class Proposal:
     strict: bool
 
 
+class Closing(Protocol):
+    """A certifier that can close a subtree: that of arithmetic "verified" or "exact"."""
+
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        """The solutions below a partial assignment, none or one, if it can hold one only; None if that is not proven."""
+
+
 class Closer:
     """Which nodes of the tree are worth a try: all where tries succeed, fewer and fewer where they fail.
 
     Parameters
     ----------
-    certifier : Certifier
-        Of arithmetic "verified" or "exact".
+    certifier : Closing
     """
 
-    def __init__(self, certifier: Certifier) -> None:
+    def __init__(self, certifier: Closing) -> None:
         self._certifier = certifier
         self._alert = False
         self._wait = self._pause = 0
@@ -200,7 +205,7 @@ class Reduction:
     # -- the test of definiteness ----------------------------------------------------------------------------------
 
     def weights(self, counted: NDArray[np.bool_]) -> Array | None:
-        """tau for which the form of (6.10) is definite, 0 at the nodes that do not count; None if none was found."""
+        """tau for which the form of theory, (6.9), is definite, 0 at nodes that do not count; None if none was found."""
         m = len(self.places)
         symmetric = 0.5 * (self.R + self.R.T)
         if not m:
@@ -281,10 +286,8 @@ def _slack(system: ScaledSystem, selection: list[int], force: Array, w: Array) -
     return np.array([slack[code][i] for i, code in enumerate(selection)])
 
 
-def _counted(
-    reduction: Reduction, selection: list[int], force: Array, w: Array, *, exactly: bool
-) -> NDArray[np.bool_]:
-    """Free nodes that the test of definiteness has to count (theory, (6.10))."""
+def _counted(reduction: Reduction, selection: list[int], force: Array, w: Array, *, exactly: bool) -> NDArray[np.bool_]:
+    """Free nodes that the test of definiteness has to count (theory, (6.9))."""
     p, nodes = reduction.system.p, reduction.nodes
     apart = w[nodes] + reduction.system.F[nodes] * np.abs(w[p + nodes])
     resting = np.array([selection[i] == OPEN for i in nodes], dtype=bool)

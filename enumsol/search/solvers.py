@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from enumsol.proof.proof_file import Recorder
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rationals import ExactCertifier
+    from enumsol.search.closing import Closing
     from enumsol.search.tree import SearchLimits, SearchProgress
     from enumsol.selections.rationals import ExactSelections
 
@@ -155,10 +156,8 @@ class Solvers:
         progress: Callable[[SearchProgress], object] | None = None,
     ) -> TreeSearch:
         """A search of the tree with a certifier made here."""
-        closer = None if self.arithmetic == "fast" else Closer(certifier)
-        return TreeSearch(
-            self.scaled, certifier, engine=self.engine, limits=limits, progress=progress, closer=closer
-        )
+        closer = None if self.arithmetic == "fast" else Closer(cast("Closing", certifier))
+        return TreeSearch(self.scaled, certifier, engine=self.engine, limits=limits, progress=progress, closer=closer)
 
     def remake(self) -> Callable[[], Solvers]:
         """Makes the same again, also in another process."""

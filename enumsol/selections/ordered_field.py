@@ -37,7 +37,7 @@ class FiberSelections(ExactSelections):
         self.exact, self.alpha = exact, alpha
         self.F_positive = tuple(not without for without in exact.frictionless)
 
-    def _solve_reduced(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
+    def solve_equations(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
         rows, columns = self.reduced(codes)
         if not rows:
             return tuple(self._zero), 1

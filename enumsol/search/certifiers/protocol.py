@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.selections.solution import Codes, SelectionSolution
+    from enumsol.selections.solution import Codes
 
 
 @dataclass(frozen=True)
@@ -104,9 +104,6 @@ class Certifier(Protocol):
     def selection(self, codes: Codes) -> Any:
         """All roots in a complete selection, None when it holds none, why that is open, or what to split further."""
 
-    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
-        """The solutions below a partial assignment, none or one, where its only possible solution is found; or None."""
-
     def branching(self, node: int, children: Sequence[int]) -> None:
         """Record that a partial assignment is split at ``node`` (called in preorder, for the proof)."""
 
@@ -135,10 +132,5 @@ class WithoutProof:
 
     def _nothing(self, *_: object, **__: object) -> None:
         """There is nothing to write, and nothing to take over."""
-
-    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
-        """No subtree is closed."""
-        del codes, relaxation
-        return None
 
     branching = skipped = unloaded = add = _nothing

@@ -51,7 +51,7 @@ class ExactCertifier(WithoutProof):
         return solve_or_open(self._selections, codes)
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
-        """The solutions below a partial assignment, where its only possible solution is found."""
+        """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
         found = self.closing(codes, *start(self._scaled, relaxation))
         return None if found is None else found[1]
 

@@ -166,7 +166,7 @@ class VerifiedCertifier:
     # -- subtrees closed by their only possible solution (theory, section 6.11) ---------------------------------------
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
-        """The solutions below a partial assignment, where its only possible solution is found."""
+        """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
         if self._enclosed is None:
             return None
         near = start(self._scaled, relaxation)
@@ -210,8 +210,8 @@ class VerifiedCertifier:
             return []
         solution = self._regular_one(ball)
         if solution is None:
-            known = [other for other in self._verified.items() if isinstance(other[1], ClosedSolution)]
-            alike = [same_solution(ball.core, ball.possible, core, other.possible) for core, other in known]
+            known = [other for other in self._verified.values() if isinstance(other, ClosedSolution)]
+            alike = [same_solution(ball.core, ball.possible, other.core, other.possible) for other in known]
             if None in alike and True not in alike:
                 return None
             self._verified[ball.core] = ball
