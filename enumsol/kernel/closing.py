@@ -100,7 +100,7 @@ def closed_solution(
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         reduced = Reduced.of(system, selection, free)
-        return None if reduced is None else reduced.enclosed(tau, force)
+        return None if reduced is None or not _are_weights(tau, free) else reduced.enclosed(tau, force)
 
 
 def definite_sign(system: EnclosedSystem, selection: Codes, free: Sequence[int], tau: Array) -> int:
@@ -110,7 +110,13 @@ def definite_sign(system: EnclosedSystem, selection: Codes, free: Sequence[int],
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         reduced = Reduced.of(system, selection, free)
-        return reduced.sign if reduced is not None and reduced.least(tau) > 0 else 0
+        if reduced is None or not _are_weights(tau, free):
+            return 0
+        return reduced.sign if reduced.least(tau) > 0 else 0
+
+
+def _are_weights(tau: Array, free: Sequence[int]) -> bool:
+    return len(tau) == len(free) and bool(np.all(np.isfinite(tau) & (tau >= 0)))
 
 
 def same_solution(
@@ -200,7 +206,7 @@ class Reduced:
             return 1.0
         used = np.flatnonzero((self.tangential >= 0) & (tau > 0))
         # weights at least F / sqrt(tau), for any rounding
-        weight = self._slope[used] / np.sqrt(tau[used]) * SAFE
+        weight = self._slope[used] / np.sqrt(tau[used]) * SAFE + TINY
         T = self.R[self.tangential[used]] * Ball.exact(np.repeat(weight[:, None], len(self.places), axis=1))
         square = Ball(T.mid.T, T.rad.T) @ T
         Q = self.R - Ball.exact(np.diag(self._diagonal(used, tau))) - Ball(0.5 * square.mid, 0.5 * square.rad)

@@ -54,7 +54,7 @@ class Closing(Protocol):
     """A certifier that can close a subtree: that of arithmetic "verified" or "exact"."""
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
-        """The solutions below a partial assignment, none or one, if it can hold one only; None if that is not proven."""
+        """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
 
 
 class Closer:
@@ -77,9 +77,7 @@ class Closer:
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions of a subtree that can be closed, None where it has to be searched."""
-        # at a solution without slip the energy is zero, and it is the minimum
-        promising = self._alert or (relaxation is not None and abs(relaxation.bound) <= NEAR)
-        if not promising or max(codes) < CONTACT:
+        if max(codes) < CONTACT or not (self._alert or _touches(codes, relaxation)):
             return None
         if self._wait > 0:
             self._wait -= 1
@@ -88,6 +86,15 @@ class Closer:
         self._pause = 2 * self._pause + 1 if found is None else 0
         self._wait = self._pause
         return found
+
+
+def _touches(codes: Codes, relaxation: Relaxation | None) -> bool:
+    """Whether the energy's minimum is zero, as at a solution without slip, and open nodes touch there without load."""
+    if relaxation is None or abs(relaxation.bound) > NEAR:
+        return False
+    p = len(codes)
+    forces, w = relaxation.forces[:p], relaxation.displacements[:p]
+    return any(code >= CONTACT and forces[i] <= NEAR and w[i] >= -NEAR for i, code in enumerate(codes))
 
 
 class Reduction:
@@ -205,7 +212,7 @@ class Reduction:
     # -- the test of definiteness ----------------------------------------------------------------------------------
 
     def weights(self, counted: NDArray[np.bool_]) -> Array | None:
-        """tau for which the form of theory, (6.9), is definite, 0 at nodes that do not count; None if none was found."""
+        """tau for which Q of theory, (6.9), is definite, 0 at nodes that do not count; None if none was found."""
         m = len(self.places)
         symmetric = 0.5 * (self.R + self.R.T)
         if not m:

@@ -222,17 +222,20 @@ class TreeSearch:
         """Settle one node of the tree, or give its children in the order in which they are examined."""
         outcome = self.outcome
         outcome.nodes += 1
-        relaxation = self._relax(item)
         codes = item.codes
+        relaxation: Relaxation | None
+        relaxation = solved = self._relax(item)
+        if solved.stalled:
+            # the fallback costs more than a try
+            if self._closed(item, None):
+                return
+            relaxation = self._fall_back(codes)
         if relaxation is not None and relaxation.pruned and self.certifier.excluded(codes, relaxation):
             outcome.pruned += 1
             self._covered += item.weight
             return
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
-        if self.closer is not None and (found := self.closer.closed(codes, usable)) is not None:
-            outcome.closed += 1
-            outcome.solutions += found
-            self._covered += item.weight
+        if self._closed(item, usable):
             return
         node, forced = branching_node(codes, item.forced, usable)
         if node < 0:
@@ -247,6 +250,16 @@ class TreeSearch:
             child = (*codes[:node], code, *codes[node + 1 :])
             last = k + 1 == len(children)
             yield TreeNode(usable, child, node, last, item.weight / len(children), forced)
+
+    def _closed(self, item: TreeNode, relaxation: Relaxation | None) -> bool:
+        """Whether the subtree is closed by its only possible solution."""
+        found = None if self.closer is None else self.closer.closed(item.codes, relaxation)
+        if found is None:
+            return False
+        self.outcome.closed += 1
+        self.outcome.solutions += found
+        self._covered += item.weight
+        return True
 
     def _settle(self, codes: Codes) -> int:
         """Have the certifier decide a complete selection; -1, or the node that it asks to have split further."""
@@ -284,15 +297,14 @@ class TreeSearch:
 
     # -- relaxations -----------------------------------------------------------------------------------------------
 
-    def _relax(self, item: TreeNode) -> Relaxation | None:
-        """The solved relaxation; None when no engine has an answer."""
+    def _relax(self, item: TreeNode) -> Relaxation:
+        """The relaxation, solved or stalled."""
         codes = item.codes
         self.outcome.qps += 1
         if item.parent is not None:
-            relaxation = item.parent.child(*self._rows.of(item.changed, codes[item.changed]), last=item.last)
-        else:
-            relaxation = self.engine.root(*self._rows.over(codes, range(len(codes))))
-        return self._fall_back(codes) if relaxation.stalled else relaxation
+            return item.parent.child(*self._rows.of(item.changed, codes[item.changed]), last=item.last)
+        relaxation: Relaxation = self.engine.root(*self._rows.over(codes, range(len(codes))))
+        return relaxation
 
     def _fall_back(self, codes: Codes) -> Relaxation | None:
         """The relaxation by the slower engine; None when that gives no answer either."""

@@ -160,7 +160,7 @@ class ExactSelections:
         return tuple(result)
 
     def resting(self, point: Point) -> tuple[bool, ...]:
-        """Nodes that the test of theory, (6.9), need not count: open with w_n + F |w_t| <= 0, or w = 0 and lambda_t = 0."""
+        """Nodes that theory, (6.9), need not count: lambda = 0 and w_n + F |w_t| <= 0, or w = 0 and lambda_t = 0."""
         p, w = self.p, self._w(point)
         return tuple(
             point[p + i] == 0 and ((point[i] == 0 and w[i] + F * abs(w[p + i]) <= 0) or (w[i] == 0 and w[p + i] == 0))
