@@ -79,9 +79,8 @@ def connected_components(
     known: dict[Codes, SelectionSolution] = {}
     singles: list[RootComponent] = []
     for solution in solutions:
-        if solution.codes in known:
-            continue
-        known[solution.codes] = solution
+        if solution.codes not in known or solution.index is not None:
+            known[solution.codes] = solution
     degenerate = []
     for solution in known.values():
         if solution.dimension == 0 and solution.strict and solution.det_sign != 0:

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from enumsol.selections.solution import SelectionSolution
-from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.selections.solution import Codes
+    from enumsol.selections.solution import ActiveSets, Codes
 
     Array = NDArray[np.float64]
 
@@ -41,6 +41,8 @@ class Proposal:
     force : (2p,) array, lambda
     tau : one number a free node for the test of definiteness; 0 where a node need not be in it
     strict : every status in the proof holds strictly
+    least : least slack of the conditions of the fixed nodes
+    sign : of the determinant of the fixed nodes' equations
     """
 
     selection: Codes
@@ -48,10 +50,12 @@ class Proposal:
     force: Array
     tau: Array
     strict: bool
+    least: float
+    sign: int
 
 
 class Closing(Protocol):
-    """A certifier that can close a subtree: that of arithmetic "verified" or "exact"."""
+    """A certifier that can close a subtree."""
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
@@ -77,6 +81,9 @@ class Closer:
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions of a subtree that can be closed, None where it has to be searched."""
+        # at a solution without slip the energy is zero, and that is its minimum
+        if not self._alert and (relaxation is None or abs(relaxation.bound) > NEAR):
+            return None
         if max(codes) < CONTACT or not (self._alert or _touches(codes, relaxation)):
             return None
         if self._wait > 0:
@@ -89,8 +96,8 @@ class Closer:
 
 
 def _touches(codes: Codes, relaxation: Relaxation | None) -> bool:
-    """Whether the energy's minimum is zero, as at a solution without slip, and open nodes touch there without load."""
-    if relaxation is None or abs(relaxation.bound) > NEAR:
+    """Whether undecided nodes touch without load at the minimiser."""
+    if relaxation is None:
         return False
     p = len(codes)
     forces, w = relaxation.forces[:p], relaxation.displacements[:p]
@@ -125,6 +132,7 @@ class Reduction:
         for k, i in enumerate(stuck, start=len(fixed)):
             self.E[p + i, k] = 1.0
         M = S[rows] @ self.E
+        self.sign = int(np.linalg.slogdet(M)[0])
         # a singular matrix is refused by whoever proves something of it
         self.Z = np.linalg.solve(M, np.column_stack([system.g[rows], S[np.ix_(rows, self.places)]]))
         moved = S[self.places] @ self.E @ self.Z
@@ -237,6 +245,14 @@ class Reduction:
         return None
 
 
+def holds_below(codes: Codes, active: ActiveSets) -> bool:
+    """Whether a solution lies below an assignment: at every node a final code holds that refines its code."""
+    return all(
+        bool(held) if code == UNDECIDED else bool(held - {OPEN}) if code == CONTACT else code in held
+        for code, held in zip(codes, active, strict=True)
+    )
+
+
 def start(system: ScaledSystem, relaxation: Relaxation | None) -> tuple[Array, Array]:
     """lambda and w from which the solution of a reduced problem is sought."""
     if relaxation is None:
@@ -278,7 +294,8 @@ def propose(system: ScaledSystem, codes: Codes, force: Array, w: Array, *, exact
     tau = reduction.weights(_counted(reduction, selection, force, w, exactly=exactly))
     if tau is None:
         return None
-    return Proposal(tuple(selection), free, force, tau, bool(np.all(np.abs(slack) > NEAR)))
+    least = float(np.min(slack[fixed], initial=np.inf))
+    return Proposal(tuple(selection), free, force, tau, bool(np.all(np.abs(slack) > NEAR)), least, reduction.sign)
 
 
 _FINAL = (OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS)

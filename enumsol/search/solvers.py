@@ -156,7 +156,7 @@ class Solvers:
         progress: Callable[[SearchProgress], object] | None = None,
     ) -> TreeSearch:
         """A search of the tree with a certifier made here."""
-        closer = None if self.arithmetic == "fast" else Closer(cast("Closing", certifier))
+        closer = Closer(cast("Closing", certifier))
         return TreeSearch(self.scaled, certifier, engine=self.engine, limits=limits, progress=progress, closer=closer)
 
     def remake(self) -> Callable[[], Solvers]:

@@ -9,9 +9,9 @@ from enumsol.relaxation.rows import imposed_rows
 from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
 from enumsol.search.certifiers.floats import solve_or_open
 from enumsol.search.certifiers.protocol import WithoutProof
-from enumsol.search.closing import propose, start
+from enumsol.search.closing import holds_below, propose, start
 from enumsol.selections.solution import SelectionSolution
-from enumsol.statuses import CONTACT, OPEN, UNDECIDED, RowKind
+from enumsol.statuses import RowKind
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,13 +26,6 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
-
-
-def holds_below(code: int, held: frozenset[int]) -> bool:
-    """Whether one of the final codes that hold at a node refines a (partial) code."""
-    if code == UNDECIDED:
-        return bool(held)
-    return bool(held - {OPEN}) if code == CONTACT else code in held
 
 
 class ExactCertifier(WithoutProof):
@@ -73,7 +66,7 @@ class ExactCertifier(WithoutProof):
         uncounted = [not F or rests for F, rests in zip(solver.F_positive, resting, strict=True)]
         if not all(proposal.selection[i] in active[i] and (tau > 0 or uncounted[i]) for i, tau in free):
             return None
-        if not all(holds_below(code, held) for code, held in zip(codes, active, strict=True)):
+        if not holds_below(codes, active):
             return proposal, []
         fixed = [active[i] for i in range(solver.p) if i not in proposal.free]
         index = sign if all(len(held) == 1 for held in fixed) else None
