@@ -55,7 +55,15 @@ class Proposal:
 
 
 class Closing(Protocol):
-    """A certifier that can close a subtree."""
+    """A certifier that can close a subtree.
+
+    Attributes
+    ----------
+    hard : bool
+        A complete selection was met that is degenerate, or nearly so.
+    """
+
+    hard: bool
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
@@ -77,7 +85,7 @@ class Closer:
     def met(self, answer: object) -> None:
         """Take note of what a complete selection holds: a degenerate solution makes every node worth a try."""
         strict = answer is None or (isinstance(answer, SelectionSolution) and answer.strict)
-        self._alert = self._alert or not strict
+        self._alert = self._alert or not strict or self._certifier.hard
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions of a subtree that can be closed, None where it has to be searched."""

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import fmpq, fmpq_mat
 
+from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.exact import ExactSystem
 from enumsol.selections.polytopes import polytope_vertices, value
 from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
-from enumsol.statuses import CONDITIONS, FINAL, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
+from enumsol.statuses import CONDITIONS, FINAL, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -166,6 +167,21 @@ class ExactSelections:
             point[p + i] == 0 and ((point[i] == 0 and w[i] + F * abs(w[p + i]) <= 0) or (w[i] == 0 and w[p + i] == 0))
             for i, F in enumerate(self.system.F)
         )
+
+    def statuses_by_test_functions(self, point: Point, r: NDArray[np.float64]) -> tuple[int, ...]:
+        """Per node the code that the signs of theory, (1.7), name at any point; ``r`` holds powers of two."""
+        p, w = self.p, self._w(point)
+        codes = []
+        for i, (F, friction) in enumerate(zip(self.system.F, self.F_positive, strict=True)):
+            unit = rational(float(r[i]))
+            bound, across = F * point[i], point[p + i] + unit * w[p + i]
+            if point[i] + unit * w[i] <= 0:
+                codes.append(OPEN)
+            elif not friction:
+                codes.append(FRICTIONLESS)
+            else:
+                codes.append(SLIP_PLUS if across > bound else SLIP_MINUS if across < -bound else STICK)
+        return tuple(codes)
 
     def equal(self, a: Point, b: Point) -> bool:
         """Exact equality."""

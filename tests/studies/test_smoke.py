@@ -30,6 +30,7 @@ CONCLUSIONS = {
     "extremes": ("all: 28 cases, 28 right, 0 undecided, 0 wrong",),
     "fixed_points_basins": ("sign of the index at all: yes", "none of the repelling ones: yes"),
     "fixed_points_scaling": ("all converged: yes", "Newton needed no help: yes"),
+    "grazing": ("chains: all complete and checked: yes; at most", "rows of equal discs: 4 of 4 complete"),
     "paper_examples": ("all 19 facts hold", "no arc or continuum missed, no jump"),
     "requirements": ("both interpreters import the same enumsol", "import enumsol: "),
     "samples_vs_graph": ("branches of length 0.001 are missed by 50 samples", "40 of 40 root sets agree"),

@@ -33,6 +33,8 @@ class FastCertifier(WithoutProof):
     changes its bound by the multipliers times the shift; a pruning that does not survive it is branched on.
     """
 
+    hard = False
+
     def __init__(self, selections: FloatSelections) -> None:
         self._selections = selections
         self._norms = selections.row_norms()

@@ -28,8 +28,13 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
+_NEWTON_STEPS = 8
+
+
 class ExactCertifier(WithoutProof):
     """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, (6.1))."""
+
+    hard = False
 
     def __init__(
         self, selections: ExactSelections, scaled: ScaledSystem, enclosed: EnclosedSystem | None = None
@@ -73,6 +78,23 @@ class ExactCertifier(WithoutProof):
         strict = all(len(held) == 1 for held in active)
         solution = SelectionSolution(proposal.selection, (point,), 0, determinant, strict, exact=True, index=index)
         return proposal, [solution]
+
+    def solution_near(self, proposal: Proposal) -> SelectionSolution | None:
+        """The root of what is proposed with the statuses that hold exactly, by Newton's method; None if not found."""
+        solver, free, codes = self._selections, proposal.free, proposal.selection
+        units = self._scaled.force / self._scaled.length
+        for _ in range(_NEWTON_STEPS):
+            solved = solver.solve_equations(codes, solver.system.g)
+            if solved is None:
+                return None
+            point, determinant = solved
+            active = solver.active(point)
+            if all(code in held for code, held in zip(codes, active, strict=True)):
+                strict = all(len(held) == 1 for held in active)
+                return SelectionSolution(codes, (point,), 0, determinant, strict, exact=True)
+            moved = solver.statuses_by_test_functions(point, units)
+            codes = tuple(moved[i] if i in free else code for i, code in enumerate(codes))
+        return None
 
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         """Whether the multipliers prove a positive lower bound on the energy."""

@@ -99,6 +99,8 @@ class VerifiedCertifier:
         self._escalations = Escalations()
         self._verified: dict[Codes, VerifiedSelection | ClosedSolution] = {}
         self._leaves = 0
+        #: A complete selection was not decided by balls.
+        self.hard = False
         #: Selections of the roots found in rationals.
         self._known: list[Codes] = []
 
@@ -146,6 +148,7 @@ class VerifiedCertifier:
             self._escalations.balls += 1
             self._leaf(Leaf.NO_ROOT)
             return None
+        self.hard = True
         certifier = self._exact()
         if certifier is None:
             if (found := self._closed_selection(codes, ball)) is not None:
@@ -182,7 +185,13 @@ class VerifiedCertifier:
             self._escalations.rationals += 1
             self._leaf(Leaf.CLOSED_IN_RATIONALS, closing.selection, closing.tau.tolist(), len(solutions))
             return solutions
-        return None if proposal is None or ball is None else self._closed_by(proposal, ball)
+        found = None if proposal is None or ball is None else self._closed_by(proposal, ball)
+        if found and proposal is not None and certifier is not None:
+            exactly = certifier.solution_near(proposal)
+            if exactly is not None:
+                self._known.append(exactly.codes)
+                return [exactly]
+        return found
 
     def _closed_selection(self, codes: Codes, near: VerifiedSelection | None) -> list[SelectionSolution] | None:
         """The same for a selection whose conditions are not decided, without rationals."""
