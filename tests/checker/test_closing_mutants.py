@@ -4,9 +4,9 @@ import functools
 
 import numpy as np
 import pytest
-from grazing import beside_a_loaded_node, touching_problem
 from proof_tools import copied, proof_of, records_of
 from rational_checker import Refused, check_records
+from touching import beside_a_loaded_node, touching_problem
 
 from enumsol import enumerate_roots, verify
 from enumsol.search import closing, solvers

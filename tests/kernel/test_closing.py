@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from grazing import touching_problem
 from rational_closings import Reduced
 from rational_forms import Data, Forms, Refused, exact
+from touching import touching_problem
 
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.kernel.closing import closed_solution, definite_sign, same_solution

@@ -1,10 +1,13 @@
 """Subtrees closed by their only possible solution: how many nodes, and the same roots as without (theory, 6.11)."""
 
+from concurrent.futures import ProcessPoolExecutor
+
 import numpy as np
 import pytest
-from grazing import beside_a_loaded_node, row_of_discs, touching_problem
+from generators import random_problem
+from touching import beside_a_loaded_node, row_of_discs, touching_problem
 
-from enumsol import enumerate_roots, verify
+from enumsol import ContactProblem, enumerate_roots, verify
 from enumsol.search import closing, solvers
 
 
@@ -115,7 +118,40 @@ def test_searches_without_degenerate_roots_try_nothing(monkeypatch):
 
     monkeypatch.setattr("enumsol.search.certifiers.verified.VerifiedCertifier.closed", never)
     rng = np.random.default_rng(1)
-    from generators import random_problem
-
     for p in (2, 4, 6):
         assert enumerate_roots(random_problem(rng, p), 0).complete
+
+
+@pytest.mark.parametrize("slides", [False, True])
+def test_nearly_grazing_nodes(slides):
+    # data off by rounding: a regular root whose margin is far below what balls see
+    problem = beside_a_loaded_node(4, slides=slides, grazing=True)
+    rng = np.random.default_rng(4)
+    A = problem.A.toarray() * (1 + 1e-16 * rng.normal(size=(problem.n, problem.n)))
+    f = problem.f + 1e-17 * rng.normal(size=problem.n)
+    problem = ContactProblem((A + A.T) / 6, problem.Bn, problem.Bt, f / 3, friction=0.5)
+    roots = enumerate_roots(problem, 0, max_nodes=60)
+    assert roots.complete
+    assert roots.index_sum == len(roots) == 1
+    assert roots.stats.closed
+    assert roots[0].regular
+    assert roots[0].margin < 1e-15
+    assert verify(problem, roots.proof).complete
+
+
+def test_executors_find_the_same():
+    problem = beside_a_loaded_node(6, slides=True, grazing=False)
+    alone = enumerate_roots(problem, 0)
+    with ProcessPoolExecutor(2) as executor:
+        together = enumerate_roots(problem, 0, executor=executor)
+    assert together.complete
+    assert [root.active for root in together] == [root.active for root in alone]
+    assert verify(problem, together.proof).complete
+
+
+def test_fast_arithmetic():
+    for slides in (False, True):
+        problem = beside_a_loaded_node(32, slides=slides, grazing=True)
+        roots = enumerate_roots(problem, 0, "fast", max_nodes=200)
+        assert roots.whole
+        assert roots.index_sum == len(roots) == 1
