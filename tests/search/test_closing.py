@@ -1,4 +1,4 @@
-"""Subtrees closed by their only possible solution: how many nodes, and the same roots as without (theory, 6.11)."""
+"""Closed subtrees: how many nodes they leave, and the same roots as without (theory, section 6.11)."""
 
 from concurrent.futures import ProcessPoolExecutor
 
