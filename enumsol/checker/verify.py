@@ -213,11 +213,7 @@ class Checker(TreeChecker):
             self.undecided += 1
             return None if isinstance(record[1], str) else "its reason is no text"
         if kind == "M":
-            from enumsol.checker.closing import closed_in_rationals
-
-            reason, selection, points = closed_in_rationals(self.system, self.rational, codes, record)
-            self.polytopes += [(selection, points, 0)] if points else []
-            return reason
+            return self._closed_in_rationals(codes, record)
         if kind == "z":
             unloaded = all(c == UNDECIDED for c in codes) and self.problem.is_unloaded(self.alpha)
             # g = 0: the energy bound reads lambda' S lambda <= 0
@@ -254,6 +250,13 @@ class Checker(TreeChecker):
         reason, ball = closed_by_balls(self.system, codes, record, self.force)
         if ball is not None:
             self.closed[ball.core] = ball
+        return reason
+
+    def _closed_in_rationals(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        from enumsol.checker.closing import closed_in_rationals
+
+        reason, selection, points = closed_in_rationals(self.system, self.rational, codes, record)
+        self.polytopes += [(selection, points, 0)] if points else []
         return reason
 
     def _rational_exclusion(self, codes: tuple[int, ...], record: list[Any]) -> str | None:

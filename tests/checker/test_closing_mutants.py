@@ -9,6 +9,7 @@ from rational_checker import Refused, check_records
 from touching import beside_a_loaded_node, touching_problem
 
 from enumsol import enumerate_roots, verify
+from enumsol.checker.stability import stability_radius
 from enumsol.search import closing, solvers
 
 MUTANTS = 150
@@ -136,3 +137,9 @@ def test_the_independent_checker_refuses_as_well():
     forged = [*records[k][:3], 1 - records[k][3]]
     with pytest.raises(Refused):
         check_records(problem, [*records[:k], forged, *records[k + 1 :]])
+
+
+def test_proofs_with_closed_subtrees_have_no_stability_radius():
+    for kind in ("m", "M"):
+        problem, records = cases(kind)[0]
+        assert stability_radius(problem, proof_of(records)) == 0
