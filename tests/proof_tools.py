@@ -10,6 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 from oracles import _affine, _at, _conditions, _dimension, _meet, _rref, _vertices, exact_condense
+from rational_checker import Refused, check_records
 
 from enumsol import Proof
 
@@ -81,7 +82,12 @@ class Judge:
         self.problem = problem
 
     def valid(self, records):
-        """Every leaf proves what it says, the leaves cover all selections, the counts are right."""
+        """Every leaf proves what it says, the leaves cover all selections, the counts are right.
+
+        Closed subtrees are judged by the other rational checker, which tries all selections of their free nodes.
+        """
+        if any(isinstance(record, list) and record[0] in ("m", "M") for record in records):
+            return _accepted(self.problem, records)
         header, footer = records[0], records[-1]
         alpha = Fraction(header["alpha"])
         self.S, self.g, self.F = exact_condense(self.problem, alpha)
@@ -201,6 +207,13 @@ class Judge:
                     break
         families = sum(any(part[1] > 0 for part in group) for group in groups)
         return len(groups) - families, families
+
+
+def _accepted(problem, records):
+    try:
+        return check_records(problem, records) == records[-1]
+    except Refused:
+        return False
 
 
 def det_sign(S, F, codes):

@@ -11,6 +11,7 @@ from itertools import pairwise, product
 
 from flint import fmpq, fmpq_mat
 from rational_arcs import Arcs
+from rational_closings import Closings
 from rational_forms import (
     Data,
     Forms,
@@ -143,7 +144,7 @@ class Point(Proof):
         self.forms = Forms(self.data.S, self.data.load(alpha), F)
         self.scale = self.units(header)
         self.regular = self.undecided = self.leaves = 0
-        self.polytopes = []
+        self.polytopes, self.roots, self.closings = [], [], Closings(self.forms, self.friction, self.scale)
         self.declared = []
 
     def run(self, records):
@@ -161,6 +162,7 @@ class Point(Proof):
                 self.leaves += 1
                 self.leaf(codes, *record)
         isolated, families = self.joined()
+        isolated += self.closings.apart(self.roots + [codes for codes, _ in self.polytopes])
         counts = {"roots": self.regular + isolated, "families": families}
         counts |= {"undecided": self.undecided, "leaves": self.leaves}
         need(records[position:] == [counts], f"the footer is not {counts}")
@@ -186,7 +188,13 @@ class Point(Proof):
             need(set(codes) == {6} and not any(self.forms.g), "the body is loaded")
             self.polytopes.append(((0,) * self.p, 0))
         else:
-            need(kind in ("n", "N", "r", "D"), "an unknown leaf")
+            need(kind in ("n", "N", "r", "D", "m", "M"), "an unknown leaf")
+            if kind == "m":
+                self.closings.leaf(codes, *rest)
+                return
+            if kind == "M":
+                self.polytopes += self.closings.exact_leaf(codes, *rest)
+                return
             need(max(codes) < 5, "a selection is not complete")
             {"n": self.empty, "N": self.empty, "r": self.root, "D": self.polytope}[kind](codes, *rest)
 
@@ -227,6 +235,7 @@ class Point(Proof):
             need(abs(x - m) <= r, "an enclosure misses the root")
         need(integer(index) == (1 if N.det() > 0 else -1), "an index is wrong")
         self.regular += 1
+        self.roots.append(codes)
 
     def polytope(self, codes, points, dimension):
         vertices = self.forms.hull(codes)

@@ -225,11 +225,16 @@ class Forms:
 
     def hull(self, *selections):
         """[5.3, D] Vertices of the common solutions of some selections."""
-        affine = _affine([form for codes in selections for form in self.equations(codes)])
+        equations = [form for codes in selections for form in self.equations(codes)]
+        return self.vertices(equations, [form for codes in selections for form in self.conditions(codes)])
+
+    @staticmethod
+    def vertices(equations, given):
+        """Vertices of a bounded set {equations = 0, given >= 0}."""
+        affine = _affine(equations)
         if affine is None:
             return []
         origin, kernel = affine
-        given = [form for codes in selections for form in self.conditions(codes)]
         slopes = [[_value(form, k, 0) for k in kernel] for form in given]
         values = [_value(form, origin) for form in given]
         need(comb(len(given), len(kernel)) <= LARGEST_HULL, "too many candidate vertices")

@@ -22,10 +22,12 @@ What checker and search share
     - ``kernel.point`` and ``kernel.interval``: the exclusion inequality, the verified solve of a selection and the
       contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled copy of
       the inequality); ``kernel.forms``, the same with other forms than the energy at one alpha;
+    - ``kernel.closing``, the test by which a subtree is closed by its only possible solution, and which of these
+      solutions are the same; its linear systems of balls, ``kernel.ball_arrays``;
     - for the arcs of branch graphs: ``kernel.selection_rows``, the numbers of unknowns and conditions;
       ``kernel.arc_selections``, ``kernel.arc_series``, ``kernel.bernstein`` and ``kernel.arcs``, a selection over an
       interval as a series with bounds of its error; ``kernel.precise`` and ``kernel.many_digits``, the same with many
-      digits, loaded only where a box asks for it; ``kernel.ball_arrays``, linear systems of balls (in 3D, too);
+      digits, loaded only where a box asks for it; ``kernel.ball_arrays`` (in 3D, too);
     - for problems in 3D, and loaded for their proofs only: ``kernel.space``, the rows and branchings and the
       exclusion inequality; ``kernel.leaves``, what a complete assignment holds and which leaves share a root;
       ``sectors``, the ends of sectors; ``condensation.space``, balls for S and g in the variables in which friction is
@@ -52,6 +54,11 @@ What counts as one root
     A root at which every condition holds strictly solves one selection only, and so two such roots of two leaves are
     two. Roots on the border of several selections are decided in rationals and joined where they meet, as are the
     polytopes of a family; none of them can meet a strict root.
+
+    A root that closes a subtree is the only one with the statuses of its fixed nodes, which hold strictly. Two such
+    roots are one if one of them surely has the statuses of the other one's fixed nodes, and two if some node has no
+    status that both may have; so with roots of single selections. Where neither is so, one more part counts as
+    undecided.
 
     In 3D a root that slips along the common end of two sectors is found in both. Roots of leaves with the same statuses
     are one if the directions of one lie in the box of angles in which the other is proven to be the only one, and two

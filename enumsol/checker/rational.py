@@ -31,6 +31,7 @@ class RationalSystem:
     ----------
     problem : ContactProblem
     alpha : Fraction
+    definite : S is proven positive definite already
 
     Raises
     ------
@@ -39,16 +40,17 @@ class RationalSystem:
         EXACT_DOF_LIMIT degrees of freedom.
     """
 
-    def __init__(self, problem: ContactProblem, alpha: Fraction) -> None:
+    def __init__(self, problem: ContactProblem, alpha: Fraction, *, definite: bool = False) -> None:
         self.p, a = problem.p, rational(alpha)
         A, B = exact_matrices(problem)
         self.S = B * solved(A, B.transpose())
-        if not is_positive_definite(self.S):
+        if not definite and not is_positive_definite(self.S):
             raise NotEnclosedError("the condensed compliance S is not positive definite in rational arithmetic")
         self.g: Vector = [x + a * y for x, y in zip(*free_displacements(problem), strict=True)]
         self.F: Vector = [rational(F) for F in exactly_at(alpha, *problem.friction)]
         self._S: list[Vector] = self.S.tolist()
         self._inverse: Any = None
+        self.zero = fmpq(0)
 
     def row(self, kind: int, node: int) -> tuple[Vector, Any]:
         """A row of ``kernel.rows`` as an affine function of lambda: 2p coefficients, and what is added."""
@@ -72,6 +74,11 @@ class RationalSystem:
         rows = [self.row(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][1]]
         moved = (fmpq_mat([form for form, _ in rows]) * fmpq_mat([[x] for x in point])).entries()
         return [x + constant for x, (_, constant) in zip(moved, rows, strict=True)]
+
+    def node_conditions(self, code: int, node: int, point: Vector) -> Vector:
+        """The inequalities of a final code at a node, at a point."""
+        rows = [self.row(kind, node) for kind in CONDITIONS[code][1]]
+        return [sum((a * x for a, x in zip(form, point, strict=True) if x != 0), constant) for form, constant in rows]
 
     def energy_bound_positive(
         self, signs: NDArray[np.int8], rows: Sequence[int], values: Sequence[float], units: Sequence[Fraction]

@@ -172,6 +172,14 @@ class _WidenedChecker(Checker):
         self.radius = 0.0
         return "it was proven for the given data alone"
 
+    def _closed(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        self.radius = 0.0
+        return "it was proven for the given data alone"
+
+    def _closed_in_rationals(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        self.radius = 0.0
+        return "it was proven for the given data alone"
+
     def _rational_selection(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         self.radius = 0.0
         return "it was proven for the given data alone"

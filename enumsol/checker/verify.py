@@ -20,7 +20,7 @@ from enumsol.checker.graph import GraphChecker
 from enumsol.checker.reports import GraphVerificationReport, VerificationReport
 from enumsol.checker.tree import TreeChecker
 from enumsol.checks import instance_of, optional_callable
-from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
+from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
 from enumsol.kernel.rows import FRICTIONLESS, ROW_KINDS, UNDECIDED, children_of, row_signs
 from enumsol.problem import ContactProblem
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.checker.rational import RationalSystem
+    from enumsol.kernel.closing import ClosedSolution
     from enumsol.problem3d import ContactProblem3D
 
     #: codes of a selection, the vertices of its root set, and its dimension
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
 #: Exclusion leaves checked together.
 _BATCH = 256
 #: Entries of a leaf's record, by its kind.
-_ENTRIES = {"x": 3, "X": 3, "n": 1, "r": 4, "N": 1, "D": 3, "z": 1, "u": 2}
+_ENTRIES = {"x": 3, "X": 3, "n": 1, "r": 4, "N": 1, "D": 3, "z": 1, "u": 2, "M": 4}
 #: Covers underflow of one product.
 _SUBNORMAL = 2.0**-1070
 
@@ -121,6 +122,10 @@ class Checker(TreeChecker):
     """Checks one proof of a problem in 2D."""
 
     polytopes: list[Polytope] = field(default_factory=list)
+    closed: dict[tuple[int, ...], ClosedSolution] = field(default_factory=dict)
+    #: Codes of the strict roots of complete selections.
+    strict: list[tuple[int, ...]] = field(default_factory=list)
+    _in_doubt: int = 0
     _waiting: list[tuple[int, tuple[int, ...], Any, Any]] = field(default_factory=list)
     _by_forms: FormLeaves = field(default_factory=FormLeaves)
 
@@ -161,7 +166,11 @@ class Checker(TreeChecker):
             raise RefusedError("a rational leaf in a proof about S and g as computed")
         from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
 
-        return RationalSystem(self.problem, self.alpha)
+        try:
+            definite = self.system.smallest_eigenvalue > 0
+        except (NotEnclosedError, RefusedError):
+            definite = False
+        return RationalSystem(self.problem, self.alpha, definite=definite)
 
     def _flush(self, *, last: bool) -> None:
         """Check the dual inequalities of the waiting leaves together."""
@@ -203,8 +212,10 @@ class Checker(TreeChecker):
         kind = record[0]
         if kind == "f":
             return self._by_forms.add(self.leaves, codes, record)
-        if not isinstance(kind, str) or kind not in _ENTRIES:
+        if not isinstance(kind, str) or kind not in (*_ENTRIES, "m"):
             return f"unknown kind of record {shown(kind)}"
+        if kind == "m":
+            return self._closed(codes, record)
         if len(record) != _ENTRIES[kind]:
             return f"its record has {len(record)} entries; expected {_ENTRIES[kind]}"
         if kind == "x":
@@ -215,6 +226,8 @@ class Checker(TreeChecker):
         if kind == "u":
             self.undecided += 1
             return None if isinstance(record[1], str) else "its reason is no text"
+        if kind == "M":
+            return self._closed_in_rationals(codes, record)
         if kind == "z":
             unloaded = all(c == UNDECIDED for c in codes) and self.problem.is_unloaded(self.alpha)
             # g = 0: the energy bound reads lambda' S lambda <= 0
@@ -235,6 +248,7 @@ class Checker(TreeChecker):
         if not ball.is_root:
             return "its candidate is not proven to be a root"
         self.regular += 1
+        self.strict.append(codes)
         _, mid, rad, index = record
         centre, radius = (numbers_from(values, len(ball.force)) for values in (mid, rad))
         with np.errstate(over="ignore", invalid="ignore"):
@@ -243,6 +257,21 @@ class Checker(TreeChecker):
         if not np.all(inside):
             return "its enclosure does not hold the root"
         return None if type(index) is int and index == ball.det_sign else "its index is wrong"
+
+    def _closed(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        from enumsol.checker.closing import closed_by_balls
+
+        reason, ball = closed_by_balls(self.system, codes, record, self.force)
+        if ball is not None:
+            self.closed[ball.core] = ball
+        return reason
+
+    def _closed_in_rationals(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        from enumsol.checker.closing import closed_in_rationals
+
+        reason, selection, points = closed_in_rationals(self.system, self.rational, codes, record)
+        self.polytopes += [(selection, points, 0)] if points else []
+        return reason
 
     def _rational_exclusion(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         p = self.problem.p
@@ -266,6 +295,10 @@ class Checker(TreeChecker):
             return "its roots are not those that are claimed"
         self.polytopes.append((codes, hull.points, hull.dimension))
         return None
+
+    @property
+    def _doubtful(self) -> int:
+        return self._in_doubt
 
     # -- counting --------------------------------------------------------------------------------------------------
 
@@ -292,7 +325,12 @@ class Checker(TreeChecker):
                     groups[group_of(k)] = group_of(m)
         found = {group_of(k) for k in range(len(groups))}
         families = {group_of(k) for k, polytope in enumerate(self.polytopes) if polytope[2] > 0}
-        return len(found) - len(families), len(families)
+        apart = 0
+        if self.closed:
+            from enumsol.checker.closing import count_apart
+
+            apart, self._in_doubt = count_apart(self.closed, self.strict + [codes for codes, _, _ in self.polytopes])
+        return len(found) - len(families) + apart, len(families)
 
     def _meet(self, k: int, m: int) -> bool:
         """Whether two root sets have a point in common."""

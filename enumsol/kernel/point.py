@@ -362,6 +362,20 @@ def verified_solve(M: Array, M_rad: Array, b: Array, b_rad: Array) -> tuple[Arra
     return y, radius, sign * (1 - 2 * (negative % 2))
 
 
+def row_balls(
+    system: EnclosedSystem, force: Array, force_rad: Array, w: Array, w_rad: Array
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values of all rows, shape (7, p), for balls of lambda and w, and their radii."""
+    p = system.p
+    (n, t), (n_rad, t_rad) = force.reshape(2, p), force_rad.reshape(2, p)
+    reach = system.F * n
+    cone_rad = system.F * n_rad + system.F_rad * (np.abs(n) + n_rad) + t_rad
+    cone_rad = (cone_rad + 4 * UNIT * (np.abs(reach) + np.abs(t))) * SAFE + TINY
+    values = np.stack([n, t, reach - t, reach + t, -w[:p], w[p:], -w[p:]])
+    radii = np.stack([n_rad, t_rad, cone_rad, cone_rad, w_rad[:p], w_rad[p:], w_rad[p:]])
+    return values, radii
+
+
 def _conditions(
     system: EnclosedSystem,
     codes: NDArray[np.intp],
@@ -371,12 +385,6 @@ def _conditions(
     w_rad: Array,
     sign: int,
 ) -> VerifiedSelection:
-    p = system.p
-    (n, t), (n_rad, t_rad) = force.reshape(2, p), force_rad.reshape(2, p)
-    reach = system.F * n
-    cone_rad = system.F * n_rad + system.F_rad * (np.abs(n) + n_rad) + t_rad
-    cone_rad = (cone_rad + 4 * UNIT * (np.abs(reach) + np.abs(t))) * SAFE + TINY
-    values = np.stack([n, t, reach - t, reach + t, -w[:p], w[p:], -w[p:]])
-    radii = np.stack([n_rad, t_rad, cone_rad, cone_rad, w_rad[:p], w_rad[p:], w_rad[p:]])
+    values, radii = row_balls(system, force, force_rad, w, w_rad)
     kinds, nodes = np.array([(kind, i) for i, code in enumerate(codes.tolist()) for kind in CONDITIONS[code][1]]).T
     return VerifiedSelection(force, force_rad, w, w_rad, values[kinds, nodes], radii[kinds, nodes], sign)

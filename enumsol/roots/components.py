@@ -79,9 +79,8 @@ def connected_components(
     known: dict[Codes, SelectionSolution] = {}
     singles: list[RootComponent] = []
     for solution in solutions:
-        if solution.codes in known:
-            continue
-        known[solution.codes] = solution
+        if solution.codes not in known or solution.index is not None:
+            known[solution.codes] = solution
     degenerate = []
     for solution in known.values():
         if solution.dimension == 0 and solution.strict and solution.det_sign != 0:
@@ -194,7 +193,9 @@ def _component(
                 for node, codes in enumerate(solver.active(vertex)):
                     sets[node] |= codes
     active = tuple(frozenset(s) for s in sets)
-    index = _index(group, solver) if whole else (degree(active) if degree is not None else None)
+    index = next((solution.index for solution in group if solution.index is not None), None)
+    if index is None:
+        index = _index(group, solver) if whole else (degree(active) if degree is not None else None)
     if dimension > 0:
         group = _maximal(group, solver)
     return RootComponent(tuple(group), active, dimension, index, whole)

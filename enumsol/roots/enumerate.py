@@ -22,6 +22,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.roots.at_rest import AtRest
 from enumsol.roots.builder import RootBuilder, in_order, named, root_family
+from enumsol.roots.closed import apart, closed_component
 from enumsol.roots.components import RootComponent, connected_components
 from enumsol.roots.enumeration import Enumeration
 from enumsol.roots.local_degree import perturbed_degree
@@ -157,6 +158,11 @@ def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
     return isinstance(problem, ContactBody) and not isinstance(problem, ContactProblem)
 
 
+def _in_doubt(core: Codes) -> UndecidedPart:
+    hint = "perturb the load, or condense the body to its contact nodes"
+    return UndecidedPart(core, "a root in it may be the same as another one", hint, examined=True)
+
+
 class _Enumeration(Enumeration[Solvers]):
     """One call of enumerate_roots in 2D."""
 
@@ -169,6 +175,8 @@ class _Enumeration(Enumeration[Solvers]):
     ) -> None:
         super().__init__(solvers, progress, proof_path)
         self.method = method
+        #: Closed roots that may be the same as others.
+        self.doubtful: list[Codes] = []
 
     def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
         counted = [0, 0]
@@ -216,11 +224,12 @@ class _Enumeration(Enumeration[Solvers]):
 
     def _components(self) -> list[tuple[list[RootComponent], SelectionSolver]]:
         """Components of the root set with the solver whose points they hold."""
-        solutions = self.outcome.solutions
+        solutions, closed, self.doubtful = apart(self.outcome.solutions)
         exact, floats = [s for s in solutions if s.exact], [s for s in solutions if not s.exact]
         parts: list[tuple[list[RootComponent], SelectionSolver]] = []
-        if floats:
-            parts.append((connected_components(floats, self.solvers.floats, self._degree), self.solvers.floats))
+        if floats or closed:
+            components = connected_components(floats, self.solvers.floats, self._degree)
+            parts.append(([*components, *map(closed_component, closed)], self.solvers.floats))
         if exact and self.solvers.exact is not None:
             parts.append((connected_components(exact, self.solvers.exact, self._degree), self.solvers.exact))
         return parts
@@ -236,30 +245,31 @@ class _Enumeration(Enumeration[Solvers]):
         outcome, solvers = self.outcome, self.solvers
         roots: list[Root] = []
         families: list[RootFamily] = []
-        apart, joinable = 0, False
+        separate, joinable = 0, False
         if self.unloaded:
             at_rest = AtRest(solvers.floats.F_positive, proven=solvers.arithmetic != "fast")
-            roots, apart = [self._root(at_rest.component, at_rest)], 1
+            roots, separate = [self._root(at_rest.component, at_rest)], 1
         for components, solver in self._components():
             # what joins a component that was not examined whole is not known
-            apart += sum(c.whole for c in components)
+            separate += sum(c.whole for c in components)
             joinable = joinable or not all(c.whole for c in components)
             roots += [self._root(c, solver) for c in components if c.dimension == 0]
             proven = solver is not solvers.floats
             families += [root_family(solvers.alpha, c, solver, proven=proven) for c in components if c.dimension > 0]
         roots, families = in_order(roots, families)
-        whole = outcome.stopped is None and not outcome.undecided
+        whole = outcome.stopped is None and not outcome.undecided and not self.doubtful
+        separate -= len(self.doubtful)
         return RootSet(
             alpha=solvers.alpha,
             roots=roots,
             families=families,
-            undecided=[named(part) for part in outcome.undecided],
+            undecided=[named(part) for part in [*outcome.undecided, *map(_in_doubt, self.doubtful)]],
             arithmetic=solvers.arithmetic,
             method=self.method,
             stopped=None if outcome.stopped is None else str(outcome.stopped),
             stats=self._stats(),
             node_ids=solvers.problem.node_ids,
-            at_least=None if whole else apart + int(joinable),
+            at_least=None if whole else separate + int(joinable),
             certified_data=solvers.data,
             proof=self._proof(roots=len(roots), families=len(families)),
         )

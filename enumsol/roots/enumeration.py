@@ -117,6 +117,7 @@ class Enumeration(ABC, Generic[_Solvers]):
             seconds=time.perf_counter() - self.started,
             escalations=self.certifier.certified.escalations,
             presolved=outcome.presolved,
+            closed=outcome.closed,
         )
 
     def _proof(self, **counts: int) -> Proof | None:

@@ -88,6 +88,10 @@ class Root(ContactState):
     enclosure, or in rationals. ``active`` then holds all names that this sign does not exclude (of a body too large for
     rationals, n > 250, the enclosure of u_t may hold zero and leave the sign open).
 
+    A root at which more than one status may hold, of a body too large for rationals or where they do not apply, may be
+    known by its enclosure only (theory, section 6.11): it exists and is the only one there, and ``active`` holds all
+    statuses that its enclosure does not exclude.
+
     Attributes
     ----------
     alpha : float or Fraction

@@ -92,6 +92,8 @@ class SearchStats:
         In verified arithmetic: how many decisions needed which arithmetic.
     presolved : int
         Contact nodes proven open or in contact before the search began to branch on alternatives.
+    closed : int
+        Partial assignments closed by the only solution that they may hold.
 
     Examples
     --------
@@ -109,6 +111,7 @@ class SearchStats:
     seconds: float = 0.0
     escalations: Escalations | None = None
     presolved: int = 0
+    closed: int = 0
 
 
 class RootSet(Sequence[Root], Immutable):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.search.certifiers.floats import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.search.closing import Closer
 from enumsol.search.forms import Forms
 from enumsol.search.proof_header import point_header, unit_exponents
 from enumsol.search.tree import TreeSearch
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from enumsol.proof.proof_file import Recorder
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rationals import ExactCertifier
+    from enumsol.search.closing import Closing
     from enumsol.search.tree import SearchLimits, SearchProgress
     from enumsol.selections.rationals import ExactSelections
 
@@ -89,7 +91,9 @@ class Solvers:
         if self.arithmetic != "exact" and self.problem.n > EXACT_DOF_LIMIT:
             return None
         system = ExactSystem.from_problem(self.problem, self.alpha)
-        if not is_positive_definite(system.S):
+        enclosed, data = self._enclosed
+        proven = enclosed is not None and data == "problem"
+        if not proven and not is_positive_definite(system.S):
             raise InvalidProblemError("A is not positive definite (S = B A^-1 B' is not, in rational arithmetic)")
         return ExactSelections(system)
 
@@ -100,7 +104,7 @@ class Solvers:
             return None
         from enumsol.search.certifiers.rationals import ExactCertifier  # python-flint
 
-        return ExactCertifier(self.exact, self.scaled)
+        return ExactCertifier(self.exact, self.scaled, self.enclosed)
 
     @cached_property
     def _enclosed(self) -> tuple[EnclosedSystem | None, str]:
@@ -140,7 +144,7 @@ class Solvers:
         if self.arithmetic == "exact":
             from enumsol.search.certifiers.rationals import ExactCertifier  # python-flint
 
-            return ExactCertifier(_present(self.exact), self.scaled)
+            return ExactCertifier(_present(self.exact), self.scaled, self.enclosed)
         return VerifiedCertifier(
             self.scaled, self.enclosed, lambda: self.exact_certifier, _present(recorder), self.problem.node_ids
         )
@@ -153,7 +157,13 @@ class Solvers:
     ) -> TreeSearch:
         """A search of the tree with a certifier made here."""
         return TreeSearch(
-            self.scaled, certifier, engine=self.engine, limits=limits, progress=progress, forms=self._forms()
+            self.scaled,
+            certifier,
+            engine=self.engine,
+            limits=limits,
+            progress=progress,
+            closer=Closer(cast("Closing", certifier)),
+            forms=self._forms(),
         )
 
     def _forms(self) -> Forms | None:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space import SpaceSystem
     from enumsol.search.certifiers.protocol import Certifier
+    from enumsol.search.closing import Closer
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
@@ -99,6 +100,7 @@ class SearchOutcome:
     qps: int = 0
     fallback_qps: int = 0
     presolved: int = 0
+    closed: int = 0
 
     def forget(self) -> None:
         """Forget what was found, as the search begins again; the work that it took still counts."""
@@ -116,6 +118,7 @@ class SearchOutcome:
         self.qps += part.qps
         self.fallback_qps += part.fallback_qps
         self.presolved += part.presolved
+        self.closed += part.closed
 
 
 @dataclass(slots=True)
@@ -166,6 +169,8 @@ class TreeSearch:
         How a status splits and which rows it imposes; by default those of the plane at one alpha.
     limits : SearchLimits
     progress : called with a SearchProgress now and then
+    closer : Closer, optional
+        Closes subtrees by their only possible solution.
     forms : Forms, optional
         What a long search may bound with in place of the energy.
     """
@@ -179,6 +184,7 @@ class TreeSearch:
         splitting: Splitting | None = None,
         limits: SearchLimits | None = None,
         progress: Callable[[SearchProgress], object] | None = None,
+        closer: Closer | None = None,
         forms: Forms | None = None,
     ) -> None:
         self.system = system
@@ -188,6 +194,7 @@ class TreeSearch:
         self.engine: Any = engine
         self.limits = limits or SearchLimits()
         self.progress = progress
+        self.closer = closer
         self.forms = forms
         self.outcome = SearchOutcome()
         self._fallback: InteriorPointEngine | None = None
@@ -248,13 +255,21 @@ class TreeSearch:
         """Settle one node of the tree, or give its children in the order in which they are examined."""
         outcome = self.outcome
         outcome.nodes += 1
-        relaxation = self._relax(item)
         codes = item.codes
+        relaxation: Relaxation | None
+        relaxation = solved = self._relax(item)
+        if solved.stalled:
+            # the fallback costs more than a try
+            if self._closed(item, None):
+                return
+            relaxation = self._fall_back(codes)
         if relaxation is not None and relaxation.pruned and self.certifier.excluded(codes, relaxation):
             outcome.pruned += 1
             self._covered += item.weight
             return
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
+        if self._closed(item, usable):
+            return
         node, forced = branching_node(codes, item.forced, usable)
         if node < 0:
             node = self._settle(codes)
@@ -269,11 +284,23 @@ class TreeSearch:
             last = k + 1 == len(children)
             yield TreeNode(usable, child, node, last, item.weight / len(children), forced)
 
+    def _closed(self, item: TreeNode, relaxation: Relaxation | None) -> bool:
+        """Whether the subtree is closed by its only possible solution."""
+        found = None if self.closer is None else self.closer.closed(item.codes, relaxation)
+        if found is None:
+            return False
+        self.outcome.closed += 1
+        self.outcome.solutions += found
+        self._covered += item.weight
+        return True
+
     def _settle(self, codes: Codes) -> int:
         """Have the certifier decide a complete selection; -1, or the node that it asks to have split further."""
         outcome = self.outcome
         outcome.selections += 1
         answer = self.certifier.selection(codes)
+        if self.closer is not None:
+            self.closer.met(answer)
         if isinstance(answer, Refine):
             return answer.node
         if isinstance(answer, UndecidedPart):
@@ -303,17 +330,19 @@ class TreeSearch:
 
     # -- relaxations -----------------------------------------------------------------------------------------------
 
-    def _relax(self, item: TreeNode) -> Relaxation | None:
-        """The solved relaxation; None when no engine has an answer."""
+    def _relax(self, item: TreeNode) -> Relaxation:
+        """The relaxation, solved or stalled."""
         codes = item.codes
         self.outcome.qps += 1
         if item.parent is not None:
             relaxation = item.parent.child(*self._rows.of(item.changed, codes[item.changed]), last=item.last)
         else:
             relaxation = self._root(codes)
-        if relaxation.stalled:
-            return self._fall_back(codes)
-        if self.forms is not None and self.forms.in_use and not (relaxation.pruned or item.forced):
+        if (
+            self.forms is not None
+            and self.forms.in_use
+            and not (relaxation.stalled or relaxation.pruned or item.forced)
+        ):
             return self.forms.better(codes, relaxation, self._rows)
         return relaxation
 

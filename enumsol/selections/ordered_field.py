@@ -37,7 +37,8 @@ class FiberSelections(ExactSelections):
         self.exact, self.alpha = exact, alpha
         self.F_positive = tuple(not without for without in exact.frictionless)
 
-    def _solve_reduced(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
+    def solve_equations(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
+        """The selection's forces for the right-hand side ``target`` and sign det, or None when it is singular."""
         rows, columns = self.reduced(codes)
         if not rows:
             return tuple(self._zero), 1

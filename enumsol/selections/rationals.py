@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import fmpq, fmpq_mat
 
+from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.exact import ExactSystem
 from enumsol.selections.polytopes import polytope_vertices, value
 from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
-from enumsol.statuses import CONDITIONS, FINAL, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
+from enumsol.statuses import CONDITIONS, FINAL, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -113,7 +114,7 @@ class ExactSelections:
                 columns.append(column)
         return rows, columns
 
-    def _solve_reduced(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
+    def solve_equations(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
         """The selection's forces for the right-hand side ``target`` and sign det, or None when it is singular."""
         rows, columns = self.reduced(codes)
         if not rows:
@@ -128,7 +129,7 @@ class ExactSelections:
 
     def solve(self, codes: Codes) -> SelectionSolution | None:
         """All roots in the selection, or None."""
-        regular = self._solve_reduced(codes, self.system.g)
+        regular = self.solve_equations(codes, self.system.g)
         equations, inequalities = self.forms(codes)
         if regular is not None:
             point, sign = regular
@@ -159,6 +160,29 @@ class ExactSelections:
             result.append(frozenset(code for code in FINAL[friction] if n >= 0 and _holds(CONDITIONS[code], rows)))
         return tuple(result)
 
+    def resting(self, point: Point) -> tuple[bool, ...]:
+        """Nodes that theory, (6.9), need not count: lambda = 0 and w_n + F |w_t| <= 0, or w = 0 and lambda_t = 0."""
+        p, w = self.p, self._w(point)
+        return tuple(
+            point[p + i] == 0 and ((point[i] == 0 and w[i] + F * abs(w[p + i]) <= 0) or (w[i] == 0 and w[p + i] == 0))
+            for i, F in enumerate(self.system.F)
+        )
+
+    def statuses_by_test_functions(self, point: Point, r: NDArray[np.float64]) -> tuple[int, ...]:
+        """Per node the code that the signs of theory, (1.7), name at any point; ``r`` holds powers of two."""
+        p, w = self.p, self._w(point)
+        codes = []
+        for i, (F, friction) in enumerate(zip(self.system.F, self.F_positive, strict=True)):
+            unit = rational(float(r[i]))
+            bound, across = F * point[i], point[p + i] + unit * w[p + i]
+            if point[i] + unit * w[i] <= 0:
+                codes.append(OPEN)
+            elif not friction:
+                codes.append(FRICTIONLESS)
+            else:
+                codes.append(SLIP_PLUS if across > bound else SLIP_MINUS if across < -bound else STICK)
+        return tuple(codes)
+
     def equal(self, a: Point, b: Point) -> bool:
         """Exact equality."""
         return a == b
@@ -173,7 +197,7 @@ class ExactSelections:
         if solution.det_sign == 0:
             return 0
         push = tuple(fmpq(int(v)) for v in direction)
-        moved = self._solve_reduced(solution.codes, push)
+        moved = self.solve_equations(solution.codes, push)
         if moved is None:  # det_sign says otherwise
             raise AssertionError("a regular selection became singular")
         step, sign = moved

@@ -32,6 +32,11 @@ class SelectionSolution:
         All conditions of the selection hold strictly (only asked of points).
     exact : bool
         Vertices are tuples of field elements, not arrays of floats.
+    index : int or None
+        Local degree of the point, where it is proven by other means than its selections' determinants.
+    possible : tuple of p frozensets of codes, or None
+        Of a point known by its enclosure, which need not hold in any one selection for certain: the codes that may hold
+        there. ``codes`` is then UNDECIDED where they are several (theory, section 6.11).
     """
 
     codes: Codes
@@ -40,6 +45,8 @@ class SelectionSolution:
     det_sign: int
     strict: bool
     exact: bool = False
+    index: int | None = None
+    possible: ActiveSets | None = None
 
 
 class PointValues(Protocol):

@@ -50,6 +50,7 @@ SHARED = {
     "kernel.interval": {"EnclosedPiece", "as_computed", "interval_exclusion_margin"},
     "kernel.precise": None,
     "kernel.selection_rows": None,
+    "kernel.closing": {"ClosedSolution", "closed_solution", "definite_sign", "same_solution"},
     "kernel.point": {"VerifiedSelection", "exclusion_margin", "holds_no_root", "solve_selection"},
     "kernel.forms": {"EnclosedForm", "Equations", "form_margin"},
     "kernel.rows": None,
@@ -165,7 +166,7 @@ def test_what_the_search_uses_of_what_is_trusted_is_listed():
 
 def test_no_module_of_the_search_is_loaded_by_a_verification(tmp_path):
     """Point proofs with and without rational leaves, and a graph's, checked in a process of their own."""
-    degenerate = integer_problem(np.random.default_rng(20), 2)
+    degenerate = integer_problem(np.random.default_rng(34), 2)
     moving, interval = through_the_unloaded_state()
     plain = enumsol.gallery.one_node_triangle()
     proofs = [(degenerate, enumerate_roots(degenerate, 0.0)), (plain, enumerate_roots(plain, 5.0))]

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import rational_arcs
 import rational_checker
+import rational_closings
 import rational_forms
 import rational_zeros
 from generators import integer_problem, random_problem, singular_problem
@@ -27,6 +28,7 @@ from graph_proofs import (
 )
 from proof_tools import MAGIC, bytes_of, copied, leaves_of, multipliers, proof_of, records_of, sealed, with_multipliers
 from rational_checker import Refused, check, check_records, fingerprint
+from touching import beside_a_loaded_node
 
 from enumsol import enumerate_roots, gallery, verify
 
@@ -46,6 +48,7 @@ POINTS = {
     "frictionless": lambda: (triangle(friction=0.0), 1.0),
     "everything": lambda: (three_with_everything(), Fraction(7, 3)),
     "all statuses": lambda: (integer_problem(np.random.default_rng(20), 2), 0.0),
+    "grazing": lambda: (beside_a_loaded_node(3, slides=True, grazing=True), 0.0),
 }
 
 
@@ -62,7 +65,7 @@ def point(name):
 
 
 def test_the_checker_imports_nothing_of_the_package():
-    modules, names = (rational_checker, rational_arcs, rational_forms, rational_zeros), set()
+    modules, names = (rational_checker, rational_arcs, rational_closings, rational_forms, rational_zeros), set()
     for module in modules:
         tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
         names |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
@@ -91,7 +94,7 @@ def test_point_proofs_are_accepted(name):
 
 def test_every_kind_of_leaf_is_among_them():
     kinds = {record[0] for name in POINTS for record in point(name)[1][1:-1]}
-    assert kinds == {"b", "x", "r", "n", "N", "D", "z"}
+    assert kinds == {"b", "x", "r", "n", "N", "D", "z", "m", "M"}
 
 
 @pytest.mark.parametrize("make", [random_problem, integer_problem, singular_problem])

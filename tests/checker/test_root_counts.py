@@ -106,6 +106,22 @@ def test_counts_equal_the_exact_ones(p, count):
     assert balls >= count / 5
 
 
+def contained(exact, roots):
+    """Whether these are the exact roots, with all statuses that hold: balls may leave some possible that do not."""
+    left = list(roots)
+    for root in exact:
+        same = [
+            other
+            for other in left
+            if root.index == other.index
+            and all(held <= may for held, may in zip(root.active, other.active, strict=True))
+        ]
+        if not same:
+            return False
+        left.remove(min(same, key=lambda other: sum(map(len, other.active))))
+    return not left
+
+
 @pytest.mark.parametrize(("p", "count"), [(1, 40), (2, 60), (3, 30)])
 def test_without_rationals_the_count_is_right_or_open(p, count, monkeypatch):
     verified = []
@@ -121,7 +137,8 @@ def test_without_rationals_the_count_is_right_or_open(p, count, monkeypatch):
         assert report.ok
         assert report.complete == roots.complete
         if roots.complete:
-            assert outline(roots) == outline(exact)
+            assert contained(exact, roots)
+            assert outline(roots)[1] == outline(exact)[1]
         else:
             left_open += 1
             assert "undecided" in roots.completeness()

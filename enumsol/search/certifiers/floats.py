@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from enumsol.kernel.forms import form_margin
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.protocol import UndecidedPart, WithoutProof
+from enumsol.search.closing import NEAR, holds_below, propose, start
 from enumsol.selections.solution import VertexLimitError
 
 if TYPE_CHECKING:
@@ -32,6 +34,8 @@ class FastCertifier(WithoutProof):
     changes its bound by the multipliers times the shift; a pruning that does not survive it is branched on.
     """
 
+    hard = False
+
     def __init__(self, selections: FloatSelections) -> None:
         self._selections = selections
         self._norms = selections.row_norms()
@@ -45,6 +49,19 @@ class FastCertifier(WithoutProof):
             margin = form_margin(relaxation.form, codes, rows, values)
             return margin > 2.0 * self._selections.tolerance * shift
         return relaxation.bound > PRUNE_MARGIN + 2.0 * self._selections.tolerance * shift
+
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        """The solutions below a partial assignment, none or one, if it can hold one only; within the tolerance."""
+        solver = self._selections
+        proposal = propose(solver.system, codes, *start(solver.system, relaxation), exactly=True)
+        if proposal is None:
+            return None
+        if proposal.least < -2.0 * max(solver.tolerance, NEAR):
+            return []
+        solution = solver.solve(proposal.selection)
+        if solution is None or solution.dimension > 0 or not holds_below(codes, solver.active(solution.vertices[0])):
+            return None
+        return [replace(solution, index=proposal.sign if proposal.least > NEAR else None)]
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in the selection within the tolerance."""

@@ -4,31 +4,97 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from enumsol.kernel.closing import definite_sign
 from enumsol.relaxation.rows import imposed_rows
 from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
 from enumsol.search.certifiers.floats import solve_or_open
 from enumsol.search.certifiers.protocol import WithoutProof
+from enumsol.search.closing import holds_below, propose, start
+from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import RowKind
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.protocol import UndecidedPart
+    from enumsol.search.closing import Proposal
     from enumsol.selections.rationals import ExactSelections
-    from enumsol.selections.solution import Codes, SelectionSolution
+    from enumsol.selections.solution import Codes
+
+    Array = NDArray[np.float64]
+
+
+_NEWTON_STEPS = 8
 
 
 class ExactCertifier(WithoutProof):
     """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, (6.1))."""
 
-    def __init__(self, selections: ExactSelections, scaled: ScaledSystem) -> None:
+    hard = False
+
+    def __init__(
+        self, selections: ExactSelections, scaled: ScaledSystem, enclosed: EnclosedSystem | None = None
+    ) -> None:
         self._selections = selections
         self._scaled = scaled
+        self._enclosed = enclosed
         self._inverse: Any = None
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in the selection."""
         return solve_or_open(self._selections, codes)
+
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
+        found = self.closing(codes, *start(self._scaled, relaxation))
+        return None if found is None else found[1]
+
+    def closing(self, codes: Codes, force: Array, w: Array) -> tuple[Proposal, list[SelectionSolution]] | None:
+        """What closes a subtree, and the solutions in it, sought near a point (theory, section 6.11)."""
+        if self._enclosed is None:
+            return None
+        proposal = propose(self._scaled, codes, force, w, exactly=True)
+        if proposal is None:
+            return None
+        sign = definite_sign(self._enclosed, proposal.selection, proposal.free, proposal.tau)
+        solver = self._selections
+        solved = solver.solve_equations(proposal.selection, solver.system.g) if sign else None
+        if solved is None:
+            return None
+        point, determinant = solved
+        active, resting = solver.active(point), solver.resting(point)
+        free = zip(proposal.free, proposal.tau, strict=True)
+        uncounted = [not F or rests for F, rests in zip(solver.F_positive, resting, strict=True)]
+        if not all(proposal.selection[i] in active[i] and (tau > 0 or uncounted[i]) for i, tau in free):
+            return None
+        if not holds_below(codes, active):
+            return proposal, []
+        fixed = [active[i] for i in range(solver.p) if i not in proposal.free]
+        index = sign if all(len(held) == 1 for held in fixed) else None
+        strict = all(len(held) == 1 for held in active)
+        solution = SelectionSolution(proposal.selection, (point,), 0, determinant, strict, exact=True, index=index)
+        return proposal, [solution]
+
+    def solution_near(self, proposal: Proposal) -> SelectionSolution | None:
+        """The root of what is proposed with the statuses that hold exactly, by Newton's method; None if not found."""
+        solver, free, codes = self._selections, proposal.free, proposal.selection
+        units = self._scaled.force / self._scaled.length
+        for _ in range(_NEWTON_STEPS):
+            solved = solver.solve_equations(codes, solver.system.g)
+            if solved is None:
+                return None
+            point, determinant = solved
+            active = solver.active(point)
+            if all(code in held for code, held in zip(codes, active, strict=True)):
+                strict = all(len(held) == 1 for held in active)
+                return SelectionSolution(codes, (point,), 0, determinant, strict, exact=True)
+            moved = solver.statuses_by_test_functions(point, units)
+            codes = tuple(moved[i] if i in free else code for i, code in enumerate(codes))
+        return None
 
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         """Whether the multipliers prove a positive lower bound on the energy."""

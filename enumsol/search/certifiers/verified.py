@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.kernel.closing import ClosedSolution, closed_solution, same_solution
 from enumsol.kernel.forms import form_margin
 from enumsol.kernel.point import VerifiedSelection, exclusion_margin, holds_no_root, solve_selection
 from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
 from enumsol.proof.proof_file import fraction_text, packed
 from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
+from enumsol.search.closing import propose, start
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import CONDITIONS, RowKind
 
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.rationals import ExactCertifier
+    from enumsol.search.closing import Proposal
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -51,6 +54,8 @@ class Leaf(enum.StrEnum):
     POLYTOPE = "D"
     UNLOADED = "z"
     UNDECIDED = "u"
+    CLOSED = "m"
+    CLOSED_IN_RATIONALS = "M"
 
 
 _ROW_NAMES = {
@@ -99,10 +104,14 @@ class VerifiedCertifier:
         self.recorder = recorder
         self._node_ids = node_ids
         self._escalations = Escalations()
-        self._verified: dict[Codes, VerifiedSelection] = {}
+        self._verified: dict[Codes, VerifiedSelection | ClosedSolution] = {}
         self._leaves = 0
         #: Forms in the order in which they were written.
         self._forms: dict[EnclosedForm, int] = {}
+        #: A complete selection was not decided by balls.
+        self.hard = False
+        #: Selections of the roots found in rationals.
+        self._known: list[Codes] = []
 
     @property
     def certified(self) -> Certified:
@@ -163,8 +172,11 @@ class VerifiedCertifier:
             self._escalations.balls += 1
             self._leaf(Leaf.NO_ROOT)
             return None
+        self.hard = True
         certifier = self._exact()
         if certifier is None:
+            if (found := self._closed_selection(codes, ball)) is not None:
+                return found[0] if found else None
             return self._undecided(codes, *_reason(codes, ball, self._node_ids))
         solution = certifier.selection(codes)
         if isinstance(solution, UndecidedPart):
@@ -173,9 +185,87 @@ class VerifiedCertifier:
         if solution is None:
             self._leaf(Leaf.NO_ROOT_IN_RATIONALS)
         else:
+            self._known.append(codes)
             points = [[_fraction(v) for v in vertex] for vertex in solution.vertices]
             self._leaf(Leaf.POLYTOPE, points, solution.dimension)
         return solution
+
+    # -- subtrees closed by their only possible solution (theory, section 6.11) ---------------------------------------
+
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
+        if self._enclosed is None:
+            return None
+        near = start(self._scaled, relaxation)
+        proposal = propose(self._scaled, codes, *near, exactly=False)
+        ball = None if proposal is None else self._proven(proposal)
+        # statuses that do not hold strictly are told by rationals, where there are any
+        if proposal is not None and ball is not None and (proposal.strict or ball.is_excluded or self._is_known(ball)):
+            return self._closed_by(proposal, ball)
+        certifier = self._exact()
+        if certifier is not None and (exact := certifier.closing(codes, *near)) is not None:
+            closing, solutions = exact
+            self._known += [solution.codes for solution in solutions]
+            self._escalations.rationals += 1
+            self._leaf(Leaf.CLOSED_IN_RATIONALS, closing.selection, closing.tau.tolist(), len(solutions))
+            return solutions
+        found = None if proposal is None or ball is None else self._closed_by(proposal, ball)
+        if found and proposal is not None and certifier is not None:
+            exactly = certifier.solution_near(proposal)
+            if exactly is not None:
+                self._known.append(exactly.codes)
+                return [exactly]
+        return found
+
+    def _closed_selection(self, codes: Codes, near: VerifiedSelection | None) -> list[SelectionSolution] | None:
+        """The same for a selection whose conditions are not decided, without rationals."""
+        if near is None:
+            return None
+        proposal = propose(self._scaled, codes, near.force, near.w, exactly=False)
+        ball = None if proposal is None else self._proven(proposal)
+        return None if proposal is None or ball is None else self._closed_by(proposal, ball)
+
+    def _proven(self, proposal: Proposal) -> ClosedSolution | None:
+        system, tau = _present(self._enclosed), proposal.tau
+        ball = closed_solution(system, proposal.selection, proposal.free, tau, proposal.force)
+        return ball if ball is not None and (ball.is_root or ball.is_excluded) else None
+
+    def _is_known(self, ball: ClosedSolution) -> bool:
+        """Whether it is a root that was found in rationals before."""
+        return any(same_solution(ball.core, ball.possible, codes, _only(codes)) for codes in self._known)
+
+    def _closed_by(self, proposal: Proposal, ball: ClosedSolution) -> list[SelectionSolution] | None:
+        """Write a leaf and give its solutions; None where a root could not be told from another one."""
+        record = [proposal.selection, proposal.free, proposal.tau.tolist(), (ball.force * self._scaled.force).tolist()]
+        if ball.is_excluded:
+            self._escalations.balls += 1
+            self._leaf(Leaf.CLOSED, *record)
+            return []
+        solution = self._regular_one(ball)
+        if solution is None:
+            known = [other for other in self._verified.values() if isinstance(other, ClosedSolution)]
+            alike = [same_solution(ball.core, ball.possible, other.core, other.possible) for other in known]
+            if None in alike and True not in alike:
+                return None
+            self._verified[ball.core] = ball
+            solution = SelectionSolution(
+                ball.core, (ball.force,), 0, 0, strict=False, index=ball.sign, possible=ball.possible
+            )
+        self._escalations.balls += 1
+        radius = ball.force_rad * self._scaled.force * _WIDEN
+        self._leaf(Leaf.CLOSED, *record, radius.tolist(), ball.sign)
+        return [solution]
+
+    def _regular_one(self, ball: ClosedSolution) -> SelectionSolution | None:
+        """The solution in its only selection, if there is one only and it is regular."""
+        if any(len(codes) > 1 for codes in ball.possible):
+            return None
+        codes = tuple(code for (code,) in ball.possible)
+        regular = solve_selection(_present(self._enclosed), codes)
+        if regular is None or not regular.is_root:
+            return None
+        self._verified[codes] = regular
+        return SelectionSolution(codes, (regular.force,), 0, regular.det_sign, strict=True)
 
     def unloaded(self) -> None:
         """Write the proof of the unloaded body."""
@@ -192,6 +282,7 @@ class VerifiedCertifier:
         """Forget what was proven."""
         self._verified, self._escalations, self._leaves = {}, Escalations(), 0
         self._forms.clear()
+        self._known.clear()
 
     def _regular(self, codes: Codes, ball: VerifiedSelection) -> SelectionSolution:
         self._verified[codes] = ball
@@ -217,6 +308,16 @@ def _margins(system: EnclosedSystem) -> Callable[[Codes, NDArray[np.intp], Array
     except ImportError:
         return partial(exclusion_margin, system, errors=2.0)
     return Margins((system,), system.F, system.F).margin
+
+
+def _present(system: EnclosedSystem | None) -> EnclosedSystem:
+    if system is None:
+        raise AssertionError("there are no balls")
+    return system
+
+
+def _only(codes: Codes) -> tuple[frozenset[int], ...]:
+    return tuple(frozenset((code,)) for code in codes)
 
 
 def _fraction(value: Any) -> str:

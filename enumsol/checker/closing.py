@@ -1,0 +1,158 @@
+"""Leaves that close a subtree by its only possible solution, as the checker tests them (docs/proof_format.md)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from flint import fmpq_mat
+
+from enumsol.arithmetic.balls import SAFE
+from enumsol.arithmetic.rationals import to_fraction
+from enumsol.kernel.closing import closed_solution, definite_sign, final_codes, same_solution
+from enumsol.kernel.rows import CONTACT, FRICTIONLESS, OPEN, STICK
+from enumsol.proof.reading import numbers_from
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.checker.rational import RationalSystem
+    from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.kernel.closing import ClosedSolution
+
+    Codes = tuple[int, ...]
+    Array = NDArray[np.float64]
+    #: The core of a solution, and per node the codes that may hold there.
+    Known = tuple[Codes, Sequence[frozenset[int]]]
+
+
+def closed_by_balls(
+    system: EnclosedSystem, codes: Codes, record: list[Any], force: Array
+) -> tuple[str | None, ClosedSolution | None]:
+    """Why a record of kind "m" proves nothing, or None; and the root that it proves, if it claims one."""
+    if len(record) not in (5, 7):
+        return f"its record has {len(record)} entries; expected 5 or 7", None
+    selection = _selection(record[1], system.F > 0)
+    free = _nodes(record[2], system.p)
+    if any(code != selection[i] for i, code in enumerate(codes) if i not in free):
+        return "a node that has a status in its proof has another one in its assignment", None
+    tau = _weights(record[3], len(free))
+    mid = numbers_from(record[4], 2 * system.p)
+    ball = closed_solution(system, selection, free, tau, mid / force)
+    if ball is None:
+        return "its reduced problem is not proven to have one solution", None
+    if len(record) == 5:
+        return (None if ball.is_excluded else "its only solution does not break a condition strictly"), None
+    if not ball.is_root:
+        return "its only solution is not proven to be a root", None
+    radius = numbers_from(record[5], 2 * system.p)
+    with np.errstate(over="ignore", invalid="ignore"):
+        inside = (np.abs(mid - ball.force * force) + ball.force_rad * force) * SAFE <= radius
+    if not np.all(inside | ((ball.force_rad == 0) & (mid == 0) & (radius >= 0))):
+        return "its enclosure does not hold the root", None
+    return (None if type(record[6]) is int and record[6] == ball.sign else "its index is wrong"), ball
+
+
+def closed_in_rationals(
+    system: EnclosedSystem, rational: RationalSystem, codes: Codes, record: list[Any]
+) -> tuple[str | None, Codes, list[Any]]:
+    """Why a record of kind "M" proves nothing, or None; the selection that it names, and the root in it, if any."""
+    friction = system.F > 0
+    selection = _selection(record[1], friction)
+    free = tuple(i for i, code in enumerate(codes) if code > FRICTIONLESS)
+    if any(code != selection[i] for i, code in enumerate(codes) if i not in free):
+        return "its selection is none below its assignment", selection, []
+    tau = _weights(record[2], len(free))
+    if not definite_sign(system, selection, free, tau):
+        return "its reduced form is not proven definite", selection, []
+    point = _point(rational, selection)
+    if point is None:
+        return "its selection is singular", selection, []
+    w = _displacements(rational, point)
+    least = {i: min(rational.node_conditions(selection[i], i, point)) for i in range(rational.p)}
+    if any(least[i] < 0 for i in free):
+        return "the point of its selection does not solve the reduced problem", selection, []
+    for i, weight in zip(free, tau, strict=True):
+        if friction[i] and weight == 0 and not _rests(rational, point, w, i):
+            return "a node of its reduced form needs a weight", selection, []
+    touching = all(w[i] == 0 for i, code in enumerate(codes) if code == CONTACT)
+    holds = touching and all(least[i] >= 0 for i in range(rational.p) if i not in free)
+    if record[3] is not holds and (type(record[3]) is not int or record[3] != int(holds)):
+        return "it holds another number of roots than it claims", selection, []
+    return None, selection, [tuple(to_fraction(x) for x in point)] if holds else []
+
+
+def count_apart(closed: dict[Codes, ClosedSolution], others: list[Codes]) -> tuple[int, int]:
+    """Closed roots that are not among those of complete selections, each once, and how many of them are in doubt."""
+    known: list[Known] = [(codes, tuple(frozenset((code,)) for code in codes)) for codes in others if closed]
+    kept = doubtful = 0
+    for core, ball in sorted(closed.items()):
+        answers = [same_solution(core, ball.possible, *other) for other in known]
+        if True in answers:
+            continue
+        doubtful += None in answers
+        kept += 1
+        known.append((core, ball.possible))
+    return kept, doubtful
+
+
+def _selection(value: Any, friction: NDArray[np.bool_]) -> Codes:
+    if not isinstance(value, list) or len(value) != len(friction) or not all(type(code) is int for code in value):
+        raise ValueError(f"its selection is no list of {len(friction)} codes")
+    if any(code not in final_codes(bool(positive)) for code, positive in zip(value, friction, strict=True)):
+        raise ValueError("a node cannot have the code that its selection gives it")
+    return tuple(value)
+
+
+def _nodes(value: Any, p: int) -> tuple[int, ...]:
+    if not isinstance(value, list) or not all(type(i) is int and 0 <= i < p for i in value):
+        raise ValueError("its free nodes are no list of nodes")
+    if sorted(set(value)) != value:
+        raise ValueError("its free nodes are not ascending")
+    return tuple(value)
+
+
+def _weights(value: Any, size: int) -> Array:
+    tau = numbers_from(value, size)
+    if np.any(tau < 0):
+        raise ValueError("a weight is negative")
+    return tau
+
+
+def _point(rational: RationalSystem, selection: Codes) -> list[Any] | None:
+    """The only solution of a selection's equations; None where they are singular."""
+    p, S = rational.p, rational.S
+    closed = [i for i, code in enumerate(selection) if code != OPEN]
+    held = [p + i for i, code in enumerate(selection) if code == STICK]
+    rows, point = closed + held, [rational.zero] * (2 * p)
+    if not rows:
+        return point
+    turn = [{2: rational.F[i], 3: -rational.F[i]}.get(selection[i], rational.zero) for i in closed]
+    table = [
+        [S[r, i] + f * S[r, p + i] for i, f in zip(closed, turn, strict=True)] + [S[r, k] for k in held] for r in rows
+    ]
+    try:
+        y = fmpq_mat(table).solve(fmpq_mat([[rational.g[r]] for r in rows])).entries()
+    except ZeroDivisionError:
+        return None
+    for i, f, force in zip(closed, turn, y, strict=False):
+        point[i], point[p + i] = force, f * force
+    for k, force in zip(held, y[len(closed) :], strict=True):
+        point[k] = force
+    return point
+
+
+def _displacements(rational: RationalSystem, point: list[Any]) -> list[Any]:
+    moved = (rational.S * fmpq_mat([[x] for x in point])).entries()
+    return [g - x for g, x in zip(rational.g, moved, strict=True)]
+
+
+def _rests(rational: RationalSystem, point: list[Any], w: list[Any], node: int) -> bool:
+    """Whether the test of definiteness need not count a node (theory, (6.9))."""
+    n, t = node, rational.p + node
+    if point[t] != 0:
+        return False
+    apart = point[n] == 0 and w[n] + rational.F[node] * abs(w[t]) <= 0
+    return bool(apart or (w[n] == 0 and w[t] == 0))

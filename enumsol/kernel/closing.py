@@ -1,0 +1,315 @@
+"""The trusted test of closed subtrees: one reduced solution where some contact nodes are free (theory, section 6.11).
+
+Some nodes have a status, the others are free: they may have any. Eliminating the equations of the fixed nodes leaves
+the reduced problem of the free ones, w = h - R lambda. Where its matrix passes a test of definiteness it has exactly
+one solution, which is enclosed without knowing the statuses of its nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, upper_norm
+from enumsol.kernel.ball_arrays import Ball, determinant_sign, solution
+from enumsol.kernel.point import row_balls
+from enumsol.kernel.rows import (
+    CONDITIONS,
+    FRICTIONLESS,
+    OPEN,
+    SLIP_MINUS,
+    SLIP_PLUS,
+    STICK,
+    UNDECIDED,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.arithmetic.balls import Array
+    from enumsol.condensation.enclosure import EnclosedSystem
+
+    Codes = tuple[int, ...]
+
+
+def core_of(selection: Sequence[int], free: Sequence[int]) -> Codes:
+    """The selection with its free nodes undecided."""
+    chosen = set(free)
+    return tuple(UNDECIDED if i in chosen else code for i, code in enumerate(selection))
+
+
+@dataclass(frozen=True)
+class ClosedSolution:
+    """The one solution of a reduced problem as balls, in scaled units.
+
+    Attributes
+    ----------
+    core : status codes, UNDECIDED at the free nodes
+    force, force_rad, w, w_rad : (2p,) arrays
+        lambda and w = g - S lambda.
+    possible : per node the final codes that may hold there; those of a fixed node that holds strictly are its own only
+    sign : int
+        Sign of the determinant of the fixed nodes' equations: the index, if the fixed nodes' conditions hold strictly.
+    slack, slack_rad : arrays
+        The conditions of the fixed nodes.
+    """
+
+    core: Codes
+    force: Array
+    force_rad: Array
+    w: Array
+    w_rad: Array
+    possible: tuple[frozenset[int], ...]
+    sign: int
+    slack: Array
+    slack_rad: Array
+
+    @property
+    def is_root(self) -> bool:
+        """The conditions of all fixed nodes hold strictly: exactly one root has this core."""
+        return bool(np.all(self.slack > self.slack_rad))
+
+    @property
+    def is_excluded(self) -> bool:
+        """A condition of a fixed node is broken strictly: no root has this core."""
+        return bool(np.any(self.slack < -self.slack_rad))
+
+
+def final_codes(friction: bool) -> tuple[int, ...]:
+    """The final codes of a node."""
+    return (OPEN, STICK, SLIP_PLUS, SLIP_MINUS) if friction else (OPEN, FRICTIONLESS)
+
+
+def closed_solution(
+    system: EnclosedSystem, selection: Codes, free: Sequence[int], tau: Array, force: Array
+) -> ClosedSolution | None:
+    """The only solution of the reduced problem of the free nodes, or None where that is not proven.
+
+    Parameters
+    ----------
+    system : EnclosedSystem
+    selection : final codes; those of the free nodes only name a point near the solution
+    free : ascending nodes
+    tau : one number a free node, positive, or 0 where it is open by more than its slip bound (theory, (6.9))
+    force : (2p,) array, lambda near the solution; only that of the free nodes is read
+    """
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        reduced = Reduced.of(system, selection, free)
+        return None if reduced is None or not _are_weights(tau, free) else reduced.enclosed(tau, force)
+
+
+def definite_sign(system: EnclosedSystem, selection: Codes, free: Sequence[int], tau: Array) -> int:
+    """The determinant's sign of the fixed nodes' equations if the reduced form with tau is definite, 0 if not proven.
+
+    Where ``tau`` is zero nothing is asked of the node: that it may be so is to be shown otherwise (theory, (6.9)).
+    """
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        reduced = Reduced.of(system, selection, free)
+        if reduced is None or not _are_weights(tau, free):
+            return 0
+        return reduced.sign if reduced.least(tau) > 0 else 0
+
+
+def _are_weights(tau: Array, free: Sequence[int]) -> bool:
+    return len(tau) == len(free) and bool(np.all(np.isfinite(tau) & (tau >= 0)))
+
+
+def same_solution(
+    one: Codes, one_possible: Sequence[frozenset[int]], other: Codes, other_possible: Sequence[frozenset[int]]
+) -> bool | None:
+    """Whether two solutions, each the only one of its core, are the same; None where that is open.
+
+    The solution of one core solves that of another if it has the statuses of its fixed nodes. A solution in a complete
+    selection is one whose core is complete.
+    """
+    if any(not a & b for a, b in zip(one_possible, other_possible, strict=True)):
+        return False
+    for core, possible in ((one, other_possible), (other, one_possible)):
+        if all(code == UNDECIDED or held == {code} for code, held in zip(core, possible, strict=True)):
+            return True
+    return None
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """w = h - R lambda on the free nodes, by elimination of the fixed ones.
+
+    Attributes
+    ----------
+    places : int array
+        Of the free components in lambda: all lambda_n, then lambda_t of the nodes with friction.
+    normal, tangential : int arrays
+        Places of the components of every free node among them; -1 where there is none.
+    E, Z : Ball
+        lambda = E y + P x, and y = Z (1, -x): the fixed nodes' forces for free ones x.
+    R, h : Ball
+    """
+
+    system: EnclosedSystem
+    selection: Codes
+    free: NDArray[np.intp]
+    places: NDArray[np.intp]
+    normal: NDArray[np.intp]
+    tangential: NDArray[np.intp]
+    rows: NDArray[np.intp]
+    E: Ball
+    Z: Ball
+    R: Ball
+    h: Ball
+    sign: int
+
+    @classmethod
+    def of(cls, system: EnclosedSystem, selection: Codes, free: Sequence[int]) -> Reduced | None:
+        """None where the fixed nodes' equations are not proven regular, or a node cannot have its code."""
+        if any(code not in final_codes(F > 0) for code, F in zip(selection, system.F, strict=True)):
+            return None
+        p, nodes = system.p, np.array(free, dtype=np.intp)
+        status = np.array(core_of(selection, free), dtype=np.intp)
+        closed = np.flatnonzero((status != OPEN) & (status != UNDECIDED))
+        held = p + np.flatnonzero(status == STICK)
+        rubbing = nodes[system.F[nodes] > 0]
+        places = np.concatenate([nodes, p + rubbing])
+        tangential = np.full(len(nodes), -1, dtype=np.intp)
+        tangential[system.F[nodes] > 0] = len(nodes) + np.arange(len(rubbing))
+        slip = np.where(status == SLIP_PLUS, 1.0, 0.0) - np.where(status == SLIP_MINUS, 1.0, 0.0)
+        E, E_rad = np.zeros((2 * p, len(closed) + len(held))), np.zeros((2 * p, len(closed) + len(held)))
+        column = np.arange(len(closed))
+        E[closed, column] = 1.0
+        E[p + closed, column], E_rad[p + closed, column] = (slip * system.F)[closed], (abs(slip) * system.F_rad)[closed]
+        E[held, len(closed) + np.arange(len(held))] = 1.0
+        forms, rows = Ball(E, E_rad), np.concatenate([closed, held])
+        S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
+        M = S[rows] @ forms
+        sign = determinant_sign(M)
+        across = S[np.ix_(rows, places)]
+        right = Ball(np.column_stack([g.mid[rows], across.mid]), np.column_stack([g.rad[rows], across.rad]))
+        Z = solution(M, right) if sign else None
+        if Z is None:
+            return None
+        moved = (S[places] @ forms) @ Z
+        R, h = S[np.ix_(places, places)] - moved[:, 1:], g[places] - moved[:, 0]
+        return cls(system, selection, nodes, places, np.arange(len(nodes)), tangential, rows, forms, Z, R, h, sign)
+
+    @cached_property
+    def _slope(self) -> Array:
+        """Upper bounds of the free nodes' friction coefficients."""
+        return np.asarray((self.system.F + self.system.F_rad)[self.free] * SAFE)
+
+    def least(self, tau: Array) -> float:
+        """Lower bound of the smallest eigenvalue of Q (theory, (6.9)), at most 0 where none positive is proven."""
+        if not len(self.places):
+            return 1.0
+        used = np.flatnonzero((self.tangential >= 0) & (tau > 0))
+        # weights at least F / sqrt(tau), for any rounding
+        weight = self._slope[used] / np.sqrt(tau[used]) * SAFE + TINY
+        T = self.R[self.tangential[used]] * Ball.exact(np.repeat(weight[:, None], len(self.places), axis=1))
+        square = Ball(T.mid.T, T.rad.T) @ T
+        Q = self.R - Ball.exact(np.diag(self._diagonal(used, tau))) - Ball(0.5 * square.mid, 0.5 * square.rad)
+        mid = 0.5 * (Q.mid + Q.mid.T)
+        # the symmetric part of the form lies in the mean of both triangles
+        rad = (np.maximum(Q.rad, Q.rad.T) + 4 * UNIT * np.abs(mid)) * SAFE
+        if not (np.all(np.isfinite(mid)) and np.all(np.isfinite(rad))):
+            return 0.0
+        return float((dense_eigenvalue_bound(mid) - upper_norm(rad)) / SAFE)
+
+    def _diagonal(self, used: NDArray[np.intp], tau: Array) -> Array:
+        diagonal = np.zeros(len(self.places))
+        diagonal[self.normal[used]] = 0.5 * tau[used]
+        return diagonal
+
+    def enclosed(self, tau: Array, force: Array) -> ClosedSolution | None:
+        """The solution as a ball, None where it is not proven to exist and to be the only one."""
+        least = self.least(tau)
+        if not least > 0:
+            return None
+        x = self._point(force)
+        reach = self._distance(self._displacements(x)) / least * SAFE
+        if not np.isfinite(reach):
+            return None
+        x = Ball(x.mid, (x.rad + reach) * SAFE)
+        easy = (tau == 0) & (self.tangential >= 0)
+        if not self._far_from_contact(np.flatnonzero(easy), self._displacements(x)):
+            return None
+        # nodes that are open at all solutions
+        x.rad[self.normal[easy]] = x.rad[self.tangential[easy]] = 0.0
+        return self._solution(x, self._displacements(x))
+
+    def _displacements(self, x: Ball) -> Ball:
+        """w of the free components."""
+        return self.h - (self.R @ Ball(x.mid[:, None], x.rad[:, None]))[:, 0]
+
+    def _far_from_contact(self, nodes: NDArray[np.intp], w: Ball) -> bool:
+        """Whether nodes are open with w_n + F |w_t| < 0."""
+        n, t = self.normal[nodes], self.tangential[nodes]
+        across = self._slope[nodes] * w.size[t]
+        largest = w.mid[n] + w.rad[n] + across + 8 * UNIT * (np.abs(w.mid[n]) + w.rad[n] + across) + TINY
+        named_open = all(self.selection[node] == OPEN for node in self.free[nodes])
+        return named_open and bool(np.all(largest < 0))
+
+    def _point(self, force: Array) -> Ball:
+        """Forces in the cones, with the statuses of the selection, near the given ones."""
+        p, system = self.system.p, self.system
+        mid, rad = np.zeros(len(self.places)), np.zeros(len(self.places))
+        for i, node in enumerate(self.free):
+            code, t = self.selection[node], self.tangential[i]
+            if code == OPEN:
+                continue
+            n = max(float(force[node]), 0.0)
+            mid[i] = n
+            if code == STICK:
+                bound = max(system.F[node] - system.F_rad[node], 0.0) * n / SAFE
+                mid[t] = min(max(float(force[p + node]), -bound), bound)
+            elif code in (SLIP_PLUS, SLIP_MINUS):
+                mid[t] = (1.0 if code == SLIP_PLUS else -1.0) * system.F[node] * n
+                rad[t] = (system.F_rad[node] * n + 2 * UNIT * abs(mid[t])) * SAFE + TINY
+        return Ball(mid, rad)
+
+    def _distance(self, w: Ball) -> float:
+        """Bound of ||d|| + ||F d_t|| with d the change of h for which the point is a solution (theory, (6.10))."""
+        size, change = w.size, np.zeros(len(self.places))
+        up, down = np.maximum(w.mid + w.rad, 0.0) * SAFE, np.maximum(w.rad - w.mid, 0.0) * SAFE
+        for i, node in enumerate(self.free):
+            code, t = self.selection[node], self.tangential[i]
+            change[i] = up[i] if code == OPEN else size[i]
+            if t >= 0:
+                change[t] = {OPEN: 0.0, STICK: size[t], SLIP_PLUS: down[t], SLIP_MINUS: up[t]}[code]
+        rubbing = self.tangential >= 0
+        return float((upper_norm(change) + upper_norm(self._slope[rubbing] * change[self.tangential[rubbing]])) * SAFE)
+
+    def _solution(self, x: Ball, w_free: Ball) -> ClosedSolution:
+        system, p = self.system, self.system.p
+        y = self.Z[:, 0] - (self.Z[:, 1:] @ Ball(x.mid[:, None], x.rad[:, None]))[:, 0]
+        force = (self.E @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
+        status = np.array(core_of(self.selection, self.free.tolist()))
+        idle = np.concatenate([status == OPEN, (status == OPEN) | (status == FRICTIONLESS) | (status == UNDECIDED)])
+        force.mid[idle], force.rad[idle] = 0.0, 0.0
+        force.mid[self.places], force.rad[self.places] = x.mid, x.rad
+        S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
+        w = g - (S @ Ball(force.mid[:, None], force.rad[:, None]))[:, 0]
+        w.mid[self.places], w.rad[self.places] = w_free.mid, w_free.rad
+        w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
+        values, radii = row_balls(system, force.mid, force.rad, w.mid, w.rad)
+        fixed = [(kind, i) for i in range(p) if status[i] != UNDECIDED for kind in CONDITIONS[int(status[i])][1]]
+        kinds, nodes = (np.array(part, dtype=np.intp) for part in (zip(*fixed, strict=True) if fixed else ((), ())))
+        possible = tuple(
+            frozenset((int(status[i]),)) if status[i] != UNDECIDED else self._possible(i, values[:, i], radii[:, i])
+            for i in range(p)
+        )
+        core = tuple(status.tolist())
+        slack, slack_rad = values[kinds, nodes], radii[kinds, nodes]
+        return ClosedSolution(core, force.mid, force.rad, w.mid, w.rad, possible, self.sign, slack, slack_rad)
+
+    def _possible(self, node: int, values: Array, radii: Array) -> frozenset[int]:
+        """Final codes of a free node that its balls do not exclude."""
+        high, low = values + radii, values - radii
+        return frozenset(
+            code
+            for code in final_codes(self.system.F[node] > 0)
+            if all(low[k] <= 0 <= high[k] for k in CONDITIONS[code][0])
+            and all(high[k] >= 0 for k in CONDITIONS[code][1])
+        )

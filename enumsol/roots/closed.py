@@ -1,0 +1,53 @@
+"""Roots that close subtrees and are known by their enclosures: each once, beside those of single selections."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from enumsol.kernel.closing import same_solution
+from enumsol.roots.components import RootComponent
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from enumsol.selections.solution import Codes, SelectionSolution
+
+Kept = tuple[list["SelectionSolution"], list["SelectionSolution"], list["Codes"]]
+
+
+def apart(solutions: Iterable[SelectionSolution]) -> Kept:
+    """Solutions of selections, closed roots that are none of them, each once, and the cores of those in doubt.
+
+    Neither depends on the order of the solutions. A closed root that is a degenerate solution of a selection gives it
+    its index; one in doubt may be the same as another one (theory, section 6.11).
+    """
+    single, closed = [], {}
+    for solution in solutions:
+        if solution.possible is None:
+            single.append(solution)
+        else:
+            closed[solution.codes] = solution
+    kept: list[SelectionSolution] = []
+    doubtful = []
+    for core, solution in sorted(closed.items()):
+        same = [_same(solution, other) for other in single]
+        for k in (k for k, answer in enumerate(same) if answer and not single[k].strict):
+            single[k] = replace(single[k], index=solution.index)
+        same += [_same(solution, other) for other in kept]
+        if True in same:
+            continue
+        if None in same:
+            doubtful.append(core)
+        kept.append(solution)
+    return single, kept, doubtful
+
+
+def _same(closed: SelectionSolution, other: SelectionSolution) -> bool | None:
+    possible = other.possible or tuple(frozenset((code,)) for code in other.codes)
+    return same_solution(closed.codes, closed.possible or (), other.codes, possible)
+
+
+def closed_component(solution: SelectionSolution) -> RootComponent:
+    """A closed root, of which all is known that ever will be."""
+    return RootComponent((solution,), solution.possible or (), 0, solution.index, whole=True)

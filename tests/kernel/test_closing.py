@@ -1,0 +1,87 @@
+"""The test that closes a subtree, against all selections in rationals."""
+
+import numpy as np
+import pytest
+from rational_closings import Reduced
+from rational_forms import Data, Forms, Refused, exact
+from touching import touching_problem
+
+from enumsol.condensation.enclosure import CondensedEnclosure
+from enumsol.kernel.closing import closed_solution, definite_sign, same_solution
+
+
+def system_of(problem):
+    scaled = problem.condensed.at(0.0).scaled
+    return CondensedEnclosure.from_problem(problem).at(0.0, scaled.force, scaled.length), scaled
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_what_is_proven_is_so(seed):
+    rng = np.random.default_rng(seed)
+    proven = 0
+    for _ in range(6):
+        problem = touching_problem(rng, int(rng.integers(1, 4)))
+        system, scaled = system_of(problem)
+        data = Data(problem)
+        forms, friction = Forms(data.S, data.load(0), data.friction(0)), [F > 0 for F in problem.friction[0]]
+        selection = tuple(int(rng.integers(4)) if positive else int(rng.choice([0, 4])) for positive in friction)
+        free = tuple(i for i in range(problem.p) if rng.random() < 0.7)
+        # units of lambda are powers of two: forces of size one
+        tau = rng.choice([0.0, 0.1, 0.5, 1.0, 2.0], size=len(free))
+        force = rng.normal(size=2 * problem.p)
+        ball = closed_solution(system, selection, free, tau, force)
+        core = tuple(6 if i in free else code for i, code in enumerate(selection))
+        sign = definite_sign(system, selection, free, tau)
+        assert ball is None or (ball.sign == sign != 0 and ball.core == core)
+        if sign:
+            units = scaled.length[: problem.p] / scaled.force[: problem.p]
+            weights = {i: exact(float(t * units[i])) for i, t in zip(free, tau, strict=True)}
+            reduced = Reduced(forms, core, friction)
+            assert reduced.definite(weights)
+            assert (reduced.determinant > 0) == (sign > 0)
+        if ball is None:
+            continue
+        proven += 1
+        (point,) = reduced.solutions()
+        for k, value in enumerate(point):
+            x = float(value) / scaled.force[k]
+            assert abs(x - ball.force[k]) <= ball.force_rad[k] + 1e-14 * (1 + abs(x))
+            w = float(forms.move(1, k)[-1] + sum((a * b for a, b in zip(forms.move(1, k), point, strict=False)), 0))
+            w /= scaled.length[k]
+            assert abs(w - ball.w[k]) <= ball.w_rad[k] + 1e-14 * (1 + abs(w))
+    assert proven
+
+
+def test_bad_proposals_prove_nothing():
+    problem = touching_problem(np.random.default_rng(3), 3)
+    system, _ = system_of(problem)
+    assert np.all(system.F > 0)
+    assert definite_sign(system, (1, 1, 1), (), np.zeros(0)) == 1
+    for selection in ((4, 1, 1), (1, 1, 6), (0, 5, 0)):
+        assert definite_sign(system, selection, (), np.zeros(0)) == 0
+        assert closed_solution(system, selection, (0, 1), np.ones(2), np.zeros(6)) is None
+    free, near = (0, 1, 2), np.zeros(6)
+    for weight in (np.inf, np.nan, -1.0, 1e300, 1e-300):
+        tau = np.array([weight, 1.0, 1.0])
+        assert definite_sign(system, (1, 1, 1), free, tau) == 0
+        assert closed_solution(system, (1, 1, 1), free, tau, near) is None
+    assert definite_sign(system, (1, 1, 1), free, np.ones(2)) == 0
+
+
+def test_which_solutions_are_the_same():
+    def sets(*codes):
+        return tuple(frozenset(held) for held in codes)
+
+    one = (1, 6, 6), sets({1}, {0, 1}, {2})
+    assert same_solution(*one, (1, 6, 2), sets({1}, {0, 1, 2}, {2})) is True
+    assert same_solution(*one, (1, 0, 2), sets({1}, {0}, {2})) is True
+    assert same_solution(*one, (1, 2, 6), sets({1}, {2}, {2, 3})) is False
+    assert same_solution(*one, (3, 6, 6), sets({3}, {0}, {2})) is False
+    # neither surely has the other one's statuses
+    assert same_solution((1, 6, 6), sets({1}, {0, 1}, {0, 1}), (6, 0, 6), sets({1, 2}, {0}, {0, 1})) is None
+
+
+def test_the_independent_judge_refuses():
+    data = Data(touching_problem(np.random.default_rng(3), 2))
+    with pytest.raises(Refused):
+        Reduced(Forms(data.S * 0, data.load(0), data.friction(0)), (1, 6), [True, True])

@@ -1,0 +1,141 @@
+"""[5.3, m and M] Leaves that close a subtree by its only possible solution, for rational_checker, in rationals.
+
+Nothing of enumsol is imported. That a solution is the only one is not believed because a form is definite: all
+selections of the free nodes are tried as well. Numbers in brackets are sections of docs/proof_format.md.
+"""
+
+from itertools import product
+
+from flint import fmpq, fmpq_mat
+from rational_forms import _value, as_point, column_of, exact, integer, need
+
+FINAL = {True: (0, 1, 2, 3), False: (0, 4)}
+KINDS = {0: (4,), 1: (0, 2, 3), 2: (0, 5), 3: (0, 6), 4: (0,)}
+
+
+class Closings:
+    """The closed subtrees of one proof."""
+
+    def __init__(self, forms, friction, units):
+        self.forms, self.friction, self.p = forms, friction, forms.p
+        self.unit = [length / force for length, force in zip(*units, strict=True)]
+        self.points = {}
+
+    def leaf(self, codes, selection, free, tau, mid, rad=None, index=None):
+        self.check(selection, free, codes)
+        core = tuple(6 if i in free else code for i, code in enumerate(selection))
+        reduced = Reduced(self.forms, core, self.friction)
+        tau = self.weights(free, tau)
+        need(reduced.definite(tau), "a form is not definite")
+        points = reduced.solutions()
+        need(len(points) == 1, "a reduced problem has no solution or several")
+        (point,) = points
+        for i in free:
+            if self.friction[i] and tau[i] == 0:
+                need(self.apart_from_contact(point, i) < 0, "a node needs a weight")
+        need(len(mid) == 2 * self.p, "a point has another size")
+        values = [value for i in reduced.fixed for value in self.conditions(core[i], i, point)]
+        if rad is None:
+            need(any(value < 0 for value in values), "no condition is broken")
+            return
+        need(all(value > 0 for value in values), "a condition is not strict")
+        need(len(rad) == 2 * self.p, "an enclosure has another size")
+        for x, m, r in zip(point, map(exact, mid), map(exact, rad), strict=True):
+            need(abs(x - m) <= r, "an enclosure misses the root")
+        need(integer(index) == (1 if reduced.determinant > 0 else -1), "an index is wrong")
+        self.points[as_point(point)] = point
+
+    def exact_leaf(self, codes, selection, tau, count):
+        """The selection as a polytope to be counted, if the leaf holds its solution."""
+        free = [i for i, code in enumerate(codes) if code in (5, 6)]
+        self.check(selection, free, codes)
+        equations = self.forms.equations(selection)
+        N = fmpq_mat([form[:-1] for form in equations])
+        need(N.det() != 0, "a selection is singular")
+        point = N.solve(column_of([-form[-1] for form in equations])).entries()
+        reduced = Reduced(self.forms, tuple(6 if i in free else c for i, c in enumerate(selection)), self.friction)
+        tau = self.weights(free, tau)
+        need(reduced.definite(tau), "a form is not definite")
+        holds = {i: min(self.conditions(selection[i], i, point)) >= 0 for i in range(self.p)}
+        need(all(holds[i] for i in free), "the reduced problem has another solution")
+        for i in free:
+            if self.friction[i] and tau[i] == 0:
+                n, t, w_n, w_t = self.values(point, i)
+                rests = t == 0 and ((n == 0 and w_n + self.forms.F[i] * abs(w_t) <= 0) or w_n == w_t == 0)
+                need(rests, "a node needs a weight")
+        need([as_point(x) for x in reduced.solutions()] == [as_point(point)], "a reduced problem has several solutions")
+        touching = all(self.values(point, i)[2] == 0 for i in free if codes[i] == 5)
+        need(integer(count) == int(touching and all(holds.values())), "a leaf holds another number of roots")
+        return [(tuple(selection), 0)] if count else []
+
+    def apart(self, others):
+        """[5.4] How many closed roots solve none of these selections."""
+        return sum(not any(self.solves(codes, point) for codes in others) for point in self.points.values())
+
+    def solves(self, codes, point):
+        equations = all(_value(form, point) == 0 for form in self.forms.equations(codes))
+        return equations and all(_value(form, point) >= 0 for form in self.forms.conditions(codes))
+
+    def check(self, selection, free, codes):
+        need(len(selection) == self.p, "a selection has another size")
+        for i, code in enumerate(selection):
+            need(integer(code) in FINAL[bool(self.friction[i])], "a node cannot have its code")
+            need(i in free or codes[i] == code, "a fixed node has another code")
+        need(list(free) == sorted({integer(i) for i in free if 0 <= i < self.p}), "free nodes are out of order")
+
+    def weights(self, free, tau):
+        need(len(tau) == len(free), "there are not as many weights as free nodes")
+        found = {i: exact(value) * self.unit[i] for i, value in zip(free, tau, strict=True)}
+        need(all(value >= 0 for value in found.values()), "a weight is negative")
+        return found
+
+    def values(self, point, i):
+        w = [_value(self.forms.move(1, k), point) for k in (i, self.p + i)]
+        return point[i], point[self.p + i], *w
+
+    def apart_from_contact(self, point, i):
+        _, _, w_n, w_t = self.values(point, i)
+        return w_n + self.forms.F[i] * abs(w_t)
+
+    def conditions(self, code, i, point):
+        return [_value(self.forms.row(kind, i), point) for kind in KINDS[code]]
+
+
+class Reduced:
+    """w = h - R x on the free nodes of a core."""
+
+    def __init__(self, forms, core, friction):
+        self.forms, self.core, self.friction, p = forms, core, friction, forms.p
+        self.free = [i for i, code in enumerate(core) if code == 6]
+        self.fixed = [i for i, code in enumerate(core) if code != 6]
+        self.places = self.free + [p + i for i in self.free if friction[i]]
+        # lambda as a function of x: the free components are set
+        rows = forms.equations([0 if code == 6 else code for code in core])
+        N = fmpq_mat([row[:-1] for row in rows])
+        self.determinant = N.det()
+        need(self.determinant != 0, "the fixed nodes' equations are singular")
+        sides = [[-row[-1] for row in rows]] + [[fmpq(int(k == place)) for k in range(2 * p)] for place in self.places]
+        solved = N.solve(fmpq_mat(sides).transpose()).transpose().tolist()
+        self.R = [[-_value(forms.move(1, k), x, 0) for x in solved[1:]] for k in self.places]
+
+    def definite(self, tau):
+        size, m = len(self.places), len(self.free)
+        Q = [[(self.R[a][b] + self.R[b][a]) / 2 for b in range(size)] for a in range(size)]
+        for n, i in enumerate(self.free):
+            if self.friction[i] and tau[i] > 0:
+                r = self.R[m + [j for j in self.free if self.friction[j]].index(i)]
+                Q[n][n] -= tau[i] / 2
+                factor = self.forms.F[i] ** 2 / tau[i] / 2
+                Q = [[q - factor * r[a] * r[b] for b, q in enumerate(row)] for a, row in enumerate(Q)]
+        return all(fmpq_mat([row[:k] for row in Q[:k]]).det() > 0 for k in range(1, size + 1))
+
+    def solutions(self):
+        """All vertices of the solution sets over the selections of the free nodes."""
+        found = set()
+        for chosen in product(*(FINAL[bool(self.friction[i])] for i in self.free)):
+            codes = list(self.core)
+            for i, code in zip(self.free, chosen, strict=True):
+                codes[i] = code
+            given = [self.forms.row(kind, i) for i in self.free for kind in KINDS[codes[i]]]
+            found.update(self.forms.vertices(self.forms.equations(codes), given))
+        return [[fmpq(*x.as_integer_ratio()) for x in point] for point in sorted(found)]

@@ -1,0 +1,157 @@
+"""Closed subtrees: how many nodes they leave, and the same roots as without (theory, section 6.11)."""
+
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+import pytest
+from generators import random_problem
+from touching import beside_a_loaded_node, row_of_discs, touching_problem
+
+from enumsol import ContactProblem, enumerate_roots, verify
+from enumsol.search import closing, solvers
+
+
+@pytest.mark.parametrize("slides", [False, True])
+@pytest.mark.parametrize("grazing", [False, True])
+def test_grazing_nodes_cost_a_number_of_nodes_linear_in_theirs(slides, grazing):
+    for k in (4, 8, 16, 32):
+        problem = beside_a_loaded_node(k, slides=slides, grazing=grazing)
+        roots = enumerate_roots(problem, 0, max_nodes=6 * k + 20)
+        assert roots.complete
+        assert len(roots) == roots.index_sum == 1
+        assert all(len(held) == (2 if grazing else 4) for held in roots[0].active[1:])
+        assert verify(problem, roots.proof).complete
+
+
+def test_sixty_four_unloaded_nodes():
+    problem = beside_a_loaded_node(64, slides=False, grazing=False)
+    for arithmetic in ("verified", "exact"):
+        roots = enumerate_roots(problem, 0, arithmetic, max_nodes=20)
+        assert roots.complete
+        assert len(roots) == 1
+        assert all(len(held) == 4 for held in roots[0].active[1:])
+
+
+def test_a_row_of_discs():
+    problem = row_of_discs(20)
+    roots = enumerate_roots(problem, 0, max_nodes=40)
+    assert roots.complete
+    assert roots.index_sum == len(roots) == 1
+    # 18 pairs of discs touch without load
+    assert sum(len(held) == 4 for held in roots[0].active) == 18
+    assert verify(problem, roots.proof).complete
+
+
+@pytest.fixture
+def every_node(monkeypatch):
+    """Every subtree is tried."""
+    before = closing.Closer.closed
+
+    def closed(self, codes, relaxation):
+        self._alert, self._wait = True, 0
+        return before(self, codes, relaxation)
+
+    monkeypatch.setattr(closing.Closer, "closed", closed)
+
+
+def alike(problem, exact, roots):
+    """Whether roots are those found in rationals, within their enclosures, with all statuses that hold."""
+    assert roots.complete
+    assert verify(problem, roots.proof).complete
+    assert [len(roots), len(roots.families)] == [len(exact), len(exact.families)]
+
+    def ordered(found):
+        return sorted(found, key=lambda root: (root.lambda_n.round(9).tolist(), root.lambda_t.round(9).tolist()))
+
+    for one, other in zip(ordered(exact), ordered(roots), strict=True):
+        assert one.index == other.index
+        assert all(held <= may for held, may in zip(one.active, other.active, strict=True))
+        for name in ("lambda_n", "lambda_t", "u_n", "u_t"):
+            (low, high), wide = getattr(other.enclosure, name).T, 1e-14
+            assert np.all((low <= getattr(other, name)) & (getattr(other, name) <= high))
+            assert np.all((low - wide <= getattr(one, name)) & (getattr(one, name) <= high + wide))
+            assert np.max(high - low) < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_roots_are_those_of_all_selections(every_node, seed):
+    rng = np.random.default_rng(seed)
+    problem = touching_problem(rng, int(rng.integers(1, 5)))
+    exact = enumerate_roots(problem, 0, "exact", "exhaustive")
+    roots = enumerate_roots(problem, 0)
+    alike(problem, exact, roots)
+    assert [root.active for root in roots] == [root.active for root in exact]
+    tree = enumerate_roots(problem, 0, "exact")
+    assert [root.active for root in tree] == [root.active for root in exact]
+
+
+def test_the_roots_without_rationals(monkeypatch, every_node):
+    complete = degenerate = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        problem = touching_problem(rng, int(rng.integers(1, 5)))
+        with monkeypatch.context() as patch:
+            patch.setattr(solvers, "EXACT_DOF_LIMIT", 0)
+            roots = enumerate_roots(problem, 0)
+        if roots.complete and roots.certified_data == "problem":
+            complete += 1
+            degenerate += any(not root.regular for root in roots)
+            alike(problem, enumerate_roots(problem, 0, "exact", "exhaustive"), roots)
+        else:
+            assert verify(problem, roots.proof).ok
+    assert complete > 40
+    assert degenerate > 20
+
+
+def test_a_body_too_large_for_rationals():
+    problem = touching_problem(np.random.default_rng(3), 3, inner=300)
+    small = touching_problem(np.random.default_rng(3), 3)
+    assert problem.n > 250
+    roots = enumerate_roots(problem, 0)
+    assert any(not root.regular for root in roots)
+    alike(problem, enumerate_roots(small, 0, "exact", "exhaustive"), roots)
+
+
+def test_searches_without_degenerate_roots_try_nothing(monkeypatch):
+    def never(*_):
+        raise AssertionError("a try")
+
+    monkeypatch.setattr("enumsol.search.certifiers.verified.VerifiedCertifier.closed", never)
+    rng = np.random.default_rng(1)
+    for p in (2, 4, 6):
+        assert enumerate_roots(random_problem(rng, p), 0).complete
+
+
+@pytest.mark.parametrize("slides", [False, True])
+def test_nearly_grazing_nodes(slides):
+    # data off by rounding: a regular root whose margin is far below what balls see
+    problem = beside_a_loaded_node(4, slides=slides, grazing=True)
+    rng = np.random.default_rng(4)
+    A = problem.A.toarray() * (1 + 1e-16 * rng.normal(size=(problem.n, problem.n)))
+    f = problem.f + 1e-17 * rng.normal(size=problem.n)
+    problem = ContactProblem((A + A.T) / 6, problem.Bn, problem.Bt, f / 3, friction=0.5)
+    roots = enumerate_roots(problem, 0, max_nodes=60)
+    assert roots.complete
+    assert roots.index_sum == len(roots) == 1
+    assert roots.stats.closed
+    assert roots[0].regular
+    assert roots[0].margin < 1e-15
+    assert verify(problem, roots.proof).complete
+
+
+def test_executors_find_the_same():
+    problem = beside_a_loaded_node(6, slides=True, grazing=False)
+    alone = enumerate_roots(problem, 0)
+    with ProcessPoolExecutor(2) as executor:
+        together = enumerate_roots(problem, 0, executor=executor)
+    assert together.complete
+    assert [root.active for root in together] == [root.active for root in alone]
+    assert verify(problem, together.proof).complete
+
+
+def test_fast_arithmetic():
+    for slides in (False, True):
+        problem = beside_a_loaded_node(32, slides=slides, grazing=True)
+        roots = enumerate_roots(problem, 0, "fast", max_nodes=200)
+        assert roots.whole
+        assert roots.index_sum == len(roots) == 1
