@@ -200,7 +200,8 @@ def _check_jacobians(corners: Floats, element: Any, quadrature: Floats) -> None:
     """Refuse cells whose area or volume vanishes or changes its sign at a corner or a quadrature point."""
     places = np.concatenate([element.refdom.init_refdom()[0], quadrature], axis=1)
     slopes = [np.broadcast_to(element.lbasis(places, i)[1], places.shape) for i in range(corners.shape[1])]
-    values = np.linalg.det(np.einsum("mai,akq->mqik", corners, np.stack(slopes)))
+    with np.errstate(all="ignore"):  # what over- or underflows is refused below
+        values = np.linalg.det(np.einsum("mai,akq->mqik", corners, np.stack(slopes)))
     extents = np.max(np.ptp(corners, axis=1), axis=1) ** corners.shape[2]
     wrong = np.min(np.abs(values), axis=1) <= FLAT * extents
     wrong |= np.abs(np.sum(np.sign(values), axis=1)) < values.shape[1]

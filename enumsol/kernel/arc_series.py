@@ -33,6 +33,10 @@ _SHARE = 1e-3
 #: Sizes are rounded up to multiples of this one; most entries of a stack.
 _STEP, _MOST_ENTRIES = 4, 2**20
 
+#: Where a constant M is so far from singular, t = 1 is as good as any other last row: search and checker, which may
+#: choose differently close to this, both find good series there.
+_PLAINLY = 2.0**-10
+
 
 @dataclass(frozen=True)
 class Series:
@@ -94,7 +98,7 @@ class _Stack:
     """
 
     def __init__(self, asked: Sequence[Asked], terms: int, errors: float, *, plain: bool) -> None:
-        self._asked, self._terms, self._errors = asked, terms, errors
+        self._asked, self._terms, self._errors, self._plain = asked, terms, errors, plain
         self._sizes = [(len(s.rows.unknown), len(s.rows.conditions)) for s, _, _ in asked]
         self._k = -(-max(size for size, _ in self._sizes) // _STEP) * _STEP + 1
         low, high = np.array([part for _, *part in asked]).T
@@ -232,7 +236,8 @@ class _Stack:
             bound = bound * (1.0 + norm) * SAFE
             off = (gamma(self._k + 4) * size * size + 2.0 * size * off + off * off) * SAFE + TINY
         share = wrong * found * SAFE
-        found = np.where(share * self._errors < 0.5, found / (1.0 - share) * SAFE, np.nan)
+        most = _PLAINLY if self._plain else 0.5 / self._errors
+        found = np.where(share < most, found / (1.0 - share) * SAFE, np.nan)
         return np.asarray(np.where(found * self._errors < _LARGEST_GROWTH, found, np.nan))
 
 

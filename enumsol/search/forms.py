@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 #: Nodes examined with the energy before a form is tried, and the share of the tree that may be left only then.
 NODES, _LEFT = 3000, 0.5
 #: Steps of the ascent on trial; at the root once it pays, with one more for so many contact nodes; and below.
-_TRIAL, _ROOT, _NODES_A_STEP, _BELOW = 4, 14, 10, 10
+TRIAL, ROOT, NODES_A_STEP, BELOW = 4, 14, 10, 10
 #: A form pays when it closes so much more of the gap at the root, or so many times as much.
-_MORE, _TIMES = 0.1, 3.0
+MORE, TIMES = 0.1, 3.0
 #: A new form is looked for after this share of the contact nodes was decided, unless so few are open.
-_DEEPER, _FEW = 0.32, 8
+DEEPER, FEW = 0.32, 8
 
 
 class Forms:
@@ -71,14 +71,14 @@ class Forms:
         self._ascent = ascent = FormAscent(self._scaled, self._enclosed, engine)
         imposed = rows.over(codes, range(len(codes)))
         plain = engine.root(*imposed)
-        found = ascent.improve(codes, ascent.energy, imposed, _TRIAL)
+        found = ascent.improve(codes, ascent.energy, imposed, TRIAL)
         if found is None or not isinstance(plain, ActiveSetRelaxation) or plain.stalled or plain.pruned:
             return False
         if not found[1].pruned:
             before, after = plain.gap_closed(codes), found[1].gap_closed(codes)
-            if after < min(before + _MORE, _TIMES * before):
+            if after < min(before + MORE, TIMES * before):
                 return False
-            steps = _ROOT + self._scaled.p // _NODES_A_STEP
+            steps = ROOT + self._scaled.p // NODES_A_STEP
             found = ascent.improve(codes, found[0].multipliers, imposed, steps) or found
         if not found[0].smallest_eigenvalue > 0:
             return False
@@ -98,9 +98,9 @@ class Forms:
         if form is None or self._ascent is None:
             return relaxation
         decided = _decided(codes)
-        if len(codes) - decided < _FEW or decided - _decided(form.codes) < max(_FEW, _DEEPER * len(codes)):
+        if len(codes) - decided < FEW or decided - _decided(form.codes) < max(FEW, DEEPER * len(codes)):
             return relaxation
-        found = self._ascent.improve(codes, form.multipliers, rows.over(codes, range(len(codes))), _BELOW)
+        found = self._ascent.improve(codes, form.multipliers, rows.over(codes, range(len(codes))), BELOW)
         self.made += 1
         if found is None or not found[0].smallest_eigenvalue > 0:
             return relaxation

@@ -46,12 +46,12 @@ PROBLEMS = (
 SMOKE_PROBLEMS = (block(16, PRESSED, 0.3), straight_wedge(8))
 SCHEDULES = {
     "as it is": {},
-    "5 steps below": {"_BELOW": 5},
-    "20 steps below": {"_BELOW": 20},
-    "30 more steps at the root": {"_ROOT": 44},
-    "again after a sixth": {"_DEEPER": 0.16},
-    "again after a half": {"_DEEPER": 0.5},
-    "never again": {"_DEEPER": 2.0},
+    "5 steps below": {"BELOW": 5},
+    "20 steps below": {"BELOW": 20},
+    "30 more steps at the root": {"ROOT": 44},
+    "again after a sixth": {"DEEPER": 0.16},
+    "again after a half": {"DEEPER": 0.5},
+    "never again": {"DEEPER": 2.0},
 }
 NEVER, EARLY = 10**9, 50
 MAX_NODES = 60_000

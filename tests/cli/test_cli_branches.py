@@ -174,7 +174,7 @@ def test_graph_with_jobs(capsys, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_stops_a_graph(jobs):
-    with on_terminal("graph", "gallery:wedge-20-5", "--from", 0, "--to", 5, "--jobs", jobs) as (process, wait_for):
+    with on_terminal("graph", "gallery:wedge-32-5", "--from", 0, "--to", 5, "--jobs", jobs) as (process, wait_for):
         wait_for(b"search")
         process.send_signal(2)
         process.communicate(timeout=120)

@@ -22,9 +22,9 @@ from enumsol.search.solvers import Solvers
 def eager(monkeypatch):
     """Forms from the first node on, whether they pay or not, and again at every second contact node."""
     monkeypatch.setattr(policy, "NODES", 1)
-    monkeypatch.setattr(policy, "_MORE", -2.0)
-    monkeypatch.setattr(policy, "_FEW", 2)
-    monkeypatch.setattr(policy, "_DEEPER", 0.0)
+    monkeypatch.setattr(policy, "MORE", -2.0)
+    monkeypatch.setattr(policy, "FEW", 2)
+    monkeypatch.setattr(policy, "DEEPER", 0.0)
 
 
 def slipping(seed, p=3):
@@ -283,7 +283,7 @@ def test_a_search_that_is_stopped_after_it_began_again_claims_what_it_has(monkey
 def test_workers_make_the_same_proof(monkeypatch):
     problem = gallery.clamped_block(32, 16)
     monkeypatch.setattr(policy, "NODES", 5)
-    monkeypatch.setattr(policy, "_MORE", -2.0)
+    monkeypatch.setattr(policy, "MORE", -2.0)
     found = []
     for workers in (1, 2):
         with ThreadPoolExecutor(workers) as executor:

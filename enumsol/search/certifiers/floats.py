@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
 
 
+#: A condition is broken beyond doubt: one that is broken by less may hold within the tolerance at another point.
+_CLEARLY = 1e-6
+
+
 def solve_or_open(solver: SelectionSolver, codes: Codes) -> SelectionSolution | UndecidedPart | None:
     """The solver's answer; a polytope with too many candidate vertices leaves the selection open."""
     try:
@@ -56,7 +60,7 @@ class FastCertifier(WithoutProof):
         proposal = propose(solver.system, codes, *start(solver.system, relaxation), exactly=True)
         if proposal is None:
             return None
-        if proposal.least < -2.0 * max(solver.tolerance, NEAR):
+        if proposal.least < -max(_CLEARLY, 2.0 * solver.tolerance):
             return []
         solution = solver.solve(proposal.selection)
         if solution is None or solution.dimension > 0 or not holds_below(codes, solver.active(solution.vertices[0])):
