@@ -335,16 +335,8 @@ class TreeSearch:
         codes = item.codes
         self.outcome.qps += 1
         if item.parent is not None:
-            relaxation = item.parent.child(*self._rows.of(item.changed, codes[item.changed]), last=item.last)
-        else:
-            relaxation = self._root(codes)
-        if (
-            self.forms is not None
-            and self.forms.in_use
-            and not (relaxation.stalled or relaxation.pruned or item.forced)
-        ):
-            return self.forms.better(codes, relaxation, self._rows)
-        return relaxation
+            return item.parent.child(*self._rows.of(item.changed, codes[item.changed]), last=item.last)
+        return self._root(codes)
 
     def _root(self, codes: Codes) -> Relaxation:
         """The relaxation of a partial assignment without a parent's."""

@@ -20,11 +20,9 @@ from enumsol.search.solvers import Solvers
 
 @pytest.fixture
 def eager(monkeypatch):
-    """Forms from the first node on, whether they pay or not, and again at every second contact node."""
-    monkeypatch.setattr(policy, "NODES", 1)
+    """A form from the first node on, whether it pays or not."""
+    monkeypatch.setattr(policy, "NODES", 0)
     monkeypatch.setattr(policy, "MORE", -2.0)
-    monkeypatch.setattr(policy, "FEW", 2)
-    monkeypatch.setattr(policy, "DEEPER", 0.0)
 
 
 def slipping(seed, p=3):
@@ -64,7 +62,7 @@ def test_the_roots_are_the_same(eager, monkeypatch):
 def test_a_long_search_is_shorter_with_forms(monkeypatch):
     problem = gallery.clamped_block(32, 16)
     plain = enumerate_roots(problem, 0.3)
-    monkeypatch.setattr(policy, "NODES", 20)
+    monkeypatch.setattr(policy, "NODES", 1)
     found = enumerate_roots(problem, 0.3)
     assert found.complete
     assert kinds_of(found.proof).count("f") > 20
@@ -76,7 +74,7 @@ def test_a_long_search_is_shorter_with_forms(monkeypatch):
 def test_wedges_go_on_with_the_energy(monkeypatch):
     entry = gallery.get("wedge-8-5")
     plain = enumerate_roots(entry.build(), entry.alpha)
-    monkeypatch.setattr(policy, "NODES", 20)
+    monkeypatch.setattr(policy, "NODES", 1)
     found = enumerate_roots(entry.build(), entry.alpha)
     assert records_of(found.proof) == records_of(plain.proof)
 
@@ -272,7 +270,7 @@ def test_an_indefinite_form_excludes_nothing():
 
 def test_a_search_that_is_stopped_after_it_began_again_claims_what_it_has(monkeypatch):
     problem = gallery.clamped_block(32, 16)
-    monkeypatch.setattr(policy, "NODES", 20)
+    monkeypatch.setattr(policy, "NODES", 1)
     cut = enumerate_roots(problem, 0.3, max_nodes=100)
     assert not cut.complete
     report = verify(problem, cut.proof)
@@ -282,7 +280,7 @@ def test_a_search_that_is_stopped_after_it_began_again_claims_what_it_has(monkey
 
 def test_workers_make_the_same_proof(monkeypatch):
     problem = gallery.clamped_block(32, 16)
-    monkeypatch.setattr(policy, "NODES", 5)
+    monkeypatch.setattr(policy, "NODES", 1)
     monkeypatch.setattr(policy, "MORE", -2.0)
     found = []
     for workers in (1, 2):
