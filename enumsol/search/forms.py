@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from enumsol.search.splitting import ImposedRows
     from enumsol.selections.solution import Codes
 
-#: Nodes examined with the energy, for every contact node, before a form is tried: about what it would cost.
-NODES = 40
+#: Nodes examined with the energy, for every contact node, before a form is tried: about what it would cost. Small
+#: problems count as ones with so many contact nodes.
+NODES, _SMALL = 40, 25
 #: A form is tried where at least this share of the tree is left.
 _LEFT = 0.5
 #: Steps of the ascent on trial, and those that follow once it pays.
@@ -50,7 +51,7 @@ class Forms:
 
     def due(self, nodes: int, covered: float) -> bool:
         """Whether it is time to try a form."""
-        return nodes >= NODES * self._scaled.p and covered < 1.0 - _LEFT
+        return nodes >= NODES * max(self._scaled.p, _SMALL) and covered < 1.0 - _LEFT
 
     def pay(self, engine: Any, codes: Codes, rows: ImposedRows) -> bool:
         """Whether a form at the root of the search is clearly tighter than the energy; if so it is in use."""
