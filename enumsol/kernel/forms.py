@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, dense_eigenvalue_bound, gamma, upper_norm
-from enumsol.kernel.point import margins
+from enumsol.kernel.point import dots, margins
 from enumsol.kernel.rows import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED, row_signs
 
 if TYPE_CHECKING:
@@ -235,16 +235,12 @@ def _form_bounds(form: EnclosedForm, y: Array, c: Array, c_rad: Array, errors: f
         x += (v - x @ form.H) @ form.inverse.T
     Hx = x @ form.H
     x_abs, rest = np.abs(x), v - Hx
-    x_square, cross, x_form, first = _dots(x, x), _dots(x, v), _dots(x, Hx), y @ g
-    rest_norm = np.sqrt(_dots(rest, rest)) + np.sqrt(_dots(v_rad, v_rad)) + k * np.sqrt(_dots(v, v))
+    x_square, cross, x_form, first = dots(x, x), dots(x, v), dots(x, Hx), y @ g
+    rest_norm = np.sqrt(dots(rest, rest)) + np.sqrt(dots(v_rad, v_rad)) + k * np.sqrt(dots(v, v))
     rest_norm = (rest_norm + form.form_error * np.sqrt(x_square) + ROOT_TINY) * (1 + k) * SAFE
     tail = rest_norm * rest_norm / form.smallest_eigenvalue
     total = form.k + first - 0.5 * cross + 0.25 * x_form
-    error = form.k_rad + y_abs @ (g_rad + k * np.abs(g)) + 0.5 * _dots(x_abs, v_rad + k * np.abs(v))
+    error = form.k_rad + y_abs @ (g_rad + k * np.abs(g)) + 0.5 * dots(x_abs, v_rad + k * np.abs(v))
     error += 0.25 * (form.form_error * x_square + tail)
     error += 8 * UNIT * (abs(form.k) + np.abs(first) + np.abs(cross) + np.abs(x_form))
     return np.asarray(total - errors * error * (1 + k) * SAFE * SAFE - TINY)
-
-
-def _dots(a: Array, b: Array) -> Array:
-    return np.asarray(np.einsum("ij,ij->i", a, b))

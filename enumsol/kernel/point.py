@@ -150,12 +150,12 @@ def energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array, erro
     x = q @ system.inverse.T
     x += (q - x @ S) @ system.inverse.T
     Sx, Sy = x @ S, y @ S
-    first, cross = _dots(y, g - c), _dots(x, q)
-    y_form, x_form = _dots(y, Sy), _dots(x, Sx)
-    first_error = _dots(y_abs, k * (np.abs(g) + np.abs(c)) + system.g_rad + c_rad)
-    cross_error = _dots(np.abs(x), k * q_abs + q_rad)
-    y_square, x_square, rest = _dots(y, y), _dots(x, x), q - Sx
-    rest_norm = np.sqrt(_dots(rest, rest)) + np.sqrt(_dots(q_rad, q_rad)) + k * np.sqrt(_dots(q, q))
+    first, cross = dots(y, g - c), dots(x, q)
+    y_form, x_form = dots(y, Sy), dots(x, Sx)
+    first_error = dots(y_abs, k * (np.abs(g) + np.abs(c)) + system.g_rad + c_rad)
+    cross_error = dots(np.abs(x), k * q_abs + q_rad)
+    y_square, x_square, rest = dots(y, y), dots(x, x), q - Sx
+    rest_norm = np.sqrt(dots(rest, rest)) + np.sqrt(dots(q_rad, q_rad)) + k * np.sqrt(dots(q, q))
     rest_norm = (rest_norm + system.form_error * np.sqrt(x_square) + ROOT_TINY) * (1 + k) * SAFE
     tail = rest_norm * rest_norm / system.smallest_eigenvalue
     total = 0.5 * first - 0.25 * y_form - 0.5 * cross + 0.25 * x_form
@@ -164,7 +164,8 @@ def energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array, erro
     return np.asarray(total - errors * error * (1 + k) * SAFE * SAFE - TINY)
 
 
-def _dots(a: Array, b: Array) -> Array:
+def dots(a: Array, b: Array) -> Array:
+    """Inner products of the rows of two arrays."""
     return np.asarray(np.einsum("ij,ij->i", a, b))
 
 

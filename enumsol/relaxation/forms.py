@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
 
 from enumsol.kernel.forms import EnclosedForm, Equations
-from enumsol.kernel.rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.kernel.rows import CONTACT, UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetRelaxation, FormEngine
 from enumsol.relaxation.rows import row_normals
 
@@ -139,9 +139,8 @@ class FormAscent:
             Q, R, _ = qr(a.T, pivoting=True)
             size = np.abs(np.diagonal(R))
             across = Q[:, int(np.sum(size > _DEPENDENT * size[0])) :]
-        settled = np.isin(status, (OPEN, STICK, FRICTIONLESS, SLIP_PLUS, SLIP_MINUS))
-        normal, tangential = ~settled & (status == UNDECIDED), ~settled & (self._scaled.F > 0)
-        assert not np.any((status == CONTACT) & normal)
+        normal = status == UNDECIDED
+        tangential = (normal | (status == CONTACT)) & (self._scaled.F > 0)
         live = np.flatnonzero(np.concatenate([normal, normal & tangential, tangential, tangential]))
         return _Subspace(across, live)
 
