@@ -46,6 +46,9 @@ OPEN, STICK, SLIP_PLUS, SLIP_MINUS = range(4)
 FRICTIONLESS = 4
 #: Inside the searches a node whose status is not final: in contact and not known how, and nothing known.
 CONTACT, UNDECIDED = 5, 6
+#: A node that is open or slips in one direction (theory, section 6.11).
+FORWARD, BACKWARD = 7, 8
+SLIDING = {FORWARD: (OPEN, SLIP_PLUS), BACKWARD: (OPEN, SLIP_MINUS)}
 
 
 def contact_status(code: int, u_t: float) -> ContactStatus:
@@ -85,6 +88,8 @@ CONDITIONS = {
     FRICTIONLESS: Conditions((_R.PENETRATION, _R.TANGENTIAL_FORCE), (_R.NORMAL_FORCE,)),
     CONTACT: Conditions((_R.PENETRATION,), (_R.CONE_PLUS, _R.CONE_MINUS)),
     UNDECIDED: Conditions((), (_R.PENETRATION, _R.CONE_PLUS, _R.CONE_MINUS)),
+    FORWARD: Conditions((_R.CONE_PLUS,), (_R.PENETRATION, _R.CONE_MINUS)),
+    BACKWARD: Conditions((_R.CONE_MINUS,), (_R.PENETRATION, _R.CONE_PLUS)),
 }
 #: Final statuses of a node with friction, and of one without.
 FINAL = {True: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), False: (OPEN, FRICTIONLESS)}

@@ -41,6 +41,8 @@ ALLOWED = {
     4: "+EEEE..",
     5: "+.++E..",
     6: "+.+++..",
+    7: "+.E++..",
+    8: "+.+E+..",
     "undecided, F = 0": "+E+++..",
     # [6.3] slip where friction is not constant
     "slip+": "+.++E+.+.",
@@ -171,8 +173,9 @@ class Point(Proof):
     def split(self, codes, record):
         _, node, children = record
         need(0 <= integer(node) < self.p, "no such node")
-        whole = {6: (0, 5) if self.friction[node] else (0, 4), 5: (1, 2, 3)}.get(codes[node])
-        need(whole is not None and sorted(map(integer, children)) == sorted(whole), "a split does not cover")
+        ways = {5: ["123"], 6: ["05", "137", "128"] if self.friction[node] else ["04"], 7: ["02"], 8: ["03"]}
+        found = "".join(map(str, sorted(map(integer, children))))
+        need(found in ways.get(codes[node], ()), "a split does not cover")
         return [(*codes[:node], code, *codes[node + 1 :]) for code in children]
 
     def leaf(self, codes, kind, *rest):

@@ -10,6 +10,7 @@ from flint import fmpq, fmpq_mat
 from rational_forms import _value, as_point, column_of, exact, integer, need
 
 FINAL = {True: (0, 1, 2, 3), False: (0, 4)}
+SIDES = {7: (0, 2), 8: (0, 3)}
 KINDS = {0: (4,), 1: (0, 2, 3), 2: (0, 5), 3: (0, 6), 4: (0,)}
 
 
@@ -25,7 +26,7 @@ class Closings:
         self.check(selection, free, codes)
         core = tuple(6 if i in free else code for i, code in enumerate(selection))
         reduced = Reduced(self.forms, core, self.friction)
-        tau = self.weights(free, tau)
+        tau = self.weights(free, tau) | {i: fmpq(0) for i in reduced.sliding}
         need(reduced.definite(tau), "a form is not definite")
         points = reduced.solutions()
         need(len(points) == 1, "a reduced problem has no solution or several")
@@ -35,6 +36,7 @@ class Closings:
                 need(self.apart_from_contact(point, i) < 0, "a node needs a weight")
         need(len(mid) == 2 * self.p, "a point has another size")
         values = [value for i in reduced.fixed for value in self.conditions(core[i], i, point)]
+        values += [self.slides(core[i], i, point) for i in reduced.sliding]
         if rad is None:
             need(any(value < 0 for value in values), "no condition is broken")
             return
@@ -47,8 +49,9 @@ class Closings:
 
     def exact_leaf(self, codes, selection, tau, count):
         """The selection as a polytope to be counted, if the leaf holds its solution."""
-        free = [i for i, code in enumerate(codes) if code in (5, 6)]
+        free = [i for i, code in enumerate(codes) if code > 4]
         self.check(selection, free, codes)
+        need(max(selection) < 5, "a selection is not complete")
         equations = self.forms.equations(selection)
         N = fmpq_mat([form[:-1] for form in equations])
         need(N.det() != 0, "a selection is singular")
@@ -79,8 +82,9 @@ class Closings:
     def check(self, selection, free, codes):
         need(len(selection) == self.p, "a selection has another size")
         for i, code in enumerate(selection):
-            need(integer(code) in FINAL[bool(self.friction[i])], "a node cannot have its code")
-            need(i in free or codes[i] == code, "a fixed node has another code")
+            slides = code in SIDES and i not in free and self.friction[i]
+            need(integer(code) in FINAL[bool(self.friction[i])] or slides, "a node cannot have its code")
+            need(i in free or codes[i] in (code, *SIDES.get(code, ())), "a fixed node has another code")
         need(list(free) == sorted({integer(i) for i in free if 0 <= i < self.p}), "free nodes are out of order")
 
     def weights(self, free, tau):
@@ -97,20 +101,30 @@ class Closings:
         _, _, w_n, w_t = self.values(point, i)
         return w_n + self.forms.F[i] * abs(w_t)
 
+    def slides(self, code, i, point):
+        """Positive where the node is open by some distance or slips to its side, negative where it must and does not."""
+        n, _, w_n, w_t = self.values(point, i)
+        slip = w_t if code == 7 else -w_t
+        return -w_n if w_n < 0 else slip if slip > 0 or n > 0 else fmpq(0)
+
     def conditions(self, code, i, point):
         return [_value(self.forms.row(kind, i), point) for kind in KINDS[code]]
 
 
 class Reduced:
-    """w = h - R x on the free nodes of a core."""
+    """w = h - R x on the free and the sliding nodes of a core."""
 
     def __init__(self, forms, core, friction):
         self.forms, self.core, self.friction, p = forms, core, friction, forms.p
-        self.free = [i for i, code in enumerate(core) if code == 6]
-        self.fixed = [i for i, code in enumerate(core) if code != 6]
-        self.places = self.free + [p + i for i in self.free if friction[i]]
-        # lambda as a function of x: the free components are set
-        rows = forms.equations([0 if code == 6 else code for code in core])
+        self.sliding = [i for i, code in enumerate(core) if code in SIDES]
+        self.fixed = [i for i, code in enumerate(core) if code < 5]
+        self.free = [i for i, code in enumerate(core) if code == 6] + self.sliding
+        self.rubbing = [i for i in self.free if friction[i] and core[i] == 6]
+        self.places = self.free + [p + i for i in self.rubbing]
+        # lambda as a function of x: the free components are set, and lambda_t -+ F lambda_n = 0 where a node slides
+        rows = forms.equations([0 if code > 5 else code for code in core])
+        for i in self.sliding:
+            rows[p + i] = forms.force(-forms.F[i] if core[i] == 7 else forms.F[i], 1, i)
         N = fmpq_mat([row[:-1] for row in rows])
         self.determinant = N.det()
         need(self.determinant != 0, "the fixed nodes' equations are singular")
@@ -123,7 +137,7 @@ class Reduced:
         Q = [[(self.R[a][b] + self.R[b][a]) / 2 for b in range(size)] for a in range(size)]
         for n, i in enumerate(self.free):
             if self.friction[i] and tau[i] > 0:
-                r = self.R[m + [j for j in self.free if self.friction[j]].index(i)]
+                r = self.R[m + self.rubbing.index(i)]
                 Q[n][n] -= tau[i] / 2
                 factor = self.forms.F[i] ** 2 / tau[i] / 2
                 Q = [[q - factor * r[a] * r[b] for b, q in enumerate(row)] for a, row in enumerate(Q)]
@@ -132,10 +146,11 @@ class Reduced:
     def solutions(self):
         """All vertices of the solution sets over the selections of the free nodes."""
         found = set()
-        for chosen in product(*(FINAL[bool(self.friction[i])] for i in self.free)):
+        for chosen in product(*(SIDES.get(self.core[i]) or FINAL[bool(self.friction[i])] for i in self.free)):
             codes = list(self.core)
             for i, code in zip(self.free, chosen, strict=True):
                 codes[i] = code
-            given = [self.forms.row(kind, i) for i in self.free for kind in KINDS[codes[i]]]
+            kinds = {i: (4,) if codes[i] == 0 else (0,) for i in self.sliding}
+            given = [self.forms.row(kind, i) for i in self.free for kind in kinds.get(i, KINDS[codes[i]])]
             found.update(self.forms.vertices(self.forms.equations(codes), given))
         return [[fmpq(*x.as_integer_ratio()) for x in point] for point in sorted(found)]

@@ -10,11 +10,11 @@ from flint import fmpq_mat
 from enumsol.arithmetic.balls import SAFE
 from enumsol.arithmetic.rationals import to_fraction
 from enumsol.kernel.closing import closed_solution, definite_sign, final_codes, same_solution
-from enumsol.kernel.rows import CONTACT, FRICTIONLESS, OPEN, STICK
+from enumsol.kernel.rows import BACKWARD, CONTACT, FORWARD, FRICTIONLESS, OPEN, STICK, refines
 from enumsol.proof.reading import numbers_from
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from numpy.typing import NDArray
 
@@ -34,9 +34,9 @@ def closed_by_balls(
     """Why a record of kind "m" proves nothing, or None; and the root that it proves, if it claims one."""
     if len(record) not in (5, 7):
         return f"its record has {len(record)} entries; expected 5 or 7", None
-    selection = _selection(record[1], system.F > 0)
     free = _nodes(record[2], system.p)
-    if any(code != selection[i] for i, code in enumerate(codes) if i not in free):
+    selection = _selection(record[1], system.F > 0, sliding=set(range(system.p)) - set(free))
+    if any(not refines(code, selection[i]) for i, code in enumerate(codes) if i not in free):
         return "a node that has a status in its proof has another one in its assignment", None
     tau = _weights(record[3], len(free))
     mid = numbers_from(record[4], 2 * system.p)
@@ -98,10 +98,13 @@ def count_apart(closed: dict[Codes, ClosedSolution], others: list[Codes]) -> tup
     return kept, doubtful
 
 
-def _selection(value: Any, friction: NDArray[np.bool_]) -> Codes:
+def _selection(value: Any, friction: NDArray[np.bool_], sliding: Collection[int] = ()) -> Codes:
+    """Final codes; FORWARD and BACKWARD are allowed as well at the given nodes."""
     if not isinstance(value, list) or len(value) != len(friction) or not all(type(code) is int for code in value):
         raise ValueError(f"its selection is no list of {len(friction)} codes")
-    if any(code not in final_codes(bool(positive)) for code, positive in zip(value, friction, strict=True)):
+    for i, (code, positive) in enumerate(zip(value, friction.tolist(), strict=True)):
+        if code in final_codes(positive) or (positive and code in (FORWARD, BACKWARD) and i in sliding):
+            continue
         raise ValueError("a node cannot have the code that its selection gives it")
     return tuple(value)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.kernel.forms import EnclosedForm, form_margins
-from enumsol.kernel.rows import CONTACT, ROW_KINDS, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.kernel.rows import ROW_KINDS, refines
 from enumsol.proof.reading import RefusedError, codes_from, multipliers_from, numbers_from
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
 
 _RECORD, _LEAF = 7, 4
-_WITHIN = {UNDECIDED: frozenset(range(UNDECIDED + 1)), CONTACT: frozenset((STICK, SLIP_PLUS, SLIP_MINUS, CONTACT))}
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class _Declared:
 
     def holds(self, codes: tuple[int, ...]) -> bool:
         """Whether a partial assignment is part of the one that this form is made for."""
-        return all(code == mine or code in _WITHIN.get(mine, ()) for code, mine in zip(codes, self.codes, strict=True))
+        return all(refines(code, mine) for code, mine in zip(codes, self.codes, strict=True))
 
 
 class FormLeaves:

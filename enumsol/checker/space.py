@@ -64,10 +64,11 @@ class SpaceChecker(TreeChecker):
             raise RefusedError("S is not proven positive definite")
         return enclosed
 
-    def _covering(self, code: int, node: int) -> tuple[int, ...]:
+    def _coverings(self, code: int, node: int) -> tuple[tuple[int, ...], ...]:
         if code > SECTORS and level_of(code - SECTORS) > DEEPEST:
             return ()
-        return children_of(code, self.tangents[node])
+        children = children_of(code, self.tangents[node])
+        return (children,) if children else ()
 
     # -- leaves ----------------------------------------------------------------------------------------------------
 

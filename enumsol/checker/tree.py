@@ -83,8 +83,8 @@ class TreeChecker:
     def _read_header(self, header: Any) -> None:
         raise NotImplementedError
 
-    def _covering(self, code: int, node: int) -> tuple[int, ...]:
-        """Codes that together cover a partial one; none for a final one."""
+    def _coverings(self, code: int, node: int) -> tuple[tuple[int, ...], ...]:
+        """All ways to cover a partial code by others; none for a final one."""
         raise NotImplementedError
 
     def _leaf(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
@@ -153,8 +153,8 @@ class TreeChecker:
     def _children(self, codes: tuple[int, ...], record: list[Any]) -> list[tuple[int, ...]]:
         _, node, children = record if len(record) == 3 else (None, None, None)
         if type(node) is int and 0 <= node < self.problem.p and isinstance(children, list):
-            expected = self._covering(codes[node], node)
-            if expected and all(type(code) is int for code in children) and sorted(children) == sorted(expected):
+            coverings = map(sorted, self._coverings(codes[node], node))
+            if all(type(code) is int for code in children) and sorted(children) in coverings:
                 return [(*codes[:node], code, *codes[node + 1 :]) for code in children]
         raise RefusedError(f"a branching {shown(record)} does not cover the assignment that it splits")
 

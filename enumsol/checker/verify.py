@@ -22,7 +22,7 @@ from enumsol.checker.tree import TreeChecker
 from enumsol.checks import instance_of, optional_callable
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
-from enumsol.kernel.rows import FRICTIONLESS, ROW_KINDS, UNDECIDED, children_of, row_signs
+from enumsol.kernel.rows import FRICTIONLESS, ROW_KINDS, UNDECIDED, coverings_of, row_signs
 from enumsol.problem import ContactProblem
 from enumsol.proof.proof_file import Proof, fraction_text
 from enumsol.proof.reading import (
@@ -198,8 +198,8 @@ class Checker(TreeChecker):
     def _declare(self, record: list[Any]) -> None:
         self._by_forms.declare(record, self.problem.p)
 
-    def _covering(self, code: int, node: int) -> tuple[int, ...]:
-        return children_of(code, friction=self.friction[node])
+    def _coverings(self, code: int, node: int) -> tuple[tuple[int, ...], ...]:
+        return coverings_of(code, friction=self.friction[node])
 
     def _claim(self, isolated: int, families: int) -> dict[str, int]:
         roots = self.regular + isolated

@@ -1,8 +1,8 @@
 """The trusted test of closed subtrees: one reduced solution where some contact nodes are free (theory, section 6.11).
 
-Some nodes have a status, the others are free: they may have any. Eliminating the equations of the fixed nodes leaves
-the reduced problem of the free ones, w = h - R lambda. Where its matrix passes a test of definiteness it has exactly
-one solution, which is enclosed without knowing the statuses of its nodes.
+Some nodes have a status, others are free: they may have any; and others slide: they are open or slip in one direction.
+Eliminating the equations of the fixed nodes leaves the reduced problem of the others, w = h - R x. Where its matrix
+passes a test of definiteness it has exactly one solution, which is enclosed without knowing the statuses of its nodes.
 """
 
 from __future__ import annotations
@@ -17,13 +17,16 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, u
 from enumsol.kernel.ball_arrays import Ball, determinant_sign, solution
 from enumsol.kernel.point import row_balls
 from enumsol.kernel.rows import (
+    BACKWARD,
     CONDITIONS,
+    FORWARD,
     FRICTIONLESS,
     OPEN,
     SLIP_MINUS,
     SLIP_PLUS,
     STICK,
     UNDECIDED,
+    refines,
 )
 
 if TYPE_CHECKING:
@@ -49,14 +52,14 @@ class ClosedSolution:
 
     Attributes
     ----------
-    core : status codes, UNDECIDED at the free nodes
+    core : status codes, UNDECIDED at the free nodes, FORWARD or BACKWARD at those that slide
     force, force_rad, w, w_rad : (2p,) arrays
         lambda and w = g - S lambda.
     possible : per node the final codes that may hold there; those of a fixed node that holds strictly are its own only
     sign : int
-        Sign of the determinant of the fixed nodes' equations: the index, if the fixed nodes' conditions hold strictly.
+        Sign of the determinant of the fixed nodes' equations: the index, if the conditions below hold strictly.
     slack, slack_rad : arrays
-        The conditions of the fixed nodes.
+        The conditions of the fixed nodes, and of every sliding one: the sign of its slip, unless it is open.
     """
 
     core: Codes
@@ -71,12 +74,12 @@ class ClosedSolution:
 
     @property
     def is_root(self) -> bool:
-        """The conditions of all fixed nodes hold strictly: exactly one root has this core."""
+        """All conditions hold strictly: exactly one root has this core."""
         return bool(np.all(self.slack > self.slack_rad))
 
     @property
     def is_excluded(self) -> bool:
-        """A condition of a fixed node is broken strictly: no root has this core."""
+        """A condition is broken strictly: no root has this core."""
         return bool(np.any(self.slack < -self.slack_rad))
 
 
@@ -88,19 +91,20 @@ def final_codes(friction: bool) -> tuple[int, ...]:
 def closed_solution(
     system: EnclosedSystem, selection: Codes, free: Sequence[int], tau: Array, force: Array
 ) -> ClosedSolution | None:
-    """The only solution of the reduced problem of the free nodes, or None where that is not proven.
+    """The only solution of the reduced problem, or None where that is not proven.
 
     Parameters
     ----------
     system : EnclosedSystem
-    selection : final codes; those of the free nodes only name a point near the solution
-    free : ascending nodes
+    selection : final codes, those of the free nodes only name a point near the solution; FORWARD or BACKWARD where a
+        node slides
+    free : ascending nodes, none of which slides
     tau : one number a free node, positive, or 0 where it is open by more than its slip bound (theory, (6.9))
-    force : (2p,) array, lambda near the solution; only that of the free nodes is read
+    force : (2p,) array, lambda near the solution; only that of nodes that are free or slide is read
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         reduced = Reduced.of(system, selection, free)
-        return None if reduced is None or not _are_weights(tau, free) else reduced.enclosed(tau, force)
+        return None if reduced is None or not _are_weights(tau, free) else reduced.enclosed(reduced.of_all(tau), force)
 
 
 def definite_sign(system: EnclosedSystem, selection: Codes, free: Sequence[int], tau: Array) -> int:
@@ -112,7 +116,7 @@ def definite_sign(system: EnclosedSystem, selection: Codes, free: Sequence[int],
         reduced = Reduced.of(system, selection, free)
         if reduced is None or not _are_weights(tau, free):
             return 0
-        return reduced.sign if reduced.least(tau) > 0 else 0
+        return reduced.sign if reduced.least(reduced.of_all(tau)) > 0 else 0
 
 
 def _are_weights(tau: Array, free: Sequence[int]) -> bool:
@@ -130,33 +134,40 @@ def same_solution(
     if any(not a & b for a, b in zip(one_possible, other_possible, strict=True)):
         return False
     for core, possible in ((one, other_possible), (other, one_possible)):
-        if all(code == UNDECIDED or held == {code} for code, held in zip(core, possible, strict=True)):
+        if all(all(refines(c, code) for c in held) for code, held in zip(core, possible, strict=True)):
             return True
     return None
 
 
+_SLIDING = (FORWARD, BACKWARD)
+
+
 @dataclass(frozen=True)
 class Reduced:
-    """w = h - R lambda on the free nodes, by elimination of the fixed ones.
+    """w = h - R x on the nodes that are free or slide, by elimination of the fixed ones.
 
     Attributes
     ----------
+    nodes : int array
+        Those that are free, then those that slide.
     places : int array
-        Of the free components in lambda: all lambda_n, then lambda_t of the nodes with friction.
-    normal, tangential : int arrays
-        Places of the components of every free node among them; -1 where there is none.
+        Of x in lambda: lambda_n of all these nodes, then lambda_t of the free ones with friction.
+    tangential : int array
+        Place of lambda_t among them, for all nodes; -1 where there is none.
+    turn : Ball
+        lambda_t of a sliding node is so many times its lambda_n, +-F; zero for free nodes.
     E, Z : Ball
-        lambda = E y + P x, and y = Z (1, -x): the fixed nodes' forces for free ones x.
+        lambda = E y + P x, and y = Z (1, -x): the fixed nodes' forces for x.
     R, h : Ball
     """
 
     system: EnclosedSystem
     selection: Codes
-    free: NDArray[np.intp]
+    nodes: NDArray[np.intp]
     places: NDArray[np.intp]
-    normal: NDArray[np.intp]
     tangential: NDArray[np.intp]
     rows: NDArray[np.intp]
+    turn: Ball
     E: Ball
     Z: Ball
     R: Ball
@@ -166,17 +177,21 @@ class Reduced:
     @classmethod
     def of(cls, system: EnclosedSystem, selection: Codes, free: Sequence[int]) -> Reduced | None:
         """None where the fixed nodes' equations are not proven regular, or a node cannot have its code."""
-        if any(code not in final_codes(F > 0) for code, F in zip(selection, system.F, strict=True)):
-            return None
-        p, nodes = system.p, np.array(free, dtype=np.intp)
-        status = np.array(core_of(selection, free), dtype=np.intp)
-        closed = np.flatnonzero((status != OPEN) & (status != UNDECIDED))
-        held = p + np.flatnonzero(status == STICK)
-        rubbing = nodes[system.F[nodes] > 0]
-        places = np.concatenate([nodes, p + rubbing])
+        chosen = set(free)
+        for i, (code, F) in enumerate(zip(selection, system.F, strict=True)):
+            if code not in final_codes(F > 0) and not (code in _SLIDING and F > 0 and i not in chosen):
+                return None
+        p, status = system.p, np.array(core_of(selection, free), dtype=np.intp)
+        slides = np.isin(status, _SLIDING)
+        nodes = np.concatenate([np.array(free, dtype=np.intp), np.flatnonzero(slides)])
+        rubbing = (system.F[nodes] > 0) & ~slides[nodes]
+        places = np.concatenate([nodes, p + nodes[rubbing]])
         tangential = np.full(len(nodes), -1, dtype=np.intp)
-        tangential[system.F[nodes] > 0] = len(nodes) + np.arange(len(rubbing))
-        slip = np.where(status == SLIP_PLUS, 1.0, 0.0) - np.where(status == SLIP_MINUS, 1.0, 0.0)
+        tangential[rubbing] = len(nodes) + np.arange(np.count_nonzero(rubbing))
+        closed = np.flatnonzero((status != OPEN) & (status != UNDECIDED) & ~slides)
+        held = p + np.flatnonzero(status == STICK)
+        slip = np.where(np.isin(status, (SLIP_PLUS, FORWARD)), 1.0, 0.0)
+        slip -= np.where(np.isin(status, (SLIP_MINUS, BACKWARD)), 1.0, 0.0)
         E, E_rad = np.zeros((2 * p, len(closed) + len(held))), np.zeros((2 * p, len(closed) + len(held)))
         column = np.arange(len(closed))
         E[closed, column] = 1.0
@@ -186,22 +201,36 @@ class Reduced:
         S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
         M = S[rows] @ forms
         sign = determinant_sign(M)
-        across = S[np.ix_(rows, places)]
-        right = Ball(np.column_stack([g.mid[rows], across.mid]), np.column_stack([g.rad[rows], across.rad]))
+        turn = Ball((slip * system.F)[nodes], (abs(slip) * system.F_rad)[nodes])
+        across = S[:, places]
+        side = np.flatnonzero(slides[nodes])
+        turned = across[:, side] + S[:, p + nodes[side]] * turn[side]
+        across.mid[:, side], across.rad[:, side] = turned.mid, turned.rad
+        above = across[rows]
+        right = Ball(np.column_stack([g.mid[rows], above.mid]), np.column_stack([g.rad[rows], above.rad]))
         Z = solution(M, right) if sign else None
         if Z is None:
             return None
         moved = (S[places] @ forms) @ Z
-        R, h = S[np.ix_(places, places)] - moved[:, 1:], g[places] - moved[:, 0]
-        return cls(system, selection, nodes, places, np.arange(len(nodes)), tangential, rows, forms, Z, R, h, sign)
+        R, h = across[places] - moved[:, 1:], g[places] - moved[:, 0]
+        return cls(system, selection, nodes, places, tangential, rows, turn, forms, Z, R, h, sign)
 
     @cached_property
     def _slope(self) -> Array:
-        """Upper bounds of the free nodes' friction coefficients."""
-        return np.asarray((self.system.F + self.system.F_rad)[self.free] * SAFE)
+        """Upper bounds of the nodes' friction coefficients."""
+        return np.asarray((self.system.F + self.system.F_rad)[self.nodes] * SAFE)
+
+    def of_all(self, tau: Array) -> Array:
+        """The numbers of the free nodes with zeros for those that slide."""
+        return np.concatenate([tau, np.zeros(len(self.nodes) - len(tau))])
 
     def least(self, tau: Array) -> float:
-        """Lower bound of the smallest eigenvalue of Q (theory, (6.9)), at most 0 where none positive is proven."""
+        """Lower bound of the smallest eigenvalue of Q (theory, (6.9)), at most 0 where none positive is proven.
+
+        Parameters
+        ----------
+        tau : one number a node
+        """
         if not len(self.places):
             return 1.0
         used = np.flatnonzero((self.tangential >= 0) & (tau > 0))
@@ -219,7 +248,7 @@ class Reduced:
 
     def _diagonal(self, used: NDArray[np.intp], tau: Array) -> Array:
         diagonal = np.zeros(len(self.places))
-        diagonal[self.normal[used]] = 0.5 * tau[used]
+        diagonal[used] = 0.5 * tau[used]
         return diagonal
 
     def enclosed(self, tau: Array, force: Array) -> ClosedSolution | None:
@@ -228,15 +257,15 @@ class Reduced:
         if not least > 0:
             return None
         x = self._point(force)
-        reach = self._distance(self._displacements(x)) / least * SAFE
+        reach = self._distance(x.mid, self._displacements(x)) / least * SAFE
         if not np.isfinite(reach):
             return None
         x = Ball(x.mid, (x.rad + reach) * SAFE)
-        easy = (tau == 0) & (self.tangential >= 0)
-        if not self._far_from_contact(np.flatnonzero(easy), self._displacements(x)):
+        easy = np.flatnonzero((tau == 0) & (self.tangential >= 0))
+        if not self._far_from_contact(easy, self._displacements(x)):
             return None
         # nodes that are open at all solutions
-        x.rad[self.normal[easy]] = x.rad[self.tangential[easy]] = 0.0
+        x.rad[easy] = x.rad[self.tangential[easy]] = 0.0
         return self._solution(x, self._displacements(x))
 
     def _displacements(self, x: Ball) -> Ball:
@@ -245,22 +274,24 @@ class Reduced:
 
     def _far_from_contact(self, nodes: NDArray[np.intp], w: Ball) -> bool:
         """Whether nodes are open with w_n + F |w_t| < 0."""
-        n, t = self.normal[nodes], self.tangential[nodes]
+        n, t = nodes, self.tangential[nodes]
         across = self._slope[nodes] * w.size[t]
         largest = w.mid[n] + w.rad[n] + across + 8 * UNIT * (np.abs(w.mid[n]) + w.rad[n] + across) + TINY
-        named_open = all(self.selection[node] == OPEN for node in self.free[nodes])
+        named_open = all(self.selection[node] == OPEN for node in self.nodes[nodes])
         return named_open and bool(np.all(largest < 0))
 
     def _point(self, force: Array) -> Ball:
         """Forces in the cones, with the statuses of the selection, near the given ones."""
         p, system = self.system.p, self.system
         mid, rad = np.zeros(len(self.places)), np.zeros(len(self.places))
-        for i, node in enumerate(self.free):
+        for i, node in enumerate(self.nodes):
             code, t = self.selection[node], self.tangential[i]
             if code == OPEN:
                 continue
             n = max(float(force[node]), 0.0)
             mid[i] = n
+            if code in _SLIDING:
+                continue
             if code == STICK:
                 bound = max(system.F[node] - system.F_rad[node], 0.0) * n / SAFE
                 mid[t] = min(max(float(force[p + node]), -bound), bound)
@@ -269,13 +300,14 @@ class Reduced:
                 rad[t] = (system.F_rad[node] * n + 2 * UNIT * abs(mid[t])) * SAFE + TINY
         return Ball(mid, rad)
 
-    def _distance(self, w: Ball) -> float:
+    def _distance(self, point: Array, w: Ball) -> float:
         """Bound of ||d|| + ||F d_t|| with d the change of h for which the point is a solution (theory, (6.10))."""
         size, change = w.size, np.zeros(len(self.places))
         up, down = np.maximum(w.mid + w.rad, 0.0) * SAFE, np.maximum(w.rad - w.mid, 0.0) * SAFE
-        for i, node in enumerate(self.free):
+        for i, node in enumerate(self.nodes):
             code, t = self.selection[node], self.tangential[i]
-            change[i] = up[i] if code == OPEN else size[i]
+            apart = code == OPEN or (code in _SLIDING and point[i] == 0)
+            change[i] = up[i] if apart else size[i]
             if t >= 0:
                 change[t] = {OPEN: 0.0, STICK: size[t], SLIP_PLUS: down[t], SLIP_MINUS: up[t]}[code]
         rubbing = self.tangential >= 0
@@ -285,27 +317,41 @@ class Reduced:
         system, p = self.system, self.system.p
         y = self.Z[:, 0] - (self.Z[:, 1:] @ Ball(x.mid[:, None], x.rad[:, None]))[:, 0]
         force = (self.E @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
-        status = np.array(core_of(self.selection, self.free.tolist()))
-        idle = np.concatenate([status == OPEN, (status == OPEN) | (status == FRICTIONLESS) | (status == UNDECIDED)])
+        free = [int(node) for node in self.nodes if self.selection[node] not in _SLIDING]
+        core = core_of(self.selection, free)
+        status = np.array(core)
+        fixed = (status != UNDECIDED) & ~np.isin(status, _SLIDING)
+        idle = np.concatenate([~fixed | (status == OPEN), ~fixed | (status == OPEN) | (status == FRICTIONLESS)])
         force.mid[idle], force.rad[idle] = 0.0, 0.0
         force.mid[self.places], force.rad[self.places] = x.mid, x.rad
+        side = np.flatnonzero(np.isin(status[self.nodes], _SLIDING))
+        turned = x[side] * self.turn[side]
+        force.mid[p + self.nodes[side]], force.rad[p + self.nodes[side]] = turned.mid, turned.rad
         S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
         w = g - (S @ Ball(force.mid[:, None], force.rad[:, None]))[:, 0]
         w.mid[self.places], w.rad[self.places] = w_free.mid, w_free.rad
         w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
         values, radii = row_balls(system, force.mid, force.rad, w.mid, w.rad)
-        fixed = [(kind, i) for i in range(p) if status[i] != UNDECIDED for kind in CONDITIONS[int(status[i])][1]]
-        kinds, nodes = (np.array(part, dtype=np.intp) for part in (zip(*fixed, strict=True) if fixed else ((), ())))
+        tests = [(values[kind, i], radii[kind, i]) for i in np.flatnonzero(fixed) for kind in CONDITIONS[core[i]][1]]
+        tests += [self._slides(core[node], values[:, node], radii[:, node]) for node in self.nodes[side]]
+        slack, slack_rad = (np.array(part) for part in (zip(*tests, strict=True) if tests else ((), ())))
         possible = tuple(
-            frozenset((int(status[i]),)) if status[i] != UNDECIDED else self._possible(i, values[:, i], radii[:, i])
-            for i in range(p)
+            frozenset((core[i],)) if fixed[i] else self._possible(i, values[:, i], radii[:, i]) for i in range(p)
         )
-        core = tuple(status.tolist())
-        slack, slack_rad = values[kinds, nodes], radii[kinds, nodes]
         return ClosedSolution(core, force.mid, force.rad, w.mid, w.rad, possible, self.sign, slack, slack_rad)
 
+    @staticmethod
+    def _slides(code: int, values: Array, radii: Array) -> tuple[float, float]:
+        """What tells that a sliding node slips in its direction or is open, with its radius."""
+        forward = 5 if code == FORWARD else 6
+        separate, slips = (values[4], radii[4]), (values[forward], radii[forward])
+        if values[4] > radii[4]:
+            return separate
+        loaded = values[0] > radii[0]
+        return slips if loaded or slips[0] > slips[1] else (0.0, 0.0)
+
     def _possible(self, node: int, values: Array, radii: Array) -> frozenset[int]:
-        """Final codes of a free node that its balls do not exclude."""
+        """Final codes of a node that its balls do not exclude."""
         high, low = values + radii, values - radii
         return frozenset(
             code

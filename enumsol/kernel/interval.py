@@ -19,7 +19,7 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.kernel.point import margins
-from enumsol.kernel.rows import ROW_KINDS, UNDECIDED, row_table
+from enumsol.kernel.rows import BACKWARD, FORWARD, ROW_KINDS, STILL, UNDECIDED, row_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,10 +32,12 @@ if TYPE_CHECKING:
 
 KINDS = ROW_KINDS + 2
 #: Table of rows.row_table with kinds 7 and 8; then slip+ and slip- at a node whose friction varies.
-_CONSTANT = np.hstack([row_table(), np.zeros((8, 2), dtype=np.int8)])
+_CONSTANT = np.hstack([row_table(), np.zeros((len(row_table()), 2), dtype=np.int8)])
 _VARYING = _CONSTANT.copy()
 _VARYING[2] = [1, 0, 1, 1, 2, 1, 0, 1, 0]
 _VARYING[3] = [1, 0, 1, 1, 2, 0, 1, 0, 1]
+# no tree over an interval has these codes
+_VARYING[[FORWARD, BACKWARD]] = _VARYING[UNDECIDED]
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ def as_computed(problem: ContactProblem) -> CondensedEnclosure:
 
 
 def interval_row_tables() -> NDArray[np.int8]:
-    """What the multipliers may be, shape (2, 8, 9), by status code as in rows.row_table; second: friction varies."""
+    """What the multipliers may be, shape (2, 10, 9), by status code as in rows.row_table; second: friction varies."""
     return np.stack([_CONSTANT, _VARYING])
 
 
@@ -138,6 +140,6 @@ def interval_exclusion_margins(
     -------
     (m,) array
     """
-    code = np.where((codes == UNDECIDED) & (piece.high == 0), 7, codes)
+    code = np.where((codes == UNDECIDED) & (piece.high == 0), STILL, codes)
     allowed = np.where((piece.low == piece.high)[:, None], _CONSTANT[code], _VARYING[code])
     return margins(piece.ends, allowed, (piece.low, piece.high), leaf, rows, values, errors)

@@ -488,7 +488,7 @@ cdef class QPState:
         cdef Py_ssize_t i, j, k, count = 0, best = -1, p = rule.p
         cdef double slip, value, worth, most = -1.0, gap = fmax(target - self.bound, 1e-300)
         for i in range(p):
-            if codes[i] < CONTACT_:
+            if codes[i] < CONTACT_ or codes[i] > UNDECIDED_:
                 continue
             slip = rule.F[i] * self.x[i] * fabs(self.w[p + i]) - self.x[p + i] * self.w[p + i]
             if codes[i] == UNDECIDED_:

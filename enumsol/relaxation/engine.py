@@ -59,7 +59,7 @@ class Relaxation(Protocol):
 def largest_violation(codes: Codes, F: NDArray[np.float64], forces: NDArray[np.float64], w: NDArray[np.float64]) -> int:
     """The undecided node at which complementarity is violated most, -1 when all are decided."""
     array, p = np.array(codes), len(F)
-    open_nodes = np.flatnonzero(array >= CONTACT)
+    open_nodes = np.flatnonzero((array == CONTACT) | (array == UNDECIDED))
     if not len(open_nodes):
         return -1
     slip = F * forces[:p] * np.abs(w[p:]) - forces[p:] * w[p:]

@@ -14,6 +14,7 @@ from enumsol.statuses import (
     CONTACT,
     FRICTIONLESS,
     OPEN,
+    SLIDING,
     STATUSES,
     STICK,
     UNDECIDED,
@@ -179,6 +180,8 @@ def named(part: UndecidedPart) -> Undecided:
     for code in part.codes:
         if code == UNDECIDED:
             names.append(None)
+        elif code in SLIDING:
+            names.append(" or ".join(STATUSES[held].value for held in SLIDING[code]))
         else:
             names.append("contact" if code in (CONTACT, FRICTIONLESS) else STATUSES[code])
     return Undecided(tuple(names), part.reason, part.hint)

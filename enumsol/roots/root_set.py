@@ -34,7 +34,8 @@ class Undecided(Sealed):
     Attributes
     ----------
     statuses : tuple
-        Per node a ContactStatus, the string "contact" (in contact, not known how) or None (nothing known).
+        Per node a ContactStatus, the string "contact" (in contact, not known how), "open or slip+", "open or slip-", or
+        None (nothing known).
     reason : str
         What could not be decided.
     hint : str

@@ -11,7 +11,17 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from enumsol.selections.solution import SelectionSolution
-from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.statuses import (
+    BACKWARD,
+    CONTACT,
+    FORWARD,
+    FRICTIONLESS,
+    OPEN,
+    SLIDING,
+    SLIP_MINUS,
+    SLIP_PLUS,
+    STICK,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,6 +38,8 @@ NEAR = 1e-9
 #: Smallest eigenvalue below which a form counts as not definite.
 _DEFINITE = 1e-10
 _NEWTON_STEPS, _WEIGHT_STEPS = 16, 6
+#: So many nodes that slide without load make a search begin again.
+_MANY = 3
 
 
 @dataclass(frozen=True)
@@ -37,6 +49,7 @@ class Proposal:
     Attributes
     ----------
     selection : final codes, of a selection that holds there up to rounding
+    sliding : FORWARD or BACKWARD for nodes that in the proof are open or slip that way
     free : ascending nodes that have no status in the proof
     force : (2p,) array, lambda
     tau : one number a free node for the test of definiteness; 0 where a node need not be in it
@@ -46,12 +59,18 @@ class Proposal:
     """
 
     selection: Codes
+    sliding: dict[int, int]
     free: tuple[int, ...]
     force: Array
     tau: Array
     strict: bool
     least: float
     sign: int
+
+    @property
+    def named(self) -> Codes:
+        """The selection with the codes of the sliding nodes."""
+        return tuple(self.sliding.get(i, code) for i, code in enumerate(self.selection))
 
 
 class Closing(Protocol):
@@ -61,9 +80,12 @@ class Closing(Protocol):
     ----------
     hard : bool
         A complete selection was met that is degenerate, or nearly so.
+    sliding : dict
+        FORWARD or BACKWARD for nodes that touch without load and slide at a solution met.
     """
 
     hard: bool
+    sliding: dict[int, int]
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
@@ -79,8 +101,16 @@ class Closer:
 
     def __init__(self, certifier: Closing) -> None:
         self._certifier = certifier
-        self._alert = False
+        self._alert = self._began_again = False
         self._wait = self._pause = 0
+
+    def begins_again(self) -> bool:
+        """Whether so much has become known that a search had better begin again; once at most."""
+        if self._began_again or len(self._certifier.sliding) < _MANY:
+            return False
+        self._began_again = True
+        self._wait = self._pause = 0
+        return True
 
     def met(self, answer: object) -> None:
         """Take note of what a complete selection holds: a degenerate solution makes every node worth a try."""
@@ -118,19 +148,24 @@ class Reduction:
     Parameters
     ----------
     system : ScaledSystem
-    codes : status codes; nodes with a final one are fixed
+    codes : status codes; nodes with a final one that are neither free nor slide are fixed
+    free : ascending nodes
+    sliding : FORWARD or BACKWARD for other nodes
     """
 
-    def __init__(self, system: ScaledSystem, codes: Codes, free: tuple[int, ...]) -> None:
+    def __init__(self, system: ScaledSystem, codes: Codes, free: tuple[int, ...], sliding: dict[int, int]) -> None:
         p, S, F = system.p, system.S, system.F
-        self.system, self.codes, self.free = system, codes, free
-        chosen = set(free)
+        self.system, self.free = system, (*free, *sorted(sliding))
+        chosen = set(self.free)
         fixed = [i for i in range(p) if i not in chosen and codes[i] != OPEN]
         stuck = [i for i in fixed if codes[i] == STICK]
-        self.nodes = np.array(free, dtype=np.intp)
-        self.rubbing = F[self.nodes] > 0
+        self.nodes = np.array(self.free, dtype=np.intp)
+        slides = np.arange(len(self.nodes)) >= len(free)
+        self.rubbing = (F[self.nodes] > 0) & ~slides
         self.places = np.concatenate([self.nodes, p + self.nodes[self.rubbing]])
-        self.tangential = np.where(self.rubbing, len(free) + np.cumsum(self.rubbing) - 1, -1)
+        self.tangential = np.where(self.rubbing, len(self.free) + np.cumsum(self.rubbing) - 1, -1)
+        self.turn = np.array([(sliding.get(i, 0) == FORWARD) - (sliding.get(i, 0) == BACKWARD) for i in self.free])
+        self.turn = self.turn * F[self.nodes]
         rows = np.array(fixed + [p + i for i in stuck], dtype=np.intp)
         self.E = np.zeros((2 * p, len(rows)))
         for k, i in enumerate(fixed):
@@ -139,17 +174,21 @@ class Reduction:
                 self.E[p + i, k] = F[i] if codes[i] == SLIP_PLUS else -F[i]
         for k, i in enumerate(stuck, start=len(fixed)):
             self.E[p + i, k] = 1.0
+        across = S[:, self.places]
+        across[:, : len(self.free)] += S[:, p + self.nodes] * self.turn
         M = S[rows] @ self.E
         self.sign = int(np.linalg.slogdet(M)[0])
         # a singular matrix is refused by whoever proves something of it
-        self.Z = np.linalg.solve(M, np.column_stack([system.g[rows], S[np.ix_(rows, self.places)]]))
+        self.Z = np.linalg.solve(M, np.column_stack([system.g[rows], across[rows]]))
         moved = S[self.places] @ self.E @ self.Z
-        self.R, self.h = S[np.ix_(self.places, self.places)] - moved[:, 1:], system.g[self.places] - moved[:, 0]
+        self.R, self.h = across[self.places] - moved[:, 1:], system.g[self.places] - moved[:, 0]
 
     def forces(self, x: Array) -> Array:
-        """lambda for the forces of the free nodes."""
+        """lambda for the forces of the nodes that are free or slide."""
         force = np.asarray(self.E @ (self.Z[:, 0] - self.Z[:, 1:] @ x))
         force[self.places] = x
+        turned = self.turn != 0
+        force[self.system.p + self.nodes[turned]] = (self.turn * x[: len(self.free)])[turned]
         return force
 
     def solution(self, force: Array, w: Array) -> tuple[Array, list[int]] | None:
@@ -256,7 +295,7 @@ class Reduction:
 def holds_below(codes: Codes, active: ActiveSets) -> bool:
     """Whether a solution lies below an assignment: at every node a final code holds that refines its code."""
     return all(
-        bool(held) if code == UNDECIDED else bool(held - {OPEN}) if code == CONTACT else code in held
+        bool(held - {OPEN}) if code == CONTACT else bool(held) if code > FRICTIONLESS else code in held
         for code, held in zip(codes, active, strict=True)
     )
 
@@ -268,7 +307,9 @@ def start(system: ScaledSystem, relaxation: Relaxation | None) -> tuple[Array, A
     return relaxation.forces, relaxation.displacements
 
 
-def propose(system: ScaledSystem, codes: Codes, force: Array, w: Array, *, exactly: bool) -> Proposal | None:
+def propose(
+    system: ScaledSystem, codes: Codes, force: Array, w: Array, *, exactly: bool, sides: bool = True
+) -> Proposal | None:
     """What may close a subtree, or None.
 
     Parameters
@@ -277,12 +318,14 @@ def propose(system: ScaledSystem, codes: Codes, force: Array, w: Array, *, exact
     codes : of the subtree
     force, w : (2p,) arrays, lambda and w near its solution
     exactly : for a proof in rationals, in which statuses need not hold strictly; otherwise nodes whose status does not
-        hold strictly are freed
+        hold strictly are freed, or slide
+    sides : nodes that are open or slip in one direction slide; otherwise they are free
     """
-    free = tuple(i for i, code in enumerate(codes) if code not in _FINAL)
+    free = tuple(i for i, code in enumerate(codes) if code not in _FINAL and (code not in SLIDING or not sides))
+    sliding = {} if not sides else {i: code for i, code in enumerate(codes) if code in SLIDING}
     for _ in range(2):
         try:
-            reduction = Reduction(system, codes, free)
+            reduction = Reduction(system, codes, free, sliding)
         except np.linalg.LinAlgError:
             return None
         found = reduction.solution(force, w)
@@ -291,19 +334,31 @@ def propose(system: ScaledSystem, codes: Codes, force: Array, w: Array, *, exact
         force = reduction.forces(found[0])
         w = system.g - system.S @ force
         selection = list(codes)
-        for i, code in zip(free, found[1], strict=True):
+        for i, code in zip(reduction.free, found[1], strict=True):
             selection[i] = code
+            if i in sliding and code == FRICTIONLESS:
+                selection[i] = SLIDING[sliding[i]][1]
         slack = _slack(system, selection, force, w)
-        fixed = np.array([i for i in range(system.p) if i not in set(free)], dtype=np.intp)
+        fixed = np.array([i for i in range(system.p) if i not in set(reduction.free)], dtype=np.intp)
         loose = [int(i) for i in fixed if abs(slack[i]) <= NEAR]
         if exactly or not loose or np.min(slack[fixed]) < -NEAR:
             break
-        free = tuple(sorted({*free, *loose}))
+        resting = without_load(system, force, w)
+        sliding |= {i: resting[i] for i in loose if codes[i] in SLIDING.get(resting.get(i, 0), ())}
+        free = tuple(sorted({*free, *loose} - sliding.keys()))
     tau = reduction.weights(_counted(reduction, selection, force, w, exactly=exactly))
     if tau is None:
         return None
     least = float(np.min(slack[fixed], initial=np.inf))
-    return Proposal(tuple(selection), free, force, tau, bool(np.all(np.abs(slack) > NEAR)), least, reduction.sign)
+    strict = bool(np.all(np.abs(slack) > NEAR))
+    return Proposal(tuple(selection), sliding, free, force, tau[: len(free)], strict, least, reduction.sign)
+
+
+def without_load(system: ScaledSystem, force: Array, w: Array) -> dict[int, int]:
+    """FORWARD or BACKWARD for the nodes with friction that touch without load and slide."""
+    p = system.p
+    rests = (np.abs(force[:p]) <= NEAR) & (np.abs(w[:p]) <= NEAR) & (np.abs(w[p:]) > NEAR) & (system.F > 0)
+    return {int(i): FORWARD if w[p + i] > 0 else BACKWARD for i in np.flatnonzero(rests)}
 
 
 _FINAL = (OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS)

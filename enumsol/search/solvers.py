@@ -17,6 +17,7 @@ from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.closing import Closer
 from enumsol.search.forms import Forms
 from enumsol.search.proof_header import point_header, unit_exponents
+from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import TreeSearch
 from enumsol.selections.floats import FloatSelections
 
@@ -156,13 +157,15 @@ class Solvers:
         progress: Callable[[SearchProgress], object] | None = None,
     ) -> TreeSearch:
         """A search of the tree with a certifier made here."""
+        closing = cast("Closing", certifier)
         return TreeSearch(
             self.scaled,
             certifier,
             engine=self.engine,
+            splitting=PlaneSplitting(self.scaled.F, sliding=closing.sliding),
             limits=limits,
             progress=progress,
-            closer=Closer(cast("Closing", certifier)),
+            closer=Closer(closing),
             forms=self._forms(),
         )
 

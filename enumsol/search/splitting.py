@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from enumsol.relaxation.rows import status_rows
-from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIDING, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -71,12 +71,18 @@ def branching_node(
     relaxation : with its minimiser, or None
     """
     if relaxation is None:
-        return next((i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED)), -1), forced
+        node = next((i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED)), -1)
+        return (node if node >= 0 else _sliding_node(codes)), forced
     if forced is not None:
         forced = forced or relaxation.forced(codes)
         if forced:
             return forced[0], forced[1:]
-    return relaxation.choose(codes), None
+    node = relaxation.choose(codes)
+    return (node if node >= 0 else _sliding_node(codes)), None
+
+
+def _sliding_node(codes: Codes) -> int:
+    return next((i for i, code in enumerate(codes) if code in SLIDING), -1)
 
 
 class PlaneSplitting:
@@ -87,10 +93,18 @@ class PlaneSplitting:
     F : (p,) array
         Friction coefficients; a node with F = 0 is only open or in contact.
     allowed : per node the final codes to be examined; default all
+    sliding : FORWARD or BACKWARD for nodes that slide without load as far as is known; read as the search goes on
+        They are split into that code and the two statuses that it does not contain.
     """
 
-    def __init__(self, F: NDArray[np.float64], allowed: Sequence[frozenset[int]] | None = None) -> None:
+    def __init__(
+        self,
+        F: NDArray[np.float64],
+        allowed: Sequence[frozenset[int]] | None = None,
+        sliding: Mapping[int, int] | None = None,
+    ) -> None:
         self._F = F
+        self._sliding = sliding if sliding is not None else {}
         self.friction = [bool(f > 0) for f in F]
         every = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS))
         self._allowed = list(allowed) if allowed is not None else [every] * len(F)
@@ -106,6 +120,11 @@ class PlaneSplitting:
         p = len(codes)
         if relaxation is not None:
             force, w = relaxation.forces, relaxation.displacements
+        if codes[node] in SLIDING:
+            return list(SLIDING[codes[node]])
+        if codes[node] == UNDECIDED and self.friction[node] and node in self._sliding:
+            side = self._sliding[node]
+            return [side, STICK, SLIP_MINUS if SLIP_PLUS in SLIDING[side] else SLIP_PLUS]
         if codes[node] == UNDECIDED:
             touching = FRICTIONLESS if not self.friction[node] else (contact[0] if len(contact) == 1 else CONTACT)
             children = [OPEN] if OPEN in allowed else []

@@ -217,27 +217,46 @@ class TreeSearch:
         if self.forms is None or len(start) > 1:
             self._run(start)
             return self.outcome
-        forms, certifier = self.forms, self.certifier
+        certifier = self.certifier
         held = HeldRecords(certifier.recorder)
         certifier.recorder = held
         try:
-            stack = self._run(start, until=forms)
-            if stack and forms.pay(self.engine, start[0].codes, self._rows):
-                held.drop()
-                certifier.forget()
-                self.outcome.forget()
-                self._covered, stack = 0.0, start
+            stack = self._begin(start, held, self.forms)
         finally:
             certifier.recorder = held.recorder
             held.release()
         self._run(stack)
         return self.outcome
 
-    def _run(self, stack: list[TreeNode], until: Forms | None = None) -> list[TreeNode]:
-        """Examine what waits, depth first; what still waits when it is time to try forms."""
+    def _begin(self, start: list[TreeNode], held: HeldRecords, forms: Forms) -> list[TreeNode]:
+        """Search until it is known how the search goes on: from the beginning, if that is better; what still waits."""
+
+        def known() -> bool:
+            return forms.due(self.outcome.nodes, self._covered) or again()
+
+        def again() -> bool:
+            return self.closer is not None and self.closer.begins_again()
+
+        stack = self._run(start, until=known)
+        if stack and not forms.due(self.outcome.nodes, self._covered):
+            self._forget(held)
+            stack = self._run(start, until=known)
+        if stack and forms.pay(self.engine, start[0].codes, self._rows):
+            self._forget(held)
+            stack = start
+        return stack
+
+    def _forget(self, held: HeldRecords) -> None:
+        held.drop()
+        self.certifier.forget()
+        self.outcome.forget()
+        self._covered = 0.0
+
+    def _run(self, stack: list[TreeNode], until: Callable[[], bool] | None = None) -> list[TreeNode]:
+        """Examine what waits, depth first; what still waits when it is time to stop."""
         stack = list(stack)
         while stack:
-            if until is not None and until.due(self.outcome.nodes, self._covered):
+            if until is not None and until():
                 break
             if self.must_stop(len(stack)):
                 for item in reversed(stack):

@@ -1,6 +1,7 @@
 """Leaves that close a subtree: forged ones are refused, and any mutant that is accepted is still a proof."""
 
 import functools
+from itertools import product
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ MUTANTS = 150
 @functools.cache
 def cases(kind):
     """Problems with records of proofs that have such leaves."""
+    if kind in ("slides", "sides"):
+        return cases_with_sides(kind)
     found = []
     with pytest.MonkeyPatch.context() as patch:
         before = closing.Closer.closed
@@ -34,14 +37,34 @@ def cases(kind):
             problem = touching_problem(rng, int(rng.integers(2, 4)))
             roots = enumerate_roots(problem, 0)
             records = records_of(roots.proof)
-            if roots.certified_data == "problem" and roots.complete and any(r[0] == kind for r in records[1:-1]):
+            if roots.certified_data == "problem" and roots.complete and leaves(records, kind):
+                found.append((problem, records))
+    assert len(found) > 5
+    return found
+
+
+def cases_with_sides(kind):
+    """Proofs in which undecided nodes are split by sides."""
+    found = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(closing, "_MANY", 1)
+        for k, slides, friction in product((2, 3), (False, True), (0.875, 1.0, 1.25, 1.5)):
+            problem = beside_a_loaded_node(k, slides=slides, grazing=True, friction=friction)
+            records = records_of(enumerate_roots(problem, 0).proof)
+            if leaves(records, kind):
                 found.append((problem, records))
     assert len(found) > 5
     return found
 
 
 def leaves(records, kind):
-    return [k for k, record in enumerate(records) if isinstance(record, list) and record[0] == kind]
+    """Numbers of the records of a kind: "m", "M", or "m" with sliding nodes; "b" with sides."""
+    chosen = [(k, record) for k, record in enumerate(records) if isinstance(record, list)]
+    if kind == "slides":
+        return [k for k, record in chosen if record[0] == "m" and max(record[1]) > 6]
+    if kind == "sides":
+        return [k for k, record in chosen if record[0] == "b" and max(record[2]) > 6]
+    return [k for k, record in chosen if record[0] == kind]
 
 
 def accepted(problem, records):
@@ -52,7 +75,10 @@ def accepted(problem, records):
     return report.ok
 
 
-@pytest.mark.parametrize("kind", ["m", "M"])
+KINDS = ["m", "M", "slides", "sides"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_both_checkers_accept(kind):
     for problem, records in cases(kind):
         assert accepted(problem, records)
@@ -73,14 +99,14 @@ def changed(record, rng):
         if how == 0:
             del record[k][j]
         else:
-            record[k][j] = int(rng.integers(0, 5)) if how == 1 else value + int(rng.integers(-1, 2))
+            record[k][j] = int(rng.integers(0, 9)) if how == 1 else value + int(rng.integers(-1, 2))
     else:
         scale = float(rng.choice([0.0, -1.0, 0.5, 2.0, 1e3, 1e-3, 1 + 1e-6]))
         record[k][j] = value * scale if rng.random() < 0.8 else float(rng.normal())
     return record
 
 
-@pytest.mark.parametrize("kind", ["m", "M"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_an_accepted_mutant_is_still_a_proof(kind):
     rng, refused = np.random.default_rng(5), 0
     for n in range(MUTANTS):

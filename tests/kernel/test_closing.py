@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rational_closings import Reduced
+from rational_closings import Closings, Reduced
 from rational_forms import Data, Forms, Refused, exact
 from touching import touching_problem
 
@@ -27,6 +27,11 @@ def test_what_is_proven_is_so(seed):
         selection = tuple(int(rng.integers(4)) if positive else int(rng.choice([0, 4])) for positive in friction)
         free = tuple(i for i in range(problem.p) if rng.random() < 0.7)
         # units of lambda are powers of two: forces of size one
+        # some of the others slide
+        selection = tuple(
+            int(rng.choice([7, 8])) if positive and i not in free and rng.random() < 0.4 else code
+            for i, (code, positive) in enumerate(zip(selection, friction, strict=True))
+        )
         tau = rng.choice([0.0, 0.1, 0.5, 1.0, 2.0], size=len(free))
         force = rng.normal(size=2 * problem.p)
         ball = closed_solution(system, selection, free, tau, force)
@@ -37,7 +42,7 @@ def test_what_is_proven_is_so(seed):
             units = scaled.length[: problem.p] / scaled.force[: problem.p]
             weights = {i: exact(float(t * units[i])) for i, t in zip(free, tau, strict=True)}
             reduced = Reduced(forms, core, friction)
-            assert reduced.definite(weights)
+            assert reduced.definite(weights | dict.fromkeys(reduced.sliding, exact(0.0)))
             assert (reduced.determinant > 0) == (sign > 0)
         if ball is None:
             continue
@@ -49,6 +54,11 @@ def test_what_is_proven_is_so(seed):
             w = float(forms.move(1, k)[-1] + sum((a * b for a, b in zip(forms.move(1, k), point, strict=False)), 0))
             w /= scaled.length[k]
             assert abs(w - ball.w[k]) <= ball.w_rad[k] + 1e-14 * (1 + abs(w))
+        judge = Closings(forms, friction, (scaled.length, scaled.force))
+        values = [v for i in reduced.fixed for v in judge.conditions(core[i], i, point)]
+        values += [judge.slides(core[i], i, point) for i in reduced.sliding]
+        assert not ball.is_root or all(v > 0 for v in values)
+        assert not ball.is_excluded or any(v < 0 for v in values)
     assert proven
 
 
@@ -57,7 +67,10 @@ def test_bad_proposals_prove_nothing():
     system, _ = system_of(problem)
     assert np.all(system.F > 0)
     assert definite_sign(system, (1, 1, 1), (), np.zeros(0)) == 1
-    for selection in ((4, 1, 1), (1, 1, 6), (0, 5, 0)):
+    assert definite_sign(system, (7, 1, 8), (), np.zeros(0)) == 1
+    # a free node does not slide
+    assert definite_sign(system, (7, 1, 8), (0,), np.ones(1)) == 0
+    for selection in ((4, 1, 1), (1, 1, 6), (0, 5, 0), (9, 1, 1), (-1, 1, 1)):
         assert definite_sign(system, selection, (), np.zeros(0)) == 0
         assert closed_solution(system, selection, (0, 1), np.ones(2), np.zeros(6)) is None
     free, near = (0, 1, 2), np.zeros(6)
@@ -77,6 +90,13 @@ def test_which_solutions_are_the_same():
     assert same_solution(*one, (1, 0, 2), sets({1}, {0}, {2})) is True
     assert same_solution(*one, (1, 2, 6), sets({1}, {2}, {2, 3})) is False
     assert same_solution(*one, (3, 6, 6), sets({3}, {0}, {2})) is False
+    # a node that slides: open or slip+, open or slip-
+    slides = (7, 6, 8), sets({0, 2}, {1}, {0})
+    assert same_solution(*slides, (0, 1, 3), sets({0}, {1}, {3})) is False
+    assert same_solution(*slides, (2, 6, 6), sets({2}, {1}, {0, 3})) is True
+    assert same_solution(*slides, (6, 6, 0), sets({0, 1, 2}, {1, 2}, {0})) is True
+    assert same_solution(*slides, (6, 1, 6), sets({0, 1}, {1}, {0, 1})) is True
+    assert same_solution(*slides, (1, 6, 6), sets({1, 2}, {1}, {0, 1})) is None
     # neither surely has the other one's statuses
     assert same_solution((1, 6, 6), sets({1}, {0, 1}, {0, 1}), (6, 0, 6), sets({1, 2}, {0}, {0, 1})) is None
 

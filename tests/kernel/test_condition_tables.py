@@ -11,22 +11,22 @@ from enumsol.relaxation.interval import interval_rows
 from enumsol.relaxation.rows import EQUALITY, INEQUALITY, imposed_rows, status_rows, with_implied
 from enumsol.statuses import RowKind
 
-NAMES = ("OPEN", "STICK", "SLIP_PLUS", "SLIP_MINUS", "FRICTIONLESS", "CONTACT", "UNDECIDED")
+NAMES = ("OPEN", "STICK", "SLIP_PLUS", "SLIP_MINUS", "FRICTIONLESS", "CONTACT", "UNDECIDED", "FORWARD", "BACKWARD")
 FINAL = range(5)
-#: Rows of the kernel's table: a code, or 7 for an undecided node without friction.
+#: Rows of the kernel's table: a code, or STILL for an undecided node without friction.
 TABLE = rows.row_table()
 
 
 def table_row(code, friction):
-    return 7 if code == rows.UNDECIDED and not friction else code
+    return rows.STILL if code == rows.UNDECIDED and not friction else code
 
 
 def cases():
-    return [(code, friction) for code in range(7) for friction in (True, False) if friction or code in (0, 4, 6)]
+    return [(code, friction) for code in range(9) for friction in (True, False) if friction or code in (0, 4, 6)]
 
 
 def test_both_sides_use_the_same_codes():
-    assert [getattr(statuses, name) for name in NAMES] == [getattr(rows, name) for name in NAMES] == list(range(7))
+    assert [getattr(statuses, name) for name in NAMES] == [getattr(rows, name) for name in NAMES] == list(range(9))
     assert (INEQUALITY, EQUALITY) == (rows.NONNEGATIVE, rows.FREE)
     assert len(RowKind) == rows.ROW_KINDS
 
@@ -38,7 +38,7 @@ def test_both_sides_impose_the_same_conditions(code):
     assert [tuple(map(int, part)) for part in ours] == list(theirs)
 
 
-@pytest.mark.parametrize("code", range(7))
+@pytest.mark.parametrize("code", range(9))
 def test_the_multipliers_fit_the_conditions(code):
     equations, inequalities = statuses.CONDITIONS[code]
     assert all(TABLE[code, kind] == rows.FREE for kind in equations)
@@ -63,9 +63,12 @@ def test_the_same_over_an_interval(code):
     assert (max(found) >= rows.ROW_KINDS) == slips
 
 
-@pytest.mark.parametrize("parent", [rows.UNDECIDED, rows.CONTACT])
+@pytest.mark.parametrize("parent", [rows.UNDECIDED, rows.CONTACT, rows.FORWARD, rows.BACKWARD])
 def test_children_impose_what_their_parents_do(parent):
-    for child in rows.children_of(parent, friction=True):
+    assert rows.coverings_of(parent, friction=True)[0] == rows.children_of(parent, friction=True)
+    for child in {child for covering in rows.coverings_of(parent, friction=True) for child in covering}:
+        assert rows.refines(child, parent)
+        assert not rows.refines(parent, child)
         below, above = TABLE[child], TABLE[parent]
         assert all(a <= b for a, b in zip(above, below, strict=True))
         if child != rows.OPEN:

@@ -4,11 +4,14 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
-from generators import random_problem
+from generators import integer_problem, random_problem
+from proof_tools import records_of
+from rational_checker import check_records
 from touching import beside_a_loaded_node, row_of_discs, touching_problem
 
 from enumsol import ContactProblem, enumerate_roots, verify
 from enumsol.search import closing, solvers
+from enumsol.statuses import BACKWARD, FORWARD
 
 
 @pytest.mark.parametrize("slides", [False, True])
@@ -21,6 +24,39 @@ def test_grazing_nodes_cost_a_number_of_nodes_linear_in_theirs(slides, grazing):
         assert len(roots) == roots.index_sum == 1
         assert all(len(held) == (2 if grazing else 4) for held in roots[0].active[1:])
         assert verify(problem, roots.proof).complete
+
+
+@pytest.mark.parametrize("arithmetic", ["verified", "fast"])
+@pytest.mark.parametrize("slides", [False, True])
+def test_much_friction(slides, arithmetic):
+    # too much for the test of definiteness where all nodes are free
+    for k in (4, 8, 16, 32):
+        problem = beside_a_loaded_node(k, slides=slides, grazing=True, friction=0.875)
+        roots = enumerate_roots(problem, 0, arithmetic, max_nodes=7 * k + 20)
+        assert not roots.undecided
+        assert len(roots) == 1
+        assert all(len(held) == 2 for held in roots[0].active[1:])
+        if arithmetic == "verified":
+            assert roots.complete
+            assert verify(problem, roots.proof).complete
+
+
+def test_sides_without_rationals(monkeypatch):
+    monkeypatch.setattr(solvers, "EXACT_DOF_LIMIT", 0)
+    problem = beside_a_loaded_node(12, slides=True, grazing=True, friction=0.875)
+    roots = enumerate_roots(problem, 0, max_nodes=100)
+    assert roots.complete
+    assert len(roots) == roots.index_sum == 1
+    assert verify(problem, roots.proof).complete
+
+
+@pytest.mark.parametrize("weights", [(2.0, 3.0), (1.0, 2.0, 4.0)])
+def test_a_row_of_unequal_discs(weights):
+    problem = row_of_discs(12, weights=weights, friction=0.9, stiffness=4.0)
+    roots = enumerate_roots(problem, 0, max_nodes=2000)
+    assert roots.complete
+    assert roots.index_sum == len(roots) == 1
+    assert verify(problem, roots.proof).complete
 
 
 def test_sixty_four_unloaded_nodes():
@@ -71,6 +107,31 @@ def alike(problem, exact, roots):
             assert np.all((low <= getattr(other, name)) & (getattr(other, name) <= high))
             assert np.all((low - wide <= getattr(one, name)) & (getattr(one, name) <= high + wide))
             assert np.max(high - low) < 1e-9
+
+
+@pytest.fixture
+def any_side(monkeypatch):
+    """Nodes are told from sticking and slipping in one direction, whether they slide or not."""
+    before, rng = closing.Closer.__init__, np.random.default_rng(2)
+
+    def made(self, certifier):
+        before(self, certifier)
+        certifier.sliding.update({i: int(rng.choice([FORWARD, BACKWARD])) for i in range(8) if rng.random() < 0.7})
+
+    monkeypatch.setattr(closing.Closer, "__init__", made)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_splits_by_sides_find_the_same(any_side, seed):
+    rng = np.random.default_rng(seed)
+    p = int(rng.integers(1, 5))
+    problem = touching_problem(rng, p) if seed % 3 else integer_problem(rng, p)
+    exact = enumerate_roots(problem, 0, "exact", "exhaustive")
+    roots = enumerate_roots(problem, 0)
+    alike(problem, exact, roots)
+    assert check_records(problem, records_of(roots.proof)) == records_of(roots.proof)[-1]
+    assert [root.active for root in enumerate_roots(problem, 0, "fast")] == [root.active for root in exact]
+    assert [root.active for root in enumerate_roots(problem, 0, "exact")] == [root.active for root in exact]
 
 
 @pytest.mark.parametrize("seed", range(40))

@@ -68,7 +68,7 @@ cdef class Margins:
                 return -np.inf
             code = codes[i]
             F = self.high[i]
-            sign = self.tables[self.low[i] != F, 7 if code == 6 and F == 0.0 else code, kind]
+            sign = self.tables[self.low[i] != F, 9 if code == 6 and F == 0.0 else code, kind]
             if sign == self.forbidden or (sign == self.nonnegative and v < 0.0):
                 return -np.inf
             a = fabs(v)

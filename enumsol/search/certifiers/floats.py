@@ -10,13 +10,13 @@ import numpy as np
 from enumsol.kernel.forms import form_margin
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.protocol import UndecidedPart, WithoutProof
-from enumsol.search.closing import NEAR, holds_below, propose, start
-from enumsol.selections.solution import VertexLimitError
+from enumsol.search.closing import NEAR, holds_below, propose, start, without_load
+from enumsol.selections.solution import SelectionSolution, VertexLimitError
 
 if TYPE_CHECKING:
     from enumsol.relaxation.engine import Relaxation
     from enumsol.selections.floats import FloatSelections
-    from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
+    from enumsol.selections.solution import Codes, SelectionSolver
 
 
 #: A condition is broken beyond doubt: one that is broken by less may hold within the tolerance at another point.
@@ -43,6 +43,8 @@ class FastCertifier(WithoutProof):
     def __init__(self, selections: FloatSelections) -> None:
         self._selections = selections
         self._norms = selections.row_norms()
+        #: Nodes that slide without load at a solution met (see Closing).
+        self.sliding: dict[int, int] = {}
 
     def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
         """Accept the pruning if conditions may be off by twice the tolerance."""
@@ -69,4 +71,8 @@ class FastCertifier(WithoutProof):
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in the selection within the tolerance."""
-        return solve_or_open(self._selections, codes)
+        found = solve_or_open(self._selections, codes)
+        if isinstance(found, SelectionSolution) and not found.strict:
+            system, force = self._selections.system, found.vertices[0]
+            self.sliding |= without_load(system, force, system.g - system.S @ force)
+        return found

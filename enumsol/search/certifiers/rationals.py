@@ -43,6 +43,8 @@ class ExactCertifier(WithoutProof):
         self._scaled = scaled
         self._enclosed = enclosed
         self._inverse: Any = None
+        #: What sticks or slides is left to the branchings.
+        self.sliding: dict[int, int] = {}
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in the selection."""
@@ -57,7 +59,7 @@ class ExactCertifier(WithoutProof):
         """What closes a subtree, and the solutions in it, sought near a point (theory, section 6.11)."""
         if self._enclosed is None:
             return None
-        proposal = propose(self._scaled, codes, force, w, exactly=True)
+        proposal = propose(self._scaled, codes, force, w, exactly=True, sides=False)
         if proposal is None:
             return None
         sign = definite_sign(self._enclosed, proposal.selection, proposal.free, proposal.tau)
@@ -81,7 +83,7 @@ class ExactCertifier(WithoutProof):
 
     def solution_near(self, proposal: Proposal) -> SelectionSolution | None:
         """The root of what is proposed with the statuses that hold exactly, by Newton's method; None if not found."""
-        solver, free, codes = self._selections, proposal.free, proposal.selection
+        solver, free, codes = self._selections, {*proposal.free, *proposal.sliding}, proposal.selection
         units = self._scaled.force / self._scaled.length
         for _ in range(_NEWTON_STEPS):
             solved = solver.solve_equations(codes, solver.system.g)

@@ -18,7 +18,7 @@ from enumsol.kernel.point import VerifiedSelection, exclusion_margin, holds_no_r
 from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
 from enumsol.proof.proof_file import fraction_text, packed
 from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
-from enumsol.search.closing import propose, start
+from enumsol.search.closing import propose, start, without_load
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import CONDITIONS, RowKind
 
@@ -110,6 +110,8 @@ class VerifiedCertifier:
         self._forms: dict[EnclosedForm, int] = {}
         #: A complete selection was not decided by balls.
         self.hard = False
+        #: Nodes that slide without load at a solution met (see Closing).
+        self.sliding: dict[int, int] = {}
         #: Selections of the roots found in rationals.
         self._known: list[Codes] = []
 
@@ -186,6 +188,8 @@ class VerifiedCertifier:
             self._leaf(Leaf.NO_ROOT_IN_RATIONALS)
         else:
             self._known.append(codes)
+            if ball is not None:
+                self._take_note(ball.force, ball.w)
             points = [[_fraction(v) for v in vertex] for vertex in solution.vertices]
             self._leaf(Leaf.POLYTOPE, points, solution.dimension)
         return solution
@@ -198,6 +202,14 @@ class VerifiedCertifier:
             return None
         near = start(self._scaled, relaxation)
         proposal = propose(self._scaled, codes, *near, exactly=False)
+        found = self._closed(codes, proposal, near)
+        if found and proposal is not None:
+            self._take_note(proposal.force, self._scaled.g - self._scaled.S @ proposal.force)
+        return found
+
+    def _closed(
+        self, codes: Codes, proposal: Proposal | None, near: tuple[Array, Array]
+    ) -> list[SelectionSolution] | None:
         ball = None if proposal is None else self._proven(proposal)
         # statuses that do not hold strictly are told by rationals, where there are any
         if proposal is not None and ball is not None and (proposal.strict or ball.is_excluded or self._is_known(ball)):
@@ -217,17 +229,22 @@ class VerifiedCertifier:
                 return [exactly]
         return found
 
+    def _take_note(self, force: Array, w: Array) -> None:
+        """Take note of nodes that slide without load at a solution."""
+        self.sliding |= without_load(self._scaled, force, w)
+
     def _closed_selection(self, codes: Codes, near: VerifiedSelection | None) -> list[SelectionSolution] | None:
         """The same for a selection whose conditions are not decided, without rationals."""
         if near is None:
             return None
+        self._take_note(near.force, near.w)
         proposal = propose(self._scaled, codes, near.force, near.w, exactly=False)
         ball = None if proposal is None else self._proven(proposal)
         return None if proposal is None or ball is None else self._closed_by(proposal, ball)
 
     def _proven(self, proposal: Proposal) -> ClosedSolution | None:
         system, tau = _present(self._enclosed), proposal.tau
-        ball = closed_solution(system, proposal.selection, proposal.free, tau, proposal.force)
+        ball = closed_solution(system, proposal.named, proposal.free, tau, proposal.force)
         return ball if ball is not None and (ball.is_root or ball.is_excluded) else None
 
     def _is_known(self, ball: ClosedSolution) -> bool:
@@ -236,7 +253,7 @@ class VerifiedCertifier:
 
     def _closed_by(self, proposal: Proposal, ball: ClosedSolution) -> list[SelectionSolution] | None:
         """Write a leaf and give its solutions; None where a root could not be told from another one."""
-        record = [proposal.selection, proposal.free, proposal.tau.tolist(), (ball.force * self._scaled.force).tolist()]
+        record = [proposal.named, proposal.free, proposal.tau.tolist(), (ball.force * self._scaled.force).tolist()]
         if ball.is_excluded:
             self._escalations.balls += 1
             self._leaf(Leaf.CLOSED, *record)
