@@ -42,8 +42,10 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         solvers: SpaceSolvers,
         progress: Callable[[SearchProgress], object] | None,
         proof_path: str | Path | None,
+        *,
+        resumed: bool = False,
     ) -> None:
-        super().__init__(solvers, progress, proof_path)
+        super().__init__(solvers, progress, proof_path, resumed=resumed)
         self.problem, self.alpha, self.arithmetic = solvers.problem, solvers.alpha, solvers.arithmetic
         self.system, self.enclosed = solvers.system, solvers.enclosed
 

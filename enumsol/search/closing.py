@@ -87,6 +87,10 @@ class Closer:
         strict = answer is None or (isinstance(answer, SelectionSolution) and answer.strict)
         self._alert = self._alert or not strict or self._certifier.hard
 
+    def again(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        """The solutions of a subtree that was closed in an earlier search."""
+        return self._certifier.closed(codes, relaxation)
+
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions of a subtree that can be closed, None where it has to be searched."""
         # at a solution without slip the energy is zero, and that is its minimum

@@ -14,6 +14,7 @@ from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Engine
     from enumsol.search.splitting import ImposedRows
@@ -43,6 +44,7 @@ class Forms:
     def __init__(self, scaled: ScaledSystem, enclosed: EnclosedSystem) -> None:
         self._scaled, self._enclosed = scaled, enclosed
         self._engine: Engine | None = None
+        self._form: EnclosedForm | None = None
 
     @property
     def in_use(self) -> bool:
@@ -51,7 +53,19 @@ class Forms:
 
     def due(self, nodes: int, covered: float) -> bool:
         """Whether it is time to try a form."""
-        return nodes >= NODES * max(self._scaled.p, _SMALL) and covered < 1.0 - _LEFT
+        return self.tried(nodes) and covered < 1.0 - _LEFT
+
+    def tried(self, nodes: int) -> bool:
+        """Whether a search of so many nodes has tried a form."""
+        return nodes >= NODES * max(self._scaled.p, _SMALL)
+
+    def use(self, engine: Any, form: EnclosedForm | None) -> None:
+        """Go on with a form that is known already, or with the energy."""
+        if form is not None and form is self._form:
+            return
+        self._form = form
+        usable = form is not None and isinstance(engine, ActiveSetEngine) and form.smallest_eigenvalue > 0
+        self._engine = FormEngine(engine, self._scaled, form) if usable and form is not None else None
 
     def pay(self, engine: Any, codes: Codes, rows: ImposedRows) -> bool:
         """Whether a form at the root of the search is clearly tighter than the energy; if so it is in use."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from enumsol.executors import WorkerLost, has_result, result_of, submit
+from enumsol.search.resume import Replay
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.search.tree import SearchLimits, SearchOutcome, TreeNode
 
@@ -13,8 +14,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from concurrent.futures import Executor, Future
 
+    from enumsol.proof.begun import BegunProof
     from enumsol.proof.proof_file import Recorder
     from enumsol.search.certifiers.protocol import Certified, Certifier
+    from enumsol.search.resume import Reader
     from enumsol.search.tree import SearchProgress, TreeSearch
     from enumsol.selections.solution import Codes
 
@@ -51,6 +54,9 @@ class Searchable(Protocol):
     def unloaded(self) -> bool:
         """Whether g = 0, so that only lambda = 0 solves."""
 
+    def reader(self) -> Reader:
+        """Understands the records of an earlier proof."""
+
     def proof_header(self) -> dict[str, Any]:
         """First record of a proof."""
 
@@ -62,10 +68,17 @@ class _Answer:
     certified: Certified
 
 
-def run_parallel(executor: Executor, solvers: Searchable, search: TreeSearch) -> None:
+def run_parallel(
+    executor: Executor,
+    solvers: Searchable,
+    search: TreeSearch,
+    begun: BegunProof | None = None,
+    passed: Callable[[], None] | None = None,
+) -> None:
     """Search the tree with the help of an executor; ``search`` collects the outcome, which does not depend on timing.
 
-    Its outcome is filled as the subtrees come in, so that an interruption keeps those that did.
+    Its outcome is filled as the subtrees come in, so that an interruption keeps those that did. It goes on with an
+    earlier proof, if there is one (see Replay.run).
 
     Raises
     ------
@@ -80,7 +93,10 @@ def run_parallel(executor: Executor, solvers: Searchable, search: TreeSearch) ->
 
     plan = _Plan(hand_out)
     try:
-        _examine_top(plan, search)
+        if begun is None or passed is None:
+            _examine_top(plan, search)
+        else:
+            _go_on(plan, search, Replay(search, solvers.reader(), plan.submit), begun, passed)
         _collect(plan, search)
     finally:
         for handed in plan.handed:
@@ -99,11 +115,22 @@ def _examine_top(plan: _Plan, search: TreeSearch) -> None:
         while stack:
             item, level = stack.pop()
             if level >= LEVELS:
-                plan.submit(item.codes)
+                plan.submit(item)
             else:
                 children = reversed(list(search.examine(item)))
                 # presolve goes down without spreading out
                 stack.extend((child, level + (child.forced is None)) for child in children)
+    finally:
+        certifier.recorder = recorder
+
+
+def _go_on(plan: _Plan, search: TreeSearch, replay: Replay, begun: BegunProof, passed: Callable[[], None]) -> None:
+    """Take over an earlier proof, and hand out what it leaves."""
+    certifier = search.certifier
+    recorder, certifier.recorder = certifier.recorder, plan
+    try:
+        for item in reversed(replay.run(begun, lambda: plan.items.append(passed))):
+            plan.submit(item)
     finally:
         certifier.recorder = recorder
 
@@ -129,9 +156,9 @@ class _Plan:
         """Keep a record of the top of the tree."""
         self.items.append(record)
 
-    def submit(self, codes: Codes) -> None:
+    def submit(self, item: TreeNode) -> None:
         """Hand out a subtree, as long as the executor takes any."""
-        future = None
+        future, codes = None, item.codes
         if self.lost is None:
             try:
                 future = self._hand_out(codes)
@@ -168,6 +195,9 @@ def _collect(plan: _Plan, search: TreeSearch) -> None:
     if plan.lost is not None:
         finished = _finished(plan.handed, plan.lost, outcome)
     for item in plan.items:
+        if callable(item):
+            item()
+            continue
         if not isinstance(item, _Handed):
             search.certifier.recorder.write(item)
             continue

@@ -17,6 +17,7 @@ from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.closing import Closer
 from enumsol.search.forms import Forms
 from enumsol.search.proof_header import point_header, unit_exponents
+from enumsol.search.resume import PlaneReader
 from enumsol.search.tree import TreeSearch
 from enumsol.selections.floats import FloatSelections
 
@@ -182,6 +183,10 @@ class Solvers:
         if self.arithmetic == "exact":
             return not any(_present(self.exact).system.g)
         return self.problem.is_unloaded(self.alpha)
+
+    def reader(self) -> PlaneReader:
+        """Understands the records of an earlier proof."""
+        return PlaneReader(self.problem.p, self.enclosed)
 
     def proof_header(self) -> dict[str, Any]:
         """First record of a proof (see enumsol.proof.proof_file).

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import base64
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.kernel.leaves import Open, settle
 from enumsol.kernel.space import exclusion_margin
+from enumsol.proof.reading_space import multipliers_in_space
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space import SpaceEngine
 from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart
+from enumsol.search.resume import RecordedBound
 from enumsol.sectors import DEEPEST, SECTORS, direction, end_number, level_of
 from enumsol.statuses import CONTACT, UNDECIDED
 
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from enumsol.kernel.leaves import SpaceRoot
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.protocol import Bound
     from enumsol.selections.solution import Codes
 
 _DEGENERATE = "a condition holds with equality, or nearly so, at what may be a root"
@@ -50,6 +53,42 @@ class SpaceSplitting:
         tau, v = (self._system.tangential(x)[node] for x in (relaxation.forces, relaxation.displacements))
         towards = tau / (np.linalg.norm(tau) + 1e-300) + v / (np.linalg.norm(v) + 1e-300)
         return sorted(children, key=lambda code: -_towards(code, towards) if code > SECTORS else -10.0)
+
+    def covering(self, node: int, code: int) -> Sequence[int]:
+        """Codes that together cover a partial status of a node, in any order; none for a final one."""
+        return () if code > SECTORS and level_of(code - SECTORS) >= DEEPEST else self._engine.children(node, code)
+
+
+class SpaceReader:
+    """Understands the records of a proof in 3D (see ``search.resume``).
+
+    Parameters
+    ----------
+    engine : SpaceEngine
+    """
+
+    def __init__(self, engine: SpaceEngine) -> None:
+        self._engine = engine
+
+    def declare(self, record: list[Any]) -> None:
+        """There are no forms in 3D."""
+        del record
+        raise ValueError("a form in a proof in 3D")
+
+    def form_over(self, codes: Codes) -> None:
+        """No form."""
+
+    def bound(self, codes: Codes, record: list[Any]) -> Bound:
+        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
+        engine, p = self._engine, len(codes)
+        if len(record) != 3:
+            raise ValueError("no three entries")
+        rows, values = multipliers_in_space(record[1], record[2], p)
+        slots = [engine.slot(row) for row in rows]
+        numbers = [slot * p + row[1] for slot, row in zip(slots, rows, strict=True) if slot is not None]
+        if len(numbers) < len(rows):
+            raise ValueError("no room for its rows")
+        return RecordedBound(np.array(numbers, dtype=np.intp), values)
 
 
 def _towards(code: int, vector: np.ndarray) -> float:
@@ -80,7 +119,7 @@ class SpaceCertifier:
         """What was proven so far."""
         return Certified(self._roots, None, self._leaves)
 
-    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
         if not relaxation.bound > PRUNE_MARGIN:
             return False

@@ -11,7 +11,7 @@ from enumsol.condensation.space import EnclosedSpace, SpaceSystem
 from enumsol.relaxation.space import SpaceEngine
 from enumsol.search.certifiers.protocol import Unrecorded
 from enumsol.search.proof_header import point_header, unit_exponents
-from enumsol.search.space import SpaceCertifier, SpaceSplitting
+from enumsol.search.space import SpaceCertifier, SpaceReader, SpaceSplitting
 from enumsol.search.tree import TreeSearch
 
 if TYPE_CHECKING:
@@ -97,6 +97,10 @@ class SpaceSolvers:
     def unloaded(self) -> bool:
         """Whether g = 0 for the data as given, so that only lambda = 0 solves."""
         return self.problem.is_unloaded(self.alpha)
+
+    def reader(self) -> SpaceReader:
+        """Understands the records of an earlier proof."""
+        return SpaceReader(self._engine)
 
     def proof_header(self) -> dict[str, Any]:
         """First record of a proof (see enumsol.proof.proof_file).

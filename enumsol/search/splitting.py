@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from enumsol.kernel.rows import children_of
 from enumsol.relaxation.rows import status_rows
 from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
@@ -26,6 +27,9 @@ class Splitting(Protocol):
 
     def children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
         """Codes that together cover the node's partial status, in the order in which they are examined."""
+
+    def covering(self, node: int, code: int) -> Sequence[int]:
+        """Codes that together cover a partial status of a node, in any order; none for a final one."""
 
     def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
         """(kind, mode) of the rows that the node imposes in a status; those of a child extend its parent's."""
@@ -94,6 +98,10 @@ class PlaneSplitting:
         self.friction = [bool(f > 0) for f in F]
         every = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS))
         self._allowed = list(allowed) if allowed is not None else [every] * len(F)
+
+    def covering(self, node: int, code: int) -> Sequence[int]:
+        """Codes that together cover a partial status of a node, in any order; none for a final one."""
+        return children_of(code, friction=self.friction[node])
 
     def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
         """(kind, mode) of the rows that a contact node imposes in a status."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from enumsol.condensation.condensed import ScaledSystem
@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from enumsol.condensation.space import SpaceSystem
-    from enumsol.search.certifiers.protocol import Certifier
+    from enumsol.kernel.forms import EnclosedForm
+    from enumsol.search.certifiers.protocol import Bound, Certifier
     from enumsol.search.closing import Closer
 
 #: Progress is reported and limits on time are looked at after this many nodes.
@@ -53,6 +54,8 @@ class SearchProgress:
         Selections found so far that hold a root.
     seconds : float
         Wall time so far.
+    resumed : int
+        Nodes taken from the proof of an earlier search, which are not among ``nodes``.
 
     Examples
     --------
@@ -67,6 +70,7 @@ class SearchProgress:
     covered: float
     solutions: int
     seconds: float
+    resumed: int = 0
 
 
 @dataclass
@@ -101,6 +105,8 @@ class SearchOutcome:
     fallback_qps: int = 0
     presolved: int = 0
     closed: int = 0
+    #: Nodes taken from the proof of an earlier search.
+    resumed: int = 0
 
     def forget(self) -> None:
         """Forget what was found, as the search begins again; the work that it took still counts."""
@@ -119,6 +125,7 @@ class SearchOutcome:
         self.fallback_qps += part.fallback_qps
         self.presolved += part.presolved
         self.closed += part.closed
+        self.resumed += part.resumed
 
 
 @dataclass(slots=True)
@@ -200,7 +207,7 @@ class TreeSearch:
         self._fallback: InteriorPointEngine | None = None
         self.splitting: Splitting = splitting or PlaneSplitting(system.F)
         self._rows = ImposedRows(self.splitting, system.p)
-        self._covered = 0.0
+        self.covered = 0.0
         self._start = time.perf_counter()
 
     # -- the loop --------------------------------------------------------------------------------------------------
@@ -226,18 +233,32 @@ class TreeSearch:
                 held.drop()
                 certifier.forget()
                 self.outcome.forget()
-                self._covered, stack = 0.0, start
+                self.covered, stack = 0.0, start
         finally:
             certifier.recorder = held.recorder
             held.release()
         self._run(stack)
         return self.outcome
 
+    def below(self, items: Sequence[TreeNode], form: EnclosedForm | None, *, trial: bool = False) -> None:
+        """Examine subtrees, the last first, with a form that is known to hold for them; or on trial with a new one."""
+        if self.forms is not None:
+            self.forms.use(self.engine, form)
+        if self.outcome.stopped is not None:
+            for item in reversed(items):
+                self.skip(item.codes, "raise the limit")
+            return
+        stack = self._run(list(items), until=self.forms if trial and form is None else None)
+        if stack and self.forms is not None and self.forms.pay(self.engine, self.first().codes, self._rows):
+            # from here on without the parents' relaxations, which are the energy's
+            stack = [replace(item, parent=None, forced=None) for item in stack]
+        self._run(stack)
+
     def _run(self, stack: list[TreeNode], until: Forms | None = None) -> list[TreeNode]:
         """Examine what waits, depth first; what still waits when it is time to try forms."""
         stack = list(stack)
         while stack:
-            if until is not None and until.due(self.outcome.nodes, self._covered):
+            if until is not None and until.due(self.outcome.nodes, self.covered):
                 break
             if self.must_stop(len(stack)):
                 for item in reversed(stack):
@@ -260,21 +281,18 @@ class TreeSearch:
         relaxation = solved = self._relax(item)
         if solved.stalled:
             # the fallback costs more than a try
-            if self._closed(item, None):
+            if self.closed(item, None):
                 return
             relaxation = self._fall_back(codes)
-        if relaxation is not None and relaxation.pruned and self.certifier.excluded(codes, relaxation):
-            outcome.pruned += 1
-            self._covered += item.weight
+        if relaxation is not None and relaxation.pruned and self.excluded(item, relaxation):
             return
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
-        if self._closed(item, usable):
+        if self.closed(item, usable):
             return
         node, forced = branching_node(codes, item.forced, usable)
         if node < 0:
-            node = self._settle(codes)
+            node = self._settle(item)
         if node < 0:
-            self._covered += item.weight
             return
         children = self.splitting.children(codes, node, relaxation)
         outcome.presolved += forced is not None
@@ -284,21 +302,35 @@ class TreeSearch:
             last = k + 1 == len(children)
             yield TreeNode(usable, child, node, last, item.weight / len(children), forced)
 
-    def _closed(self, item: TreeNode, relaxation: Relaxation | None) -> bool:
-        """Whether the subtree is closed by its only possible solution."""
-        found = None if self.closer is None else self.closer.closed(item.codes, relaxation)
+    def excluded(self, item: TreeNode, bound: Bound) -> bool:
+        """Whether the subtree is proven to hold no solution."""
+        if not self.certifier.excluded(item.codes, bound):
+            return False
+        self.outcome.pruned += 1
+        self.covered += item.weight
+        return True
+
+    def closed(self, item: TreeNode, relaxation: Relaxation | None, *, again: bool = False) -> bool:
+        """Whether the subtree is closed by its only possible solution; ``again``: it was, in an earlier search."""
+        if self.closer is None:
+            return False
+        found = (self.closer.again if again else self.closer.closed)(item.codes, relaxation)
         if found is None:
             return False
         self.outcome.closed += 1
         self.outcome.solutions += found
-        self._covered += item.weight
+        self.covered += item.weight
         return True
 
-    def _settle(self, codes: Codes) -> int:
+    def settled(self, item: TreeNode) -> bool:
+        """Whether the certifier decides a complete selection, or leaves it undecided for good."""
+        return self._settle(item) < 0
+
+    def _settle(self, item: TreeNode) -> int:
         """Have the certifier decide a complete selection; -1, or the node that it asks to have split further."""
         outcome = self.outcome
         outcome.selections += 1
-        answer = self.certifier.selection(codes)
+        answer = self.certifier.selection(item.codes)
         if self.closer is not None:
             self.closer.met(answer)
         if isinstance(answer, Refine):
@@ -307,6 +339,7 @@ class TreeSearch:
             outcome.undecided.append(answer)
         elif answer is not None:
             outcome.solutions.append(answer)
+        self.covered += item.weight
         return -1
 
     def must_stop(self, waiting: int) -> bool:
@@ -319,14 +352,14 @@ class TreeSearch:
         elif limits.deadline is not None and time.perf_counter() > limits.deadline:
             outcome.stopped = Stop(StopReason.TIME_LIMIT, unexamined=waiting)
         elif outcome.nodes % _REPORT_EVERY == 0:
-            self.report(self._covered)
+            self.report(self.covered)
         return outcome.stopped is not None
 
     def report(self, covered: float) -> None:
         """Call the progress callback."""
         if self.progress is not None:
             outcome, seconds = self.outcome, time.perf_counter() - self._start
-            self.progress(SearchProgress(outcome.nodes, covered, len(outcome.solutions), seconds))
+            self.progress(SearchProgress(outcome.nodes, covered, len(outcome.solutions), seconds, outcome.resumed))
 
     # -- relaxations -----------------------------------------------------------------------------------------------
 
@@ -345,6 +378,11 @@ class TreeSearch:
             engine = self.forms.engine
         relaxation: Relaxation = engine.root(*self._rows.over(codes, range(len(codes))))
         return relaxation
+
+    def relaxed(self, codes: Codes) -> Relaxation | None:
+        """The relaxation of a partial assignment, if it is solved and leaves a minimiser."""
+        relaxation = self._root(codes)
+        return None if relaxation.stalled or relaxation.pruned else relaxation
 
     def _fall_back(self, codes: Codes) -> Relaxation | None:
         """The relaxation by the slower engine; None when that gives no answer either."""

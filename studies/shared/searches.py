@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from enumsol.proof.proof_file import ProofWriter
+from enumsol.proof.writer import ProofWriter
 from enumsol.search.solvers import Solvers
 from enumsol.search.tree import SearchLimits, TreeSearch
 from enumsol.selections.floats import SIGN_TOLERANCE

@@ -15,6 +15,7 @@ from enumsol.selections.solution import VertexLimitError
 
 if TYPE_CHECKING:
     from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.protocol import Bound
     from enumsol.selections.floats import FloatSelections
     from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
 
@@ -44,7 +45,7 @@ class FastCertifier(WithoutProof):
         self._selections = selections
         self._norms = selections.row_norms()
 
-    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Accept the pruning if conditions may be off by twice the tolerance."""
         rows, values = relaxation.multipliers()
         shift = float(np.abs(values) @ self._norms[rows])

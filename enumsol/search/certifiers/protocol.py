@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.proof.proof_file import Recorder
-    from enumsol.relaxation.engine import Relaxation
     from enumsol.selections.solution import Codes
 
 
@@ -83,6 +86,21 @@ class Certified:
     leaves: int = 0
 
 
+class Bound(Protocol):
+    """What a relaxation, or a record of an earlier proof, says of a partial assignment without a solution."""
+
+    @property
+    def bound(self) -> float:
+        """A lower bound that is positive."""
+
+    @property
+    def form(self) -> EnclosedForm | None:
+        """The form that ``bound`` is about; None for the energy."""
+
+    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Rows and their multipliers, which prove ``bound``."""
+
+
 class Certifier(Protocol):
     """Decides in one arithmetic what the tree may conclude, and writes the proof, if one is wanted.
 
@@ -98,7 +116,7 @@ class Certifier(Protocol):
     def certified(self) -> Certified:
         """What was proven so far."""
 
-    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers prove that the partial assignment holds no solution."""
 
     def selection(self, codes: Codes) -> Any:

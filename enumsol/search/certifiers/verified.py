@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from enumsol.kernel.forms import EnclosedForm
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.protocol import Bound
     from enumsol.search.certifiers.rationals import ExactCertifier
     from enumsol.search.closing import Proposal
     from enumsol.selections.solution import Codes
@@ -118,7 +119,7 @@ class VerifiedCertifier:
         """What was proven so far."""
         return Certified(self._verified, self._escalations, self._leaves)
 
-    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
         rows, values = relaxation.multipliers()
         if relaxation.form is not None:
