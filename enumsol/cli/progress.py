@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rich.progress import Progress, TaskID
 
-    from enumsol.search.tree import SearchProgress
+    from enumsol.search.outcome import SearchProgress
 
 #: Work shorter than this shows no progress [seconds].
 _PROGRESS_DELAY = 1.0

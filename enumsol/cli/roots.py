@@ -79,8 +79,8 @@ def roots(
 
     Exit status: 0 when complete (in fast arithmetic, which proves nothing: when the search ran to its end with nothing
     undecided); 3 when something stayed undecided, a limit cut the search short, or the indices do not add up to +1;
-    2 on bad input; 71 when a process of --jobs died, 130 on Ctrl-C, both after printing what was found so far; 74 when
-    a result could not be written, 141 when nobody read it any more.
+    2 on bad input; 130 on Ctrl-C, after printing what was found so far; 74 when a result could not be written, 141 when
+    nobody read it any more.
     """
     if jobs > 1 and method != "tree":
         raise InvalidArgumentError(f"--jobs is {jobs} with the exhaustive method; expected 1 job, or the method tree")

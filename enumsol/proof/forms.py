@@ -55,6 +55,11 @@ class DeclaredForm:
             raise ValueError("a multiplier of a form is negative and must not be")
         return cls(codes, multipliers, weight)
 
+    def same(self, other: DeclaredForm) -> bool:
+        """Whether another record says the same."""
+        alike = self.codes == other.codes and self.weight == other.weight
+        return alike and np.array_equal(self.multipliers, other.multipliers)
+
     def holds(self, codes: Sequence[int]) -> bool:
         """Whether a partial assignment is part of the one that this form is made for."""
         return all(code == mine or code in _WITHIN.get(mine, ()) for code, mine in zip(codes, self.codes, strict=True))

@@ -99,6 +99,9 @@ class Recorder(Protocol):
     def write(self, record: Any) -> None:
         """Append one record."""
 
+    def add(self, lines: list[str]) -> None:
+        """Append records that were encoded elsewhere (``writer.encoded``)."""
+
 
 class Proof:
     """A proof that a set of roots is complete; ``enumsol.verify(problem, proof)`` checks it.

@@ -26,6 +26,11 @@ FLUSH_EVERY = 64
 BESIDE = ".resumed"
 
 
+def encoded(record: Any) -> str:
+    """A record as a line of a proof."""
+    return _ENCODER.encode(record)
+
+
 class ProofWriter:
     """Writes the records of a proof one by one, to a file or to memory.
 
@@ -74,7 +79,11 @@ class ProofWriter:
         InvalidArgumentError
             The file takes no more.
         """
-        self._pending.append(_ENCODER.encode(record))
+        self.add([encoded(record)])
+
+    def add(self, lines: list[str]) -> None:
+        """Append records that were encoded elsewhere."""
+        self._pending += lines
         if len(self._pending) >= FLUSH_EVERY:
             self._flush()
 

@@ -29,9 +29,9 @@ from enumsol.roots.local_degree import perturbed_degree
 from enumsol.roots.root_set import RootSet
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
+from enumsol.search.outcome import SearchLimits, SearchProgress
 from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.search.tree import SearchLimits, SearchProgress
 from enumsol.selections.floats import SIGN_TOLERANCE
 
 if TYPE_CHECKING:
@@ -84,7 +84,8 @@ def enumerate_roots(
     method : {"tree", "exhaustive"}
         "tree": pruned search (theory, section 5.4). "exhaustive": all 4^p selections, the oracle for small p.
     executor : concurrent.futures.Executor, optional
-        Runs subtrees in parallel (method "tree").
+        Runs parts of the tree in parallel (method "tree"): roots and proof do not depend on the number of workers. What
+        a worker that died had to do is done again, by others or in this process, with a RuntimeWarning.
     progress : callable, optional
         Called regularly with a SearchProgress.
     stop_after : int, optional
@@ -116,8 +117,6 @@ def enumerate_roots(
         The exhaustive method or exact arithmetic would take too long; the message says how long.
     Interrupted
         On Ctrl-C; ``partial`` holds what was found.
-    WorkerError
-        A worker of the executor died; ``partial`` holds what was found.
     OutputError
         There was no space to write the whole proof; ``partial`` holds the result without it.
 

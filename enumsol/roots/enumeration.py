@@ -7,16 +7,15 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from enumsol.errors import Interrupted, OutputError, WorkerError
-from enumsol.executors import WorkerLost
+from enumsol.errors import Interrupted, OutputError
 from enumsol.proof.begun import begun_proof
 from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root_set import SearchStats
 from enumsol.search.certifiers.protocol import UndecidedPart
-from enumsol.search.parallel import Searchable, run_parallel
+from enumsol.search.outcome import SearchLimits, SearchOutcome
+from enumsol.search.parallel import Searchable, Spread
 from enumsol.search.resume import resume
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.search.tree import SearchLimits, SearchOutcome
 from enumsol.texts import counted
 
 if TYPE_CHECKING:
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from enumsol.proof.begun import BegunProof
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.root_set import RootSet
-    from enumsol.search.tree import SearchProgress
+    from enumsol.search.outcome import SearchProgress
 
 _Solvers = TypeVar("_Solvers", bound=Searchable)
 
@@ -84,9 +83,6 @@ class Enumeration(ABC, Generic[_Solvers]):
             partial = self._result()
             message = f"enumerate_roots was interrupted; {counted(len(partial), 'root')} so far"
             raise Interrupted(message, partial) from interruption
-        except WorkerLost as loss:
-            partial = self._result()
-            raise WorkerError(f"{loss}; {counted(len(partial), 'root')} so far", partial) from loss
         if self.writer is not None:
             self.writer.replace()
         result = self._result()
@@ -108,12 +104,18 @@ class Enumeration(ABC, Generic[_Solvers]):
             codes = search.first().codes
             self.certifier.skipped(codes, reason)
             self.outcome.undecided.append(UndecidedPart(codes, reason, "hold the body better, or scale the data"))
-        elif executor is not None:
-            run_parallel(executor, solvers, search, *earlier)
-        elif earlier:
-            resume(search, solvers.reader(), *earlier)
         else:
-            search.run()
+            spread = None if executor is None else Spread(executor, solvers, search)
+            if spread is not None:
+                search.loop = spread.run
+            try:
+                if earlier:
+                    resume(search, solvers.reader(), *earlier)
+                else:
+                    search.run()
+            finally:
+                if spread is not None:
+                    spread.cancel()
 
     def _examined(self) -> int:
         """What an interruption says was done."""
@@ -140,6 +142,7 @@ class Enumeration(ABC, Generic[_Solvers]):
             presolved=outcome.presolved,
             closed=outcome.closed,
             resumed=outcome.resumed,
+            redone=outcome.redone,
         )
 
     def _proof(self, **counts: int) -> Proof | None:

@@ -97,6 +97,8 @@ class SearchStats:
     resumed : int
         Nodes of the tree taken from the proof of an earlier search, and proven again. They are not among ``nodes``, but
         what they came to is among ``pruned``, ``selections`` and ``closed``.
+    redone : int
+        Tasks of an executor whose worker died, and which were done again.
 
     Examples
     --------
@@ -116,6 +118,7 @@ class SearchStats:
     presolved: int = 0
     closed: int = 0
     resumed: int = 0
+    redone: int = 0
 
 
 class RootSet(Sequence[Root], Immutable):

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from enumsol.kernel.leaves import SpaceRoot
     from enumsol.search.certifiers.protocol import UndecidedPart
-    from enumsol.search.tree import SearchProgress
+    from enumsol.search.outcome import SearchProgress
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]

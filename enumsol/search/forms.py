@@ -7,6 +7,7 @@ it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, FormEngine
@@ -51,6 +52,11 @@ class Forms:
         """Whether the search goes on with forms."""
         return self._engine is not None
 
+    @property
+    def form(self) -> EnclosedForm | None:
+        """That form."""
+        return self._form
+
     def due(self, nodes: int, covered: float) -> bool:
         """Whether it is time to try a form."""
         return self.tried(nodes) and covered < 1.0 - _LEFT
@@ -86,7 +92,7 @@ class Forms:
             found = ascent.improve(codes, found[0].multipliers, imposed, STEPS) or found
         if not found[0].smallest_eigenvalue > 0:
             return False
-        self._engine = FormEngine(engine, self._scaled, found[0])
+        self._form, self._engine = found[0], FormEngine(engine, self._scaled, found[0])
         return True
 
     @property
@@ -94,6 +100,11 @@ class Forms:
         """Relaxations with the form of the root."""
         assert self._engine is not None
         return self._engine
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    text: str
 
 
 class HeldRecords:
@@ -113,10 +124,17 @@ class HeldRecords:
         """Keep a record."""
         self._records.append(record)
 
+    def add(self, lines: list[str]) -> None:
+        """Keep records that are lines already."""
+        self._records += [_Line(line) for line in lines]
+
     def release(self) -> None:
         """Hand the records on."""
         for record in self._records:
-            self.recorder.write(record)
+            if isinstance(record, _Line):
+                self.recorder.add([record.text])
+            else:
+                self.recorder.write(record)
         self._records.clear()
 
     def drop(self) -> None:

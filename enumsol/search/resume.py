@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.begun import BegunProof
     from enumsol.search.certifiers.protocol import Bound
-    from enumsol.search.tree import SearchOutcome, TreeSearch
+    from enumsol.search.tree import TreeSearch
     from enumsol.selections.solution import Codes
 
 #: Progress is reported after so many nodes.
@@ -80,7 +80,9 @@ class PlaneReader:
 
     def declare(self, record: list[Any]) -> None:
         """Take note of a form; ValueError where the record makes no sense."""
-        self._declared.append(DeclaredForm.read(record, self._p))
+        said = DeclaredForm.read(record, self._p)
+        # parts of one search declare the same form
+        self._declared.append(next((known for known in self._used if known.same(said)), said))
 
     def form_over(self, codes: Codes) -> EnclosedForm | None:
         """The form that was used last of those that hold over a partial assignment."""
@@ -109,25 +111,18 @@ class PlaneReader:
 
 
 def resume(search: TreeSearch, reader: Reader, begun: BegunProof, passed: Callable[[], None]) -> None:
-    """Go on with an earlier proof, in this process (for ``passed`` see Replay.run)."""
+    """Go on with an earlier proof (for ``passed`` see Replay.run)."""
 
     def below(*items: TreeNode, trial: bool = False) -> None:
         search.below(items, reader.form_over(items[-1].codes), trial=trial)
 
     rest = Replay(search, reader, below).run(begun, passed)
-    if any(reader.form_over(item.codes) for item in rest):
+    if len({reader.form_over(item.codes) for item in rest}) > 1:
         while rest:
             below(rest.pop())
     elif rest:
         below(*rest, trial=search.forms is not None and not search.forms.tried(search.outcome.resumed))
-    count_unexamined(search.outcome)
-
-
-def count_unexamined(outcome: SearchOutcome) -> None:
-    """Have the reason of an early end say how many subtrees it left, in all parts of the search."""
-    if outcome.stopped is not None and outcome.stopped.unexamined is not None:
-        left = sum(not part.examined for part in outcome.undecided)
-        outcome.stopped = replace(outcome.stopped, unexamined=left)
+    search.outcome.count_unexamined()
 
 
 class Replay:
@@ -139,7 +134,7 @@ class Replay:
         Its certifier proves and writes.
     reader : Reader
     below : callable
-        Searches a subtree, now or later, in the place where its record is due.
+        Searches a subtree, in the place where its record is due.
     """
 
     def __init__(self, search: TreeSearch, reader: Reader, below: Callable[[TreeNode], None]) -> None:
@@ -152,18 +147,14 @@ class Replay:
         """
         outcome, needed = self._search.outcome, begun.needed()
         stack = [replace(self._search.first(), forced=None)]
-        if not needed:
-            passed()
-        for number, record in enumerate(begun.records(), start=1):
+        for number, record in enumerate(begun.records() if needed else (), start=1):
             if not stack or not isinstance(record, list) or not record or not self._take(stack, record):
                 break
             if number == needed:
-                passed()
-                needed = 0
+                break  # what follows is open, and all of it on the stack
             if outcome.resumed % _REPORT_EVERY == 0:
                 self._search.report(self._search.covered)
-        if needed:
-            passed()
+        passed()
         return stack
 
     def _take(self, stack: list[TreeNode], record: list[Any]) -> bool:

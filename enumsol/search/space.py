@@ -15,7 +15,7 @@ from enumsol.relaxation.space import SpaceEngine
 from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart
 from enumsol.search.resume import RecordedBound
 from enumsol.sectors import DEEPEST, SECTORS, direction, end_number, level_of
-from enumsol.statuses import CONTACT, UNDECIDED
+from enumsol.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,6 +57,12 @@ class SpaceSplitting:
     def covering(self, node: int, code: int) -> Sequence[int]:
         """Codes that together cover a partial status of a node, in any order; none for a final one."""
         return () if code > SECTORS and level_of(code - SECTORS) >= DEEPEST else self._engine.children(node, code)
+
+    def above(self, code: int) -> int:
+        """The code of which this one is a child."""
+        if code > SECTORS and level_of(code - SECTORS) > 2:
+            return SECTORS + (code - SECTORS) // 2
+        return CONTACT if code > SECTORS or code in (STICK, SLIP_PLUS, SLIP_MINUS) else UNDECIDED
 
 
 class SpaceReader:

@@ -31,6 +31,9 @@ class Splitting(Protocol):
     def covering(self, node: int, code: int) -> Sequence[int]:
         """Codes that together cover a partial status of a node, in any order; none for a final one."""
 
+    def above(self, code: int) -> int:
+        """The code of which this one is a child."""
+
     def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
         """(kind, mode) of the rows that the node imposes in a status; those of a child extend its parent's."""
 
@@ -102,6 +105,10 @@ class PlaneSplitting:
     def covering(self, node: int, code: int) -> Sequence[int]:
         """Codes that together cover a partial status of a node, in any order; none for a final one."""
         return children_of(code, friction=self.friction[node])
+
+    def above(self, code: int) -> int:
+        """The code of which this one is a child."""
+        return CONTACT if code in (STICK, SLIP_PLUS, SLIP_MINUS) else UNDECIDED
 
     def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
         """(kind, mode) of the rows that a contact node imposes in a status."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from enumsol.condensation.condensed import ScaledSystem
@@ -23,9 +23,10 @@ from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart
 from enumsol.search.forms import Forms, HeldRecords
+from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting, branching_node
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.selections.solution import Codes, SelectionSolution
+from enumsol.selections.solution import Codes
 from enumsol.statuses import UNDECIDED
 
 if TYPE_CHECKING:
@@ -38,94 +39,6 @@ if TYPE_CHECKING:
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
-
-
-@dataclass(frozen=True)
-class SearchProgress:
-    """State of a running search, as handed to the ``progress`` callback.
-
-    Attributes
-    ----------
-    nodes : int
-        Partial assignments examined so far.
-    covered : float
-        Share of all selections accounted for, between 0 and 1.
-    solutions : int
-        Selections found so far that hold a root.
-    seconds : float
-        Wall time so far.
-    resumed : int
-        Nodes taken from the proof of an earlier search, which are not among ``nodes``.
-
-    Examples
-    --------
-    >>> import enumsol
-    >>> seen = []
-    >>> roots = enumsol.enumerate_roots(enumsol.gallery.chain(4), alpha=5, progress=seen.append)
-    >>> 0 < seen[-1].covered <= 1
-    True
-    """
-
-    nodes: int
-    covered: float
-    solutions: int
-    seconds: float
-    resumed: int = 0
-
-
-@dataclass
-class SearchLimits:
-    """When to stop early."""
-
-    enough: Callable[[list[SelectionSolution]], bool] | None = None
-    max_nodes: int | None = None
-    deadline: float | None = None
-
-    @staticmethod
-    def deadline_in(seconds: float | None) -> float | None:
-        """The clock's value this many seconds from now."""
-        return None if seconds is None else time.perf_counter() + seconds
-
-    def remaining(self) -> float | None:
-        """Seconds until the deadline."""
-        return None if self.deadline is None else self.deadline - time.perf_counter()
-
-
-@dataclass
-class SearchOutcome:
-    """What a search found; filled while it runs, so that an interruption loses nothing."""
-
-    solutions: list[SelectionSolution] = field(default_factory=list)
-    undecided: list[UndecidedPart] = field(default_factory=list)
-    stopped: Stop | None = None
-    nodes: int = 0
-    pruned: int = 0
-    selections: int = 0
-    qps: int = 0
-    fallback_qps: int = 0
-    presolved: int = 0
-    closed: int = 0
-    #: Nodes taken from the proof of an earlier search.
-    resumed: int = 0
-
-    def forget(self) -> None:
-        """Forget what was found, as the search begins again; the work that it took still counts."""
-        self.solutions.clear()
-        self.undecided.clear()
-
-    def add(self, part: SearchOutcome) -> None:
-        """Add what the search of a subtree found."""
-        self.solutions += part.solutions
-        self.undecided += part.undecided
-        self.stopped = self.stopped or part.stopped
-        self.nodes += part.nodes
-        self.pruned += part.pruned
-        self.selections += part.selections
-        self.qps += part.qps
-        self.fallback_qps += part.fallback_qps
-        self.presolved += part.presolved
-        self.closed += part.closed
-        self.resumed += part.resumed
 
 
 @dataclass(slots=True)
@@ -208,6 +121,9 @@ class TreeSearch:
         self.splitting: Splitting = splitting or PlaneSplitting(system.F)
         self._rows = ImposedRows(self.splitting, system.p)
         self.covered = 0.0
+        #: Examines what waits, the last first, and gives what still waits when it is time to try forms; another one
+        #: than this spreads it over workers.
+        self.loop: Callable[[Sequence[Any], Forms | None], list[Any]] = self._run
         self._start = time.perf_counter()
 
     # -- the loop --------------------------------------------------------------------------------------------------
@@ -216,19 +132,17 @@ class TreeSearch:
         """The root of the tree: nothing decided."""
         return TreeNode(None, (UNDECIDED,) * self.system.p, -1, last=False, weight=1.0, forced=())
 
-    def run(self, roots: Sequence[Codes] | None = None) -> SearchOutcome:
-        """Examine the subtrees of the given partial assignments (default: the whole tree)."""
+    def run(self) -> SearchOutcome:
+        """Examine the whole tree."""
         start = [self.first()]
-        if roots is not None:
-            start = [TreeNode(None, codes, -1, last=False, weight=1.0 / len(roots)) for codes in reversed(roots)]
-        if self.forms is None or len(start) > 1:
-            self._run(start)
+        if self.forms is None:
+            self.loop(start, None)
             return self.outcome
         forms, certifier = self.forms, self.certifier
         held = HeldRecords(certifier.recorder)
         certifier.recorder = held
         try:
-            stack = self._run(start, until=forms)
+            stack = self.loop(start, forms)
             if stack and forms.pay(self.engine, start[0].codes, self._rows):
                 held.drop()
                 certifier.forget()
@@ -237,7 +151,7 @@ class TreeSearch:
         finally:
             certifier.recorder = held.recorder
             held.release()
-        self._run(stack)
+        self.loop(stack, None)
         return self.outcome
 
     def below(self, items: Sequence[TreeNode], form: EnclosedForm | None, *, trial: bool = False) -> None:
@@ -245,32 +159,62 @@ class TreeSearch:
         if self.forms is not None:
             self.forms.use(self.engine, form)
         if self.outcome.stopped is not None:
-            for item in reversed(items):
-                self.skip(item.codes, "raise the limit")
+            self._leave(items)
             return
-        stack = self._run(list(items), until=self.forms if trial and form is None else None)
+        stack = self.loop(self._planted(items), self.forms if trial and form is None else None)
         if stack and self.forms is not None and self.forms.pay(self.engine, self.first().codes, self._rows):
             # from here on without the parents' relaxations, which are the energy's
-            stack = [replace(item, parent=None, forced=None) for item in stack]
-        self._run(stack)
+            stack = [replace(item, parent=None) if isinstance(item, TreeNode) else item for item in stack]
+        self.loop(stack, None)
 
-    def _run(self, stack: list[TreeNode], until: Forms | None = None) -> list[TreeNode]:
+    def examined(self, items: Sequence[TreeNode], nodes: int, deadline: float | None = None) -> list[TreeNode]:
+        """Examine so many nodes of subtrees, the last first; what still waits then, or at the deadline."""
+        stack, last = self._planted(items), self.outcome.nodes + nodes
+        while stack and self.outcome.nodes < last and (deadline is None or time.perf_counter() <= deadline):
+            stack.extend(reversed(list(self.examine(stack.pop()))))
+        return stack
+
+    def _planted(self, items: Sequence[TreeNode]) -> list[TreeNode]:
+        """Subtrees of one search, the first one last, with the relaxations from which each of them begins."""
+        if len(items) < 2 or any(item.changed < 0 for item in items):
+            return list(items)
+        planted, codes, relaxation = list[TreeNode](), self.first().codes, None
+        for item in items:
+            node = item.changed
+            above = (*item.codes[:node], self.splitting.above(item.codes[node]), *item.codes[node + 1 :])
+            moved = [i for i, (one, other) in enumerate(zip(codes, above, strict=True)) if one != other]
+            if relaxation is None:
+                relaxation = self._root(above)
+            elif moved and not (relaxation.stalled or relaxation.pruned):
+                relaxation = relaxation.child(*self._rows.over(above, moved), last=False)
+            usable = not (relaxation.stalled or relaxation.pruned)
+            # the first of those with this parent is examined last
+            last = bool(moved) or not planted
+            planted.append(replace(item, parent=relaxation if usable else None, last=last))
+            codes = above
+        return planted
+
+    def _run(self, stack: Sequence[TreeNode], until: Forms | None) -> list[TreeNode]:
         """Examine what waits, depth first; what still waits when it is time to try forms."""
         stack = list(stack)
         while stack:
             if until is not None and until.due(self.outcome.nodes, self.covered):
                 break
             if self.must_stop(len(stack)):
-                for item in reversed(stack):
-                    self.skip(item.codes, "raise the limit")
+                self._leave(stack)
                 return []
             stack.extend(reversed(list(self.examine(stack.pop()))))
         return stack
 
-    def skip(self, codes: Codes, hint: str) -> None:
+    def _leave(self, items: Sequence[TreeNode]) -> None:
+        for item in reversed(items):
+            self.skip(item.codes)
+
+    def skip(self, codes: Codes) -> None:
         """Leave a subtree undecided, because the search was stopped."""
         self.certifier.skipped(codes, str(self.outcome.stopped))
-        self.outcome.undecided.append(UndecidedPart(codes, "the search was stopped before it got here", hint))
+        part = UndecidedPart(codes, "the search was stopped before it got here", "raise the limit")
+        self.outcome.undecided.append(part)
 
     def examine(self, item: TreeNode) -> Iterator[TreeNode]:
         """Settle one node of the tree, or give its children in the order in which they are examined."""

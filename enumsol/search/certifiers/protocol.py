@@ -144,6 +144,9 @@ class Unrecorded:
     def write(self, record: Any) -> None:
         """Nothing to write."""
 
+    def add(self, lines: list[str]) -> None:
+        """Nothing to write."""
+
 
 class WithoutProof:
     """Base of certifiers that write no proof."""
