@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import concurrent.futures
 import multiprocessing
+import os
 import signal
+import threading
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager, suppress
+from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -39,7 +42,9 @@ class RenewedPool(Executor):
         with _ignoring_interrupts():
             # spawned, not forked: a progress bar runs in a thread of its own
             context = multiprocessing.get_context("spawn")
-            self._pool = concurrent.futures.ProcessPoolExecutor(self._max_workers, mp_context=context)
+            self._pool = concurrent.futures.ProcessPoolExecutor(
+                self._max_workers, mp_context=context, initializer=_end_with_parent
+            )
             # one is started for every task that waits; that one died already the search finds out
             with suppress(BrokenExecutor):
                 for _ in range(self._max_workers):
@@ -62,6 +67,18 @@ class RenewedPool(Executor):
         if self._pool is not None:
             self._pool.shutdown(wait=wait, cancel_futures=cancel_futures)
             self._pool = None
+
+
+def _end_with_parent() -> None:
+    """In a worker: do not outlive the process that started it, which may be killed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_wait_and_end, args=(parent.sentinel,), daemon=True).start()
+
+
+def _wait_and_end(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)
 
 
 @contextmanager

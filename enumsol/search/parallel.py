@@ -7,6 +7,7 @@ taken in the order of the tree: roots and proof depend neither on timing nor on 
 
 from __future__ import annotations
 
+import hashlib
 import heapq
 import pickle
 import threading
@@ -96,6 +97,20 @@ class _Root:
 
 
 @dataclass(frozen=True)
+class _Sent:
+    """What a worker makes its solvers from, and uses for many tasks."""
+
+    form: EnclosedForm | None
+    data: bytes
+    key: bytes
+
+    @classmethod
+    def of(cls, remake: Callable[[], Searchable], form: EnclosedForm | None) -> _Sent:
+        data = pickle.dumps((remake, form))
+        return cls(form, data, hashlib.sha256(data).digest())
+
+
+@dataclass(frozen=True)
 class _Answer:
     """What a task came to; ``rest`` are the subtrees that are left, the first one last."""
 
@@ -133,7 +148,9 @@ class Spread:
     def __init__(self, executor: Executor, solvers: Searchable, search: TreeSearch) -> None:
         self._crew, self._search = Crew(executor), search
         self._remake = solvers.remake()
-        self._sent: tuple[EnclosedForm | None, bytes] | None = None
+        #: What workers make their solvers from, and whether some have it.
+        self._sent: _Sent | None = None
+        self._known = False
         self._waiting: list[_Part] = []
         self._out: dict[Job, _Part] = {}
 
@@ -167,8 +184,8 @@ class Spread:
     def _begin(self, waiting: list[Any]) -> list[_Part]:
         """Parts of what waits, which are these already where the search goes on as before."""
         form = None if self._search.forms is None else self._search.forms.form
-        if self._sent is None or self._sent[0] is not form:
-            self._sent = form, pickle.dumps((self._remake, form))
+        if self._sent is None or self._sent.form is not form:
+            self._sent, self._known = _Sent.of(self._remake, form), False
         elif all(isinstance(item, _Part) for item in waiting):
             return waiting
         self.cancel()
@@ -193,11 +210,14 @@ class Spread:
 
     def _hand_out(self) -> None:
         """Keep the workers busy with what comes first in the tree."""
-        assert self._sent is not None
         while self._waiting and self._crew.room > 0:
-            part = heapq.heappop(self._waiting)
-            job = self._crew.submit(_search_part, self._sent[1], part.roots, NODES, self._search.limits.remaining())
-            self._out[job] = part
+            self._send(heapq.heappop(self._waiting), whole=not self._known)
+
+    def _send(self, part: _Part, *, whole: bool) -> None:
+        """Hand out a part; ``whole``: with all that a worker needs, which may be much."""
+        assert self._sent is not None
+        data, seconds = self._sent.data if whole else None, self._search.limits.remaining()
+        self._out[self._crew.submit(_search_part, self._sent.key, data, part.roots, NODES, seconds)] = part
 
     def _answered(self, part: _Part) -> bool:
         """Wait for the answer of a part; False when the time is over."""
@@ -208,7 +228,10 @@ class Spread:
             if job is None:
                 return False
             done = self._out.pop(job)
-            done.answer = job.result
+            if job.result is None:
+                self._send(done, whole=True)  # it went to a worker that had nothing yet
+                continue
+            self._known, done.answer = True, job.result
             done.further = self._parts(done.place, job.result.rest)
             for another in done.further:
                 heapq.heappush(self._waiting, another)
@@ -264,11 +287,15 @@ class _Lines:
 _local = threading.local()
 
 
-def _search_part(packed: bytes, roots: Sequence[_Root], nodes: int, seconds: float | None) -> _Answer:
-    """Search a part, in a worker; every thread makes what it needs once."""
-    if getattr(_local, "packed", None) != packed:
-        remake, _local.form = pickle.loads(packed)
-        _local.solvers, _local.packed = remake(), packed
+def _search_part(
+    key: bytes, data: bytes | None, roots: Sequence[_Root], nodes: int, seconds: float | None
+) -> _Answer | None:
+    """Search a part, in a worker; every thread makes what it needs once. None where it was not given that yet."""
+    if getattr(_local, "key", None) != key:
+        if data is None:
+            return None
+        remake, _local.form = pickle.loads(data)
+        _local.solvers, _local.key = remake(), key
     solvers: Searchable = _local.solvers.fresh()
     lines = _Lines()
     certifier = solvers.certifier(lines)

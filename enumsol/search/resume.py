@@ -6,7 +6,7 @@ written to the new proof; what cannot be proven again, was left undecided, or is
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -146,7 +146,7 @@ class Replay:
         ``passed`` is called once all that is proven in the file, and can be followed, has been gone through.
         """
         outcome, needed = self._search.outcome, begun.needed()
-        stack = [replace(self._search.first(), forced=None)]
+        stack = [self._search.first()]
         for number, record in enumerate(begun.records() if needed else (), start=1):
             if not stack or not isinstance(record, list) or not record or not self._take(stack, record):
                 break

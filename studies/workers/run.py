@@ -89,6 +89,7 @@ def main(run: Run) -> None:
     counts = getattr(run.options, "workers", [1, 2])
     problem = enumsol.gallery.wedge(4, size // 2, pull=(4e-4, 1e-3))
     problem.condensed  # noqa: B018 (made once, outside the clock)
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     with TemporaryDirectory() as folder:
         rows = [row(problem, workers, repeat, folder) for workers in (0, *counts)]
     one = next((entry["seconds"] for entry in rows if entry["workers"] == 1), rows[0]["seconds"])
@@ -100,6 +101,7 @@ def main(run: Run) -> None:
         "workers",
         rows,
         f"{os.cpu_count()} processors; the shortest of {repeat}",
+        f"load of the machine before, which should be near 0: {load:.1f}",
         f"all complete and checked: {'yes' if right else 'no'}; one proof whatever the number of workers: "
         f"{'yes' if len(proofs) == 1 else 'no'}",
     )

@@ -233,6 +233,22 @@ def spawned(pid):
     return [int(child) for child in children if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text()]
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="the workers are found in /proc")
+def test_workers_end_with_a_command_that_is_killed(tmp_path):
+    file = tmp_path / "chain.npz"
+    write_problem(gallery.chain(12, 0.05), file)
+    process = subprocess.Popen([sys.executable, "-m", "enumsol", "roots", str(file), "--alpha", "5", "--jobs", "2"])
+    try:
+        while len(spawned(process.pid)) < 2:
+            time.sleep(0.01)
+        workers = spawned(process.pid)
+    finally:
+        process.kill()
+        process.wait()
+    while any(Path(f"/proc/{pid}").exists() for pid in workers):
+        time.sleep(0.01)
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="the worker is found in /proc")
 def test_a_worker_killed_from_outside(tmp_path):
     # 3^6 roots; the worker is killed as soon as it is there

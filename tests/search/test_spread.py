@@ -1,5 +1,6 @@
 """Searches spread over workers: parts of bounded size, shared anew; one proof whatever the number of workers."""
 
+import pickle
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import pytest
@@ -34,7 +35,7 @@ class Watched(ThreadPoolExecutor):
 
     def submit(self, function, /, *arguments):
         future = super().submit(function, *arguments)
-        future.add_done_callback(lambda done: self.parts.append(done.result().outcome.nodes))
+        future.add_done_callback(lambda done: self.parts.append(done.result()))
         return future
 
 
@@ -58,12 +59,29 @@ def test_no_part_is_long_and_no_worker_waits(small_parts, monkeypatch, wedge):
     with Watched(2) as executor:
         found = enumerate_roots(problem, alpha, executor=executor)
     assert not differences(found, whole, rtol=1e-12)
-    assert max(executor.parts) <= 16
-    assert sum(executor.parts) == found.stats.nodes - 8
+    nodes = [part.outcome.nodes for part in executor.parts if part is not None]
+    assert max(nodes) <= 16
+    assert sum(nodes) == found.stats.nodes - 8
     assert found.stats.nodes == pytest.approx(whole.stats.nodes, rel=0.05)
     assert all(room <= 0 or not waiting for room, waiting in seen)
     assert any(waiting for _, waiting in seen)
     assert verify(problem, found.proof).complete
+
+
+def test_what_workers_need_is_sent_once_or_twice(small_parts, wedge):
+    problem, alpha, _ = wedge
+    sent = []
+
+    class Sizes(ThreadPoolExecutor):
+        def submit(self, function, /, *arguments):
+            sent.append(len(pickle.dumps(arguments)))
+            return super().submit(function, *arguments)
+
+    with Sizes(2) as executor:
+        enumerate_roots(problem, alpha, executor=executor)
+    whole = len(pickle.dumps(problem))
+    assert sum(size > whole for size in sent) <= 2 * 8
+    assert len(sent) > 40
 
 
 def check_one_proof(problem, alpha, whole):
