@@ -6,6 +6,7 @@ written to the new proof; what cannot be proven again, was left undecided, or is
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -111,10 +112,15 @@ class PlaneReader:
 
 
 def resume(search: TreeSearch, reader: Reader, begun: BegunProof, passed: Callable[[], None]) -> None:
-    """Go on with an earlier proof (for ``passed`` see Replay.run)."""
+    """Go on with an earlier proof (for ``passed`` see Replay.run); a time limit is about what is searched anew."""
+    limits, mark = search.limits, time.perf_counter()
 
     def below(*items: TreeNode, trial: bool = False) -> None:
+        nonlocal mark
+        if limits.deadline is not None:
+            limits.deadline += time.perf_counter() - mark
         search.below(items, reader.form_over(items[-1].codes), trial=trial)
+        mark = time.perf_counter()
 
     rest = Replay(search, reader, below).run(begun, passed)
     if len({reader.form_over(item.codes) for item in rest}) > 1:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.kernel.leaves import Open, settle
-from enumsol.kernel.space import exclusion_margin
+from enumsol.kernel.space import exclusion_margin, row_terms
 from enumsol.proof.reading_space import multipliers_in_space
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space import SpaceEngine
@@ -90,6 +90,8 @@ class SpaceReader:
         if len(record) != 3:
             raise ValueError("no three entries")
         rows, values = multipliers_in_space(record[1], record[2], p)
+        for row in rows:
+            row_terms(row, engine.system.tau, len(engine.system.g))  # there is such a row
         slots = [engine.slot(row) for row in rows]
         numbers = [slot * p + row[1] for slot, row in zip(slots, rows, strict=True) if slot is not None]
         if len(numbers) < len(rows):

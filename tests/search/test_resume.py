@@ -34,6 +34,7 @@ from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.proof.begun import BegunProof
 from enumsol.proof.writer import BESIDE, FLUSH_EVERY
 from enumsol.search import forms as policy
+from enumsol.search.resume import Replay
 
 QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 
@@ -234,6 +235,16 @@ def test_forgeries(forge, tmp_path):
     assert (found.stats.nodes > 0) is searched
 
 
+def test_rows_that_do_not_exist_in_space(tmp_path):
+    records = copied(records_of(known("block in space")[2].proof))
+    excluded = [record for record in records if isinstance(record, list) and record[0] == "x"]
+    for record in excluded[:4]:
+        record[1][0] = [3, 0, 5]  # v has no such component
+    found = resumed("block in space", bytes_of(proof_of(records)), tmp_path / "x.proof")
+    check("block in space", found)
+    assert found.stats.nodes > 0
+
+
 # -- limits ------------------------------------------------------------------------------------------------------------
 
 
@@ -278,6 +289,23 @@ def test_what_the_file_holds_is_taken_whatever_the_limits(tmp_path):
     assert found.stats.resumed > 0.9 * len(records) - 20
     assert found.stopped == f"stopped after max_nodes = 3 nodes, {len(found.undecided)} subtrees not examined"
     check("wedge", enumerate_roots(problem, alpha, proof_path=tmp_path / "x.proof", resume=True))
+
+
+def test_a_time_limit_is_about_what_is_searched_anew(tmp_path, monkeypatch):
+    problem, alpha, _ = known("wedge")
+    path = tmp_path / "x.proof"
+    enumerate_roots(problem, alpha, proof_path=path, max_nodes=150)
+    now, before = [0.0], Replay._take
+
+    def take(self, stack, record):
+        now[0] += 1.0
+        return before(self, stack, record)
+
+    monkeypatch.setattr("time.perf_counter", lambda: now[0])
+    monkeypatch.setattr(Replay, "_take", take)
+    found = enumerate_roots(problem, alpha, proof_path=path, resume=True, time_limit=10.0)
+    assert found.stats.resumed == now[0] == 150
+    check("wedge", found)
 
 
 @pytest.mark.parametrize("name", ["wedge", "forms", "closed", "block in space"])
