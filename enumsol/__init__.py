@@ -53,7 +53,6 @@ if TYPE_CHECKING:
         MissingDependencyError,
         OutputError,
         TooLargeError,
-        WorkerError,
     )
     from enumsol.fixed_points import (
         FixedPoint,
@@ -74,7 +73,7 @@ if TYPE_CHECKING:
     from enumsol.roots.enumerate import enumerate_roots
     from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
     from enumsol.roots.root_set import RootSet, SearchStats, Undecided
-    from enumsol.search.tree import SearchProgress
+    from enumsol.search.outcome import SearchProgress
     from enumsol.statuses import ContactStatus, sign_array
 
     __version__: str
@@ -100,7 +99,7 @@ _HOMES = {
         "newton",
     ),
     "enumsol.roots.enumerate": ("enumerate_roots",),
-    "enumsol.search.tree": ("SearchProgress",),
+    "enumsol.search.outcome": ("SearchProgress",),
     "enumsol.errors": (
         "EnumsolError",
         "FrictionJumpWarning",
@@ -111,7 +110,6 @@ _HOMES = {
         "MissingDependencyError",
         "OutputError",
         "TooLargeError",
-        "WorkerError",
     ),
     "enumsol.io": ("read_problem", "write_problem"),
     "enumsol.io.vtu": ("write_vtu",),
@@ -196,7 +194,6 @@ __all__ = [
     "TrescaSolution",
     "Undecided",
     "VerificationReport",
-    "WorkerError",
     "audit",
     "basin_table",
     "branch_graph",

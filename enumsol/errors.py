@@ -81,18 +81,6 @@ class Interrupted(_PartialResultError, KeyboardInterrupt):  # noqa: N818 (the na
     """
 
 
-class WorkerError(_PartialResultError, RuntimeError):
-    """A worker of an executor died, ran out of memory or was cancelled; what was found so far is in ``partial``.
-
-    Attributes
-    ----------
-    partial : RootSet, BranchGraph or pandas.DataFrame
-        For enumerate_roots: the roots of the subtrees that were finished, with ``complete`` False and the other
-        subtrees under ``undecided``; its proof covers what was finished. For branch_graph: the arcs of what was
-        finished. For multiplicity_table: the rows that were finished.
-    """
-
-
 class OutputError(_PartialResultError):
     """A result cannot be written: the disk is full, or the reader of the output is gone.
 

@@ -1,4 +1,4 @@
-"""Tasks for the workers of a concurrent.futures executor, and what is known when a worker dies.
+"""Tasks for the workers of a concurrent.futures executor; a worker that dies costs time and nothing else.
 
 Executors report a lost worker in many ways: BrokenProcessPool, dask's KilledWorker, a cancelled future. An error that a
 task here raises itself comes back in an `_OwnError`; any other error in a future was raised by the executor.
@@ -6,32 +6,149 @@ task here raises itself comes back in an `_OwnError`; any other error in a futur
 
 from __future__ import annotations
 
+import warnings
+from collections import deque
 from concurrent.futures import BrokenExecutor, CancelledError
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from dataclasses import dataclass, field
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from concurrent.futures import Executor, Future
 
-_P = ParamSpec("_P")
-_T = TypeVar("_T")
-
 #: Characters of an executor's own message that are passed on.
 _LONGEST = 160
+#: How often a task is handed to workers before it is done by the calling process, and a pool made anew.
+_TRIES, _RENEWALS = 3, 20
+#: Tasks handed out at a time, for each worker; where their number is not known, for all.
+_AHEAD, _MANY = 4, 64
 
 
-class WorkerLost(Exception):  # noqa: N818 (callers turn it into a WorkerError, which holds what was found)
-    """The executor lost a worker, or takes no tasks.
+@dataclass(eq=False)
+class Job:
+    """A call that a worker makes."""
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    result: Any = None
+    tries: int = 0
+    future: Future[Any] | None = field(default=None, repr=False)
+
+
+class Crew:
+    """The workers of an executor. Where one dies its tasks are done again: by others, or in the calling process.
+
+    Parameters
+    ----------
+    executor : Executor
+        One with a method ``renew`` is asked for new workers when it is broken.
 
     Attributes
     ----------
-    what : str
-        What happened, in a few words; the error's text adds the executor's own message.
+    redone : int
+        Tasks that were lost and done again.
     """
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor: Executor | None = executor
+        self.redone = 0
+        self._renewals = 0
+        self._told = False
+        self._out: set[Job] = set()
+        self._here: deque[Job] = deque()
+        self._done: SimpleQueue[Job] = SimpleQueue()
+
+    @property
+    def room(self) -> int:
+        """How many more tasks should be handed out: enough to keep all workers busy."""
+        workers = getattr(self._executor, "_max_workers", None)
+        most = _AHEAD * workers if isinstance(workers, int) else _MANY
+        return most - len(self._out) - len(self._here)
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Job:
+        """Hand out a task."""
+        job = Job(function, arguments)
+        self._hand_out(job)
+        return job
+
+    def next(self, seconds: float | None = None) -> Job | None:
+        """A task that is done; an error that it raised is raised here. None when the time is over before."""
+        while self._out or self._here:
+            if self._here and self._done.empty():
+                job = self._here.popleft()
+                job.result = job.function(*job.arguments)
+                return job
+            try:
+                job = self._done.get(timeout=seconds)
+            except Empty:
+                return None
+            if job in self._out:
+                self._out.discard(job)
+                if self._finished(job):
+                    return job
+        raise AssertionError("no task was handed out")
+
+    def cancel(self) -> None:
+        """Forget what has not been done; what has not begun never will."""
+        for job in self._out:
+            if job.future is not None:
+                job.future.cancel()
+        self._out.clear()
+        self._here.clear()
+
+    def _finished(self, job: Job) -> bool:
+        """Whether there is a result; otherwise the task is handed out again."""
+        try:
+            job.result = _result_of(_present(job.future))
+        except _Lost as loss:
+            self.redone += 1
+            self._tell(f"{loss}; what it had to do is done again")
+            self._hand_out(job)
+            return False
+        return True
+
+    def _hand_out(self, job: Job) -> None:
+        while self._executor is not None and job.tries < _TRIES:
+            try:
+                job.future = _submitted(self._executor, job)
+            except _Lost as loss:
+                if self._renewed():
+                    self._tell(f"{loss}; what it had to do is done again")
+                    continue
+                self._executor = None
+                self._tell(f"{loss}; the calling process does the rest", again=True)
+                break
+            job.tries += 1
+            self._out.add(job)
+            job.future.add_done_callback(lambda _: self._done.put(job))
+            return
+        self._here.append(job)
+
+    def _tell(self, what: str, *, again: bool = False) -> None:
+        """Warn of the first loss, and when there is nobody left."""
+        if again or not self._told:
+            warnings.warn(what, RuntimeWarning, stacklevel=2)
+        self._told = True
+
+    def _renewed(self) -> bool:
+        """Whether there are new workers in the place of a broken pool."""
+        renew = getattr(self._executor, "renew", None)
+        self._renewals += 1
+        if renew is None or self._renewals > _RENEWALS:
+            return False
+        try:
+            renew()
+        except OSError:
+            return False  # the system starts no more
+        return True
+
+
+class _Lost(Exception):  # noqa: N818 (it never leaves this module)
+    """The executor lost a worker, or takes no tasks."""
 
     def __init__(self, what: str, said: BaseException | None = None) -> None:
         super().__init__(what if said is None else f"{what} ({_one_line(said)})")
-        self.what = what
 
 
 class _OwnError(Exception):
@@ -42,34 +159,20 @@ class _OwnError(Exception):
         self.error = error
 
 
-def submit(executor: Executor, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
-    """The future of a call that a worker makes; `result_of` gives its result.
-
-    Raises
-    ------
-    WorkerLost
-        The executor takes no task: it is broken, was shut down, or can start no worker.
-    """
+def _submitted(executor: Executor, job: Job) -> Future[Any]:
     try:
-        return executor.submit(_call, function, *args, **kwargs)
+        return executor.submit(_call, job.function, *job.arguments)
     except BrokenExecutor as error:
-        raise WorkerLost("a worker died", error) from error
+        raise _Lost("a worker died", error) from error
     except (RuntimeError, OSError) as error:
-        raise WorkerLost("the executor takes no tasks", error) from error
+        raise _Lost("the executor takes no tasks", error) from error
 
 
-def result_of(future: Future[_T]) -> _T:
-    """Wait for a task and return its result; an error that the task raised is raised here.
-
-    Raises
-    ------
-    WorkerLost
-        There is no result: the worker died, ran out of memory, or the task was cancelled.
-    """
+def _result_of(future: Future[Any]) -> Any:
     try:
         error = future.exception()
     except CancelledError as cancelled:
-        raise WorkerLost("a task was cancelled") from cancelled
+        raise _Lost("a task was cancelled") from cancelled
     if error is None:
         return future.result()
     if isinstance(error, _OwnError):
@@ -77,24 +180,24 @@ def result_of(future: Future[_T]) -> _T:
     if isinstance(error, KeyboardInterrupt):
         raise error
     if isinstance(error, MemoryError):
-        raise WorkerLost("a worker ran out of memory") from error
-    raise WorkerLost("a worker died", error) from error
+        raise _Lost("a worker ran out of memory") from error
+    raise _Lost("a worker died", error) from error
 
 
-def has_result(future: Future[Any]) -> bool:
-    """Whether the result is available without waiting."""
-    return future.done() and not future.cancelled() and future.exception() is None
-
-
-def _call(function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+def _call(function: Callable[..., Any], *arguments: Any) -> Any:
     """Run a task, in the worker."""
     try:
-        return function(*args, **kwargs)
+        return function(*arguments)
     except MemoryError:
         # about the worker, not about the task
         raise
     except Exception as error:
         raise _OwnError(error) from error
+
+
+def _present(future: Future[Any] | None) -> Future[Any]:
+    assert future is not None
+    return future
 
 
 def _one_line(error: BaseException) -> str:

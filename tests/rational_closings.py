@@ -102,7 +102,7 @@ class Closings:
         return w_n + self.forms.F[i] * abs(w_t)
 
     def slides(self, code, i, point):
-        """Positive where the node is open by some distance or slips to its side, negative where it must and does not."""
+        """Positive where the node is open or slips to its side, strictly; negative where it must and does not."""
         n, _, w_n, w_t = self.values(point, i)
         slip = w_t if code == 7 else -w_t
         return -w_n if w_n < 0 else slip if slip > 0 or n > 0 else fmpq(0)

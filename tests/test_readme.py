@@ -43,7 +43,7 @@ def test_a_mesh():
 
 
 def test_branches_and_continuation(elsewhere):
-    assert len(BLOCKS) == 5
+    assert len(BLOCKS) == 6
     seen = {}
     exec(BLOCKS[2], seen)
     graph, path = seen["graph"], seen["path"]
@@ -71,6 +71,14 @@ def test_all_solutions_in_three_dimensions(elsewhere):
     exec(BLOCKS[4], seen)
     assert [str(root.statuses[0]) for root in seen["roots"]] == ["stick", "slip", "open"]
     assert seen["roots"].complete
+
+
+def test_a_cluster():
+    pytest.importorskip("distributed")
+    seen = {"__name__": "__main__"}
+    exec(BLOCKS[5].replace("n_workers=2", "n_workers=2, dashboard_address=None"), seen)
+    assert seen["roots"].complete
+    assert len(seen["roots"]) == 5
 
 
 def test_commands(elsewhere, capsys):

@@ -33,8 +33,7 @@ from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed
 from enumsol.condensation.unloaded import vanishing_alpha
-from enumsol.errors import Interrupted, InvalidArgumentError, WorkerError
-from enumsol.executors import WorkerLost
+from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
@@ -118,8 +117,6 @@ def branch_graph(
         On Ctrl-C during the search, or while arcs are worked out; ``partial`` is the graph of what was found so far,
         which is not complete. Beyond 24 degrees of freedom only the arcs of some of the selections found are in it, if
         there are many: ``partial.reasons`` says how many.
-    WorkerError
-        A worker of the executor died; ``partial`` likewise.
 
     Examples
     --------
@@ -150,7 +147,7 @@ def branch_graph(
         deadline=None if time_limit is None else started + time_limit,
         progress=_stage(progress, "search"),
     )
-    candidates, loss = _candidates(search, exact, executor)
+    candidates = _candidates(search, exact, executor)
     searched = time.perf_counter()
     tick = _stage(progress, "arcs")
     made = _make(problem, search, candidates, traced, exact, tick)
@@ -176,8 +173,6 @@ def branch_graph(
     graph = BranchGraph(data)
     if any(stop.interrupted for stop in made.stops):
         raise Interrupted("branch_graph was interrupted; the arcs found so far are kept", graph)
-    if loss is not None:
-        raise WorkerError(f"{loss}; the arcs found so far are kept", graph) from loss
     return graph
 
 
@@ -248,14 +243,11 @@ def _certifier(
     return FastIntervalCertifier() if arithmetic == "fast" else VerifiedIntervalCertifier(problem, exact, zero)
 
 
-def _candidates(
-    search: IntervalSearch, exact: ExactCondensed | None, executor: Executor | None
-) -> tuple[set[Codes], WorkerLost | None]:
-    """The selections that may hold somewhere; Ctrl-C and the loss of a worker keep those that were found."""
+def _candidates(search: IntervalSearch, exact: ExactCondensed | None, executor: Executor | None) -> set[Codes]:
+    """The selections that may hold somewhere; Ctrl-C keeps those that were found."""
     if exact is not None and exact.unloaded:
         # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
-        return {(OPEN,) * exact.p}, None
-    loss = None
+        return {(OPEN,) * exact.p}
     try:
         if executor is None:
             search.run()
@@ -263,9 +255,7 @@ def _candidates(
             run_parallel(executor, search)
     except KeyboardInterrupt:
         search.stopped = Stop(StopReason.INTERRUPTED, search.nodes)
-    except WorkerLost as lost:
-        loss = lost
-    return search.selections, loss
+    return search.selections
 
 
 def _proof(

@@ -7,8 +7,9 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from enumsol.branches.parts import PartKind
-from enumsol.proof.proof_file import Proof, ProofWriter, packed
+from enumsol.proof.proof_file import Proof, packed
 from enumsol.proof.reading import fits
+from enumsol.proof.writer import ProofWriter
 from enumsol.search.proof_header import unit_exponents
 
 if TYPE_CHECKING:

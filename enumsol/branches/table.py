@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 from collections import Counter
-from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from enumsol.checks import alpha_list, instance_of, optional_callable, optional_executor
 from enumsol.contact_body import ContactBody
-from enumsol.errors import Interrupted, WorkerError
-from enumsol.executors import WorkerLost, has_result, result_of, submit
+from enumsol.errors import Interrupted
+from enumsol.executors import Crew
 from enumsol.problem import ContactProblem
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.statuses import STATUSES, ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
-    from concurrent.futures import Executor, Future
+    from concurrent.futures import Executor
 
     import pandas as pd
 
     from enumsol.checks import Alpha, AlphaLike
+    from enumsol.executors import Job
     from enumsol.problem3d import ContactProblem3D
     from enumsol.roots.root_set import RootSet
-
-#: Tasks handed to an executor ahead of the one that is awaited; keeps an interruption from waiting for all of them.
-_AHEAD = 64
 
 
 @dataclass
@@ -102,8 +99,6 @@ def multiplicity_table(
         ``alphas`` is one number, an alpha is not a finite number, or makes a friction coefficient negative.
     Interrupted
         On Ctrl-C; ``partial`` is the table of what was done.
-    WorkerError
-        A worker of the executor died; ``partial`` is the table of what was done.
 
     Examples
     --------
@@ -134,8 +129,6 @@ def multiplicity_table(
         raise Interrupted(
             f"multiplicity_table was interrupted after {done} of {len(rows.alphas)} alphas", rows.frame()
         ) from interruption
-    except WorkerLost as loss:
-        raise WorkerError(f"{loss}; {len(rows.done)} of {len(rows.alphas)} alphas so far", rows.frame()) from loss
     return rows.frame()
 
 
@@ -146,32 +139,22 @@ def _spread(
     progress: Callable[[int, int], object] | None,
     options: dict[str, Any],
 ) -> None:
-    """Hand the alphas to the executor, a limited number ahead of those awaited.
-
-    Raises
-    ------
-    WorkerLost
-        A worker died; the rows that were finished by then are kept.
-    """
-    running: dict[Future[dict[str, Any]], int] = {}
+    """Hand the alphas to the executor, a limited number ahead of those awaited."""
+    crew = Crew(executor)
+    running: dict[Job, int] = {}
     waiting = list(enumerate(rows.alphas))[::-1]
     try:
         while waiting or running:
-            while waiting and len(running) < _AHEAD:
+            while waiting and crew.room > 0:
                 k, alpha = waiting.pop()
-                running[submit(executor, table_row, problem, alpha, options)] = k
-            finished, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in finished:
-                rows.done[running[future]] = result_of(future)
-                del running[future]
+                running[crew.submit(table_row, problem, alpha, options)] = k
+            job = crew.next()
+            if job is not None:
+                rows.done[running.pop(job)] = job.result
                 if progress is not None:
                     progress(len(rows.done), len(rows.alphas))
-    except WorkerLost:
-        rows.done |= {k: result_of(future) for future, k in running.items() if has_result(future)}
-        raise
     finally:
-        for future in running:
-            future.cancel()
+        crew.cancel()
 
 
 def table_row(problem: ContactProblem | ContactProblem3D, alpha: Alpha, options: dict[str, Any]) -> dict[str, Any]:

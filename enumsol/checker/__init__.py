@@ -35,7 +35,9 @@ What checker and search share
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes;
       ``condensation.affine``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
       definite matrix, and floats as rationals;
-    - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file;
+    - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file; a search that goes on
+      with an earlier proof reads its multipliers and forms by ``proof.reading``, ``proof.reading_space`` and
+      ``proof.forms``, too, from what ``proof.begun`` finds, and proves them again before ``proof.writer`` has them;
     - ``problem``, ``body2d``, ``contact_body``, ``condensation.data``, ``condensation.condensed``,
       ``condensation.factorization``, ``sealed``, ``checks``, ``array_checks``, ``files``, ``texts`` and ``errors``: the
       data, their checks and their fingerprint, the factorization of A (no bound assumes that it is accurate), S and g

@@ -2,39 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.kernel.forms import EnclosedForm, form_margins
-from enumsol.kernel.rows import ROW_KINDS, refines
-from enumsol.proof.reading import RefusedError, codes_from, multipliers_from, numbers_from
+from enumsol.kernel.rows import ROW_KINDS
+from enumsol.proof.forms import DeclaredForm
+from enumsol.proof.reading import RefusedError, multipliers_from
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.enclosure import EnclosedSystem
 
-_RECORD, _LEAF = 7, 4
-
-
-@dataclass(frozen=True)
-class _Declared:
-    codes: tuple[int, ...]
-    multipliers: NDArray[np.float64]
-    weight: float
-
-    def holds(self, codes: tuple[int, ...]) -> bool:
-        """Whether a partial assignment is part of the one that this form is made for."""
-        return all(refines(code, mine) for code, mine in zip(codes, self.codes, strict=True))
+_LEAF = 4
 
 
 class FormLeaves:
     """Forms as they are declared, and leaves that wait to be checked."""
 
     def __init__(self) -> None:
-        self._declared: list[_Declared] = []
+        self._declared: list[DeclaredForm] = []
         self._waiting: dict[int, list[tuple[int, tuple[int, ...], Any, Any]]] = {}
 
     def __len__(self) -> int:
@@ -48,17 +35,10 @@ class FormLeaves:
         RefusedError
             The record makes no sense.
         """
-        if len(record) != _RECORD:
-            raise RefusedError(f"a form has {len(record)} entries; expected {_RECORD}")
         try:
-            codes = tuple(codes_from([record[1]], p)[0].tolist())
-            multipliers = np.array([numbers_from(values, p) for values in record[2:6]])
-            weight = float(numbers_from([record[6]], 1)[0])
+            self._declared.append(DeclaredForm.read(record, p))
         except ValueError as error:
-            raise RefusedError(f"a form cannot be read: {error}") from None
-        if np.any(multipliers[2:] < 0) or weight < 0:
-            raise RefusedError("a multiplier of a form is negative and must not be")
-        self._declared.append(_Declared(codes, multipliers, weight))
+            raise RefusedError(str(error)) from None
 
     def add(self, number: int, codes: tuple[int, ...], record: list[Any]) -> str | None:
         """Take a leaf, to be checked with others; the reason when it proves nothing."""

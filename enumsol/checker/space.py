@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,20 +14,18 @@ from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.condensation.space import EnclosedSpace
 from enumsol.kernel.leaves import Open, distinct_roots, settle
-from enumsol.kernel.space import CONTACT, FORCE, GAP, RIGHT, UNDECIDED, children_of, exclusion_margin
+from enumsol.kernel.space import CONTACT, UNDECIDED, children_of, exclusion_margin
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, rational_from, shown, shown_alpha
+from enumsol.proof.reading_space import multipliers_in_space
 from enumsol.sectors import DEEPEST, SECTORS, level_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.kernel.leaves import SpaceRoot
-    from enumsol.kernel.space import Row
 
 #: Entries of a leaf's record, by its kind.
 _ENTRIES = {"x": 3, "n": 1, "r": 4, "z": 1, "u": 2}
-#: Numbers of directions and sectors in rows are less: tangents may be two levels finer than the finest sector.
-_NUMBERS = 1 << (DEEPEST + 3)
 
 
 @dataclass
@@ -79,7 +76,7 @@ class SpaceChecker(TreeChecker):
         if len(record) != _ENTRIES[kind]:
             return f"its record has {len(record)} entries; expected {_ENTRIES[kind]}"
         if kind == "x":
-            rows, values = _multipliers(record[1], record[2], self.problem.p)
+            rows, values = multipliers_in_space(record[1], record[2], self.problem.p)
             positive = exclusion_margin(self.system, codes, rows, values) > 0
             return None if positive else "its multipliers do not exclude it"
         if kind == "u":
@@ -133,23 +130,3 @@ def _units(header: dict[str, Any], p: int) -> tuple[NDArray[np.float64], NDArray
     if len({a + b for a, b in zip(force, length, strict=True)}) != 1:
         raise ValueError("the units are no common scaling of energy")
     return np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))
-
-
-def _multipliers(rows: Any, text: Any, p: int) -> tuple[list[Row], NDArray[np.float64]]:
-    """Rows and as many multipliers."""
-    if not all((isinstance(rows, list), isinstance(text, str))):
-        raise ValueError("its multipliers are no list of rows and a text")
-    values = np.frombuffer(base64.b64decode(text, validate=True), dtype="<f8").astype(np.float64)
-    if len(rows) != len(values):
-        raise ValueError(f"{len(rows)} rows and {len(values)} multipliers")
-    return [_row(row, p) for row in rows], values
-
-
-def _row(row: Any, p: int) -> Row:
-    if not isinstance(row, list) or len(row) != 3 or not all(type(x) is int for x in row):
-        raise ValueError(f"{shown(row)} is no row")
-    kind, node, number = row
-    known = 0 <= kind <= RIGHT and 0 <= node < p and -1 <= number < _NUMBERS
-    if not known or (kind in (GAP, FORCE) and number):
-        raise ValueError(f"row {shown(row)} does not exist")
-    return kind, node, number

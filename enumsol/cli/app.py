@@ -12,7 +12,7 @@ from enumsol.cli import audit, fixed_point, follow, gallery, graph, report, root
 from enumsol.cli.common import ExitStatus
 from enumsol.cli.quiet import loud_again
 from enumsol.cli.streams import guarded_streams
-from enumsol.errors import EnumsolError, OutputError, WorkerError
+from enumsol.errors import EnumsolError, OutputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -75,8 +75,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except OutputError as error:
             left = isinstance(error.__cause__, BrokenPipeError)
             return _refuse(str(error), ExitStatus.BROKEN_PIPE if left else ExitStatus.OUTPUT_FAILED)
-        except WorkerError as error:
-            return _refuse(str(error), ExitStatus.WORKER_DIED)
         except EnumsolError as error:
             return _refuse(str(error))
         except _UsageError as error:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 import typer
 
 from enumsol.cli.quiet import is_quiet
-from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutputError, WorkerError
+from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -32,13 +32,12 @@ _MOST_ON_WINDOWS = 61
 
 
 class ExitStatus(enum.IntEnum):
-    """What the command line tells its caller; the two in the seventies are those of sysexits.h."""
+    """What the command line tells its caller; 74 is that of sysexits.h."""
 
     DONE = 0
     BAD_INPUT = 2
     INCOMPLETE = 3
     NOT_COMPARED = 4
-    WORKER_DIED = 71
     OUTPUT_FAILED = 74
     INTERRUPTED = 130
     BROKEN_PIPE = 141
@@ -152,7 +151,7 @@ def so_far(search: Callable[[], T]) -> tuple[T | Any, EnumsolError | None]:
     """What a search found, be it ended early, and what ended it."""
     try:
         return search(), None
-    except (Interrupted, WorkerError, OutputError) as error:
+    except (Interrupted, OutputError) as error:
         if error.partial is None:
             raise
         return error.partial, error
@@ -196,39 +195,22 @@ def workers(jobs: int) -> Iterator[Executor | None]:
     if jobs == 1:
         yield None
         return
-    jobs = capped(jobs)
     # only for several processes
     import multiprocessing
-    import signal
-    from concurrent.futures import ProcessPoolExecutor
+
+    from enumsol.cli.pool import RenewedPool
 
     before = set(multiprocessing.active_children())
-    # spawned, not forked: a progress bar runs in a thread of its own
-    context = multiprocessing.get_context("spawn")
-    executor = ProcessPoolExecutor(jobs, mp_context=context)
-    # a terminal sends Ctrl-C to the workers too: processes born while it is ignored go on ignoring it
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    pool = RenewedPool(capped(jobs))
     try:
-        _start(executor, jobs)
-        signal.signal(signal.SIGINT, handler)
-        yield executor
+        try:
+            pool.renew()
+        except OSError as error:
+            raise InvalidArgumentError(
+                f"--jobs is {jobs}, and the system starts no more processes ({error.strerror}); expected fewer"
+            ) from error
+        yield pool
     finally:
-        signal.signal(signal.SIGINT, handler)
-        executor.shutdown(wait=False, cancel_futures=True)
+        pool.shutdown(wait=False, cancel_futures=True)
         for worker in set(multiprocessing.active_children()) - before:
             worker.terminate()
-
-
-def _start(executor: Executor, jobs: int) -> None:
-    """Start the processes, one for every task that waits."""
-    from concurrent.futures import BrokenExecutor  # only for several processes
-
-    try:
-        for _ in range(jobs):
-            executor.submit(int)
-    except BrokenExecutor:
-        return  # one died already; the search finds out and says so
-    except OSError as error:
-        raise InvalidArgumentError(
-            f"--jobs is {jobs}, and the system starts no more processes ({error.strerror}); expected fewer"
-        ) from error

@@ -75,8 +75,8 @@ def graph(
     Prints branches, folds, bifurcations and continua, and whether the graph is complete.
 
     Exit status: 0 when complete (in fast arithmetic, which proves nothing: when the degrees balance at every vertex);
-    3 when the graph is known to be incomplete; 2 on bad input; 71 when a process of --jobs died, 130 on Ctrl-C, both
-    after printing the graph so far; 74 when a result could not be written, 141 when nobody read it any more.
+    3 when the graph is known to be incomplete; 2 on bad input; 130 on Ctrl-C, after printing the graph so far; 74 when
+    a result could not be written, 141 when nobody read it any more.
     """
     check_outputs(json=json_file, csv=csv_file)
     for option, path in (("--save", save_file), ("--graphml", graphml_file), ("--proof", proof_file)):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rich.progress import Progress, TaskID
 
-    from enumsol.search.tree import SearchProgress
+    from enumsol.search.outcome import SearchProgress
 
 #: Work shorter than this shows no progress [seconds].
 _PROGRESS_DELAY = 1.0
@@ -88,7 +88,8 @@ class SearchDisplay(Display):
 
     def __call__(self, state: SearchProgress) -> None:
         """Show where the search is."""
-        self.show(state.covered, f"nodes {state.nodes:,}  roots {state.solutions:,}")
+        resumed = f" and {state.resumed:,} from the file" if state.resumed else ""
+        self.show(state.covered, f"nodes {state.nodes:,}{resumed}  roots {state.solutions:,}")
 
 
 def _progress_bar(title: str) -> tuple[Progress, TaskID]:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 #: The table over contact nodes is printed when it has at most so many rows.
 _ROWS = 24
+_STATS = ("nodes", "pruned", "selections", "qps", "fallback_qps", "seconds", "resumed")
 _FIELDS = ("lambda_n", "lambda_t", "u_n", "u_t")
 
 
@@ -66,9 +67,7 @@ def as_json(found: RootSet, problem: str) -> str:
         "roots": [_root(root) for root in found],
         "families": [_family(family) for family in found.families],
         "undecided": [_undecided(item) for item in found.undecided],
-        "stats": {
-            name: getattr(stats, name) for name in ("nodes", "pruned", "selections", "qps", "fallback_qps", "seconds")
-        },
+        "stats": {name: getattr(stats, name) for name in _STATS},
     }
     return "{\n" + ",\n".join(f"{json.dumps(key)}: {_lines(value)}" for key, value in content.items()) + "\n}"
 

@@ -9,6 +9,7 @@ import typer
 from enumsol.cli import root_report
 from enumsol.cli.common import ExitStatus, finish, load_any_problem, note, parse_alpha, so_far, workers
 from enumsol.cli.options import (
+    OUTPUT,
     Arithmetic,
     JsonFile,
     MaxNodes,
@@ -50,6 +51,10 @@ StopAfter = Annotated[int | None, count("Stop at N roots; 2 answers: is it uniqu
 TimeLimit = Annotated[float | None, seconds("Stop after so long.")]
 Jobs = Annotated[int, count("Processes to search with (tree).")]
 ProofFile = Annotated[str | None, file("--proof", "Write the proof (verified).")]
+Resume = Annotated[
+    bool,
+    typer.Option("--resume", help="Go on with the proof in --proof FILE, if there is any.", rich_help_panel=OUTPUT),
+]
 CsvFile = Annotated[str | None, csv("a root and contact node")]
 
 
@@ -63,6 +68,7 @@ def roots(
     time_limit: TimeLimit = None,
     jobs: Jobs = 1,
     proof_file: ProofFile = None,
+    resume: Resume = False,
     json_file: JsonFile = None,
     csv_file: CsvFile = None,
     quiet: Quiet = False,
@@ -73,30 +79,32 @@ def roots(
 
     Exit status: 0 when complete (in fast arithmetic, which proves nothing: when the search ran to its end with nothing
     undecided); 3 when something stayed undecided, a limit cut the search short, or the indices do not add up to +1;
-    2 on bad input; 71 when a process of --jobs died, 130 on Ctrl-C, both after printing what was found so far; 74 when
-    a result could not be written, 141 when nobody read it any more.
+    2 on bad input; 130 on Ctrl-C, after printing what was found so far; 74 when a result could not be written, 141 when
+    nobody read it any more.
     """
     if jobs > 1 and method != "tree":
         raise InvalidArgumentError(f"--jobs is {jobs} with the exhaustive method; expected 1 job, or the method tree")
-    check_files(proof_file, json_file, csv_file)
+    check_files(proof_file, json_file, csv_file, resume=resume)
     limits: dict[str, Any] = {"stop_after": stop_after, "max_nodes": max_nodes, "time_limit": time_limit}
-    options = {"arithmetic": arithmetic, "method": method, "proof_path": proof_file, **limits}
+    options = {"arithmetic": arithmetic, "method": method, "proof_path": proof_file, "resume": resume, **limits}
     value = parse_alpha(alpha)
     answer(problem, load_any_problem(problem), value, jobs, options, json_file, csv_file)
 
 
-def check_files(proof_file: str | None, json_file: str | None, csv_file: str | None) -> None:
+def check_files(proof_file: str | None, json_file: str | None, csv_file: str | None, *, resume: bool) -> None:
     """Refuse results that cannot be written.
 
     Raises
     ------
     InvalidArgumentError
-        As `check_outputs`, or the proof is to go to stdout.
+        As `check_outputs`, the proof is to go to stdout, or there is none to resume.
     """
     check_outputs(json=json_file, csv=csv_file)
     if proof_file == "-":
         raise InvalidArgumentError("--proof is -, but a proof is a binary file; expected the name of a file")
     check_writable(proof_file, "--proof")
+    if resume and proof_file is None:
+        raise InvalidArgumentError("--resume is given without --proof; expected the file of the proof to go on with")
 
 
 def answer(

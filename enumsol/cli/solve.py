@@ -13,6 +13,7 @@ from enumsol.cli.roots import (
     HowExact,
     Jobs,
     ProofFile,
+    Resume,
     StopAfter,
     TimeLimit,
     answer,
@@ -126,6 +127,7 @@ def solve(
     time_limit: TimeLimit = None,
     jobs: Jobs = 1,
     proof_file: ProofFile = None,
+    resume: Resume = False,
     json_file: JsonFile = None,
     csv_file: CsvFile = None,
     output: Output = None,
@@ -160,7 +162,7 @@ def solve(
         "pressure_slope": _by_part(pressure_slope, "--pressure-slope", single=True),
         "body_force": _numbers(body_force, "--body-force"),
     }
-    check_files(proof_file, json_file, csv_file)
+    check_files(proof_file, json_file, csv_file, resume=resume)
     value = None if alpha is None else parse_alpha(alpha)
     problem = _problem(mesh, {name: entry for name, entry in given.items() if entry is not None})
     if output is not None:
@@ -170,7 +172,7 @@ def solve(
             return
         raise InvalidArgumentError("--alpha is missing, on which friction or load depend; expected it, or --output")
     limits: dict[str, Any] = {"stop_after": stop_after, "max_nodes": max_nodes, "time_limit": time_limit}
-    options = {"arithmetic": arithmetic, "proof_path": proof_file, **limits}
+    options = {"arithmetic": arithmetic, "proof_path": proof_file, "resume": resume, **limits}
     answer(mesh, problem, value or 0.0, jobs, options, json_file, csv_file)
 
 

@@ -11,7 +11,7 @@ from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha
 from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, count, csv, number, seconds
 from enumsol.cli.output import as_json, check_outputs, deliver
 from enumsol.cli.progress import Display
-from enumsol.errors import EnumsolError, InvalidArgumentError, WorkerError
+from enumsol.errors import EnumsolError, InvalidArgumentError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,8 +60,8 @@ def table(
 
     Exit status: 0 when complete at every alpha (in fast arithmetic, which proves nothing: when every search ran to its
     end with nothing undecided); 3 when something stayed undecided or the indices do not add up to +1 somewhere; 2 on
-    bad input; 71 when a process of --jobs died, 130 on Ctrl-C, both after printing what was done so far; 74 when a
-    result could not be written, 141 when nobody read it any more.
+    bad input; 130 on Ctrl-C, after printing what was done so far; 74 when a result could not be written, 141 when
+    nobody read it any more.
     """
     check_outputs(json=json_file, csv=csv_file)
     values, body = _alphas(first, last, samples, alphas), load_any_problem(problem)
@@ -162,8 +162,7 @@ def _runs(frame: pd.DataFrame) -> pd.DataFrame:
 
 def _closing_line(frame: pd.DataFrame, asked: int, ended: EnumsolError | None) -> str:
     if len(frame) < asked:
-        why = "a worker was lost" if isinstance(ended, WorkerError) else "interrupted"
-        return f"complete: no ({why} after {len(frame)} of {asked} alphas)"
+        return f"complete: no (interrupted after {len(frame)} of {asked} alphas)"
     left = _open(frame)
     if len(left):
         some = ", ".join(f"{alpha:g}" for alpha in left["alpha"][:5]) + (", ..." if len(left) > 5 else "")

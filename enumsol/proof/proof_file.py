@@ -38,7 +38,6 @@ What reading costs
 from __future__ import annotations
 
 import base64
-import contextlib
 import hashlib
 import io
 import json
@@ -63,9 +62,6 @@ if TYPE_CHECKING:
 MAGIC = b"enumsol-proof 1\n"
 _DIGEST = 32
 _CHUNK = 1 << 16
-# measured on multipliers: level 6 saves 4 % of the size and takes several times as long
-_LEVEL = 1
-_ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 #: Most characters that a byte of a file may stand for. The level at which proofs are written does not go beyond 1 : 230
 #: even for one character repeated; a file that does was made to be expanded.
 EXPANSION = 256
@@ -103,85 +99,8 @@ class Recorder(Protocol):
     def write(self, record: Any) -> None:
         """Append one record."""
 
-
-class ProofWriter:
-    """Writes the records of a proof one by one, to a file or to memory.
-
-    A file that cannot be written to the end (a full disk) does not stop the search: the records are dropped from there
-    on, and there is no proof.
-
-    Parameters
-    ----------
-    path : path or None
-        Where the proof is streamed to; None keeps the compressed proof in memory.
-
-    Attributes
-    ----------
-    failure : str or None
-        Why the file could not be written to the end.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The file cannot be written.
-    """
-
-    def __init__(self, path: str | Path | None = None) -> None:
-        self._path = None if path is None else Path(path)
-        with contextlib.nullcontext() if self._path is None else writing(self._path, "proof_path"):
-            self._file: BinaryIO = io.BytesIO() if self._path is None else self._path.open("wb")
-        self.failure: str | None = None
-        self._digest = hashlib.sha256()
-        self._zip = zlib.compressobj(_LEVEL)
-        self._pending: list[str] = []
-        self._emit(MAGIC)
-
-    def write(self, record: Any) -> None:
-        """Append one record.
-
-        Raises
-        ------
-        InvalidArgumentError
-            The file takes no more.
-        """
-        self._pending.append(_ENCODER.encode(record))
-        if len(self._pending) >= 256:
-            self._flush()
-
-    def close(self) -> Proof:
-        """Finish the file and give the proof; a damaged one when there was a ``failure``."""
-        self._flush()
-        self._emit(self._zip.flush())
-        self._emit(self._digest.digest())
-        if self._path is None:
-            return Proof(self._file.getvalue())  # type: ignore[attr-defined]
-        if self.failure is None:
-            try:
-                self._file.close()
-            except OSError as error:
-                self._give_up(error)
-        return Proof(self._path)
-
-    def _flush(self) -> None:
-        if self._pending:
-            self._emit(self._zip.compress(("\n".join(self._pending) + "\n").encode()))
-            self._pending.clear()
-
-    def _emit(self, data: bytes) -> None:
-        self._digest.update(data)
-        if self.failure is not None:
-            return
-        try:
-            self._file.write(data)
-        except OSError as error:
-            self._give_up(error)
-
-    def _give_up(self, error: OSError) -> None:
-        self.failure = (
-            f"proof_path {self._path} cannot be written to the end ({error.strerror}); expected a place with room"
-        )
-        with contextlib.suppress(OSError):  # the same once more, for what is still in its buffer
-            self._file.close()
+    def add(self, lines: list[str]) -> None:
+        """Append records that were encoded elsewhere (``writer.encoded``)."""
 
 
 class Proof:
@@ -301,11 +220,8 @@ class Proof:
         with self._open() as file:
             size = file.seek(0, io.SEEK_END)
             file.seek(len(MAGIC))
-            for line in _lines(_expanded(file, size), size):
-                try:
-                    yield _DECODER.decode(line.decode("ascii"))
-                except (ValueError, RecursionError) as error:
-                    raise ProofFormatError(f"the proof's content cannot be decoded ({error})") from error
+            for line in lines_of(_expanded(file, size), size):
+                yield decoded(line)
 
     def __repr__(self) -> str:
         try:
@@ -348,7 +264,7 @@ def _expanded(file: BinaryIO, size: int) -> Iterator[bytes]:
         raise ProofFormatError("the proof's content ends in the middle of its file")
 
 
-def _lines(parts: Iterable[bytes], size: int) -> Iterator[bytes]:
+def lines_of(parts: Iterable[bytes], size: int) -> Iterator[bytes]:
     """The lines of a stream, the last one ended too."""
     longest = min(LONGEST_RECORD, RECORD_SHARE * size + SMALL)
     begun: list[bytes] = []
@@ -364,6 +280,14 @@ def _lines(parts: Iterable[bytes], size: int) -> Iterator[bytes]:
         _check_length(length, longest)
     if length:
         raise ProofFormatError("the proof ends in the middle of a record")
+
+
+def decoded(line: bytes) -> Any:
+    """The record in a line; ProofFormatError if there is none."""
+    try:
+        return _DECODER.decode(line.decode("ascii"))
+    except (ValueError, RecursionError) as error:
+        raise ProofFormatError(f"the proof's content cannot be decoded ({error})") from error
 
 
 def _check_length(length: int, longest: int) -> None:

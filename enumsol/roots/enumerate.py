@@ -29,9 +29,9 @@ from enumsol.roots.local_degree import perturbed_degree
 from enumsol.roots.root_set import RootSet
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
+from enumsol.search.outcome import SearchLimits, SearchProgress
 from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.search.tree import SearchLimits, SearchProgress
 from enumsol.selections.floats import SIGN_TOLERANCE
 
 if TYPE_CHECKING:
@@ -63,6 +63,7 @@ def enumerate_roots(
     time_limit: float | None = None,
     proof_path: str | Path | None = None,
     *,
+    resume: bool = False,
     tolerance: float = SIGN_TOLERANCE,
     engine: str | None = None,
 ) -> RootSet:
@@ -83,7 +84,8 @@ def enumerate_roots(
     method : {"tree", "exhaustive"}
         "tree": pruned search (theory, section 5.4). "exhaustive": all 4^p selections, the oracle for small p.
     executor : concurrent.futures.Executor, optional
-        Runs subtrees in parallel (method "tree").
+        Runs parts of the tree in parallel (method "tree"): roots and proof do not depend on the number of workers. What
+        a worker that died had to do is done again, by others or in this process, with a RuntimeWarning.
     progress : callable, optional
         Called regularly with a SearchProgress.
     stop_after : int, optional
@@ -94,6 +96,10 @@ def enumerate_roots(
         Stop after this many seconds.
     proof_path : path, optional
         Stream the proof to this file (arithmetic "verified"); by default it is kept, compressed, in memory.
+    resume : bool
+        Go on with the proof that an earlier search, stopped or killed, left at ``proof_path``. All that it holds is
+        proven again; limits are about what is searched anew. The file is replaced as soon as the new one holds as much.
+        Without such a file the search begins at its beginning.
     tolerance : float
         For arithmetic "fast": see enumsol.selections.floats.SIGN_TOLERANCE.
     engine : {"active-set", "clarabel"}, optional
@@ -106,13 +112,11 @@ def enumerate_roots(
     Raises
     ------
     InvalidArgumentError
-        An argument is out of range.
+        An argument is out of range, or the file to be resumed belongs to another search.
     TooLargeError
         The exhaustive method or exact arithmetic would take too long; the message says how long.
     Interrupted
         On Ctrl-C; ``partial`` holds what was found.
-    WorkerError
-        A worker of the executor died; ``partial`` holds what was found.
     OutputError
         There was no space to write the whole proof; ``partial`` holds the result without it.
 
@@ -144,13 +148,12 @@ def enumerate_roots(
         from enumsol.search.space_solvers import SpaceSolvers
 
         check_supported(arithmetic, method, engine)
-        _check_proof(arithmetic, method, proof_path)
-        return SpaceEnumeration(SpaceSolvers(problem, value, arithmetic), progress, proof_path).run(
-            executor, *counts, seconds
-        )
-    _check_proof(arithmetic, method, proof_path)
+        _check_proof(arithmetic, method, proof_path, resume)
+        in_space = SpaceSolvers(problem, value, arithmetic)
+        return SpaceEnumeration(in_space, progress, proof_path, resumed=resume).run(executor, *counts, seconds)
+    _check_proof(arithmetic, method, proof_path, resume)
     solvers = Solvers(problem, value, arithmetic, tolerance, engine)
-    return _Enumeration(solvers, method, progress, proof_path).run(executor, *counts, seconds)
+    return _Enumeration(solvers, method, progress, proof_path, resumed=resume).run(executor, *counts, seconds)
 
 
 def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
@@ -172,8 +175,10 @@ class _Enumeration(Enumeration[Solvers]):
         method: str,
         progress: Callable[[SearchProgress], object] | None,
         proof_path: str | Path | None,
+        *,
+        resumed: bool = False,
     ) -> None:
-        super().__init__(solvers, progress, proof_path)
+        super().__init__(solvers, progress, proof_path, resumed=resumed)
         self.method = method
         #: Closed roots that may be the same as others.
         self.doubtful: list[Codes] = []
@@ -311,7 +316,10 @@ class _Selected(_Enumeration):
         del counts
 
 
-def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None) -> None:
+def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None, resume: bool) -> None:
+    instance_of(resume, bool, "resume")
+    if resume and proof_path is None:
+        raise InvalidArgumentError("resume is True without proof_path; expected the file of the proof to go on with")
     if method == "exhaustive" and arithmetic == "verified":
         raise InvalidArgumentError(
             'method is "exhaustive" with arithmetic "verified"; expected "fast" or "exact" arithmetic for the oracle'

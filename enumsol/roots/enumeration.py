@@ -4,26 +4,28 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from enumsol.errors import Interrupted, OutputError, WorkerError
-from enumsol.executors import WorkerLost
-from enumsol.proof.proof_file import ProofWriter
+from enumsol.errors import Interrupted, OutputError
+from enumsol.proof.begun import begun_proof
+from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root_set import SearchStats
 from enumsol.search.certifiers.protocol import UndecidedPart
-from enumsol.search.parallel import Searchable, run_parallel
+from enumsol.search.outcome import SearchLimits, SearchOutcome
+from enumsol.search.parallel import Searchable, Spread
+from enumsol.search.resume import resume
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.search.tree import SearchLimits, SearchOutcome
 from enumsol.texts import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from concurrent.futures import Executor
-    from pathlib import Path
 
+    from enumsol.proof.begun import BegunProof
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.root_set import RootSet
-    from enumsol.search.tree import SearchProgress
+    from enumsol.search.outcome import SearchProgress
 
 _Solvers = TypeVar("_Solvers", bound=Searchable)
 
@@ -37,6 +39,13 @@ class Enumeration(ABC, Generic[_Solvers]):
     progress : callable or None
     proof_path : path or None
         Where to write the proof (arithmetic "verified"); None keeps it in memory.
+    resumed : bool
+        Go on with the proof in that file, if there is one.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file holds something else, or cannot be written.
     """
 
     def __init__(
@@ -44,15 +53,21 @@ class Enumeration(ABC, Generic[_Solvers]):
         solvers: _Solvers,
         progress: Callable[[SearchProgress], object] | None,
         proof_path: str | Path | None,
+        *,
+        resumed: bool = False,
     ) -> None:
         self.solvers, self.progress = solvers, progress
         self.started = time.perf_counter()
         self.outcome = SearchOutcome()
         self.unloaded = False
-        self.writer = None
+        self.writer: ProofWriter | None = None
+        self._begun: BegunProof | None = None
         if solvers.arithmetic == "verified":
-            self.writer = ProofWriter(proof_path)
-            self.writer.write(solvers.proof_header())
+            header = solvers.proof_header()
+            if resumed and proof_path is not None:
+                self._begun = begun_proof(Path(proof_path), header)
+            self.writer = ProofWriter(proof_path, beside=self._begun is not None)
+            self.writer.write(header)
         self.certifier = solvers.certifier(self.writer)
 
     def run(
@@ -68,9 +83,8 @@ class Enumeration(ABC, Generic[_Solvers]):
             partial = self._result()
             message = f"enumerate_roots was interrupted; {counted(len(partial), 'root')} so far"
             raise Interrupted(message, partial) from interruption
-        except WorkerLost as loss:
-            partial = self._result()
-            raise WorkerError(f"{loss}; {counted(len(partial), 'root')} so far", partial) from loss
+        if self.writer is not None:
+            self.writer.replace()
         result = self._result()
         if self.writer is not None and self.writer.failure is not None:
             raise OutputError(self.writer.failure, result)
@@ -80,6 +94,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         """Search the tree."""
         solvers = self.solvers
         search = solvers.search(self.certifier, limits, self.progress)
+        earlier = () if self._begun is None or self.writer is None else (self._begun, self.writer.replace)
         self.outcome = search.outcome
         if solvers.unloaded():
             self.certifier.unloaded()
@@ -89,10 +104,18 @@ class Enumeration(ABC, Generic[_Solvers]):
             codes = search.first().codes
             self.certifier.skipped(codes, reason)
             self.outcome.undecided.append(UndecidedPart(codes, reason, "hold the body better, or scale the data"))
-        elif executor is not None:
-            run_parallel(executor, solvers, search)
         else:
-            search.run()
+            spread = None if executor is None else Spread(executor, solvers, search)
+            if spread is not None:
+                search.loop = spread.run
+            try:
+                if earlier:
+                    resume(search, solvers.reader(), *earlier)
+                else:
+                    search.run()
+            finally:
+                if spread is not None:
+                    spread.cancel()
 
     def _examined(self) -> int:
         """What an interruption says was done."""
@@ -118,6 +141,8 @@ class Enumeration(ABC, Generic[_Solvers]):
             escalations=self.certifier.certified.escalations,
             presolved=outcome.presolved,
             closed=outcome.closed,
+            resumed=outcome.resumed,
+            redone=outcome.redone,
         )
 
     def _proof(self, **counts: int) -> Proof | None:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.search.certifiers.floats import FastCertifier
+from enumsol.search.outcome import SearchLimits
 from enumsol.search.splitting import PlaneSplitting
-from enumsol.search.tree import SearchLimits, TreeSearch
+from enumsol.search.tree import TreeSearch
 from enumsol.selections.floats import FloatSelections
 
 if TYPE_CHECKING:

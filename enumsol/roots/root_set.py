@@ -95,6 +95,11 @@ class SearchStats:
         Contact nodes proven open or in contact before the search began to branch on alternatives.
     closed : int
         Partial assignments closed by the only solution that they may hold.
+    resumed : int
+        Nodes of the tree taken from the proof of an earlier search, and proven again. They are not among ``nodes``, but
+        what they came to is among ``pruned``, ``selections`` and ``closed``.
+    redone : int
+        Tasks of an executor whose worker died, and which were done again.
 
     Examples
     --------
@@ -113,6 +118,8 @@ class SearchStats:
     escalations: Escalations | None = None
     presolved: int = 0
     closed: int = 0
+    resumed: int = 0
+    redone: int = 0
 
 
 class RootSet(Sequence[Root], Immutable):
@@ -299,6 +306,9 @@ class RootSet(Sequence[Root], Immutable):
         lines += [f"undecided region {k}: {_region(item)}" for k, item in enumerate(regions[:_PRINTED_REGIONS])]
         if len(regions) > _PRINTED_REGIONS:
             lines.append(f"   ... {len(regions) - _PRINTED_REGIONS} more")
+        if self.stats.resumed:
+            searched = f"{self.stats.nodes} more searched" if self.stats.nodes else "nothing was left to search"
+            lines.append(f"resumed: {counted(self.stats.resumed, 'node')} of the tree from the file, {searched}")
         total = self.index_sum
         # a sum other than +1 proves that something is missing or wrong
         note = "unknown" if total is None else f"{total:+d}" if total == 1 else f"{total:+d} (not +1!)"

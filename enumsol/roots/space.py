@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from enumsol.kernel.leaves import SpaceRoot
     from enumsol.search.certifiers.protocol import UndecidedPart
-    from enumsol.search.tree import SearchProgress
+    from enumsol.search.outcome import SearchProgress
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -42,8 +42,10 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         solvers: SpaceSolvers,
         progress: Callable[[SearchProgress], object] | None,
         proof_path: str | Path | None,
+        *,
+        resumed: bool = False,
     ) -> None:
-        super().__init__(solvers, progress, proof_path)
+        super().__init__(solvers, progress, proof_path, resumed=resumed)
         self.problem, self.alpha, self.arithmetic = solvers.problem, solvers.alpha, solvers.arithmetic
         self.system, self.enclosed = solvers.system, solvers.enclosed
 

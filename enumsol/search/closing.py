@@ -117,12 +117,17 @@ class Closer:
         strict = answer is None or (isinstance(answer, SelectionSolution) and answer.strict)
         self._alert = self._alert or not strict or self._certifier.hard
 
+    def again(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        """The solutions of a subtree that was closed in an earlier search."""
+        return self._certifier.closed(codes, relaxation)
+
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions of a subtree that can be closed, None where it has to be searched."""
         # at a solution without slip the energy is zero, and that is its minimum
-        if not self._alert and (relaxation is None or abs(relaxation.bound) > NEAR):
+        alert = self._alert or bool(self._certifier.sliding)
+        if not alert and (relaxation is None or abs(relaxation.bound) > NEAR):
             return None
-        if max(codes) < CONTACT or not (self._alert or _touches(codes, relaxation)):
+        if max(codes) < CONTACT or not (alert or _touches(codes, relaxation)):
             return None
         if self._wait > 0:
             self._wait -= 1

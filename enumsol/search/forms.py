@@ -7,6 +7,7 @@ it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, FormEngine
@@ -14,6 +15,7 @@ from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Engine
     from enumsol.search.splitting import ImposedRows
@@ -43,15 +45,33 @@ class Forms:
     def __init__(self, scaled: ScaledSystem, enclosed: EnclosedSystem) -> None:
         self._scaled, self._enclosed = scaled, enclosed
         self._engine: Engine | None = None
+        self._form: EnclosedForm | None = None
 
     @property
     def in_use(self) -> bool:
         """Whether the search goes on with forms."""
         return self._engine is not None
 
+    @property
+    def form(self) -> EnclosedForm | None:
+        """That form."""
+        return self._form
+
     def due(self, nodes: int, covered: float) -> bool:
         """Whether it is time to try a form."""
-        return nodes >= NODES * max(self._scaled.p, _SMALL) and covered < 1.0 - _LEFT
+        return self.tried(nodes) and covered < 1.0 - _LEFT
+
+    def tried(self, nodes: int) -> bool:
+        """Whether a search of so many nodes has tried a form."""
+        return nodes >= NODES * max(self._scaled.p, _SMALL)
+
+    def use(self, engine: Any, form: EnclosedForm | None) -> None:
+        """Go on with a form that is known already, or with the energy."""
+        if form is not None and form is self._form:
+            return
+        self._form = form
+        usable = form is not None and isinstance(engine, ActiveSetEngine) and form.smallest_eigenvalue > 0
+        self._engine = FormEngine(engine, self._scaled, form) if usable and form is not None else None
 
     def pay(self, engine: Any, codes: Codes, rows: ImposedRows) -> bool:
         """Whether a form at the root of the search is clearly tighter than the energy; if so it is in use."""
@@ -72,7 +92,7 @@ class Forms:
             found = ascent.improve(codes, found[0].multipliers, imposed, STEPS) or found
         if not found[0].smallest_eigenvalue > 0:
             return False
-        self._engine = FormEngine(engine, self._scaled, found[0])
+        self._form, self._engine = found[0], FormEngine(engine, self._scaled, found[0])
         return True
 
     @property
@@ -80,6 +100,11 @@ class Forms:
         """Relaxations with the form of the root."""
         assert self._engine is not None
         return self._engine
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    text: str
 
 
 class HeldRecords:
@@ -99,10 +124,17 @@ class HeldRecords:
         """Keep a record."""
         self._records.append(record)
 
+    def add(self, lines: list[str]) -> None:
+        """Keep records that are lines already."""
+        self._records += [_Line(line) for line in lines]
+
     def release(self) -> None:
         """Hand the records on."""
         for record in self._records:
-            self.recorder.write(record)
+            if isinstance(record, _Line):
+                self.recorder.add([record.text])
+            else:
+                self.recorder.write(record)
         self._records.clear()
 
     def drop(self) -> None:

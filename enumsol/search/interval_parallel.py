@@ -10,16 +10,16 @@ import pickle
 import threading
 import time
 from fractions import Fraction
-from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
-from enumsol.executors import WorkerLost, has_result, result_of, submit
+from enumsol.executors import Crew
 from enumsol.search.interval import Task
 from enumsol.search.stopping import Stop, StopReason
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor, Future
+    from concurrent.futures import Executor
 
+    from enumsol.executors import Job
     from enumsol.search.interval import IntervalSearch, Piece, Worker
     from enumsol.search.interval_tree import Subtree, TreeResult
 
@@ -27,24 +27,16 @@ if TYPE_CHECKING:
 def run_parallel(executor: Executor, search: IntervalSearch) -> None:
     """Run a search with the help of an executor: the same result, whatever their number and timing.
 
-    An interruption and the loss of a worker keep the trees that were finished.
-
     Raises
     ------
     KeyboardInterrupt
         The search then holds what was found by then.
-    WorkerLost
-        A worker died; likewise.
     """
     ahead = _Ahead(executor, search)
     try:
         ahead.run()
-    except (KeyboardInterrupt, WorkerLost) as error:
-        ahead.cancel()
+    except KeyboardInterrupt:
         search.stopped = Stop(StopReason.INTERRUPTED, ahead.nodes)
-        if isinstance(error, WorkerLost):
-            ahead.take_finished()
-            search.stopped = Stop(StopReason.WORKER_LOST, loss=error.what)
         search.run(ahead.known)
         raise
     finally:
@@ -66,10 +58,9 @@ class _Ahead:
     def __init__(self, executor: Executor, search: IntervalSearch) -> None:
         self.known: dict[Task, TreeResult] = {}
         self.nodes = 0
-        self._executor, self._search = executor, search
+        self._crew, self._search = Crew(executor), search
         self._worker = pickle.dumps(search.worker)
-        self._done: SimpleQueue[Future[TreeResult]] = SimpleQueue()
-        self._tasks: dict[Future[TreeResult], Task] = {}
+        self._tasks: dict[Job, Task] = {}
         #: of every piece its first tree, and the number of its trees that are not finished
         self._first: dict[Piece, Task] = {}
         self._waiting: dict[Piece, int] = {}
@@ -81,17 +72,12 @@ class _Ahead:
         for task in search.first():
             self._begin(task)
         while self._tasks:
-            try:
-                future = self._done.get(timeout=self._seconds())
-            except Empty:
+            job = self._crew.next(self._seconds())
+            if job is None or not job.result.nodes:
+                # there is no time left, here or for the worker
                 search.stopped = Stop(StopReason.TIME_LIMIT)
                 return
-            result = result_of(future)
-            if not result.nodes:
-                # the worker had no time left
-                search.stopped = Stop(StopReason.TIME_LIMIT)
-                return
-            self._take(self._tasks.pop(future), result)
+            self._take(self._tasks.pop(job), job.result)
             if search.max_nodes is not None and self.nodes >= search.max_nodes:
                 return
 
@@ -106,9 +92,7 @@ class _Ahead:
         self._hand_out(task)
 
     def _hand_out(self, task: Task) -> None:
-        future = submit(self._executor, _search_tree, self._worker, task, self._seconds())
-        self._tasks[future] = task
-        future.add_done_callback(self._done.put)
+        self._tasks[self._crew.submit(_search_tree, self._worker, task, self._seconds())] = task
 
     def _take(self, task: Task, result: TreeResult) -> None:
         """Keep a result, and hand out the trees that follow from it."""
@@ -138,16 +122,9 @@ class _Ahead:
             waiting += task.further(self.known[task])[::-1]
         return cut
 
-    def take_finished(self) -> None:
-        """Keep the results that are there."""
-        for future, task in self._tasks.items():
-            if has_result(future) and future.result().nodes:
-                self.known[task] = future.result()
-
     def cancel(self) -> None:
         """Cancel what has not begun."""
-        for future in self._tasks:
-            future.cancel()
+        self._crew.cancel()
 
 
 _local = threading.local()

@@ -1,26 +1,42 @@
-"""Subtrees of a search run by a concurrent.futures executor, their proofs put together in the tree's order."""
+"""A search of the tree by the workers of a concurrent.futures executor, its proof put together in the tree's order.
+
+A task is a part of the tree. It ends after a number of nodes and gives back the subtrees that it did not come to, which
+are new tasks: so no part is long, however uneven the tree. What a task comes to depends on it alone, and results are
+taken in the order of the tree: roots and proof depend neither on timing nor on the number of workers.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import heapq
+import pickle
+import threading
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from enumsol.executors import WorkerLost, has_result, result_of, submit
+from enumsol.executors import Crew
+from enumsol.proof.writer import encoded
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.search.tree import SearchLimits, SearchOutcome, TreeNode
+from enumsol.search.tree import TreeNode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from concurrent.futures import Executor, Future
+    from collections.abc import Callable, Iterable, Sequence
+    from concurrent.futures import Executor
 
+    from enumsol.executors import Job
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.proof.proof_file import Recorder
     from enumsol.search.certifiers.protocol import Certified, Certifier
-    from enumsol.search.tree import SearchProgress, TreeSearch
+    from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress
+    from enumsol.search.resume import Reader
+    from enumsol.search.tree import TreeSearch
     from enumsol.selections.solution import Codes
 
-#: Levels of the tree that are examined here; the subtrees below are handed out. Their sizes differ widely, so there
-#: are many more of them than workers.
-LEVELS = 7
+#: Nodes of a task, and those that are examined here before there are any.
+NODES, FIRST = 512, 64
+#: Of the subtrees that a task gives back, so many become tasks of their own: those nearest to the root of the tree.
+ALONE = 4
 
 
 class Searchable(Protocol):
@@ -48,153 +64,248 @@ class Searchable(Protocol):
     def remake(self) -> Callable[[], Searchable]:
         """Makes the same again, also in another process."""
 
+    def fresh(self) -> Searchable:
+        """The same without anything that searches leave behind and others would depend on."""
+
     def unloaded(self) -> bool:
         """Whether g = 0, so that only lambda = 0 solves."""
+
+    def reader(self) -> Reader:
+        """Understands the records of an earlier proof."""
 
     def proof_header(self) -> dict[str, Any]:
         """First record of a proof."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Root:
+    """A subtree that waits, as it is sent to a worker (see TreeNode)."""
+
+    codes: Codes
+    changed: int
+    weight: float
+    forced: tuple[int, ...] | None
+
+    @classmethod
+    def of(cls, item: TreeNode) -> _Root:
+        return cls(item.codes, item.changed, item.weight, item.forced)
+
+    @property
+    def node(self) -> TreeNode:
+        return TreeNode(None, self.codes, self.changed, last=False, weight=self.weight, forced=self.forced)
+
+
+@dataclass(frozen=True)
+class _Sent:
+    """What a worker makes its solvers from, and uses for many tasks."""
+
+    form: EnclosedForm | None
+    sliding: dict[int, int]
+    data: bytes
+    key: bytes
+
+    @classmethod
+    def of(cls, remake: Callable[[], Searchable], form: EnclosedForm | None, sliding: dict[int, int]) -> _Sent:
+        data = pickle.dumps((remake, form, sliding))
+        return cls(form, dict(sliding), data, hashlib.sha256(data).digest())
+
+
 @dataclass(frozen=True)
 class _Answer:
+    """What a task came to; ``rest`` are the subtrees that are left, the first one last."""
+
     outcome: SearchOutcome
-    records: list[Any]
+    lines: list[str]
     certified: Certified
+    covered: float
+    rest: list[_Root]
 
 
-def run_parallel(executor: Executor, solvers: Searchable, search: TreeSearch) -> None:
-    """Search the tree with the help of an executor; ``search`` collects the outcome, which does not depend on timing.
+@dataclass(eq=False)
+class _Part:
+    """A part of the tree: subtrees that follow on each other, the first one last."""
 
-    Its outcome is filled as the subtrees come in, so that an interruption keeps those that did.
+    place: tuple[int, ...]
+    roots: Sequence[_Root]
+    answer: _Answer | None = None
+    further: Sequence[_Part] = ()
 
-    Raises
-    ------
-    WorkerLost
-        A worker died. The outcome holds the subtrees that were finished by then; the others are undecided in it and in
-        its proof.
+    def __lt__(self, other: _Part) -> bool:
+        return self.place < other.place
+
+
+class Spread:
+    """Searches a tree with the help of an executor; its `run` takes the place of the loop of a TreeSearch.
+
+    Parameters
+    ----------
+    executor : Executor
+    solvers : Searchable
+    search : TreeSearch
+        Collects the outcome as parts come in, so that an interruption keeps those that did.
     """
-    limits, remake = search.limits, solvers.remake()
 
-    def hand_out(codes: Codes) -> Future[_Answer]:
-        return submit(executor, _subtree, codes, remake, limits.max_nodes, limits.remaining())
+    def __init__(self, executor: Executor, solvers: Searchable, search: TreeSearch) -> None:
+        self._crew, self._search = Crew(executor), search
+        self._remake = solvers.remake()
+        #: What workers make their solvers from, and whether some have it.
+        self._sent: _Sent | None = None
+        self._known = False
+        self._waiting: list[_Part] = []
+        self._out: dict[Job, _Part] = {}
 
-    plan = _Plan(hand_out)
-    try:
-        _examine_top(plan, search)
-        _collect(plan, search)
-    finally:
-        for handed in plan.handed:
-            if handed.future is not None:
-                handed.future.cancel()
-    if plan.lost is not None:
-        raise plan.lost
-
-
-def _examine_top(plan: _Plan, search: TreeSearch) -> None:
-    """Examine the top of the tree, whose records go to the plan, and hand out what lies below."""
-    certifier = search.certifier
-    recorder, certifier.recorder = certifier.recorder, plan
-    try:
-        stack: list[tuple[TreeNode, int]] = [(search.first(), 0)]
+    def run(self, waiting: Iterable[Any], until: Callable[[], bool] | None = None) -> list[Any]:
+        """Examine what waits, the last first; what still waits when it is time to stop."""
+        search, outcome = self._search, self._search.outcome
+        stack = self._begin(list(waiting))
         while stack:
-            item, level = stack.pop()
-            if level >= LEVELS:
-                plan.submit(item.codes)
-            else:
-                children = reversed(list(search.examine(item)))
-                # presolve goes down without spreading out
-                stack.extend((child, level + (child.forced is None)) for child in children)
-    finally:
-        certifier.recorder = recorder
+            if until is not None and until():
+                return stack
+            if search.must_stop(0):
+                break
+            part = stack.pop()
+            if not self._answered(part):
+                stack.append(part)
+                outcome.stopped = Stop(StopReason.TIME_LIMIT, unexamined=0)
+                break
+            stack.extend(reversed(self._take(part)))
+        self._leave(stack)
+        return []
+
+    def cancel(self) -> None:
+        """Cancel what has not begun."""
+        self._search.outcome.redone = self._crew.redone
+        self._crew.cancel()
+        self._out.clear()
+        self._waiting.clear()
+
+    # -- parts -----------------------------------------------------------------------------------------------------
+
+    def _begin(self, waiting: list[Any]) -> list[_Part]:
+        """Parts of what waits, which are these already where the search goes on as before."""
+        form = None if self._search.forms is None else self._search.forms.form
+        afresh = not all(isinstance(item, _Part) for item in waiting)
+        sliding = self._search.certifier.sliding
+        if self._sent is None or self._sent.form is not form or (afresh and self._sent.sliding != sliding):
+            self._sent, self._known = _Sent.of(self._remake, form, sliding), False
+        elif not afresh:
+            return waiting
+        self.cancel()
+        items: list[TreeNode] = []
+        for item in waiting:
+            items += [root.node for root in item.roots] if isinstance(item, _Part) else [item]
+        limits, done = self._search.limits, self._search.outcome.nodes
+        first = FIRST if limits.max_nodes is None else min(FIRST, limits.max_nodes - done)
+        rest = self._search.examined(items, first, limits.deadline)
+        parts = self._parts((), [_Root.of(item) for item in rest])
+        for part in parts:
+            heapq.heappush(self._waiting, part)
+        self._hand_out()
+        return parts[::-1]
+
+    def _parts(self, place: tuple[int, ...], roots: list[_Root]) -> list[_Part]:
+        """In the order of the tree; of the subtrees the last ones are near its root, and so large."""
+        groups = [[root] for root in roots[:ALONE][::-1]]
+        if roots[ALONE:]:
+            groups.insert(0, roots[ALONE:])
+        return [_Part((*place, k), group) for k, group in enumerate(groups)]
+
+    def _hand_out(self) -> None:
+        """Keep the workers busy with what comes first in the tree."""
+        while self._waiting and self._crew.room > 0:
+            self._send(heapq.heappop(self._waiting), whole=not self._known)
+
+    def _send(self, part: _Part, *, whole: bool) -> None:
+        """Hand out a part; ``whole``: with all that a worker needs, which may be much."""
+        assert self._sent is not None
+        data, seconds = self._sent.data if whole else None, self._search.limits.remaining()
+        self._out[self._crew.submit(_search_part, self._sent.key, data, part.roots, NODES, seconds)] = part
+
+    def _answered(self, part: _Part) -> bool:
+        """Wait for the answer of a part; False when the time is over."""
+        limits = self._search.limits
+        while part.answer is None:
+            remaining = limits.remaining()
+            job = self._crew.next(None if remaining is None else max(remaining, 0.0))
+            if job is None:
+                return False
+            done = self._out.pop(job)
+            if job.result is None:
+                self._send(done, whole=True)  # it went to a worker that had nothing yet
+                continue
+            self._known, done.answer = True, job.result
+            done.further = self._parts(done.place, job.result.rest)
+            for another in done.further:
+                heapq.heappush(self._waiting, another)
+            self._hand_out()
+        return True
+
+    def _take(self, part: _Part) -> Sequence[_Part]:
+        """Take the answer of a part; gives those that follow from it."""
+        search, answer, most = self._search, part.answer, self._search.limits.max_nodes
+        assert answer is not None
+        rest = None if most is None else most - search.outcome.nodes
+        if rest is not None and answer.outcome.nodes > rest:
+            # the last part before the limit is shorter
+            left = search.examined([root.node for root in part.roots], rest)
+            return self._parts(part.place, [_Root.of(item) for item in left])
+        search.outcome.add(answer.outcome)
+        search.certifier.add(answer.certified)
+        search.certifier.recorder.add(answer.lines)
+        search.covered += answer.covered
+        search.report(search.covered)
+        return part.further
+
+    def _leave(self, stack: list[_Part]) -> None:
+        """What is left after a limit: undecided, but for parts that are there when the time is over."""
+        search = self._search
+        timely = search.outcome.stopped is not None and search.outcome.stopped.reason is StopReason.TIME_LIMIT
+        while stack:
+            part = stack.pop()
+            if timely and part.answer is not None:
+                stack.extend(reversed(self._take(part)))
+                continue
+            for root in reversed(part.roots):
+                search.skip(root.codes)
+        search.outcome.count_unexamined()
+        self.cancel()
 
 
-@dataclass(frozen=True)
-class _Handed:
-    """The place of a subtree's records among those written here; no future when the executor took no task."""
-
-    future: Future[_Answer] | None
-    codes: Codes
-
-
-class _Plan:
-    """Records written while the top of the tree is examined, with places left for the subtrees handed out."""
-
-    def __init__(self, hand_out: Callable[[Codes], Future[_Answer]]) -> None:
-        self.items: list[Any] = []
-        self.handed: list[_Handed] = []
-        self.lost: WorkerLost | None = None
-        self._hand_out = hand_out
-
-    def write(self, record: Any) -> None:
-        """Keep a record of the top of the tree."""
-        self.items.append(record)
-
-    def submit(self, codes: Codes) -> None:
-        """Hand out a subtree, as long as the executor takes any."""
-        future = None
-        if self.lost is None:
-            try:
-                future = self._hand_out(codes)
-            except WorkerLost as loss:
-                self.lost = loss
-        self.handed.append(_Handed(future, codes))
-        self.items.append(self.handed[-1])
-
-
-class _Records:
-    """Records of one subtree."""
+class _Lines:
+    """Records as lines of text."""
 
     def __init__(self) -> None:
-        self.records: list[Any] = []
+        self.lines: list[str] = []
 
     def write(self, record: Any) -> None:
-        self.records.append(record)
+        """Append one record."""
+        self.lines.append(encoded(record))
+
+    def add(self, lines: list[str]) -> None:
+        """Append records that are lines already."""
+        self.lines += lines
 
 
-def _subtree(codes: Codes, remake: Callable[[], Searchable], max_nodes: int | None, seconds: float | None) -> _Answer:
-    """Search below a partial assignment, in a worker; everything here can be pickled."""
-    solvers, records = remake(), _Records()
-    certifier = solvers.certifier(records)
-    limits = SearchLimits(max_nodes=max_nodes, deadline=SearchLimits.deadline_in(seconds))
-    outcome = solvers.search(certifier, limits).run([codes])
-    return _Answer(outcome, records.records, certifier.certified)
+_local = threading.local()
 
 
-def _collect(plan: _Plan, search: TreeSearch) -> None:
-    """Wait for the subtrees in the tree's order, until enough is found or a worker lost; put their records in place."""
-    limits, outcome, total, done = search.limits, search.outcome, len(plan.handed), 0
-    # once enough is found or a worker lost: the subtrees that are finished, which still count
-    finished: set[Future[_Answer]] | None = None
-    if plan.lost is not None:
-        finished = _finished(plan.handed, plan.lost, outcome)
-    for item in plan.items:
-        if not isinstance(item, _Handed):
-            search.certifier.recorder.write(item)
-            continue
-        answer = None
-        if item.future is not None and (finished is None or item.future in finished):
-            try:
-                answer = result_of(item.future)
-            except WorkerLost as loss:
-                plan.lost = loss
-                finished = _finished(plan.handed[done:], loss, outcome)
-        if answer is None:
-            hint = "search again, with fewer workers" if plan.lost is not None else "raise the limit"
-            search.skip(item.codes, hint)
-            continue
-        outcome.add(answer.outcome)
-        search.certifier.add(answer.certified)
-        for record in answer.records:
-            search.certifier.recorder.write(record)
-        done += 1
-        search.report(done / total)
-        if finished is None and limits.enough is not None and limits.enough(outcome.solutions):
-            outcome.stopped = outcome.stopped or Stop(StopReason.ENOUGH_ROOTS, unexamined=total - done)
-            finished = set()
-
-
-def _finished(handed: Sequence[_Handed], loss: WorkerLost, outcome: SearchOutcome) -> set[Future[_Answer]]:
-    """Of the subtrees still out when a worker was lost, those with an answer; the outcome says how many have none."""
-    found = {item.future for item in handed if item.future is not None and has_result(item.future)}
-    outcome.stopped = Stop(StopReason.WORKER_LOST, unexamined=len(handed) - len(found), loss=loss.what)
-    return found
+def _search_part(
+    key: bytes, data: bytes | None, roots: Sequence[_Root], nodes: int, seconds: float | None
+) -> _Answer | None:
+    """Search a part, in a worker; every thread makes what it needs once. None where it was not given that yet."""
+    if getattr(_local, "key", None) != key:
+        if data is None:
+            return None
+        remake, _local.form, _local.sliding = pickle.loads(data)
+        _local.solvers, _local.key = remake(), key
+    solvers: Searchable = _local.solvers.fresh()
+    lines = _Lines()
+    certifier = solvers.certifier(lines)
+    certifier.sliding.update(_local.sliding)
+    search = solvers.search(certifier)
+    if search.forms is not None:
+        search.forms.use(search.engine, _local.form)
+    deadline = None if seconds is None else time.perf_counter() + seconds
+    rest = search.examined([root.node for root in roots], nodes, deadline)
+    left = [_Root.of(item) for item in rest]
+    return _Answer(search.outcome, lines.lines, certifier.certified, search.covered, left)

@@ -17,8 +17,9 @@ from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.closing import Closer
 from enumsol.search.forms import Forms
 from enumsol.search.proof_header import point_header, unit_exponents
+from enumsol.search.resume import PlaneReader
 from enumsol.search.splitting import PlaneSplitting
-from enumsol.search.tree import TreeSearch
+from enumsol.search.tree import TreeSearch, make_engine
 from enumsol.selections.floats import FloatSelections
 
 if TYPE_CHECKING:
@@ -28,10 +29,11 @@ if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.problem import ContactProblem
     from enumsol.proof.proof_file import Recorder
+    from enumsol.relaxation.engine import Engine
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rationals import ExactCertifier
     from enumsol.search.closing import Closing
-    from enumsol.search.tree import SearchLimits, SearchProgress
+    from enumsol.search.outcome import SearchLimits, SearchProgress
     from enumsol.selections.rationals import ExactSelections
 
 Arithmetic = Literal["fast", "verified", "exact"]
@@ -161,14 +163,19 @@ class Solvers:
         return TreeSearch(
             self.scaled,
             certifier,
-            engine=self.engine,
+            engine=self._relaxations,
             splitting=PlaneSplitting(self.scaled.F, sliding=closing.sliding),
             limits=limits,
             progress=progress,
             closer=Closer(closing),
-            forms=self._forms(),
+            forms=self._forms,
         )
 
+    @cached_property
+    def _relaxations(self) -> Engine:
+        return make_engine(self.scaled, self.engine)
+
+    @cached_property
     def _forms(self) -> Forms | None:
         """Forms for a long search; None where the energy is the only one, or there are no balls to prove them by."""
         system = as_computed(self.scaled) if self.arithmetic == "fast" else self.enclosed
@@ -178,6 +185,10 @@ class Solvers:
         """Makes the same again, also in another process."""
         return partial(Solvers, self.problem, self.alpha, self.arithmetic, self.floats.tolerance, self.engine)
 
+    def fresh(self) -> Solvers:
+        """The same without anything that searches leave behind and others would depend on: nothing here."""
+        return self
+
     def unloaded(self) -> bool:
         """Whether g = 0, so that only lambda = 0 solves: in the data (verified, exact) or as computed (fast)."""
         if self.arithmetic == "fast":
@@ -185,6 +196,10 @@ class Solvers:
         if self.arithmetic == "exact":
             return not any(_present(self.exact).system.g)
         return self.problem.is_unloaded(self.alpha)
+
+    def reader(self) -> PlaneReader:
+        """Understands the records of an earlier proof."""
+        return PlaneReader(self.problem.p, self.enclosed)
 
     def proof_header(self) -> dict[str, Any]:
         """First record of a proof (see enumsol.proof.proof_file).

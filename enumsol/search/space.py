@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import base64
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.kernel.leaves import Open, settle
-from enumsol.kernel.space import exclusion_margin
+from enumsol.kernel.space import exclusion_margin, row_terms
+from enumsol.proof.reading_space import multipliers_in_space
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space import SpaceEngine
 from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart
+from enumsol.search.resume import RecordedBound
 from enumsol.sectors import DEEPEST, SECTORS, direction, end_number, level_of
-from enumsol.statuses import CONTACT, UNDECIDED
+from enumsol.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from enumsol.condensation.space import EnclosedSpace
     from enumsol.kernel.leaves import SpaceRoot
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.protocol import Bound
     from enumsol.selections.solution import Codes
 
 _DEGENERATE = "a condition holds with equality, or nearly so, at what may be a root"
@@ -51,6 +54,52 @@ class SpaceSplitting:
         towards = tau / (np.linalg.norm(tau) + 1e-300) + v / (np.linalg.norm(v) + 1e-300)
         return sorted(children, key=lambda code: -_towards(code, towards) if code > SECTORS else -10.0)
 
+    def coverings(self, node: int, code: int) -> Sequence[Sequence[int]]:
+        """All ways to cover a partial status of a node by codes, in any order; none for a final one."""
+        children = () if code > SECTORS and level_of(code - SECTORS) >= DEEPEST else self._engine.children(node, code)
+        return (children,) if children else ()
+
+    def above(self, code: int, deeper: Iterable[int]) -> int:
+        """The code of which this one is a child."""
+        del deeper
+        if code > SECTORS and level_of(code - SECTORS) > 2:
+            return SECTORS + (code - SECTORS) // 2
+        return CONTACT if code > SECTORS or code in (STICK, SLIP_PLUS, SLIP_MINUS) else UNDECIDED
+
+
+class SpaceReader:
+    """Understands the records of a proof in 3D (see ``search.resume``).
+
+    Parameters
+    ----------
+    engine : SpaceEngine
+    """
+
+    def __init__(self, engine: SpaceEngine) -> None:
+        self._engine = engine
+
+    def declare(self, record: list[Any]) -> None:
+        """There are no forms in 3D."""
+        del record
+        raise ValueError("a form in a proof in 3D")
+
+    def form_over(self, codes: Codes) -> None:
+        """No form."""
+
+    def bound(self, codes: Codes, record: list[Any]) -> Bound:
+        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
+        engine, p = self._engine, len(codes)
+        if len(record) != 3:
+            raise ValueError("no three entries")
+        rows, values = multipliers_in_space(record[1], record[2], p)
+        for row in rows:
+            row_terms(row, engine.system.tau, len(engine.system.g))  # there is such a row
+        slots = [engine.slot(row) for row in rows]
+        numbers = [slot * p + row[1] for slot, row in zip(slots, rows, strict=True) if slot is not None]
+        if len(numbers) < len(rows):
+            raise ValueError("no room for its rows")
+        return RecordedBound(np.array(numbers, dtype=np.intp), values)
+
 
 def _towards(code: int, vector: np.ndarray) -> float:
     """How much a vector points into the middle of a sector."""
@@ -73,6 +122,7 @@ class SpaceCertifier:
     def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, recorder: Recorder) -> None:
         self._engine, self.enclosed, self.recorder = engine, enclosed, recorder
         self._roots: dict[Codes, SpaceRoot] = {}
+        self.sliding: dict[int, int] = {}
         self._leaves = 0
 
     @property
@@ -80,7 +130,7 @@ class SpaceCertifier:
         """What was proven so far."""
         return Certified(self._roots, None, self._leaves)
 
-    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
         if not relaxation.bound > PRUNE_MARGIN:
             return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from fractions import Fraction
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,7 @@ from enumsol.condensation.space import EnclosedSpace, SpaceSystem
 from enumsol.relaxation.space import SpaceEngine
 from enumsol.search.certifiers.protocol import Unrecorded
 from enumsol.search.proof_header import point_header, unit_exponents
-from enumsol.search.space import SpaceCertifier, SpaceSplitting
+from enumsol.search.space import SpaceCertifier, SpaceReader, SpaceSplitting
 from enumsol.search.tree import TreeSearch
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from enumsol.problem3d import ContactProblem3D
     from enumsol.proof.proof_file import Recorder
     from enumsol.search.certifiers.protocol import Certifier
-    from enumsol.search.tree import SearchLimits, SearchProgress
+    from enumsol.search.outcome import SearchLimits, SearchProgress
 
 
 class SpaceSolvers:
@@ -94,9 +95,19 @@ class SpaceSolvers:
         """Makes the same again, also in another process."""
         return partial(SpaceSolvers, self.problem, self.alpha, self.arithmetic)
 
+    def fresh(self) -> SpaceSolvers:
+        """The same with an engine of its own: which rows it has already changes what it finds."""
+        other = copy.copy(self)
+        other.__dict__.pop("_engine", None)
+        return other
+
     def unloaded(self) -> bool:
         """Whether g = 0 for the data as given, so that only lambda = 0 solves."""
         return self.problem.is_unloaded(self.alpha)
+
+    def reader(self) -> SpaceReader:
+        """Understands the records of an earlier proof."""
+        return SpaceReader(self._engine)
 
     def proof_header(self) -> dict[str, Any]:
         """First record of a proof (see enumsol.proof.proof_file).

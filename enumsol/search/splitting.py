@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from enumsol.kernel.rows import coverings_of, refines
 from enumsol.relaxation.rows import status_rows
 from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIDING, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
@@ -26,6 +27,12 @@ class Splitting(Protocol):
 
     def children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
         """Codes that together cover the node's partial status, in the order in which they are examined."""
+
+    def coverings(self, node: int, code: int) -> Sequence[Sequence[int]]:
+        """All ways to cover a partial status of a node by codes, in any order; none for a final one."""
+
+    def above(self, code: int, deeper: Iterable[int]) -> int:
+        """A code of which this one may be a child, and of which the others are parts."""
 
     def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
         """(kind, mode) of the rows that the node imposes in a status; those of a child extend its parent's."""
@@ -108,6 +115,14 @@ class PlaneSplitting:
         self.friction = [bool(f > 0) for f in F]
         every = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS))
         self._allowed = list(allowed) if allowed is not None else [every] * len(F)
+
+    def coverings(self, node: int, code: int) -> Sequence[Sequence[int]]:
+        """All ways to cover a partial status of a node by codes, in any order; none for a final one."""
+        return coverings_of(code, friction=self.friction[node])
+
+    def above(self, code: int, deeper: Iterable[int]) -> int:
+        """A code of which this one may be a child, and of which the others are parts."""
+        return CONTACT if all(refines(c, CONTACT) for c in (code, *deeper)) and code != CONTACT else UNDECIDED
 
     def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
         """(kind, mode) of the rows that a contact node imposes in a status."""

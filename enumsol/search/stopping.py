@@ -15,7 +15,6 @@ class StopReason(enum.Enum):
     ENOUGH_ROOTS = enum.auto()
     TIME_LIMIT = enum.auto()
     INTERRUPTED = enum.auto()
-    WORKER_LOST = enum.auto()
     GRAPH_INCOMPLETE = enum.auto()
 
 
@@ -34,8 +33,6 @@ class Stop:
         Number of selections whose arcs were wanted, if that stage was interrupted and not the search.
     unexamined : int or None
         Subtrees that are listed as not examined; None where the search keeps no such list.
-    loss : str
-        What happened to the worker (WORKER_LOST).
     """
 
     reason: StopReason
@@ -43,7 +40,6 @@ class Stop:
     unit: str = "node"
     arcs_of: int | None = None
     unexamined: int | None = None
-    loss: str = ""
 
     @property
     def interrupted(self) -> bool:
@@ -59,7 +55,6 @@ class Stop:
             StopReason.ENOUGH_ROOTS: "stopped after enough roots",
             StopReason.TIME_LIMIT: "stopped by the time limit",
             StopReason.INTERRUPTED: f"interrupted after {done}",
-            StopReason.WORKER_LOST: self.loss,
             StopReason.GRAPH_INCOMPLETE: "the branch graph is not complete",
         }[self.reason]
         return text if self.unexamined is None else f"{text}, {counted(self.unexamined, 'subtree')} not examined"

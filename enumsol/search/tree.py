@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from enumsol.condensation.condensed import ScaledSystem
@@ -23,102 +23,22 @@ from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart
 from enumsol.search.forms import Forms, HeldRecords
+from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting, branching_node
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.selections.solution import Codes, SelectionSolution
+from enumsol.selections.solution import Codes
 from enumsol.statuses import UNDECIDED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from enumsol.condensation.space import SpaceSystem
-    from enumsol.search.certifiers.protocol import Certifier
+    from enumsol.kernel.forms import EnclosedForm
+    from enumsol.search.certifiers.protocol import Bound, Certifier
     from enumsol.search.closing import Closer
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
-
-
-@dataclass(frozen=True)
-class SearchProgress:
-    """State of a running search, as handed to the ``progress`` callback.
-
-    Attributes
-    ----------
-    nodes : int
-        Partial assignments examined so far.
-    covered : float
-        Share of all selections accounted for, between 0 and 1.
-    solutions : int
-        Selections found so far that hold a root.
-    seconds : float
-        Wall time so far.
-
-    Examples
-    --------
-    >>> import enumsol
-    >>> seen = []
-    >>> roots = enumsol.enumerate_roots(enumsol.gallery.chain(4), alpha=5, progress=seen.append)
-    >>> 0 < seen[-1].covered <= 1
-    True
-    """
-
-    nodes: int
-    covered: float
-    solutions: int
-    seconds: float
-
-
-@dataclass
-class SearchLimits:
-    """When to stop early."""
-
-    enough: Callable[[list[SelectionSolution]], bool] | None = None
-    max_nodes: int | None = None
-    deadline: float | None = None
-
-    @staticmethod
-    def deadline_in(seconds: float | None) -> float | None:
-        """The clock's value this many seconds from now."""
-        return None if seconds is None else time.perf_counter() + seconds
-
-    def remaining(self) -> float | None:
-        """Seconds until the deadline."""
-        return None if self.deadline is None else self.deadline - time.perf_counter()
-
-
-@dataclass
-class SearchOutcome:
-    """What a search found; filled while it runs, so that an interruption loses nothing."""
-
-    solutions: list[SelectionSolution] = field(default_factory=list)
-    undecided: list[UndecidedPart] = field(default_factory=list)
-    stopped: Stop | None = None
-    nodes: int = 0
-    pruned: int = 0
-    selections: int = 0
-    qps: int = 0
-    fallback_qps: int = 0
-    presolved: int = 0
-    closed: int = 0
-
-    def forget(self) -> None:
-        """Forget what was found, as the search begins again; the work that it took still counts."""
-        self.solutions.clear()
-        self.undecided.clear()
-
-    def add(self, part: SearchOutcome) -> None:
-        """Add what the search of a subtree found."""
-        self.solutions += part.solutions
-        self.undecided += part.undecided
-        self.stopped = self.stopped or part.stopped
-        self.nodes += part.nodes
-        self.pruned += part.pruned
-        self.selections += part.selections
-        self.qps += part.qps
-        self.fallback_qps += part.fallback_qps
-        self.presolved += part.presolved
-        self.closed += part.closed
 
 
 @dataclass(slots=True)
@@ -200,7 +120,10 @@ class TreeSearch:
         self._fallback: InteriorPointEngine | None = None
         self.splitting: Splitting = splitting or PlaneSplitting(system.F)
         self._rows = ImposedRows(self.splitting, system.p)
-        self._covered = 0.0
+        self.covered = 0.0
+        #: Examines what waits, the last first, until it is time to stop, and gives what still waits then; another one
+        #: than this spreads it over workers.
+        self.loop: Callable[[Sequence[Any], Callable[[], bool] | None], list[Any]] = self._run
         self._start = time.perf_counter()
 
     # -- the loop --------------------------------------------------------------------------------------------------
@@ -209,13 +132,11 @@ class TreeSearch:
         """The root of the tree: nothing decided."""
         return TreeNode(None, (UNDECIDED,) * self.system.p, -1, last=False, weight=1.0, forced=())
 
-    def run(self, roots: Sequence[Codes] | None = None) -> SearchOutcome:
-        """Examine the subtrees of the given partial assignments (default: the whole tree)."""
+    def run(self) -> SearchOutcome:
+        """Examine the whole tree."""
         start = [self.first()]
-        if roots is not None:
-            start = [TreeNode(None, codes, -1, last=False, weight=1.0 / len(roots)) for codes in reversed(roots)]
-        if self.forms is None or len(start) > 1:
-            self._run(start)
+        if self.forms is None:
+            self.loop(start, None)
             return self.outcome
         certifier = self.certifier
         held = HeldRecords(certifier.recorder)
@@ -225,50 +146,98 @@ class TreeSearch:
         finally:
             certifier.recorder = held.recorder
             held.release()
-        self._run(stack)
+        self.loop(stack, None)
         return self.outcome
 
-    def _begin(self, start: list[TreeNode], held: HeldRecords, forms: Forms) -> list[TreeNode]:
+    def _begin(self, start: list[TreeNode], held: HeldRecords, forms: Forms) -> list[Any]:
         """Search until it is known how the search goes on: from the beginning, if that is better; what still waits."""
 
+        def due() -> bool:
+            return forms.due(self.outcome.nodes, self.covered)
+
         def known() -> bool:
-            return forms.due(self.outcome.nodes, self._covered) or again()
+            return due() or (self.closer is not None and self.closer.begins_again())
 
-        def again() -> bool:
-            return self.closer is not None and self.closer.begins_again()
-
-        stack = self._run(start, until=known)
-        if stack and not forms.due(self.outcome.nodes, self._covered):
+        stack = self.loop(start, known)
+        if stack and not due():
             self._forget(held)
-            stack = self._run(start, until=known)
+            stack = self.loop(start, due)
         if stack and forms.pay(self.engine, start[0].codes, self._rows):
             self._forget(held)
-            stack = start
+            return list(start)
         return stack
 
     def _forget(self, held: HeldRecords) -> None:
         held.drop()
         self.certifier.forget()
         self.outcome.forget()
-        self._covered = 0.0
+        self.covered = 0.0
 
-    def _run(self, stack: list[TreeNode], until: Callable[[], bool] | None = None) -> list[TreeNode]:
+    def below(self, items: Sequence[TreeNode], form: EnclosedForm | None, *, trial: bool = False) -> None:
+        """Examine subtrees, the last first, with a form that is known to hold for them; or on trial with a new one."""
+        forms = self.forms
+        if forms is not None:
+            forms.use(self.engine, form)
+        if self.outcome.stopped is not None:
+            self._leave(items)
+            return
+        stack: list[Any] = self._planted(items)
+        if forms is not None and trial and form is None:
+            stack = self.loop(stack, lambda: forms.due(self.outcome.nodes, self.covered))
+            if stack and forms.pay(self.engine, self.first().codes, self._rows):
+                # from here on without the parents' relaxations, which are the energy's
+                stack = [replace(item, parent=None) if isinstance(item, TreeNode) else item for item in stack]
+        self.loop(stack, None)
+
+    def examined(self, items: Sequence[TreeNode], nodes: int, deadline: float | None = None) -> list[TreeNode]:
+        """Examine so many nodes of subtrees, the last first; what still waits then, or at the deadline."""
+        stack, last = self._planted(items), self.outcome.nodes + nodes
+        while stack and self.outcome.nodes < last and (deadline is None or time.perf_counter() <= deadline):
+            stack.extend(reversed(list(self.examine(stack.pop()))))
+        return stack
+
+    def _planted(self, items: Sequence[TreeNode]) -> list[TreeNode]:
+        """Subtrees of one search, the first one last, with the relaxations from which each of them begins."""
+        if len(items) < 2 or any(item.changed < 0 for item in items):
+            return list(items)
+        planted, codes, relaxation = list[TreeNode](), self.first().codes, None
+        for k, item in enumerate(items):
+            node = item.changed
+            over = self.splitting.above(item.codes[node], [deeper.codes[node] for deeper in items[k + 1 :]])
+            above = (*item.codes[:node], over, *item.codes[node + 1 :])
+            moved = [i for i, (one, other) in enumerate(zip(codes, above, strict=True)) if one != other]
+            if relaxation is None:
+                relaxation = self._root(above)
+            elif moved and not (relaxation.stalled or relaxation.pruned):
+                relaxation = relaxation.child(*self._rows.over(above, moved), last=False)
+            usable = not (relaxation.stalled or relaxation.pruned)
+            # the first of those with this parent is examined last
+            last = bool(moved) or not planted
+            planted.append(replace(item, parent=relaxation if usable else None, last=last))
+            codes = above
+        return planted
+
+    def _run(self, stack: Sequence[TreeNode], until: Callable[[], bool] | None) -> list[TreeNode]:
         """Examine what waits, depth first; what still waits when it is time to stop."""
         stack = list(stack)
         while stack:
             if until is not None and until():
                 break
             if self.must_stop(len(stack)):
-                for item in reversed(stack):
-                    self.skip(item.codes, "raise the limit")
+                self._leave(stack)
                 return []
             stack.extend(reversed(list(self.examine(stack.pop()))))
         return stack
 
-    def skip(self, codes: Codes, hint: str) -> None:
+    def _leave(self, items: Sequence[TreeNode]) -> None:
+        for item in reversed(items):
+            self.skip(item.codes)
+
+    def skip(self, codes: Codes) -> None:
         """Leave a subtree undecided, because the search was stopped."""
         self.certifier.skipped(codes, str(self.outcome.stopped))
-        self.outcome.undecided.append(UndecidedPart(codes, "the search was stopped before it got here", hint))
+        part = UndecidedPart(codes, "the search was stopped before it got here", "raise the limit")
+        self.outcome.undecided.append(part)
 
     def examine(self, item: TreeNode) -> Iterator[TreeNode]:
         """Settle one node of the tree, or give its children in the order in which they are examined."""
@@ -279,21 +248,18 @@ class TreeSearch:
         relaxation = solved = self._relax(item)
         if solved.stalled:
             # the fallback costs more than a try
-            if self._closed(item, None):
+            if self.closed(item, None):
                 return
             relaxation = self._fall_back(codes)
-        if relaxation is not None and relaxation.pruned and self.certifier.excluded(codes, relaxation):
-            outcome.pruned += 1
-            self._covered += item.weight
+        if relaxation is not None and relaxation.pruned and self.excluded(item, relaxation):
             return
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
-        if self._closed(item, usable):
+        if self.closed(item, usable):
             return
         node, forced = branching_node(codes, item.forced, usable)
         if node < 0:
-            node = self._settle(codes)
+            node = self._settle(item)
         if node < 0:
-            self._covered += item.weight
             return
         children = self.splitting.children(codes, node, relaxation)
         outcome.presolved += forced is not None
@@ -303,21 +269,35 @@ class TreeSearch:
             last = k + 1 == len(children)
             yield TreeNode(usable, child, node, last, item.weight / len(children), forced)
 
-    def _closed(self, item: TreeNode, relaxation: Relaxation | None) -> bool:
-        """Whether the subtree is closed by its only possible solution."""
-        found = None if self.closer is None else self.closer.closed(item.codes, relaxation)
+    def excluded(self, item: TreeNode, bound: Bound) -> bool:
+        """Whether the subtree is proven to hold no solution."""
+        if not self.certifier.excluded(item.codes, bound):
+            return False
+        self.outcome.pruned += 1
+        self.covered += item.weight
+        return True
+
+    def closed(self, item: TreeNode, relaxation: Relaxation | None, *, again: bool = False) -> bool:
+        """Whether the subtree is closed by its only possible solution; ``again``: it was, in an earlier search."""
+        if self.closer is None:
+            return False
+        found = (self.closer.again if again else self.closer.closed)(item.codes, relaxation)
         if found is None:
             return False
         self.outcome.closed += 1
         self.outcome.solutions += found
-        self._covered += item.weight
+        self.covered += item.weight
         return True
 
-    def _settle(self, codes: Codes) -> int:
+    def settled(self, item: TreeNode) -> bool:
+        """Whether the certifier decides a complete selection, or leaves it undecided for good."""
+        return self._settle(item) < 0
+
+    def _settle(self, item: TreeNode) -> int:
         """Have the certifier decide a complete selection; -1, or the node that it asks to have split further."""
         outcome = self.outcome
         outcome.selections += 1
-        answer = self.certifier.selection(codes)
+        answer = self.certifier.selection(item.codes)
         if self.closer is not None:
             self.closer.met(answer)
         if isinstance(answer, Refine):
@@ -326,6 +306,7 @@ class TreeSearch:
             outcome.undecided.append(answer)
         elif answer is not None:
             outcome.solutions.append(answer)
+        self.covered += item.weight
         return -1
 
     def must_stop(self, waiting: int) -> bool:
@@ -338,14 +319,14 @@ class TreeSearch:
         elif limits.deadline is not None and time.perf_counter() > limits.deadline:
             outcome.stopped = Stop(StopReason.TIME_LIMIT, unexamined=waiting)
         elif outcome.nodes % _REPORT_EVERY == 0:
-            self.report(self._covered)
+            self.report(self.covered)
         return outcome.stopped is not None
 
     def report(self, covered: float) -> None:
         """Call the progress callback."""
         if self.progress is not None:
             outcome, seconds = self.outcome, time.perf_counter() - self._start
-            self.progress(SearchProgress(outcome.nodes, covered, len(outcome.solutions), seconds))
+            self.progress(SearchProgress(outcome.nodes, covered, len(outcome.solutions), seconds, outcome.resumed))
 
     # -- relaxations -----------------------------------------------------------------------------------------------
 
@@ -364,6 +345,11 @@ class TreeSearch:
             engine = self.forms.engine
         relaxation: Relaxation = engine.root(*self._rows.over(codes, range(len(codes))))
         return relaxation
+
+    def relaxed(self, codes: Codes) -> Relaxation | None:
+        """The relaxation of a partial assignment, if it is solved and leaves a minimiser."""
+        relaxation = self._root(codes)
+        return None if relaxation.stalled or relaxation.pruned else relaxation
 
     def _fall_back(self, codes: Codes) -> Relaxation | None:
         """The relaxation by the slower engine; None when that gives no answer either."""

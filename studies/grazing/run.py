@@ -2,15 +2,15 @@
 
 Where several statuses of k nodes hold at a root, up to 4^k selections do. Searched are chains of nodes in small
 integers of which the first one sticks or slides and k others touch it unloaded (every status holds) or displaced along
-the foundation (open and slip hold), with friction 0.5 and, for those displaced, 0.875; and rows of discs on a floor, friction 0.9, of which the first
-is pulled away: of equal discs that rest, neighbours touch unloaded; of unequal ones, one is displaced past the other.
-``before`` is the search in fast arithmetic without the closing of subtrees (theory, section 6.11), cut at a number of
-nodes.
+the foundation (open and slip hold), with friction 0.5 and, for those displaced, 0.875; and rows of discs on a floor,
+friction 0.9, of which the first is pulled away: of equal discs that rest, neighbours touch unloaded; of unequal ones,
+one is displaced past the other. ``before`` is the search in fast arithmetic without the closing of subtrees (theory,
+section 6.11), cut at a number of nodes.
 
-Nodes that slide without load are split into open or slipping to that side, stick, and slipping to the other. Before they
-were, and F = 0.875: sliding beside a sliding node, k = 8 took 1,316 nodes and k = 16 did not end at 4,000; displaced
-beside a sticking one, k = 8 took 118 and k = 32 did not end at 4,000. Rows of 12 unequal discs took 3,989 nodes (4 times
-the weight's stiffness) or did not end.
+Nodes that slide without load are split into open or slipping to that side, stick, and slipping to the other. Before
+they were, and F = 0.9: k = 8 nodes displaced beside a sliding one took 1,316 nodes and k = 16 did not end at 4,000;
+beside a sticking one k = 8 took 118 and k = 32 did not end at 4,000. Rows of 12 unequal discs (weights 2 and 3) took
+3,989 nodes where the contacts are soft and did not end where they are stiff.
 
 Read ``nodes`` beside k. ``soft`` and ``stiff`` discs differ in the stiffness of their contacts.
 """

@@ -14,9 +14,10 @@ import numpy as np
 from enumsol.kernel.leaves import Open, SpaceRoot, distinct_roots, settle
 from enumsol.relaxation.space import SpaceEngine, SpaceRelaxation
 from enumsol.search import space
+from enumsol.search.outcome import SearchLimits
 from enumsol.search.space import SpaceSplitting
 from enumsol.search.space_solvers import SpaceSolvers
-from enumsol.search.tree import SearchLimits, TreeSearch
+from enumsol.search.tree import TreeSearch
 from enumsol.sectors import DEEPEST, SECTORS, contains, direction, end_number, level_of, nearest
 from enumsol.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 

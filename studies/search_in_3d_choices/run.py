@@ -49,9 +49,9 @@ from enumsol.relaxation import space
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import Refine, Unrecorded
+from enumsol.search.outcome import SearchLimits
 from enumsol.search.space import SpaceCertifier
 from enumsol.search.space_solvers import SpaceSolvers
-from enumsol.search.tree import SearchLimits
 from enumsol.sectors import DEEPEST, SECTORS, direction, end_number, level_of
 from enumsol.statuses import CONTACT, UNDECIDED
 from search_in_3d_choices.early import early

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from enumsol.proof.proof_file import ProofWriter
+from enumsol.proof.writer import ProofWriter
+from enumsol.search.outcome import SearchLimits
 from enumsol.search.solvers import Solvers
-from enumsol.search.tree import SearchLimits, TreeSearch
+from enumsol.search.tree import TreeSearch
 from enumsol.selections.floats import SIGN_TOLERANCE
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from enumsol import ContactProblem
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Engine
-    from enumsol.search.tree import SearchOutcome
+    from enumsol.search.outcome import SearchOutcome
 
 
 def search(

@@ -57,8 +57,12 @@ SHARED = {
     "kernel.space": None,
     "kernel.leaves": None,
     "kernel.ball_arrays": None,
-    "proof.proof_file": {"Proof", "ProofWriter", "Recorder", "fraction_text", "packed"},
-    "proof.reading": {"fits", "rational_text"},
+    "proof.begun": None,
+    "proof.forms": None,
+    "proof.proof_file": {"Proof", "Recorder", "fraction_text", "packed"},
+    "proof.reading": {"fits", "multipliers_from", "rational_text"},
+    "proof.reading_space": None,
+    "proof.writer": None,
     "sectors": None,
 }
 #: Rooms of such modules, and the checkers' own, of which the search uses nothing.

@@ -1,6 +1,6 @@
 """Closed subtrees: how many nodes they leave, and the same roots as without (theory, section 6.11)."""
 
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -216,3 +216,28 @@ def test_fast_arithmetic():
         roots = enumerate_roots(problem, 0, "fast", max_nodes=200)
         assert roots.whole
         assert roots.index_sum == len(roots) == 1
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_sides_are_told_to_workers(workers, monkeypatch):
+    problem = beside_a_loaded_node(24, slides=True, grazing=True, friction=0.875)
+    alone = enumerate_roots(problem, 0)
+    monkeypatch.setattr("enumsol.search.parallel.FIRST", 8)
+    monkeypatch.setattr("enumsol.search.parallel.NODES", 16)
+    with ThreadPoolExecutor(workers) as executor:
+        together = enumerate_roots(problem, 0, executor=executor, max_nodes=600)
+    assert together.complete
+    assert [root.active for root in together] == [root.active for root in alone]
+    assert any(record[0] == "b" and max(record[2]) > 6 for record in records_of(together.proof)[1:-1])
+    assert verify(problem, together.proof).complete
+
+
+@pytest.mark.parametrize("nodes", [30, 60, 90])
+def test_a_proof_with_sides_is_resumed(nodes, tmp_path):
+    problem = beside_a_loaded_node(24, slides=True, grazing=True, friction=0.875)
+    stopped = enumerate_roots(problem, 0, max_nodes=nodes, proof_path=tmp_path / "a.proof")
+    assert not stopped.complete
+    roots = enumerate_roots(problem, 0, max_nodes=3000, proof_path=tmp_path / "a.proof", resume=True)
+    assert roots.complete
+    assert len(roots) == 1
+    assert verify(problem, roots.proof).complete

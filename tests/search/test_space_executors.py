@@ -12,6 +12,7 @@ from proof_tools import bytes_of, records_of
 
 import enumsol
 from enumsol import enumerate_roots, gallery, verify
+from enumsol.search import parallel
 
 
 def three_nodes():
@@ -128,7 +129,8 @@ def test_limits(limits, executors, many):
         assert 2 <= len(roots) < 27
 
 
-def test_an_interruption_keeps_what_was_found(executors, many):
+def test_an_interruption_keeps_what_was_found(executors, many, monkeypatch):
+    monkeypatch.setattr(parallel, "NODES", 16)
     problem, whole = many
 
     def stop(progress):
@@ -145,14 +147,13 @@ def test_an_interruption_keeps_what_was_found(executors, many):
     assert not partial.complete
 
 
-@pytest.mark.parametrize("healthy", [0, 12])
-def test_a_lost_worker_leaves_what_was_found(healthy, many):
-    with ProcessPoolExecutor(2) as pool, pytest.raises(enumsol.WorkerError, match="a worker died") as caught:
-        enumerate_roots(many[0], 0, executor=DyingExecutor(pool, healthy, os._exit, 1))
-    partial = caught.value.partial
-    check_cut_short(partial, many)
-    assert "subtrees not examined" in partial.stopped
-    assert len(partial) > 0
+@pytest.mark.parametrize("healthy", [0, 3])
+def test_a_lost_worker_costs_time_and_nothing_else(healthy, many):
+    with ProcessPoolExecutor(2) as pool, pytest.warns(RuntimeWarning, match="a worker died"):
+        found = enumerate_roots(many[0], 0, executor=DyingExecutor(pool, healthy, os._exit, 1))
+    assert found.complete
+    assert_equal(found, many[1])
+    assert verify(many[0], found.proof).complete
 
 
 def test_tables(executors):
@@ -161,6 +162,6 @@ def test_tables(executors):
     together = enumsol.multiplicity_table(problem, alphas, executor=executors[0])
     assert alone["complete"].all()
     assert alone.drop(columns="seconds").to_dict("records") == together.drop(columns="seconds").to_dict("records")
-    with ProcessPoolExecutor(1) as pool, pytest.raises(enumsol.WorkerError, match="2 of 4 alphas") as caught:
-        enumsol.multiplicity_table(problem, alphas, executor=DyingExecutor(pool, 2, os._exit, 1))
-    assert caught.value.partial["alpha"].tolist() == alphas[:2]
+    with ProcessPoolExecutor(1) as pool, pytest.warns(RuntimeWarning, match="a worker died"):
+        again = enumsol.multiplicity_table(problem, alphas, executor=DyingExecutor(pool, 2, os._exit, 1))
+    assert alone.drop(columns="seconds").to_dict("records") == again.drop(columns="seconds").to_dict("records")

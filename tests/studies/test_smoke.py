@@ -36,6 +36,7 @@ CONCLUSIONS = {
     "same_body_by_other_codes": ("the same roots to 1e-09, all complete: yes",),
     "samples_vs_graph": ("branches of length 0.001 are missed by 50 samples", "40 of 40 root sets agree"),
     "search_profile": ("both interpreters import the same enumsol", "the times"),
+    "workers": ("all complete and checked: yes; one proof whatever the number of workers: yes",),
     "uniqueness_vs_mesh": ("bound on F: 2D, nodes H^0.58, 0.54 between the finest (paper 0.5)",),
 }
 #: Studies that read the peak memory from /proc.

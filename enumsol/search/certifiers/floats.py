@@ -15,6 +15,7 @@ from enumsol.selections.solution import SelectionSolution, VertexLimitError
 
 if TYPE_CHECKING:
     from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.protocol import Bound
     from enumsol.selections.floats import FloatSelections
     from enumsol.selections.solution import Codes, SelectionSolver
 
@@ -42,11 +43,10 @@ class FastCertifier(WithoutProof):
 
     def __init__(self, selections: FloatSelections) -> None:
         self._selections = selections
+        super().__init__()
         self._norms = selections.row_norms()
-        #: Nodes that slide without load at a solution met (see Closing).
-        self.sliding: dict[int, int] = {}
 
-    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Accept the pruning if conditions may be off by twice the tolerance."""
         rows, values = relaxation.multipliers()
         shift = float(np.abs(values) @ self._norms[rows])

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.proof.proof_file import Recorder
-    from enumsol.relaxation.engine import Relaxation
     from enumsol.selections.solution import Codes
 
 
@@ -76,11 +79,28 @@ class Certified:
     escalations : Escalations or None
     leaves : int
         Leaves written to the proof.
+    sliding : as of the certifier
     """
 
     verified: Mapping[Codes, Any] = field(default_factory=dict)
     escalations: Escalations | None = None
     leaves: int = 0
+    sliding: Mapping[int, int] = field(default_factory=dict)
+
+
+class Bound(Protocol):
+    """What a relaxation, or a record of an earlier proof, says of a partial assignment without a solution."""
+
+    @property
+    def bound(self) -> float:
+        """A lower bound that is positive."""
+
+    @property
+    def form(self) -> EnclosedForm | None:
+        """The form that ``bound`` is about; None for the energy."""
+
+    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Rows and their multipliers, which prove ``bound``."""
 
 
 class Certifier(Protocol):
@@ -90,15 +110,18 @@ class Certifier(Protocol):
     ----------
     recorder : Recorder
         Where the records of the proof go.
+    sliding : dict
+        FORWARD or BACKWARD for nodes that touch without load and slide at a solution met (theory, section 6.11).
     """
 
     recorder: Recorder
+    sliding: dict[int, int]
 
     @property
     def certified(self) -> Certified:
         """What was proven so far."""
 
-    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers prove that the partial assignment holds no solution."""
 
     def selection(self, codes: Codes) -> Any:
@@ -126,14 +149,28 @@ class Unrecorded:
     def write(self, record: Any) -> None:
         """Nothing to write."""
 
+    def add(self, lines: list[str]) -> None:
+        """Nothing to write."""
+
 
 class WithoutProof:
     """Base of certifiers that write no proof."""
 
     recorder: Recorder = Unrecorded()
-    certified = Certified()
+
+    def __init__(self) -> None:
+        self.sliding: dict[int, int] = {}
+
+    @property
+    def certified(self) -> Certified:
+        """Nothing is proven."""
+        return Certified(sliding=self.sliding)
+
+    def add(self, part: Certified) -> None:
+        """Take over what the certifier of a subtree has met."""
+        self.sliding |= part.sliding
 
     def _nothing(self, *_: object, **__: object) -> None:
-        """There is nothing to write, and nothing to take over."""
+        """There is nothing to write, and nothing to forget."""
 
-    branching = skipped = unloaded = add = forget = _nothing
+    branching = skipped = unloaded = forget = _nothing

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.certifiers.protocol import UndecidedPart
+    from enumsol.search.certifiers.protocol import Bound, UndecidedPart
     from enumsol.search.closing import Proposal
     from enumsol.selections.rationals import ExactSelections
     from enumsol.selections.solution import Codes
@@ -42,9 +42,8 @@ class ExactCertifier(WithoutProof):
         self._selections = selections
         self._scaled = scaled
         self._enclosed = enclosed
+        super().__init__()
         self._inverse: Any = None
-        #: What sticks or slides is left to the branchings.
-        self.sliding: dict[int, int] = {}
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in the selection."""
@@ -98,7 +97,7 @@ class ExactCertifier(WithoutProof):
             codes = tuple(moved[i] if i in free else code for i, code in enumerate(codes))
         return None
 
-    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the multipliers prove a positive lower bound on the energy."""
         solver = self._selections
 

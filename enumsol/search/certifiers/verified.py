@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from enumsol.kernel.forms import EnclosedForm
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.protocol import Bound
     from enumsol.search.certifiers.rationals import ExactCertifier
     from enumsol.search.closing import Proposal
     from enumsol.selections.solution import Codes
@@ -110,7 +111,6 @@ class VerifiedCertifier:
         self._forms: dict[EnclosedForm, int] = {}
         #: A complete selection was not decided by balls.
         self.hard = False
-        #: Nodes that slide without load at a solution met (see Closing).
         self.sliding: dict[int, int] = {}
         #: Selections of the roots found in rationals.
         self._known: list[Codes] = []
@@ -118,9 +118,9 @@ class VerifiedCertifier:
     @property
     def certified(self) -> Certified:
         """What was proven so far."""
-        return Certified(self._verified, self._escalations, self._leaves)
+        return Certified(self._verified, self._escalations, self._leaves, self.sliding)
 
-    def excluded(self, codes: Codes, relaxation: Relaxation) -> bool:
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
         rows, values = relaxation.multipliers()
         if relaxation.form is not None:
@@ -292,6 +292,7 @@ class VerifiedCertifier:
         """Take over what the certifier of a subtree has proven."""
         self._verified |= part.verified
         self._leaves += part.leaves
+        self.sliding |= part.sliding
         if part.escalations is not None:
             self._escalations.add(part.escalations)
 

@@ -1,0 +1,91 @@
+"""Worker processes of ``--jobs``: a pool that is made anew when one of them dies."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import multiprocessing
+import os
+import signal
+import threading
+from concurrent.futures import BrokenExecutor, Executor
+from contextlib import contextmanager, suppress
+from multiprocessing.connection import wait
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from concurrent.futures import Future, ProcessPoolExecutor
+
+
+class RenewedPool(Executor):
+    """A process pool that can be made anew (see ``enumsol.executors.Crew``).
+
+    Parameters
+    ----------
+    jobs : int
+        Number of processes.
+    """
+
+    def __init__(self, jobs: int) -> None:
+        self._max_workers = jobs
+        self._pool: ProcessPoolExecutor | None = None
+
+    def renew(self) -> None:
+        """Start the processes, in the place of those that were there.
+
+        Raises
+        ------
+        OSError
+            The system starts no more processes.
+        """
+        self.shutdown(wait=False, cancel_futures=True)
+        with _ignoring_interrupts():
+            # spawned, not forked: a progress bar runs in a thread of its own
+            context = multiprocessing.get_context("spawn")
+            self._pool = concurrent.futures.ProcessPoolExecutor(
+                self._max_workers, mp_context=context, initializer=_end_with_parent
+            )
+            # one is started for every task that waits; that one died already the search finds out
+            with suppress(BrokenExecutor):
+                for _ in range(self._max_workers):
+                    self._pool.submit(int)
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        """The future of a call.
+
+        Raises
+        ------
+        BrokenExecutor
+            A process died; `renew` starts others.
+        """
+        if self._pool is None:
+            raise BrokenExecutor("there are no processes")
+        return self._pool.submit(function, *arguments, **named)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Stop the processes."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=wait, cancel_futures=cancel_futures)
+            self._pool = None
+
+
+def _end_with_parent() -> None:
+    """In a worker: do not outlive the process that started it, which may be killed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_wait_and_end, args=(parent.sentinel,), daemon=True).start()
+
+
+def _wait_and_end(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)
+
+
+@contextmanager
+def _ignoring_interrupts() -> Iterator[None]:
+    """A terminal sends Ctrl-C to the workers too: processes born while it is ignored go on ignoring it."""
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)

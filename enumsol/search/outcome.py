@@ -1,0 +1,110 @@
+"""What a search is told, what it tells while it runs, and what it found."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from enumsol.search.certifiers.protocol import UndecidedPart
+    from enumsol.search.stopping import Stop
+    from enumsol.selections.solution import SelectionSolution
+
+
+@dataclass(frozen=True)
+class SearchProgress:
+    """State of a running search, as handed to the ``progress`` callback.
+
+    Attributes
+    ----------
+    nodes : int
+        Partial assignments examined so far.
+    covered : float
+        Share of all selections accounted for, between 0 and 1.
+    solutions : int
+        Selections found so far that hold a root.
+    seconds : float
+        Wall time so far.
+    resumed : int
+        Nodes taken from the proof of an earlier search, which are not among ``nodes``.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> seen = []
+    >>> roots = enumsol.enumerate_roots(enumsol.gallery.chain(4), alpha=5, progress=seen.append)
+    >>> 0 < seen[-1].covered <= 1
+    True
+    """
+
+    nodes: int
+    covered: float
+    solutions: int
+    seconds: float
+    resumed: int = 0
+
+
+@dataclass
+class SearchLimits:
+    """When to stop early."""
+
+    enough: Callable[[list[SelectionSolution]], bool] | None = None
+    max_nodes: int | None = None
+    deadline: float | None = None
+
+    @staticmethod
+    def deadline_in(seconds: float | None) -> float | None:
+        """The clock's value this many seconds from now."""
+        return None if seconds is None else time.perf_counter() + seconds
+
+    def remaining(self) -> float | None:
+        """Seconds until the deadline."""
+        return None if self.deadline is None else self.deadline - time.perf_counter()
+
+
+@dataclass
+class SearchOutcome:
+    """What a search found; filled while it runs, so that an interruption loses nothing."""
+
+    solutions: list[SelectionSolution] = field(default_factory=list)
+    undecided: list[UndecidedPart] = field(default_factory=list)
+    stopped: Stop | None = None
+    nodes: int = 0
+    pruned: int = 0
+    selections: int = 0
+    qps: int = 0
+    fallback_qps: int = 0
+    presolved: int = 0
+    closed: int = 0
+    #: Nodes taken from the proof of an earlier search.
+    resumed: int = 0
+    #: Tasks whose worker died, which were done again.
+    redone: int = 0
+
+    def forget(self) -> None:
+        """Forget what was found, as the search begins again; the work that it took still counts."""
+        self.solutions.clear()
+        self.undecided.clear()
+
+    def add(self, part: SearchOutcome) -> None:
+        """Add what the search of a subtree found."""
+        self.solutions += part.solutions
+        self.undecided += part.undecided
+        self.stopped = self.stopped or part.stopped
+        self.nodes += part.nodes
+        self.pruned += part.pruned
+        self.selections += part.selections
+        self.qps += part.qps
+        self.fallback_qps += part.fallback_qps
+        self.presolved += part.presolved
+        self.closed += part.closed
+        self.resumed += part.resumed
+
+    def count_unexamined(self) -> None:
+        """Have the reason of an early end say how many subtrees all parts of the search left."""
+        if self.stopped is not None and self.stopped.unexamined is not None:
+            left = sum(not part.examined for part in self.undecided)
+            self.stopped = replace(self.stopped, unexamined=left)

@@ -1,0 +1,215 @@
+"""A search that goes on with the proof of an earlier one, which was stopped or killed.
+
+The records are gone through in order. Each leaf is proven again by the certifier, which trusts nothing in the file, and
+written to the new proof; what cannot be proven again, was left undecided, or is missing is searched.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from enumsol.kernel.forms import EnclosedForm
+from enumsol.kernel.rows import ROW_KINDS
+from enumsol.proof.forms import DeclaredForm
+from enumsol.proof.reading import multipliers_from
+from enumsol.search.tree import TreeNode
+from enumsol.statuses import CONTACT, SLIDING, UNDECIDED
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.proof.begun import BegunProof
+    from enumsol.search.certifiers.protocol import Bound
+    from enumsol.search.tree import TreeSearch
+    from enumsol.selections.solution import Codes
+
+#: Progress is reported after so many nodes.
+_REPORT_EVERY = 64
+#: Kinds of leaves (docs/proof_format.md): excluded by multipliers, closed by a solution, solved selections.
+_EXCLUDED, _CLOSED, _SOLVED = ("x", "X", "f"), ("m", "M"), ("n", "r", "N", "D")
+
+
+@dataclass(frozen=True)
+class RecordedBound:
+    """Multipliers that are said to bound the energy, or a form, from below; in place of a relaxation's."""
+
+    rows: NDArray[np.intp]
+    values: NDArray[np.float64]
+    form: EnclosedForm | None = None
+    bound: float = np.inf
+
+    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Rows and their multipliers."""
+        return self.rows, self.values
+
+
+class Reader(Protocol):
+    """Understands the records of one proof."""
+
+    def declare(self, record: list[Any]) -> None:
+        """Take note of a form; ValueError where the record makes no sense."""
+
+    def form_over(self, codes: Codes) -> EnclosedForm | None:
+        """The form that was used last of those that hold over a partial assignment."""
+
+    def bound(self, codes: Codes, record: list[Any]) -> Bound:
+        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
+
+
+class PlaneReader:
+    """Of proofs in 2D.
+
+    Parameters
+    ----------
+    p : number of contact nodes
+    enclosed : EnclosedSystem or None
+        Balls for the system, by which forms are proven.
+    """
+
+    def __init__(self, p: int, enclosed: EnclosedSystem | None) -> None:
+        self._p, self._enclosed = p, enclosed
+        self._declared: list[DeclaredForm] = []
+        #: Forms that were used, the last one last.
+        self._used: dict[DeclaredForm, EnclosedForm] = {}
+
+    def declare(self, record: list[Any]) -> None:
+        """Take note of a form; ValueError where the record makes no sense."""
+        said = DeclaredForm.read(record, self._p)
+        # parts of one search declare the same form
+        self._declared.append(next((known for known in self._used if known.same(said)), said))
+
+    def form_over(self, codes: Codes) -> EnclosedForm | None:
+        """The form that was used last of those that hold over a partial assignment."""
+        return next((form for said, form in reversed(self._used.items()) if said.holds(codes)), None)
+
+    def bound(self, codes: Codes, record: list[Any]) -> Bound:
+        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
+        form = None
+        if record[0] == "f":
+            form, record = self._form(codes, record), record[1:]
+        return RecordedBound(*multipliers_from(record[1:], ROW_KINDS * self._p), form)
+
+    def _form(self, codes: Codes, record: list[Any]) -> EnclosedForm:
+        back = record[1] if len(record) > 1 else None
+        if self._enclosed is None or type(back) is not int or not 1 <= back <= len(self._declared):
+            raise ValueError("its form was not declared")
+        said = self._declared[-back]
+        if not said.holds(codes):
+            raise ValueError("its form was made for another assignment")
+        form = self._used.get(said)
+        if form is None:
+            with np.errstate(over="ignore", invalid="ignore"):
+                form = EnclosedForm.of(self._enclosed, said.codes, said.multipliers, said.weight)
+            self._used[said] = form
+        return form
+
+
+def resume(search: TreeSearch, reader: Reader, begun: BegunProof, passed: Callable[[], None]) -> None:
+    """Go on with an earlier proof (for ``passed`` see Replay.run); a time limit is about what is searched anew."""
+    limits, mark = search.limits, time.perf_counter()
+
+    def below(*items: TreeNode, trial: bool = False) -> None:
+        nonlocal mark
+        if limits.deadline is not None:
+            limits.deadline += time.perf_counter() - mark
+        search.below(items, reader.form_over(items[-1].codes), trial=trial)
+        mark = time.perf_counter()
+
+    rest = Replay(search, reader, below).run(begun, passed)
+    if len({reader.form_over(item.codes) for item in rest}) > 1:
+        while rest:
+            below(rest.pop())
+    elif rest:
+        below(*rest, trial=search.forms is not None and not search.forms.tried(search.outcome.resumed))
+    search.outcome.count_unexamined()
+
+
+class Replay:
+    """Goes through an earlier proof.
+
+    Parameters
+    ----------
+    search : TreeSearch
+        Its certifier proves and writes.
+    reader : Reader
+    below : callable
+        Searches a subtree, in the place where its record is due.
+    """
+
+    def __init__(self, search: TreeSearch, reader: Reader, below: Callable[[TreeNode], None]) -> None:
+        self._search, self._reader, self._below = search, reader, below
+
+    def run(self, begun: BegunProof, passed: Callable[[], None]) -> list[TreeNode]:
+        """Take over what holds; gives the subtrees that the file does not reach, the first one last.
+
+        ``passed`` is called once all that is proven in the file, and can be followed, has been gone through.
+        """
+        outcome, needed = self._search.outcome, begun.needed()
+        stack = [self._search.first()]
+        for number, record in enumerate(begun.records() if needed else (), start=1):
+            if not stack or not isinstance(record, list) or not record or not self._take(stack, record):
+                break
+            if number == needed:
+                break  # what follows is open, and all of it on the stack
+            if outcome.resumed % _REPORT_EVERY == 0:
+                self._search.report(self._search.covered)
+        passed()
+        return stack
+
+    def _take(self, stack: list[TreeNode], record: list[Any]) -> bool:
+        """Take one record; False if it and what follows make no sense."""
+        search = self._search
+        if record[0] == "q":
+            try:
+                self._reader.declare(record)
+            except ValueError:
+                return False
+            return True
+        item = stack.pop()
+        if record[0] != "b":
+            if self._proven(item, record):
+                search.outcome.resumed += 1
+            else:
+                self._below(item)
+            return True
+        children = self._children(item.codes, record)
+        if not children:
+            stack.append(item)
+            return False
+        node, weight = record[1], item.weight / len(children)
+        search.certifier.branching(node, children)
+        search.outcome.resumed += 1
+        for code in reversed(children):
+            codes = (*item.codes[:node], code, *item.codes[node + 1 :])
+            stack.append(TreeNode(None, codes, node, last=False, weight=weight))
+        return True
+
+    def _children(self, codes: Codes, record: list[Any]) -> list[int]:
+        """The codes of a branching; none where they do not cover the assignment."""
+        _, node, children = record if len(record) == 3 else (None, None, None)
+        if type(node) is not int or not 0 <= node < len(codes) or not isinstance(children, list):
+            return []
+        coverings = map(sorted, self._search.splitting.coverings(node, codes[node]))
+        fits = all(type(code) is int for code in children) and sorted(children) in coverings
+        return children if fits else []
+
+    def _proven(self, item: TreeNode, record: list[Any]) -> bool:
+        """Whether a leaf is proven again, and written."""
+        kind, search = record[0], self._search
+        if kind in _EXCLUDED:
+            try:
+                bound = self._reader.bound(item.codes, record)
+            except ValueError:
+                return False
+            return search.excluded(item, bound)
+        if kind in _CLOSED:
+            return search.closed(item, search.relaxed(item.codes), again=True)
+        partial = any(code in (CONTACT, UNDECIDED, *SLIDING) for code in item.codes)
+        return kind in _SOLVED and not partial and search.settled(item)

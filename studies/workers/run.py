@@ -1,0 +1,107 @@
+"""How much faster are several workers than one, and what does it cost to share a search?
+
+Searched is a wedge that jams (4 by p / 2, pull (4e-4, 1e-3), alpha 2.2; five roots), verified and with its proof,
+without workers and by process pools of one, two and more processes, started before the clock. Every size is searched
+``--repeat`` times in turn, and the shortest time of each counts. ``cpu`` is the time of all processes in which they
+compute, with the start of the workers; more than without workers is what sharing costs.
+
+Read ``times one`` (how many times as fast as one worker). The proofs of all numbers of workers must be the same file.
+Nothing else may run on the machine, and threads of linear algebra must be off (OMP_NUM_THREADS=1).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import multiprocessing
+import os
+import resource
+import time
+from concurrent.futures import ProcessPoolExecutor
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import enumsol
+
+if TYPE_CHECKING:
+    from shared.results import Run
+
+#: Contact nodes of the wedge: a minute or so, and a second.
+SIZE, SMOKE_SIZE = 56, 16
+
+
+def options(parser):
+    parser.add_argument("--size", type=int, default=None, help=f"contact nodes of the wedge (default {SIZE})")
+    parser.add_argument("--repeat", type=int, default=3, help="searches of each kind (default 3)")
+    parser.add_argument("--workers", type=int, nargs="+", default=[1, 2], help="numbers of workers (default 1 2)")
+
+
+def cpu():
+    """Seconds of this process and of those that it has waited for."""
+    usages = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(usage.ru_utime + usage.ru_stime for usage in usages)
+
+
+def search(problem, workers, path):
+    """Root set, seconds and seconds of all processes; no workers: in this process."""
+    before = cpu()
+    if not workers:
+        started = time.perf_counter()
+        roots = enumsol.enumerate_roots(problem, 2.2, proof_path=path)
+        return roots, time.perf_counter() - started, cpu() - before
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        # all of them are there, and have imported what they need
+        list(pool.map(_warm, range(4 * workers)))
+        started = time.perf_counter()
+        roots = enumsol.enumerate_roots(problem, 2.2, proof_path=path, executor=pool)
+        seconds = time.perf_counter() - started
+    return roots, seconds, cpu() - before
+
+
+def _warm(_):
+    import enumsol.search.parallel  # noqa: F401 (in the worker)
+
+    time.sleep(0.05)
+
+
+def row(problem, workers, repeat, folder):
+    """The shortest of several searches."""
+    path = f"{folder}/{workers}.proof"
+    found = [search(problem, workers, path) for _ in range(repeat)]
+    roots, seconds, total = min(found, key=lambda entry: entry[1])
+    with open(path, "rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()[:12]
+    return {
+        "p": problem.p,
+        "workers": workers or "none",
+        "nodes": roots.stats.nodes,
+        "roots": len(roots),
+        "complete": roots.complete,
+        "seconds": seconds,
+        "cpu": total,
+        "proof": digest,
+        "accepted": enumsol.verify(problem, enumsol.Proof.load(path)).complete,
+    }
+
+
+def main(run: Run) -> None:
+    size = getattr(run.options, "size", None) or (SMOKE_SIZE if run.smoke else SIZE)
+    repeat = 1 if run.smoke else getattr(run.options, "repeat", 3)
+    counts = getattr(run.options, "workers", [1, 2])
+    problem = enumsol.gallery.wedge(4, size // 2, pull=(4e-4, 1e-3))
+    problem.condensed  # noqa: B018 (made once, outside the clock)
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    with TemporaryDirectory() as folder:
+        rows = [row(problem, workers, repeat, folder) for workers in (0, *counts)]
+    one = next((entry["seconds"] for entry in rows if entry["workers"] == 1), rows[0]["seconds"])
+    for entry in rows:
+        entry["times one"] = one / entry["seconds"]
+    proofs = {entry["proof"] for entry in rows if entry["workers"] != "none"}
+    right = all(entry["complete"] and entry["accepted"] for entry in rows)
+    run.table(
+        "workers",
+        rows,
+        f"{os.cpu_count()} processors; the shortest of {repeat}",
+        f"load of the machine before, which should be near 0: {load:.1f}",
+        f"all complete and checked: {'yes' if right else 'no'}; one proof whatever the number of workers: "
+        f"{'yes' if len(proofs) == 1 else 'no'}",
+    )

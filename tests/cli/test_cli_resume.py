@@ -1,0 +1,63 @@
+"""``--resume``: a search goes on with its proof file."""
+
+import json
+
+import pytest
+from cli.test_cli import assert_refused, run
+from cli.test_cli_solve import BODY, OPTIONS
+
+from enumsol import Proof, gallery, verify
+
+WEDGE = ("roots", "gallery:wedge-8-5", "--alpha", 3)
+
+
+def test_a_search_in_two_parts(capsys, tmp_path):
+    proof, report = tmp_path / "w.proof", tmp_path / "w.json"
+    # the same line every time
+    search = (*WEDGE, "--proof", proof, "--json", report, "--max-nodes", 150, "--resume")
+    status, out, _ = run(capsys, *search)
+    assert status == 3
+    assert "resumed" not in out
+    first = json.loads(report.read_text())
+    assert first["stats"]["resumed"] == 0
+    status, out, _ = run(capsys, *search)
+    assert status == 0
+    second = json.loads(report.read_text())
+    taken = second["stats"]["resumed"]
+    assert taken == 150
+    assert second["stats"]["nodes"] == 239 - 150
+    assert f"resumed: {taken} nodes of the tree from the file, 89 more searched" in out
+    assert len(second["roots"]) == 5
+    assert verify(gallery.get("wedge-8-5").build(), Proof.load(proof)).complete
+    status, out, _ = run(capsys, *search)
+    assert status == 0
+    assert "resumed: 239 nodes of the tree from the file, nothing was left to search" in out
+    status, out, _ = run(capsys, "verify", "gallery:wedge-8-5", proof)
+    assert status == 0
+
+
+def test_solve(capsys, tmp_path):
+    mesh, proof, report = tmp_path / "body.msh", tmp_path / "b.proof", tmp_path / "b.json"
+    mesh.write_text(BODY)
+    search = ("solve", mesh, *OPTIONS, "--friction", "0.5,0", "--proof", proof, "--json", report, "--resume")
+    assert run(capsys, *search, "--max-nodes", 1)[0] == 3
+    for _ in range(2):
+        assert run(capsys, *search)[0] == 0
+    assert json.loads(report.read_text())["stats"]["nodes"] == 0
+    assert json.loads(report.read_text())["stats"]["resumed"] > 1
+
+
+def test_what_is_refused(capsys, tmp_path):
+    assert_refused(*run(capsys, *WEDGE, "--resume"), "--resume is given without --proof")
+    proof = tmp_path / "w.proof"
+    run(capsys, *WEDGE, "--proof", proof)
+    before = proof.read_bytes()
+    other = ("roots", "gallery:wedge-8-5", "--alpha", "5/2", "--proof", proof, "--resume")
+    assert_refused(*run(capsys, *other), "belongs to another alpha ('3'; here '5/2')")
+    assert proof.read_bytes() == before
+
+
+@pytest.mark.parametrize("verb", ["roots", "solve"])
+def test_the_help_says_so(verb, capsys):
+    _, out, _ = run(capsys, verb, "--help")
+    assert "--resume" in out

@@ -1,0 +1,165 @@
+"""Searches spread over workers: parts of bounded size, shared anew; one proof whatever the number of workers."""
+
+import pickle
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+
+import pytest
+from compare import differences
+from proof_tools import bytes_of, records_of
+
+from enumsol import Interrupted, enumerate_roots, gallery, verify
+from enumsol.executors import Crew
+from enumsol.search import forms as policy
+from enumsol.search import parallel
+
+
+@pytest.fixture
+def small_parts(monkeypatch):
+    monkeypatch.setattr(parallel, "NODES", 16)
+    monkeypatch.setattr(parallel, "FIRST", 8)
+
+
+@pytest.fixture(scope="module")
+def wedge():
+    entry = gallery.get("wedge-14-5")
+    problem = entry.build()
+    return problem, entry.alpha, enumerate_roots(problem, entry.alpha)
+
+
+class Watched(ThreadPoolExecutor):
+    """Keeps the nodes of every part and those who searched it."""
+
+    def __init__(self, size):
+        super().__init__(size)
+        self.parts = []
+
+    def submit(self, function, /, *arguments):
+        future = super().submit(function, *arguments)
+        future.add_done_callback(lambda done: self.parts.append(done.result()))
+        return future
+
+
+def test_no_part_is_long_and_no_worker_waits(small_parts, monkeypatch, wedge):
+    problem, alpha, whole = wedge
+    seen, before = [], Crew.next
+
+    def watched(self, seconds=None):
+        # when the search waits either the workers have enough to do, or there is no more
+        seen.append((self.room, len(spread._waiting)))
+        return before(self, seconds)
+
+    def made(*arguments):
+        nonlocal spread
+        spread = parallel.Spread(*arguments)
+        return spread
+
+    spread = None
+    monkeypatch.setattr(Crew, "next", watched)
+    monkeypatch.setattr("enumsol.roots.enumeration.Spread", made)
+    with Watched(2) as executor:
+        found = enumerate_roots(problem, alpha, executor=executor)
+    assert not differences(found, whole, rtol=1e-12)
+    nodes = [part.outcome.nodes for part in executor.parts if part is not None]
+    assert max(nodes) <= 16
+    assert sum(nodes) == found.stats.nodes - 8
+    assert found.stats.nodes == pytest.approx(whole.stats.nodes, rel=0.05)
+    assert all(room <= 0 or not waiting for room, waiting in seen)
+    assert any(waiting for _, waiting in seen)
+    assert verify(problem, found.proof).complete
+
+
+def test_what_workers_need_is_sent_once_or_twice(small_parts, wedge):
+    problem, alpha, _ = wedge
+    sent = []
+
+    class Sizes(ThreadPoolExecutor):
+        def submit(self, function, /, *arguments):
+            sent.append(len(pickle.dumps(arguments)))
+            return super().submit(function, *arguments)
+
+    with Sizes(2) as executor:
+        enumerate_roots(problem, alpha, executor=executor)
+    whole = len(pickle.dumps(problem))
+    assert sum(size > whole for size in sent) <= 2 * 8
+    assert len(sent) > 40
+
+
+def check_one_proof(problem, alpha, whole):
+    proofs = []
+    for pool in (ProcessPoolExecutor(2), ThreadPoolExecutor(1), ThreadPoolExecutor(3)):
+        with pool as executor:
+            found = enumerate_roots(problem, alpha, executor=executor)
+        assert not differences(found, whole, rtol=1e-9)
+        assert found.stats.redone == 0
+        proofs.append(bytes_of(found.proof))
+    assert proofs == proofs[:1] * 3
+    assert verify(problem, found.proof).complete
+    return found
+
+
+def test_one_proof(small_parts, wedge):
+    check_one_proof(*wedge)
+
+
+@pytest.mark.parametrize("nodes", [0, 1])
+def test_one_proof_with_forms(small_parts, monkeypatch, nodes):
+    monkeypatch.setattr(policy, "NODES", nodes)
+    problem = gallery.clamped_block(32, 16)
+    whole = enumerate_roots(problem, 0.3)
+    found = check_one_proof(problem, 0.3, whole)
+    kinds = [record[0] for record in records_of(found.proof)[1:-1]]
+    assert kinds.count("f") > 20
+    # begun again, not only went on: the records of the search with the energy are gone
+    assert found.stats.nodes == pytest.approx(whole.stats.nodes, rel=0.1)
+
+
+@pytest.mark.parametrize("most", [1, 5, 100, 333])
+def test_the_limit_on_nodes_is_exact(small_parts, wedge, most):
+    problem, alpha, whole = wedge
+    with ThreadPoolExecutor(2) as executor:
+        found = enumerate_roots(problem, alpha, executor=executor, max_nodes=most)
+        again = enumerate_roots(problem, alpha, executor=executor, max_nodes=most)
+    assert found.stats.nodes == most
+    assert found.stopped == f"stopped after max_nodes = {most} node{'s' * (most > 1)}, {left(found)} not examined"
+    assert bytes_of(found.proof) == bytes_of(again.proof)
+    report = verify(problem, found.proof)
+    assert report.ok
+    assert (report.roots, report.undecided) == (len(found), len(found.undecided))
+    assert len(found) <= found.at_least <= len(whole)
+
+
+def left(found):
+    count = len(found.undecided)
+    return f"{count} subtree{'s' * (count > 1)}"
+
+
+def test_an_interruption_keeps_what_came_in(small_parts, wedge, tmp_path):
+    problem, alpha, whole = wedge
+    path = tmp_path / "x.proof"
+
+    def stop(progress):
+        if progress.covered > 0.6:
+            raise KeyboardInterrupt
+
+    with ThreadPoolExecutor(2) as executor:
+        with pytest.raises(Interrupted) as caught:
+            enumerate_roots(problem, alpha, executor=executor, progress=stop, proof_path=path)
+        assert 0 < len(caught.value.partial) <= len(whole)
+        found = enumerate_roots(problem, alpha, executor=executor, proof_path=path, resume=True)
+    assert found.complete
+    assert not differences(found, whole, rtol=1e-12)
+
+
+def test_dask(small_parts, wedge):
+    distributed = pytest.importorskip("distributed")
+    problem, alpha, whole = wedge
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        found = enumerate_roots(problem, alpha, executor=client.get_executor())
+    with ThreadPoolExecutor(1) as executor:
+        alone = enumerate_roots(problem, alpha, executor=executor)
+    assert not differences(found, whole, rtol=1e-12)
+    assert bytes_of(found.proof) == bytes_of(alone.proof)
+    assert verify(problem, found.proof).complete
