@@ -138,7 +138,8 @@ def test_interruption_keeps_what_was_found(method):
     assert isinstance(caught.value, KeyboardInterrupt)
 
 
-def test_interruption_of_a_parallel_search_keeps_what_was_found():
+def test_interruption_of_a_parallel_search_keeps_what_was_found(monkeypatch):
+    monkeypatch.setattr("enumsol.search.parallel.NODES", 16)
     problem = gallery.chain(5, 0.0)
     with ThreadPoolExecutor(2) as executor, pytest.raises(enumsol.Interrupted) as caught:
         enumsol.enumerate_roots(problem, 5.0, "fast", executor=executor, progress=Stop(0.5))
