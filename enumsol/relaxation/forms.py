@@ -2,8 +2,8 @@
 
 The bound of a form over a partial assignment is concave in its multipliers, which may be what they like as long as the
 form is convex on the subspace of the assignment's equations. Newton's method maximises it together with barriers: the
-log of the determinant of the form there, and the logs of the multipliers that have a sign. It moves those logs: a step that moves the multipliers
-themselves is cut where the first of them vanishes. All terms are of rank two, so that
+log of the determinant of the form there, and the logs of the multipliers that have a sign. It moves those logs: a step
+that moves the multipliers themselves is cut where the first of them vanishes. All terms are of rank two, so that
 gradients and second derivatives need products of matrices of size 2p only.
 """
 
