@@ -13,18 +13,20 @@ contact node, the fewest that there can be if every one of them is branched on.
 What else was tried, on prototypes of the same search (nodes with the energy, then with the variant; blocks at F = 0.3):
 
 - steps of the ascent in the multipliers themselves, not in the logs of those that have a sign: block p = 100 838 nodes
-  with 24 steps and 7,447 with 54, blocks p = 256 of length 4 with F = 2 3,575 with 40 steps and over 40,000 with 24; now
-  601 and 1,281 with six. Such steps end near the border of the cone, with forms that are good at the root only.
-- weights of the barriers other than those in the code: the bound 16 to 64 times as heavy takes two to four times as
-  many steps at p = 256, half or a quarter of the weight about as many.
+  with 24 steps and 7,447 with 54, now 525 with six; block p = 256 of length 4 with F = 2 3,575 with 40, not finished at
+  5,000 with 20, now 1,281 with six. Such steps end near the border of the cone, with forms that are good at the root
+  only.
+- other weights of the bound: 16 times as heavy, the ascent takes more than 16 steps at p = 256 and F = 2; a quarter to
+  half of the weight is about as good.
 - one-sided slip work in closed form, as far as the form stays convex, at every fourth decided node: blocks p = 16, 32
   and 64: 208, 735, 4,735 -> 131, 380, 9,628; wedge p = 20: 4,488 -> 4,270. No ascent, but it does not grow with p.
 - products of rows of a node and its nearest neighbours as well (14 multipliers a node, steps not in logs): wedge p =
   14: 894 -> 418 with 75 programs of 18 ms, 60 times as long as the search with the energy; wedge p = 32: 22,606 ->
   17,045 with 1,087.
-- a form at the root of wedges whatever the trial says: p = 32: 23,108 -> 21,510, and with the bound 32 times as heavy
-  12,284, as long as with the energy (the nodes of the first kind take 0.9, those of the second twice the time); p = 20:
-  4,272 -> 2,592; p = 14: 894 -> 780.
+- a form at the root of wedges whatever the trial says, found with a bound 32 times as heavy (8 or 12 steps, the better
+  one): p = 20, 26 and 32 pulled obliquely 4,272, 10,690 and 23,108 -> 2,598, 7,046 and 14,855 in 0.6 of the time, but
+  pulled straight 1,179, 2,225 and 4,374 -> 1,256, 2,253 and 4,751 in up to 1.3 of it. With the weight in the code p =
+  32 takes 21,510.
 - new forms for the subtrees of wedges, four steps each after a quarter or half of the contact nodes is decided, with
   three weights of the bound: p = 14: 894 -> 877 to 1,031, p = 20: 4,272 -> 4,008 to 4,202. Four multipliers a node do
   not tell that the slip of one node rests on the others.
