@@ -9,7 +9,12 @@
 #include <stddef.h>
 
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)
-#define ENUMSOL_CLONES __attribute__((unused, target_clones("arch=haswell", "default")))
+/* Levels and features, never the name of a processor: that is taken on this one only, and not on later ones. */
+#if __GNUC__ >= 12
+#define ENUMSOL_CLONES __attribute__((unused, target_clones("arch=x86-64-v3", "default")))
+#else
+#define ENUMSOL_CLONES __attribute__((unused, target_clones("avx2", "default")))
+#endif
 #elif defined(__GNUC__)
 #define ENUMSOL_CLONES __attribute__((unused))
 #else

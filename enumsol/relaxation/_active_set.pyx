@@ -12,7 +12,7 @@ N the normals of the active rows, all rows scaled to unit length in the norm of 
 cimport cython
 from libc.math cimport HUGE_VAL, fabs, fmax, fmin, hypot, isfinite, sqrt
 from libc.stdlib cimport free, malloc
-from libc.string cimport memcpy, memset
+from libc.string cimport memcpy, memmove, memset
 
 import numpy as np
 
@@ -331,18 +331,16 @@ cdef class QPState:
 
     def multipliers(self):
         """Rows and multipliers, in the scaling of the rows as given: min e >= bound is proven by them."""
-        cdef Py_ssize_t j
+        cdef Py_ssize_t j, count = self.q + (self.pending >= 0 and self.pending_u != 0.0)
         cdef int row
-        rows, values = [], []
-        for j in range(self.q):
-            row = self.active[j]
-            rows.append(row)
-            values.append(self.u[j] * self.sign[row] / self.data.norm[row])
-        if self.pending >= 0 and self.pending_u != 0.0:
-            row = self.pending
-            rows.append(row)
-            values.append(self.pending_u * self.sign[row] / self.data.norm[row])
-        return np.array(rows, dtype=np.intp), np.array(values)
+        rows, values = np.empty(count, dtype=np.intp), np.empty(count)
+        cdef Py_ssize_t[::1] row_of = rows
+        cdef double[::1] value_of = values
+        for j in range(count):
+            row = self.active[j] if j < self.q else self.pending
+            row_of[j] = row
+            value_of[j] = (self.u[j] if j < self.q else self.pending_u) * self.sign[row] / self.data.norm[row]
+        return rows, values
 
     cdef double _dual_bound(self) noexcept nogil:
         """Lower bound proven by the current multipliers, computed from them and the data alone."""
@@ -562,9 +560,9 @@ cdef class QPState:
             self.active[j - 1] = self.active[j]
             self.position[self.active[j - 1]] = <int> (j - 1)
             self.u[j - 1] = self.u[j]
-            for i in range(j + 1):
-                self.R[i * n + j - 1] = self.R[i * n + j]
         for i in range(q):
+            j = i if i > l + 1 else l + 1
+            memmove(self.R + i * n + j - 1, self.R + i * n + j, (q - j) * sizeof(double))
             self.R[i * n + q - 1] = 0.0
         self.u[q - 1] = 0.0
         self.q = q - 1
@@ -581,24 +579,24 @@ cdef class QPState:
             rotate(c, s, self.R + j * n + j + 1, self.R + (j + 1) * n + j + 1, q - 2 - j)
             rotate(c, s, self.J + j * n, self.J + (j + 1) * n, n)
 
-    cdef double _polish(self) noexcept nogil:
-        """Project x back on the active rows (rounding drift); returns the largest residual found before."""
+    cdef bint _polish(self, double most) noexcept nogil:
+        """Project x back on the active rows (rounding drift) where a residual is above ``most``; whether one was."""
         cdef Py_ssize_t i, j, n = self.data.n
         cdef double s, worst = 0.0
-        # solve R'y = residual, x -= J1 y
         for i in range(self.q):
-            s = self.sign[self.active[i]] * self.data.row_at(self.active[i], self.x, self.w)
-            if fabs(s) > worst:
-                worst = fabs(s)
-            for j in range(i):
-                s -= self.R[j * n + i] * self.d[j]
-            self.d[i] = s / self.R[i * n + i]
-        if worst > 0.0:
-            for i in range(self.q):
-                self.d[i] = -self.d[i]
-            add_rows(self.J, self.q, n, self.d, self.x)
-            self._update_w()
-        return worst
+            self.d[i] = -self.sign[self.active[i]] * self.data.row_at(self.active[i], self.x, self.w)
+            worst = fmax(worst, fabs(self.d[i]))
+        if worst <= most:
+            return False
+        # solve R'y = -residual, x += J1 y
+        for i in range(self.q):
+            s = self.d[i] / self.R[i * n + i]
+            self.d[i] = s
+            for j in range(i + 1, self.q):
+                self.d[j] -= s * self.R[i * n + j]
+        add_rows(self.J, self.q, n, self.d, self.x)
+        self._update_w()
+        return True
 
     def solve(self, double target, double tolerance, long limit):
         """Run the dual method.
@@ -645,7 +643,7 @@ cdef class QPState:
                     row = <int> i
             if row < 0:
                 # drift of the active rows is mended before the answer is given
-                if polished < 3 and self._polish() > 0.1 * tolerance:
+                if polished < 3 and self._polish(0.1 * tolerance):
                     polished += 1
                     continue
                 if polished >= 3:

@@ -2,8 +2,9 @@
 
 The bound of a form over a partial assignment is concave in its multipliers, which may be what they like as long as the
 form is convex on the subspace of the assignment's equations. Newton's method maximises it together with barriers: the
-log of the determinant of the form there, and the logs of the multipliers that have a sign. All terms are of rank two,
-so that gradients and second derivatives need products of matrices of size 2p only.
+log of the determinant of the form there, and the logs of the multipliers that have a sign. It moves those logs: a step
+that moves the multipliers themselves is cut where the first of them vanishes. All terms are of rank two, so that
+gradients and second derivatives need products of matrices of size 2p only.
 """
 
 from __future__ import annotations
@@ -31,13 +32,15 @@ if TYPE_CHECKING:
     Rows = tuple[list[int], list[int]]
 
 #: Weights of the bound and of the logs of multipliers beside that of the determinant, for every unknown.
-_BOUND, _LOGS = 4.0, 0.3
+_BOUND, _LOGS = 0.125, 0.05
 #: Multipliers with a sign are kept above this share of the largest.
 _LEAST = 1e-4
 #: A step ends the ascent when it promises less than this.
 _ENOUGH = 1.0
-#: Step lengths tried, each so much shorter than the one before; share of the way to the border of the cone.
-_TRIALS, _SHORTER, _INSIDE = 8, 0.4, 0.95
+#: Lengths are shortened by this until the form is convex, then once more; then halved, so many times at most.
+_SHORTER, _INSIDE, _TRIALS = 0.7, 0.85, 8
+#: The least step length, and the furthest that one step moves the log of a multiplier.
+_SHORTEST, _FURTHEST = 1e-3, 2.0
 #: First weight of the equations by the mean curvature, and how often it is multiplied by ten.
 _WEIGHT, _HEAVIER = 10.0, 6
 #: Least curvature of a form by its mean curvature.
@@ -144,39 +147,77 @@ class FormAscent:
         live = np.flatnonzero(np.concatenate([normal, normal & tangential, tangential, tangential]))
         return _Subspace(across, live)
 
-    def _candidate(self, codes: Codes, space: _Subspace, multipliers: Array, rows: Rows) -> _Candidate | None:
-        """The relaxation with these multipliers; None where their form is not convex."""
-        table = multipliers.reshape(4, -1)
-        plain = EnclosedForm.of(self._enclosed, codes, table, 0.0)
+    def _factor(self, form: EnclosedForm, space: _Subspace) -> Array | None:
+        """The Cholesky factor of a form on the subspace; None where it is not convex there."""
+        whole = space.across.shape[1] == len(form.h)
         try:
-            factor = np.linalg.cholesky(space.across.T @ plain.H @ space.across)
+            return np.asarray(np.linalg.cholesky(form.H if whole else space.across.T @ form.H @ space.across))
         except np.linalg.LinAlgError:
             return None
+
+    def _plain(self, codes: Codes, multipliers: Array, weight: float = 0.0) -> EnclosedForm:
+        return EnclosedForm.of(self._enclosed, codes, multipliers.reshape(4, -1), weight)
+
+    def _candidate(self, codes: Codes, space: _Subspace, multipliers: Array, rows: Rows) -> _Candidate | None:
+        """The relaxation with these multipliers; None where their form is not convex."""
+        proven = self._plain(codes, multipliers)
+        factor = self._factor(proven, space)
+        if factor is None:
+            return None
         mean = float(np.sum(factor * factor)) / len(factor)
-        proven = plain
-        if len(factor) < len(plain.h):
+        if len(factor) < len(proven.h):
             for k in range(_HEAVIER):
-                weight = _WEIGHT * mean * 10.0**k
-                proven = EnclosedForm.of(self._enclosed, codes, table, weight)
+                proven = self._plain(codes, multipliers, _WEIGHT * mean * 10.0**k)
                 if _is_convex(proven.H, mean):
                     break
             else:
                 return None
-        elif not _is_convex(plain.H, mean):
+        elif not _is_convex(proven.H, mean):
             return None
         relaxation = FormEngine(self._engine, self._scaled, proven).root(*rows)
         if relaxation.stalled or not isinstance(relaxation, ActiveSetRelaxation):
             return None
-        return _Candidate(multipliers, proven, np.asarray(factor, dtype=np.float64), relaxation)
+        return _Candidate(multipliers, proven, factor, relaxation)
 
     def _step(self, codes: Codes, space: _Subspace, found: _Candidate, rows: Rows) -> tuple[_Candidate, bool] | None:
         """One step of Newton's method; with it whether it is to be the last."""
-        scaled, z, live = self._scaled, found.multipliers, space.live
-        signed = live >= 2 * scaled.p
-        forces = found.relaxation.forces.copy()
+        z, live = found.multipliers, space.live
+        signed = live >= 2 * self._scaled.p
         # the bound in the scale of the barriers
-        scale = _BOUND * 2 * scaled.p / max(-found.relaxation.bound, 1e-300)
-        left, right = self._factors(forces)
+        scale = _BOUND * 2 * self._scaled.p / max(-found.relaxation.bound, 1e-300)
+        newton = self._direction(space, found, scale)
+        if newton is None:
+            return None
+        step, promised = newton
+
+        def moved(length: float) -> Array:
+            values, change = z.copy(), length * step
+            grown = z[live] * np.exp(np.clip(change, -_FURTHEST, _FURTHEST))
+            values[live] = np.where(signed, grown, z[live] + change)
+            return values
+
+        def merit(candidate: _Candidate) -> float:
+            logs = float(np.sum(np.log(candidate.multipliers[live][signed])))
+            return scale * candidate.relaxation.bound + candidate.log_determinant + _LOGS * logs
+
+        length = 1.0
+        while self._factor(self._plain(codes, moved(length)), space) is None:
+            length *= _SHORTER
+            if length < _SHORTEST:
+                return None
+        length *= _INSIDE
+        for _ in range(_TRIALS):
+            trial = self._candidate(codes, space, moved(length), rows)
+            if trial is not None and (trial.relaxation.pruned or merit(trial) > merit(found)):
+                return trial, promised < _ENOUGH
+            length *= 0.5
+        return None
+
+    def _direction(self, space: _Subspace, found: _Candidate, scale: float) -> tuple[Array, float] | None:
+        """Newton's step, in the logs of multipliers that have a sign, and what it promises; None where it fails."""
+        scaled, live = self._scaled, space.live
+        signed = live >= 2 * scaled.p
+        left, right = self._factors(found.relaxation.forces)
         X = solve_triangular(found.factor, space.across.T, lower=True)
         P = X.T @ X
         PS = P @ scaled.S
@@ -186,32 +227,21 @@ class FormAscent:
         mixed = mixed[grid]
         lefts, rights = self._left(self._left(P).T)[grid], self._right(self._right(scaled.S @ PS).T)[grid]
         hessian = 0.5 * (lefts * rights + mixed * mixed.T) + scale * self._bending(space, found, left, right)
-        size = z[live][signed]
-        gradient[signed] += _LOGS / size
+        slope = np.where(signed, found.multipliers[live], 1.0)
+        gradient *= slope
+        hessian *= slope[:, None] * slope
         diagonal = np.diagonal(hessian).copy()
-        diagonal[signed] += _LOGS / size**2
+        # what the logs add to the curvature, where it is concave
+        diagonal[signed] += np.maximum(-gradient[signed], _LOGS)
+        gradient[signed] += _LOGS
         hessian[np.diag_indices(len(live))] = diagonal * (1.0 + 1e-8)
         if not (np.all(np.isfinite(hessian)) and np.all(np.isfinite(gradient))):
             return None
         try:
-            step = cho_solve(cho_factor(hessian, overwrite_a=True), gradient)
+            step = np.asarray(cho_solve(cho_factor(hessian, overwrite_a=True), gradient))
         except np.linalg.LinAlgError:
             return None
-        falls = step[signed] < 0
-        length = min(1.0, _INSIDE * float(np.min(-size[falls] / step[signed][falls], initial=np.inf)))
-
-        def merit(candidate: _Candidate) -> float:
-            logs = float(np.sum(np.log(candidate.multipliers[live][signed])))
-            return scale * candidate.relaxation.bound + candidate.log_determinant + _LOGS * logs
-
-        for _ in range(_TRIALS):
-            moved = z.copy()
-            moved[live] += length * step
-            trial = self._candidate(codes, space, moved, rows)
-            if trial is not None and (trial.relaxation.pruned or merit(trial) > merit(found)):
-                return trial, float(gradient @ step) < _ENOUGH
-            length *= _SHORTER
-        return None
+        return step, float(gradient @ step)
 
     def _bending(self, space: _Subspace, found: _Candidate, left: Array, right: Array) -> Array:
         """Minus the second derivative of the bound: the minimiser moves on the face of the rows that are active."""

@@ -1,6 +1,6 @@
 """When a search turns from the energy to a tighter form (theory, section 5.8).
 
-A form costs as much as thousands of nodes of the tree, and does not pay everywhere. So a search begins with the energy;
+A form costs as much as hundreds of nodes of the tree, and does not pay everywhere. So a search begins with the energy;
 one that is still far from its end after many nodes tries a form at its root, and begins again with it if that is worth
 it.
 """
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from enumsol.search.splitting import ImposedRows
     from enumsol.selections.solution import Codes
 
-#: Nodes examined with the energy, for every contact node, before a form is tried: about what it would cost. Small
+#: Nodes examined with the energy, for every contact node, before a form is tried: more than what that costs. Small
 #: problems count as ones with so many contact nodes.
-NODES, _SMALL = 40, 25
+NODES, _SMALL = 10, 100
 #: A form is tried where at least this share of the tree is left.
 _LEFT = 0.5
 #: Steps of the ascent on trial, and those that follow once it pays.
-TRIAL, STEPS = 4, 20
+TRIAL, STEPS = 4, 2
 #: A form pays when it closes so much more of the gap at the root, or so many times as much.
 MORE, TIMES = 0.1, 3.0
 

@@ -1,24 +1,37 @@
 """What does a form with four multipliers a node save in long searches, when should it be tried, and what does it cost?
 
 Verified searches of clamped blocks and wedges with the energy alone, with a form from the beginning (after one node for
-every contact node), and as they are (after 40): nodes, seconds, size of the proof, and seconds of its check. Then some
-of the blocks with other numbers of steps of the ascent. All seconds of one problem are taken one after the other; read
+every contact node, at least 100), and as they are (after ten): nodes, seconds, size of the proof, and seconds of its
+check. Then some of the blocks with other numbers of steps of the ascent. Then blocks with 256 contact nodes: what every
+part of the work takes. All seconds are those of the processor. Those of one problem are taken one after the other; read
 their ratios.
 
 Read "nodes" against "nodes, energy": the gain grows with p, and there is none on wedges, where the trial says so and
-costs what "seconds" has more than "seconds, energy". Too many steps make a form that is good at the root only.
+costs what "seconds" has more than "seconds, energy". With a good form a block takes five nodes of the tree for every
+contact node, the fewest that there can be if every one of them is branched on.
 
 What else was tried, on prototypes of the same search (nodes with the energy, then with the variant; blocks at F = 0.3):
 
+- steps of the ascent in the multipliers themselves, not in the logs of those that have a sign: block p = 100 838 nodes
+  with 24 steps and 7,447 with 54, now 525 with six; block p = 256 of length 4 with F = 2 3,575 with 40, not finished at
+  5,000 with 20, now 1,281 with six. Such steps end near the border of the cone, with forms that are good at the root
+  only.
+- other weights of the bound: 16 times as heavy, the ascent takes more than 16 steps at p = 256 and F = 2; a quarter to
+  half of the weight is about as good.
 - one-sided slip work in closed form, as far as the form stays convex, at every fourth decided node: blocks p = 16, 32
   and 64: 208, 735, 4,735 -> 131, 380, 9,628; wedge p = 20: 4,488 -> 4,270. No ascent, but it does not grow with p.
-- products of rows of a node and its nearest neighbours as well (14 multipliers a node): wedge p = 14: 894 -> 418 with
-  75 programs of 18 ms, 60 times as long as the search with the energy; wedge p = 32: 22,606 -> 17,045 with 1,087.
+- products of rows of a node and its nearest neighbours as well (14 multipliers a node, steps not in logs): wedge p =
+  14: 894 -> 418 with 75 programs of 18 ms, 60 times as long as the search with the energy; wedge p = 32: 22,606 ->
+  17,045 with 1,087.
+- a form at the root of wedges whatever the trial says, found with a bound 32 times as heavy (8 or 12 steps, the better
+  one): p = 20, 26 and 32 pulled obliquely 4,272, 10,690 and 23,108 -> 2,598, 7,046 and 14,855 in 0.6 of the time, but
+  pulled straight 1,179, 2,225 and 4,374 -> 1,256, 2,253 and 4,751 in up to 1.3 of it. With the weight in the code p =
+  32 takes 21,510.
+- new forms for the subtrees of wedges, four steps each after a quarter or half of the contact nodes is decided, with
+  three weights of the bound: p = 14: 894 -> 877 to 1,031, p = 20: 4,272 -> 4,008 to 4,202. Four multipliers a node do
+  not tell that the slip of one node rests on the others.
 - the form of the root for the subtrees that were left when it was made, without beginning again: block p = 100 was not
-  finished at 200,000 nodes (5,062 with beginning again, 4,000 of them before).
-- new forms for subtrees, after a sixth, a third and a half of the contact nodes was decided (10 steps each): block
-  p = 100 from the beginning 938, 731 and 734 nodes in 8.8, 2.4 and 1.4 s; none but the root's 722 in 1.1 s.
-- barrier weights other than those in the code: 16, 64 and 256 times 2 p on the bound take more steps on blocks.
+  finished at 200,000 nodes (5,062 with beginning again, 4,000 of them before; steps not in logs).
 """
 
 from __future__ import annotations
@@ -46,7 +59,9 @@ PROBLEMS = (
     oblique_wedge(32),
 )
 SMOKE_PROBLEMS = (block(16, PRESSED, 0.3), straight_wedge(8))
-STEPS, SMOKE_STEPS = (4, 8, 12, 16, 20, 30, 50), (4, 20)
+STEPS, SMOKE_STEPS = (0, 1, 2, 4, 8, 16), (0, 4)
+#: Blocks of length 4 with so many contact nodes, and their coefficients of friction.
+WIDE, SMOKE_WIDE, WIDE_FRICTION = 256, 16, (0.3, 1.0, 2.0)
 NEVER, EARLY = 10**9, 1
 MAX_NODES = 41_000
 
@@ -67,12 +82,12 @@ def changed(values):
 def searched(problem, loaded, **constants):
     """Nodes, seconds, size of the proof, seconds of its check; a dash for nodes where the search was cut."""
     with changed(constants):
-        start = time.perf_counter()
+        start = time.process_time()
         roots = enumsol.enumerate_roots(problem, loaded.alpha, max_nodes=MAX_NODES)
-        seconds = time.perf_counter() - start
-    start = time.perf_counter()
+        seconds = time.process_time() - start
+    start = time.process_time()
     report = enumsol.verify(problem, roots.proof)
-    check = time.perf_counter() - start
+    check = time.process_time() - start
     assert report.ok
     assert report.complete == roots.complete
     nodes = roots.stats.nodes if roots.complete else "-"
@@ -101,6 +116,32 @@ def by_steps(loaded, choices):
         yield {"problem": loaded.name, "F": loaded.alpha, "steps": steps, "nodes": nodes, "seconds": seconds}
 
 
+def wide(p):
+    """Blocks with many contact nodes, and what every part of the work takes."""
+    for F in WIDE_FRICTION:
+        problem, clock = block(p, PRESSED, F, 4.0).build(), [time.process_time()]
+        problem.condensed  # noqa: B018
+        clock.append(time.process_time())
+        problem.enclosure  # noqa: B018
+        clock.append(time.process_time())
+        roots = enumsol.enumerate_roots(problem, F)
+        clock.append(time.process_time())
+        report = enumsol.verify(problem, roots.proof)
+        clock.append(time.process_time())
+        names = ("condensation", "enclosure", "search", "check")
+        seconds = {f"{name} [s]": b - a for name, a, b in zip(names, clock[:-1], clock[1:], strict=True)}
+        yield {
+            "p": p,
+            "F": F,
+            "n": problem.n,
+            "roots": len(roots),
+            "complete": "yes" if roots.complete and report.complete else "no",
+            "nodes": roots.stats.nodes,
+            "fallback": roots.stats.fallback_qps,
+            **seconds,
+        }
+
+
 def main(run: Run) -> None:
     problems = SMOKE_PROBLEMS if run.smoke else PROBLEMS
     lines = [row(loaded) for loaded in problems]
@@ -114,3 +155,4 @@ def main(run: Run) -> None:
     blocks = problems[:1] if run.smoke else (problems[1], problems[3], problems[7], problems[8])
     choices = SMOKE_STEPS if run.smoke else STEPS
     run.table("steps", [line for loaded in blocks for line in by_steps(loaded, choices)])
+    run.table("wide", list(wide(SMOKE_WIDE if run.smoke else WIDE)))

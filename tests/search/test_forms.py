@@ -4,7 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from flint import fmpq
+from flint import fmpq, fmpq_mat
 from generators import fe_compliance, from_condensed, integer_problem, random_problem
 from proof_tools import copied, proof_of, records_of
 from rational_checker import Refused, check_records
@@ -14,8 +14,9 @@ from enumsol import enumerate_roots, gallery, verify
 from enumsol.checker.stability import stability_radius
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.kernel.forms import EnclosedForm, Equations, form_margin
+from enumsol.kernel.rows import row_signs
 from enumsol.search import forms as policy
-from enumsol.search.solvers import Solvers
+from enumsol.search.solvers import Solvers, as_computed
 
 
 @pytest.fixture
@@ -263,6 +264,68 @@ def test_an_indefinite_form_excludes_nothing():
     multipliers = -np.ones((4, 3))
     form = EnclosedForm.of(solvers.enclosed, (6, 6, 6), np.abs(multipliers) * [[-1], [0], [1], [1]], 0.0)
     assert form_margin(form, (6, 6, 6), np.array([0]), np.array([1e6])) == -np.inf
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_compiled_bounds_are_below_the_exact_one_and_that_of_the_checker(seed):
+    margins = pytest.importorskip("enumsol.search.certifiers._margin").FormMargins
+    rng = np.random.default_rng(seed)
+    p = int(rng.integers(1, 4))
+    system = as_computed(slipping(seed, p).condensed.at(1.0).scaled)
+    S, g = fmpq_mat([[_exact(x) for x in row] for row in system.S]), [_exact(x) for x in system.g]
+    codes = tuple(int(c) for c in rng.choice((0, 1, 2, 3, 5, 6), size=p))
+    signs = row_signs(np.array(codes), system.F)
+    energy = np.array([[1.0], [0.0], [0.5], [0.5]])
+    compared = 0
+    for _ in range(20):
+        multipliers = energy * rng.uniform(0.8, 1.2, size=(4, p))
+        form = EnclosedForm.of(system, codes, multipliers, 0.0)
+        if not form.smallest_eigenvalue > 0:
+            continue
+        H, h = _exact_form(S, g, system.F, multipliers)
+        once, often = margins(form, 1.0), margins(form, 4.0)
+        rows = np.array([r for r in range(7 * p) if signs[r % p, r // p] and rng.random() < 0.7], dtype=np.intp)
+        values = 10.0 ** rng.uniform(-3, 1) * np.abs(rng.normal(size=len(rows)))
+        v, constant = h, fmpq(0)
+        for row, value in zip(rows.tolist(), values, strict=True):
+            normal, offset = _row(*divmod(row, p), S, g, system.F)
+            v = [a + _exact(value) * b for a, b in zip(v, normal, strict=True)]
+            constant += _exact(value) * offset
+        column = fmpq_mat([[x] for x in v])
+        exact = constant - (column.transpose() * H.solve(column))[0, 0] / 4
+        least = once.margin(codes, rows, values)
+        assert _exact(least) <= exact
+        kernel = form_margin(form, codes, rows, values)
+        assert often.margin(codes, rows, values) <= kernel
+        assert _exact(kernel) <= exact
+        assert float(int(exact.p) / int(exact.q)) - least < 1e-9 * (1 + np.sum(values**2))
+        compared += 1
+    assert compared
+
+
+def _exact_form(S, g, F, multipliers):
+    """H and h of the form for S, g and F as they are, in rationals."""
+    p = len(F)
+    D = fmpq_mat(2 * p, 2 * p)
+    for i in range(p):
+        mu, nu, alpha, beta = (_exact(x) for x in multipliers[:, i])
+        D[i, i], D[i, p + i] = mu, nu
+        D[p + i, i], D[p + i, p + i] = _exact(F[i]) * (beta - alpha), alpha + beta
+    H = D.transpose() * S
+    h = D.transpose() * fmpq_mat([[x] for x in g])
+    return (H + H.transpose()) / 2, [h[i, 0] for i in range(2 * p)]
+
+
+def _row(kind, i, S, g, F):
+    """n and b of the row n'lambda - b."""
+    p = len(F)
+    normal, place = [fmpq(0)] * (2 * p), i if kind == 4 else p + i
+    if kind >= 4:
+        sign = -1 if kind == 5 else 1
+        return [sign * S[place, j] for j in range(2 * p)], sign * g[place]
+    normal[i] = {0: fmpq(1), 1: fmpq(0)}.get(kind, _exact(F[i]))
+    normal[p + i] = fmpq({0: 0, 1: 1, 2: -1, 3: 1}[kind])
+    return normal, fmpq(0)
 
 
 # -- limits, workers, robustness ---------------------------------------------------------------------------------------

@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.kernel.forms import form_margin
 from enumsol.relaxation.engine import PRUNE_MARGIN
+from enumsol.search.certifiers.margins import margin_of_form
 from enumsol.search.certifiers.protocol import UndecidedPart, WithoutProof
 from enumsol.search.closing import NEAR, holds_below, propose, start, without_load
 from enumsol.selections.solution import SelectionSolution, VertexLimitError
 
 if TYPE_CHECKING:
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.margins import Margin
     from enumsol.search.certifiers.protocol import Bound
     from enumsol.selections.floats import FloatSelections
     from enumsol.selections.solution import Codes, SelectionSolver
@@ -45,6 +47,7 @@ class FastCertifier(WithoutProof):
         self._selections = selections
         super().__init__()
         self._norms = selections.row_norms()
+        self._form_margins: dict[EnclosedForm, Margin] = {}
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Accept the pruning if conditions may be off by twice the tolerance."""
@@ -52,8 +55,10 @@ class FastCertifier(WithoutProof):
         shift = float(np.abs(values) @ self._norms[rows])
         if relaxation.form is not None:
             # hardly convex: its bound is worth what is left of it after rounding
-            margin = form_margin(relaxation.form, codes, rows, values)
-            return margin > 2.0 * self._selections.tolerance * shift
+            margin = self._form_margins.get(relaxation.form)
+            if margin is None:
+                margin = self._form_margins[relaxation.form] = margin_of_form(relaxation.form, 1.0)
+            return margin(codes, rows, values) > 2.0 * self._selections.tolerance * shift
         return relaxation.bound > PRUNE_MARGIN + 2.0 * self._selections.tolerance * shift
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:

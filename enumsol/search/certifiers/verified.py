@@ -7,16 +7,15 @@ problem is small enough, otherwise the selection is left undecided with the reas
 from __future__ import annotations
 
 import enum
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.kernel.closing import ClosedSolution, closed_solution, same_solution
-from enumsol.kernel.forms import form_margin
-from enumsol.kernel.point import VerifiedSelection, exclusion_margin, holds_no_root, solve_selection
+from enumsol.kernel.point import VerifiedSelection, holds_no_root, solve_selection
 from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
 from enumsol.proof.proof_file import fraction_text, packed
+from enumsol.search.certifiers.margins import energy_margin, margin_of_form
 from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
 from enumsol.search.closing import propose, start, without_load
 from enumsol.selections.solution import SelectionSolution
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from enumsol.kernel.forms import EnclosedForm
     from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.margins import Margin
     from enumsol.search.certifiers.protocol import Bound
     from enumsol.search.certifiers.rationals import ExactCertifier
     from enumsol.search.closing import Proposal
@@ -100,7 +100,7 @@ class VerifiedCertifier:
     ) -> None:
         self._scaled = scaled
         self._enclosed = enclosed
-        self._margin = None if enclosed is None else _margins(enclosed)
+        self._margin = None if enclosed is None else energy_margin(enclosed)
         self._exact = exact
         self.recorder = recorder
         self._node_ids = node_ids
@@ -109,6 +109,7 @@ class VerifiedCertifier:
         self._leaves = 0
         #: Forms in the order in which they were written.
         self._forms: dict[EnclosedForm, int] = {}
+        self._form_margins: dict[EnclosedForm, Margin] = {}
         #: A complete selection was not decided by balls.
         self.hard = False
         self.sliding: dict[int, int] = {}
@@ -144,7 +145,10 @@ class VerifiedCertifier:
 
     def _excluded_by(self, form: EnclosedForm, codes: Codes, rows: NDArray[np.intp], values: Array) -> bool:
         """The same with a form in place of the energy."""
-        if not form_margin(form, codes, rows, values, errors=_FORM_ERRORS) > 0:
+        margin = self._form_margins.get(form)
+        if margin is None:
+            margin = self._form_margins[form] = margin_of_form(form, _FORM_ERRORS)
+        if not margin(codes, rows, values) > 0:
             self._escalations.refined += 1
             return False
         if form not in self._forms:
@@ -317,15 +321,6 @@ class VerifiedCertifier:
     def _leaf(self, kind: Leaf, *record: Any) -> None:
         self._leaves += 1
         self.recorder.write([kind, *record])
-
-
-def _margins(system: EnclosedSystem) -> Callable[[Codes, NDArray[np.intp], Array], float]:
-    """The exclusion inequality, compiled where that is installed."""
-    try:
-        from enumsol.search.certifiers._margin import Margins
-    except ImportError:
-        return partial(exclusion_margin, system, errors=2.0)
-    return Margins((system,), system.F, system.F).margin
 
 
 def _present(system: EnclosedSystem | None) -> EnclosedSystem:
