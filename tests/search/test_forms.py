@@ -72,6 +72,15 @@ def test_a_long_search_is_shorter_with_forms(monkeypatch):
     assert verify(problem, found.proof).complete
 
 
+def test_a_good_form_leaves_little_more_than_one_path(monkeypatch):
+    # open or in contact, then stick or slip: five nodes of the tree a contact node, if every one is branched on once
+    problem = gallery.clamped_block(32, 16)
+    monkeypatch.setattr(policy, "NODES", 0)
+    found = enumerate_roots(problem, 0.3)
+    assert found.complete
+    assert found.stats.nodes <= 6 * 32
+
+
 def test_wedges_go_on_with_the_energy(monkeypatch):
     entry = gallery.get("wedge-8-5")
     plain = enumerate_roots(entry.build(), entry.alpha)
