@@ -11,6 +11,7 @@ import itertools
 import time
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 from enumsol.relaxation.interval import IntervalSystem
@@ -20,6 +21,9 @@ from enumsol.statuses import UNDECIDED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.selections.solution import Codes
@@ -72,6 +76,9 @@ class SearchedPiece:
 class IntervalCertifier(Protocol):
     """Decides in one arithmetic whether multipliers prove a leaf empty on the whole piece."""
 
+    #: Whether leaves may be excluded by forms other than the energy.
+    forms: bool
+
     @property
     def checkable(self) -> bool:
         """Whether a checker can repeat what was accepted so far, so that it makes a proof."""
@@ -79,16 +86,24 @@ class IntervalCertifier(Protocol):
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
 
+    def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
+        """Whether the form of these multipliers is proven convex on the piece."""
+
 
 class FastIntervalCertifier:
     """Floats: the result of the engine is trusted."""
 
-    checkable = False
+    checkable = forms = False
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Accept the pruning."""
         del piece, system, leaf
         return True
+
+    def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
+        """Floats prove nothing."""
+        del piece, system, form
+        return False
 
 
 @dataclass(frozen=True)
@@ -155,7 +170,8 @@ class Worker:
             system, middle = self._make(piece), None
             if float(piece.b - piece.a) > self._smallest:
                 middle = self._make(Piece(piece.middle, piece.middle))
-            trees = PieceTree(system, middle, lambda leaf: self.leaves.excluded(piece, system, leaf))
+            convex = partial(self.leaves.convex, piece, system) if self.leaves.forms else None
+            trees = PieceTree(system, middle, partial(self.leaves.excluded, piece, system), convex)
             self._trees = (piece, system, trees)
         return self._trees
 

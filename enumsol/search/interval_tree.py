@@ -15,7 +15,8 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from enumsol.relaxation.interval import IntervalEngine, IntervalSystem, interval_rows
+from enumsol.relaxation.interval import IntervalEngine, IntervalSystem, PieceForm, interval_rows
+from enumsol.search.interval_forms import PairedTerms, better_form
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, branching_node
 from enumsol.statuses import CONTACT, OPEN, UNDECIDED
 
@@ -35,7 +36,11 @@ TRIED_AT_THE_END = 128
 #: What was left so many times in a row gets twice as many nodes every further time: some alpha may be an event of it.
 PATIENCE = 2
 #: Nodes of one tree, after which the rest of it goes to further trees over the same piece.
-LARGEST_TREE = 2048
+LARGEST_TREE = 4096
+#: Subtrees that one tree may leave to the halves.
+MOST_CUT = 128
+#: Nodes of one tree, after which a form is tried in place of the energy.
+FORM_AFTER = 2048
 
 
 @dataclass(frozen=True)
@@ -47,19 +52,32 @@ class EmptyLeaf:
     codes : status codes, CONTACT and UNDECIDED included
     rows : int array, kind * p + node with the kinds of RowKind and IntervalRowKind
     values : float array, multipliers in the scaling of the piece's IntervalSystem
+    form : (4, p) array or None
+        Multipliers of the form whose bound they prove (theory, section 5.8); None for the energy.
     """
 
     codes: Codes
     rows: NDArray[np.intp]
     values: NDArray[np.float64]
+    form: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Subtree:
-    """A partial assignment to be searched below, and how many pieces in a row have left it to their halves."""
+    """A partial assignment to be searched below.
+
+    Attributes
+    ----------
+    codes : status codes
+    left : int
+        How many pieces in a row have left it to their halves.
+    form : PairedTerms or None
+        The form with which it was searched last.
+    """
 
     codes: Codes
     left: int = 0
+    form: PairedTerms | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass
@@ -109,9 +127,9 @@ class IntervalSplitting(PlaneSplitting):
 class _Program:
     """Relaxations over one piece, or at one alpha."""
 
-    def __init__(self, system: IntervalSystem) -> None:
+    def __init__(self, system: IntervalSystem, form: PieceForm | None = None) -> None:
         self.splitting = IntervalSplitting(system)
-        self._engine, self._p = IntervalEngine(system), system.p
+        self._engine, self._p = IntervalEngine(system, form), system.p
         self._rows = ImposedRows(self.splitting, system.p)
 
     def relax(self, item: _Item, parent: Relaxation | None) -> Relaxation:
@@ -161,34 +179,75 @@ class PieceTree:
         At its middle; None for a piece that is not to be cut.
     excluded : callable
         Whether a leaf is proven empty on the whole piece.
+    convex : callable or None
+        Whether a form of these multipliers is proven convex on the piece; None: forms are not to be used.
     """
 
     def __init__(
-        self, system: IntervalSystem, middle: IntervalSystem | None, excluded: Callable[[EmptyLeaf], bool]
+        self,
+        system: IntervalSystem,
+        middle: IntervalSystem | None,
+        excluded: Callable[[EmptyLeaf], bool],
+        convex: Callable[[NDArray[np.float64]], bool] | None = None,
     ) -> None:
-        self._over, self._middle = _Program(system), None if middle is None else _Program(middle)
-        self._excluded = excluded
+        self._system, self._at_middle = system, middle
+        self._excluded, self._convex = excluded, convex
         self._result = TreeResult()
+        self._form: PairedTerms | None = None
+        self._multipliers: NDArray[np.float64] | None = None
+        self._over: _Program
+        self._middle: _Program | None
+        self._use(None)
 
     def run(self, roots: Sequence[Subtree], max_nodes: int, deadline: float | None = None) -> TreeResult:
         """Search below the roots, which are leaves of one tree, until a limit is reached."""
         self._result = result = TreeResult()
+        self._use(roots[0].form)
+        tried = self._convex is None
         stack = [_first(roots)]
         while stack:
+            if not tried and result.nodes >= FORM_AFTER:
+                tried = True
+                if self._use(better_form(self._system)):
+                    self._result = result = TreeResult(nodes=result.nodes)
+                    stack = [_first(roots)]
             if result.nodes >= max_nodes or (deadline is not None and time.perf_counter() > deadline):
                 for item in reversed(stack):
-                    result.rest += item.roots if item.above else [Subtree(item.codes, item.roots[0].left)]
+                    roots = item.roots if item.above else [Subtree(item.codes, item.roots[0].left)]
+                    result.rest += [Subtree(root.codes, root.left, self._form) for root in roots]
                 return result
             item = stack.pop()
             children = list(self._examine(item, self._middle))
             if children and children[0].middle is not None and children[0].middle.pruned and not item.above:
                 # empty at the middle
                 if not self._settled(children[::-1], TRIED_AT_ONCE):
-                    result.cut.append(Subtree(item.codes, item.roots[0].left + 1))
+                    result.cut.append(Subtree(item.codes, item.roots[0].left + 1, self._form))
+                    if len(result.cut) > MOST_CUT + 2 * len(roots):
+                        # the piece is far too long: its halves fare better from the beginning
+                        whole = [Subtree(root.codes, root.left, self._form) for root in roots]
+                        return TreeResult(cut=whole, nodes=result.nodes)
                 continue
             stack.extend(reversed(children))
         self._try_again(max_nodes)
         return result
+
+    def _use(self, form: PairedTerms | None) -> bool:
+        """Solve relaxations with a form in place of the energy; whether it is convex."""
+        if form is not None and form is self._form:
+            return True
+        middle = self._at_middle
+        multipliers = over = at_middle = None
+        if form is not None and self._convex is not None:
+            multipliers = form.multipliers(self._system.F_lo)
+            over = PieceForm.of(self._system, multipliers) if self._convex(multipliers) else None
+        if form is None or over is None:
+            form = multipliers = None
+        elif middle is not None:
+            at_middle = PieceForm.of(middle, form.multipliers(middle.F_lo))
+        self._form, self._multipliers = form, multipliers
+        self._over = _Program(self._system, over)
+        self._middle = None if middle is None else _Program(middle, at_middle)
+        return form is not None
 
     def _try_again(self, max_nodes: int) -> None:
         """A last attempt at what is to be left to the halves, if it is little."""
@@ -244,9 +303,8 @@ class PieceTree:
     def _empty(self, item: _Item, over: Relaxation) -> bool:
         """Whether the relaxation proves the node empty, or all roots below it; roots that it does are taken out."""
         rows, values = over.multipliers()
-        leaves = [EmptyLeaf(root.codes, rows, values) for root in item.roots]
-        if not item.above:
-            leaves = [EmptyLeaf(item.codes, rows, values)]
+        every = [root.codes for root in item.roots] if item.above else [item.codes]
+        leaves = [EmptyLeaf(codes, rows, values, self._multipliers) for codes in every]
         proven = [self._excluded(leaf) for leaf in leaves]
         self._result.empty += [leaf for leaf, empty in zip(leaves, proven, strict=True) if empty]
         if item.above:
