@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 #: Pieces are not cut below this part of the interval.
 SMALLEST_PIECE = 2.0**-40
+#: Trees are given up over pieces longer than this part of the interval, which only have to be cut.
+LONG_PIECE = 2.0**-9
 #: Into how many trees what a tree of the largest size left is divided.
 FURTHER_TREES = 8
 
@@ -151,7 +153,7 @@ class Worker:
         leaves: IntervalCertifier,
     ) -> None:
         self._condensed, self._origin, self.leaves = condensed, origin, leaves
-        self._smallest = SMALLEST_PIECE * float(interval[1] - interval[0])
+        self._length = float(interval[1] - interval[0])
         self._trees: tuple[Piece, IntervalSystem, PieceTree] | None = None
 
     def run(self, task: Task, max_nodes: int | None = None, deadline: float | None = None) -> TreeResult:
@@ -168,10 +170,13 @@ class Worker:
     def _on(self, piece: Piece) -> tuple[Piece, IntervalSystem, PieceTree]:
         if self._trees is None or self._trees[0] != piece:
             system, middle = self._make(piece), None
-            if float(piece.b - piece.a) > self._smallest:
+            share = float(piece.b - piece.a) / self._length
+            if share > SMALLEST_PIECE:
                 middle = self._make(Piece(piece.middle, piece.middle))
             convex = partial(self.leaves.convex, piece, system) if self.leaves.forms else None
-            trees = PieceTree(system, middle, partial(self.leaves.excluded, piece, system), convex)
+            trees = PieceTree(
+                system, middle, partial(self.leaves.excluded, piece, system), convex, long=share > LONG_PIECE
+            )
             self._trees = (piece, system, trees)
         return self._trees
 

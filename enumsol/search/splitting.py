@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
-
 from enumsol.relaxation.rows import status_rows
 from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from enumsol.relaxation.engine import Relaxation
@@ -53,8 +52,10 @@ class ImposedRows:
             self._known[node, code] = rows
         return rows
 
-    def over(self, codes: Codes, nodes: Iterable[int]) -> tuple[list[int], list[int]]:
+    def over(self, codes: Codes, nodes: Sequence[int]) -> tuple[list[int], list[int]]:
         """The rows of some nodes in a partial assignment, and their modes."""
+        if len(nodes) == 1:
+            return self.of(nodes[0], codes[nodes[0]])
         parts = [self.of(node, codes[node]) for node in nodes]
         return [row for rows, _ in parts for row in rows], [mode for _, modes in parts for mode in modes]
 
@@ -90,7 +91,7 @@ class PlaneSplitting:
     """
 
     def __init__(self, F: NDArray[np.float64], allowed: Sequence[frozenset[int]] | None = None) -> None:
-        self._F = F
+        self._F: list[float] = F.tolist()
         self.friction = [bool(f > 0) for f in F]
         every = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS))
         self._allowed = list(allowed) if allowed is not None else [every] * len(F)
@@ -103,24 +104,20 @@ class PlaneSplitting:
         """Codes of the children, the one nearest to the minimiser first."""
         allowed = self._allowed[node]
         contact = [c for c in (STICK, SLIP_PLUS, SLIP_MINUS) if c in allowed]
-        p = len(codes)
         if relaxation is not None:
-            force, w = relaxation.forces, relaxation.displacements
+            normal, w_n = relaxation.at(node)
         if codes[node] == UNDECIDED:
             touching = FRICTIONLESS if not self.friction[node] else (contact[0] if len(contact) == 1 else CONTACT)
             children = [OPEN] if OPEN in allowed else []
             if (FRICTIONLESS in allowed) if touching == FRICTIONLESS else contact:
                 children.append(touching)
-            if relaxation is not None and force[node] > -w[node]:
+            if relaxation is not None and normal > -w_n:
                 children.reverse()
             return children
         if relaxation is not None:
-            w_t = w[p + node]
-            slack = self._F[node] * force[node] - abs(force[p + node])
-            order = {
-                STICK: 0.0 if slack > abs(w_t) else 2.0,
-                SLIP_PLUS: 1.0 - np.sign(w_t),
-                SLIP_MINUS: 1.0 + np.sign(w_t),
-            }
+            tangential, w_t = relaxation.at(len(codes) + node)
+            sign = (w_t > 0) - (w_t < 0)
+            sticks = self._F[node] * normal - abs(tangential) > abs(w_t)
+            order = {STICK: 0 if sticks else 2, SLIP_PLUS: 1 - sign, SLIP_MINUS: 1 + sign}
             contact.sort(key=lambda c: order[c])
         return contact
