@@ -14,6 +14,7 @@ from rational_checker import check_records
 from enumsol import branch_graph, gallery, verify
 from enumsol.kernel.interval import EnclosedPiece, interval_form_margins, piece_forms
 from enumsol.relaxation.interval import IntervalEngine, IntervalSystem, PieceForm
+from enumsol.search import interval_tree
 from enumsol.search.interval_forms import PairedTerms, better_form
 
 KINDS = ("friction", "load", "both")
@@ -145,3 +146,13 @@ def test_the_proof_does_not_depend_on_the_workers():
         parallel = branch_graph(problem, (0.5, 4.0), executor=executor)
         alone = branch_graph(problem, (0.5, 4.0))
         assert records_of(parallel.proof) == records_of(alone.proof)
+
+
+def test_trees_that_are_given_up_change_nothing_but_the_pieces(monkeypatch):
+    problem = gallery.get("wedge-8-3").build()
+    plain = branch_graph(problem, (0.0, 3.0))
+    monkeypatch.setattr(interval_tree, "MOST_CUT", 4)
+    graph = branch_graph(problem, (0.0, 3.0))
+    assert graph.stats.pieces > plain.stats.pieces
+    assert shape(graph) == shape(plain)
+    assert verify(problem, graph.proof).whole
