@@ -1,6 +1,8 @@
 """Graph proofs for tests of both checkers: the package's and the one in rational arithmetic."""
 
 import functools
+from contextlib import contextmanager
+from unittest import mock
 
 import numpy as np
 from generators import through_the_unloaded_state
@@ -8,6 +10,7 @@ from proof_tools import copied, proof_of, records_of
 from rational_checker import Refused, check_records
 
 from enumsol import ContactProblem, branch_graph, gallery, verify
+from enumsol.search import forms, interval_tree
 
 
 def triangle(**data):
@@ -39,6 +42,13 @@ def graph(name):
     made = branch_graph(problem, interval)
     assert made.complete
     return problem, records_of(made.proof), made
+
+
+@contextmanager
+def forms_at_once():
+    """Trees over pieces turn to forms after a few nodes, whether they pay or not."""
+    with mock.patch.object(interval_tree, "FORM_AFTER", 3), mock.patch.object(forms, "MORE", -np.inf):
+        yield
 
 
 def accepted(problem, records):

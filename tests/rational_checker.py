@@ -308,14 +308,26 @@ class Graph(Proof):
         if self.origin in (x, y):
             loads = [[value if x == self.origin else -value for value in self.data.g1]]
         forms = [Forms(self.data.S, g, F_hi, F_lo) for g in loads]
-        covered, cut = set(), []
+        covered, cut, declared = set(), [], None
         for kind, text, *rest in leaves:
+            if kind == "q":
+                declared = [list(map(exact, values)) for values in (text, *rest)]
+                need([len(values) for values in declared] == [self.p] * 4, "a form has another size")
+                need(min(declared[2] + declared[3]) >= 0, "a multiplier of a form is negative")
+                continue
             codes = self.codes(text)
             covered.update(self.selections_below(codes, friction))
             if kind == "x":
                 self.leaves += 1
                 terms = self.terms(codes, rest, units, friction, varying)
                 need(all(form.excludes(terms) for form in forms), "multipliers do not exclude a leaf")
+                continue
+            if kind == "f":
+                self.leaves += 1
+                need(declared is not None, "a form is missing")
+                terms = self.terms(codes, rest, units, friction, varying)
+                excluded = (form.excludes_by(form.own_form(declared), [], terms) for form in forms)
+                need(all(excluded), "a form does not exclude a leaf")
                 continue
             need(kind in ("s", "c") and not rest, "an unknown leaf")
             if kind == "c":

@@ -184,10 +184,10 @@ class Forms:
         return -constant - (column.transpose() * self.S.solve(column))[0, 0] / 4 > 0
 
     def own_form(self, multipliers):
-        """[5.5] lambda'H lambda - h'lambda of multipliers mu, nu, alpha, beta."""
+        """[5.5], [6.3] lambda'H lambda - h'lambda of multipliers mu, nu, alpha, beta."""
         p, mixed = self.p, []
         for i, (mu, nu, alpha, beta) in enumerate(zip(*multipliers, strict=True)):
-            mixed.append((i, mu, self.F[i] * (beta - alpha)))
+            mixed.append((i, mu, self.F_lo[i] * (beta - alpha)))
             mixed.append((p + i, nu, alpha + beta))
         table, h = [[fmpq(0)] * (2 * p) for _ in range(2 * p)], [fmpq(0)] * (2 * p)
         for k, normal, tangential in mixed:

@@ -57,6 +57,8 @@ Arithmetic = Literal["fast", "verified", "exact"]
 
 #: Boxes in which arcs are followed when the search was interrupted.
 _BOXES_AFTER_INTERRUPT = 500
+#: Selections whose arcs are then worked out without rounding: 8 at least, or so many by p^2.
+_SELECTIONS_AFTER_INTERRUPT = 4096
 
 
 def branch_graph(
@@ -212,7 +214,9 @@ def _make(
         made.exact = ExactCondensed.from_problem(problem)
     assert made.exact is not None
     a, b = (rational(end) for end in search.interval)
-    gluing = glue(made.exact, candidates, a, b, tick, cut_short=bool(made.stops))
+    # after Ctrl-C only as much as takes a moment
+    most = max(8, _SELECTIONS_AFTER_INTERRUPT // problem.p**2) if any(s.interrupted for s in made.stops) else None
+    gluing = glue(made.exact, candidates, a, b, tick, cut_short=bool(made.stops), most=most)
     made.stops += [] if gluing.interrupted is None else [gluing.interrupted]
     made.arcs = make_arcs(gluing)
     made.vertices, made.reasons = make_vertices(gluing, made.arcs), gluing.reasons

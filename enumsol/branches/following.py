@@ -93,13 +93,14 @@ def follow(
             enough = most is not None and sum(len(trace.boxes) for trace in followed.traces) >= most
             if not enough:
                 places = {codes: [traced.interval] if cut_short else where[codes] for codes in group}
-                followed.traces += traced.trace(places)
+                traced.trace(places, followed.traces)
                 if tick is not None:
                     tick(min(first + together, len(waiting)) / len(waiting))
         except KeyboardInterrupt:
             enough = True
         if enough:
-            followed.interrupted = Stop(StopReason.INTERRUPTED, first, arcs_of=len(waiting))
+            done = len({trace.selection.rows.codes for trace in followed.traces})
+            followed.interrupted = Stop(StopReason.INTERRUPTED, done, arcs_of=len(waiting))
             break
     followed.joined = join(followed.traces, traced.interval, traced.origin, traced.sharpen)
     return followed

@@ -114,6 +114,7 @@ def glue(
     tick: Callable[[float], object] | None = None,
     *,
     cut_short: bool = False,
+    most: int | None = None,
 ) -> Gluing:
     """Vertices and arcs of the graph, from the selections that the search found.
 
@@ -124,9 +125,11 @@ def glue(
     a, b : fmpq
     tick : called with the share of the candidates done
     cut_short : the search was stopped: selections it did not find are left out, and arcs may end without neighbours
+    most : int, optional
+        No further candidates are worked out after so many, as if Ctrl-C had been pressed.
     """
     known = KnownSelections(exact, a, b, cut_short=cut_short)
-    interrupted = _work_out(known, sorted(set(candidates)), tick)
+    interrupted = _work_out(known, sorted(set(candidates)), tick, most)
     for codes in list(known.arcs):
         known.close(codes)
     vertices = _vertices(_joined(known))
@@ -143,15 +146,22 @@ def glue(
 
 
 def _work_out(
-    known: KnownSelections, candidates: Sequence[Codes], tick: Callable[[float], object] | None
+    known: KnownSelections,
+    candidates: Sequence[Codes],
+    tick: Callable[[float], object] | None,
+    most: int | None,
 ) -> Stop | None:
     """Where the candidates hold; after Ctrl-C the rest is left out, as if the search had been cut short."""
     for k, codes in enumerate(candidates):
+        enough = k == most
         try:
-            known.add(codes)
-            if tick is not None:
-                tick((k + 1) / len(candidates))
+            if not enough:
+                known.add(codes)
+                if tick is not None:
+                    tick((k + 1) / len(candidates))
         except KeyboardInterrupt:
+            enough = True
+        if enough:
             known.cut_short = True
             return Stop(StopReason.INTERRUPTED, k, arcs_of=len(candidates))
     return None

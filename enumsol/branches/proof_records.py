@@ -6,6 +6,8 @@ import enum
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from enumsol.branches.parts import PartKind
 from enumsol.proof.proof_file import Proof, packed
 from enumsol.proof.reading import fits
@@ -22,10 +24,15 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import Codes
 
 
+#: Begins the record of a form, which is no leaf.
+_FORM = "q"
+
+
 class GraphLeaf(enum.StrEnum):
     """Kinds of leaves in the proof of a graph (docs/proof_format.md); the checker keeps its own list."""
 
     EXCLUDED = "x"
+    EXCLUDED_BY_FORM = "f"
     SELECTION = "s"
     CUT = "c"
 
@@ -67,8 +74,14 @@ def write_graph_proof(
                 "roots": [_text(codes) for codes in found.roots],
             }
         )
+        declared = None
         for leaf in found.empty:
-            writer.write([GraphLeaf.EXCLUDED, _text(leaf.codes), *packed(leaf.rows, leaf.values)])
+            kind = GraphLeaf.EXCLUDED if leaf.form is None else GraphLeaf.EXCLUDED_BY_FORM
+            # the same form is another object when it comes from a worker
+            if leaf.form is not None and not (declared is not None and np.array_equal(declared, leaf.form)):
+                declared = leaf.form
+                writer.write([_FORM, *declared.tolist()])
+            writer.write([kind, _text(leaf.codes), *packed(leaf.rows, leaf.values)])
         for kind, kept in ((GraphLeaf.SELECTION, found.selections), (GraphLeaf.CUT, found.cut)):
             for codes in kept:
                 writer.write([kind, _text(codes)])

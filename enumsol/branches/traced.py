@@ -103,14 +103,18 @@ class TracedProblem:
                 found.append((_down(x), -_down(-y), side))
         return found
 
-    def trace(self, where: Mapping[Codes, Iterable[Bounds]]) -> list[Trace]:
-        """Where selections hold on pieces of the interval, of every selection its own."""
-        return trace(
+    def trace(self, where: Mapping[Codes, Iterable[Bounds]], found: list[Trace]) -> None:
+        """Where selections hold on pieces of the interval, of every selection its own.
+
+        ``found`` takes the traces; on Ctrl-C those of the selections that are finished.
+        """
+        trace(
             [
                 (self.selection(codes, side), low, high, partial(self.precise, codes, side), side)
                 for codes, pieces in where.items()
                 for low, high, side in self.spans(pieces)
             ],
+            found,
             sharpened=self.problem.n <= EXACT_DOF_LIMIT,
         )
 

@@ -45,8 +45,11 @@ _FLAT_BOX = 2.0**-12
 
 
 def trace(
-    asked: Sequence[tuple[ArcSelection, float, float, Precise, float]], *, sharpened: bool = False
-) -> list[Trace]:
+    asked: Sequence[tuple[ArcSelection, float, float, Precise, float]],
+    found: list[Trace],
+    *,
+    sharpened: bool = False,
+) -> None:
     """Cut intervals into boxes and parts, of every selection its own.
 
     Parameters
@@ -54,11 +57,20 @@ def trace(
     asked : sequence of (selection, low, high, precise, side)
         ``precise`` gives the same selection in balls of many digits, for short boxes, or None where there is none;
         ``side`` is that of the selection's system.
+    found : list of Trace
+        Takes the traces; on Ctrl-C those of the selections that are finished.
     sharpened : bounds of events will be made narrower
     """
-    found = [Trace(selection, low, high, side) for selection, low, high, _, side in asked]
-    _answer([_Tracing(trace, part[3], sharpened=sharpened).run() for trace, part in zip(found, asked, strict=True)])
-    return found
+    traces = [Trace(selection, low, high, side) for selection, low, high, _, side in asked]
+    tracings = [_Tracing(one, part[3], sharpened=sharpened) for one, part in zip(traces, asked, strict=True)]
+    try:
+        _answer([tracing.run() for tracing in tracings])
+    except KeyboardInterrupt:
+        pairs = list(zip(traces, tracings, strict=True))
+        waiting = {one.selection.rows.codes for one, tracing in pairs if not tracing.finished}
+        found += [one for one in traces if one.selection.rows.codes not in waiting]
+        raise
+    found += traces
 
 
 def _answer(running: list[Asking]) -> None:
@@ -95,6 +107,7 @@ class _Tracing:
         self._length = found.high - found.low
         self._spacing = _SMALLEST_UNITS * float(np.spacing(max(abs(found.low), abs(found.high))))
         self._count = 0
+        self.finished = False
 
     def run(self) -> Asking:
         """Box by box, from left to right."""
@@ -105,6 +118,7 @@ class _Tracing:
             rest = yield from self._box(_as_float(first), _as_float(last))
             waiting += reversed(rest)
         self._selection.forget()
+        self.finished = True
 
     def _box(self, first: Number, last: Number) -> Generator[list[Question], list[Any], list[Interval]]:
         """Add a box, or as much of it as is decided; what is left."""

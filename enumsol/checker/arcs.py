@@ -76,7 +76,7 @@ class ArcCount:
     ----------
     arcs : int
     open : int
-        Parts that were left open, and events without a partner beside them.
+        Intervals that were left open, and events without a partner beside them.
     """
 
     arcs: int = 0
@@ -227,7 +227,7 @@ class ArcChecker:
             self._degrees["unloaded" if starts == 1 and "unloaded" in self._degrees else "first"] += index
 
     def left_open(self) -> None:
-        """Count a part that was left open."""
+        """Count an interval that was left open."""
         self._count.open += 1
 
     def event(self, event: _Event) -> None:
@@ -297,7 +297,8 @@ class _Follower:
     def part(self, kind: str, part: list[Any], ends: tuple[Fraction, Fraction]) -> None:
         """Go on through a part."""
         if kind == "u":
-            self._checker.left_open()
+            if not self._open:  # parts that touch are one interval
+                self._checker.left_open()
             self._holds = False
         elif kind == "n":
             if self._holds:

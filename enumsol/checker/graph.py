@@ -3,8 +3,9 @@
 Records (see enumsol.proof.proof_file for the file and the reader): a header ``{"format": "enumsol-proof",
 "version": 1, "kind": "graph", "problem": <fingerprint>, "interval": [a, b], "p": p, "data": "problem" | "condensed"}``;
 for every piece ``{"piece": [a, b], "force", "length", "roots"}``, then its leaves ``["x", codes, rows, multipliers]``
-(no solution anywhere in the piece), ``["s", codes]`` (a selection handed on) and ``["c", codes]`` (left to both halves
-of the piece); then, if the proof holds them, arcs (see enumsol.checker.arcs); at the end ``{"pieces", "leaves",
+(no solution anywhere in the piece), ``["f", codes, rows, multipliers]`` (the same by the form declared last, ``["q",
+mu, nu, alpha, beta]``), ``["s", codes]`` (a selection handed on) and ``["c", codes]`` (left to both halves of the
+piece); then, if the proof holds them, arcs (see enumsol.checker.arcs); at the end ``{"pieces", "leaves",
 "selections"}``, with arcs ``"traces"`` and ``"arcs"``, too. Codes are strings of p digits; ends of pieces are
 fractions ``"a/b"`` in decimal digits.
 
@@ -17,7 +18,7 @@ is checked by ``enumsol.checker.arcs``, if the proof says it.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +34,8 @@ from enumsol.kernel.interval import (
     EnclosedPiece,
     as_computed,
     interval_exclusion_margins,
+    interval_form_margins,
+    piece_forms,
 )
 from enumsol.kernel.rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, STICK, UNDECIDED, children_of
 from enumsol.proof.reading import (
@@ -41,6 +44,7 @@ from enumsol.proof.reading import (
     data_of,
     friction_at,
     multipliers_from,
+    numbers_from,
     rational_from,
     shown,
     units_from,
@@ -53,6 +57,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.data import Data
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.problem import ContactProblem
 
     Array = NDArray[np.float64]
@@ -62,8 +67,9 @@ if TYPE_CHECKING:
 _BATCH = 256
 #: Leaves of a piece after which repetitions are first looked for; then whenever their number has doubled.
 _LOOK = 1024
-#: Entries of a leaf's record, by its kind.
-_ENTRIES = {"x": 4, "s": 2, "c": 2}
+#: Entries of a leaf's record, by its kind, and those of a form's.
+_ENTRIES = {"x": 4, "f": 4, "s": 2, "c": 2}
+_FORM, _FORM_ENTRIES = "q", 5
 _END = object()
 
 
@@ -82,6 +88,18 @@ class _Piece:
     look: int = _LOOK
     #: made when there is something to exclude
     enclosed: EnclosedPiece | None = None
+    #: multipliers of the form declared last, and the form
+    declared: Array | None = None
+    forms: tuple[EnclosedForm, ...] | None = None
+
+    def declare(self, record: list[Any]) -> None:
+        """Read a form."""
+        if len(record) != _FORM_ENTRIES:
+            raise ValueError(f"a form has {len(record)} entries; expected {_FORM_ENTRIES}")
+        declared = np.array([numbers_from(values, self.roots.shape[1]) for values in record[1:]])
+        if np.any(declared[2:] < 0):
+            raise ValueError("a multiplier of a form is negative and must not be")
+        self.declared, self.forms = declared, None
 
     def leaves(self, *kinds: str) -> Codes:
         """Codes of the leaves of these kinds, shape (k, p); all without a kind."""
@@ -198,7 +216,7 @@ class GraphChecker:
         record = next(records, _END)
         while isinstance(record, list):
             batch: list[list[Any]] = []
-            while isinstance(record, list) and len(batch) < _BATCH:
+            while isinstance(record, list) and len(batch) < _BATCH and not (batch and record[:1] == [_FORM]):
                 batch.append(record)
                 record = next(records, _END)
             try:
@@ -228,37 +246,57 @@ class GraphChecker:
         return _Piece(a, b, *units, codes_from(record.get("roots"), self.problem.p))
 
     def _read_leaves(self, piece: _Piece, batch: list[list[Any]]) -> None:
-        """Record some leaves, and check the dual inequalities of those claimed to be empty."""
+        """Record some leaves, the first perhaps a form, and check the inequalities of those claimed to be empty."""
+        if batch[0][:1] == [_FORM]:
+            piece.declare(batch[0])
+            batch = batch[1:]
         for record in batch:
             kind = record[0] if record else None
             if not isinstance(kind, str) or kind not in _ENTRIES:
                 raise ValueError(f"unknown kind of record {shown(kind)}")
             if len(record) != _ENTRIES[kind]:
                 raise ValueError(f"a record of kind {kind!r} has {len(record)} entries; expected {_ENTRIES[kind]}")
+        if not batch:
+            return
         codes = codes_from([record[1] for record in batch], self.problem.p)
         piece.codes += codes.tobytes()
         piece.kinds += "".join(record[0] for record in batch).encode()
         if len(piece.kinds) >= piece.look:
             _check_repetitions(piece)
             piece.look = 2 * len(piece.kinds)
-        empty = [k for k, record in enumerate(batch) if record[0] == "x"]
-        if empty:
-            texts = (batch[k][2:] for k in empty)
-            pairs = [multipliers_from(text, KINDS * self.problem.p) for text in texts]
-            self._exclusions(self._enclosed(piece), codes[empty].astype(np.intp), pairs)
+        for kind in ("x", "f"):
+            empty = [k for k, record in enumerate(batch) if record[0] == kind]
+            if empty:
+                margins = partial(interval_exclusion_margins, self._enclosed(piece))
+                if kind == "f":
+                    margins = partial(interval_form_margins, self._enclosed(piece), self._forms(piece))
+                texts = (batch[k][2:] for k in empty)
+                pairs = [multipliers_from(text, KINDS * self.problem.p) for text in texts]
+                self._exclusions(margins, codes[empty].astype(np.intp), pairs)
 
     def _exclusions(
-        self, enclosed: EnclosedPiece, codes: NDArray[np.intp], pairs: list[tuple[NDArray[np.intp], Array]]
+        self,
+        margins_of: Callable[..., Array],
+        codes: NDArray[np.intp],
+        pairs: list[tuple[NDArray[np.intp], Array]],
     ) -> None:
         rows, values = zip(*pairs, strict=True)
         leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
-        margins = interval_exclusion_margins(enclosed, codes, leaf, np.concatenate(rows), np.concatenate(values))
+        margins = margins_of(codes, leaf, np.concatenate(rows), np.concatenate(values))
         for number in np.flatnonzero(~(margins > 0)):
             # alone it is summed in the order of the search, which may matter for a nearly singular S
             alone = codes[number : number + 1], np.zeros(len(rows[number]), dtype=np.intp)
-            if not interval_exclusion_margins(enclosed, *alone, rows[number], values[number])[0] > 0:
+            if not margins_of(*alone, rows[number], values[number])[0] > 0:
                 self._fail(f"leaf {self.leaves + number + 1}: its multipliers do not exclude it")
         self.leaves += len(rows)
+
+    def _forms(self, piece: _Piece) -> tuple[EnclosedForm, ...]:
+        """The form declared last at both ends of the piece."""
+        if piece.declared is None:
+            raise ValueError("its form was not declared")
+        if piece.forms is None:
+            piece.forms = piece_forms(self._enclosed(piece), piece.declared)
+        return piece.forms
 
     def _enclosed(self, piece: _Piece) -> EnclosedPiece:
         """The data at both ends of the piece, with S proven positive definite."""

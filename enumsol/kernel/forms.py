@@ -217,10 +217,10 @@ def form_margins(
     if not form.smallest_eigenvalue > 0:
         return np.full(len(codes), -np.inf)
     system = form.system
-    return margins((form,), row_signs(codes, system.F), (system.F, system.F), leaf, rows, values, errors, _form_bounds)
+    return margins((form,), row_signs(codes, system.F), (system.F, system.F), leaf, rows, values, errors, form_bounds)
 
 
-def _form_bounds(form: EnclosedForm, y: Array, c: Array, c_rad: Array, errors: float) -> Array:
+def form_bounds(form: EnclosedForm, y: Array, c: Array, c_rad: Array, errors: float) -> Array:
     """Lower bounds on q for multipliers y (m, 2p) on S lambda - g and c, a ball, on lambda; as energy_bounds."""
     S, S_rad, g, g_rad = form.system.S, form.system.S_rad, form.system.g, form.system.g_rad
     k = gamma(4 * len(g) + 16)

@@ -10,7 +10,7 @@ Rows 7 and 8 of node i, beyond those of ``enumsol.kernel.rows``: lambda_t - F_lo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.condensation.enclosure import CondensedEnclosure
+from enumsol.kernel.forms import EnclosedForm, form_bounds
 from enumsol.kernel.point import margins
 from enumsol.kernel.rows import BACKWARD, FORWARD, ROW_KINDS, STILL, UNDECIDED, row_table
 
@@ -140,6 +141,44 @@ def interval_exclusion_margins(
     -------
     (m,) array
     """
+    return margins(piece.ends, _allowed(piece, codes), (piece.low, piece.high), leaf, rows, values, errors)
+
+
+def _allowed(piece: EnclosedPiece, codes: NDArray[np.intp]) -> NDArray[np.int8]:
+    """What multipliers may be, (m, p, 9)."""
     code = np.where((codes == UNDECIDED) & (piece.high == 0), STILL, codes)
-    allowed = np.where((piece.low == piece.high)[:, None], _CONSTANT[code], _VARYING[code])
-    return margins(piece.ends, allowed, (piece.low, piece.high), leaf, rows, values, errors)
+    return np.where((piece.low == piece.high)[:, None], _CONSTANT[code], _VARYING[code])
+
+
+def piece_forms(piece: EnclosedPiece, multipliers: Array) -> tuple[EnclosedForm, ...]:
+    """A form for all alpha of a piece, at its ends: with F_lo in place of F (theory, section 7.9).
+
+    Parameters
+    ----------
+    piece : EnclosedPiece
+    multipliers : (4, p) array
+        mu, nu, alpha and beta (see EnclosedForm); the last two are at least zero.
+    """
+    everything = (UNDECIDED,) * len(piece.low)
+    # exact coefficients, below those of the piece, where friction varies
+    uncertain = [np.where(piece.low == piece.high, end.F_rad, 0.0) for end in piece.ends]
+    systems = [replace(end, F=piece.low, F_rad=rad) for end, rad in zip(piece.ends, uncertain, strict=True)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return tuple(EnclosedForm.of(system, everything, multipliers, 0.0) for system in systems)
+
+
+def interval_form_margins(
+    piece: EnclosedPiece,
+    forms: Sequence[EnclosedForm],
+    codes: NDArray[np.intp],
+    leaf: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    values: Array,
+    errors: float = 1.0,
+) -> Array:
+    """The same as interval_exclusion_margins with ``forms`` of piece_forms in place of the energy."""
+    if not all(form.smallest_eigenvalue > 0 for form in forms):
+        return np.full(len(codes), -np.inf)
+    allowed, friction = _allowed(piece, codes), (piece.low, piece.high)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return margins(forms, allowed, friction, leaf, rows, values, errors, form_bounds)

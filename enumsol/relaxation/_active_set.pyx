@@ -184,6 +184,7 @@ cdef class BranchingRule:
     cdef Py_ssize_t[:, ::1] slip_row
     cdef signed char[:, ::1] slip_mode
     cdef Py_ssize_t[::1] order
+    cdef signed char[::1] codes
 
     def __init__(self, F, slip_rows, slip_modes, candidates):
         self.p = len(F)
@@ -193,6 +194,16 @@ cdef class BranchingRule:
         self.slip_mode = np.ascontiguousarray(slip_modes, dtype=np.int8)
         self.violation = np.zeros(candidates)
         self.order = np.zeros(candidates, dtype=np.intp)
+        self.codes = np.zeros(self.p, dtype=np.int8)
+
+    cdef int take(self, codes) except -1:
+        """Keep the codes that are looked at."""
+        cdef Py_ssize_t i
+        if len(codes) != self.p:
+            raise ValueError(f"{len(codes)} codes; expected {self.p}")
+        for i in range(self.p):
+            self.codes[i] = codes[i]
+        return 0
 
 
 @cython.no_gc_clear
@@ -342,6 +353,12 @@ cdef class QPState:
             value_of[j] = (self.u[j] if j < self.q else self.pending_u) * self.sign[row] / self.data.norm[row]
         return rows, values
 
+    def at(self, Py_ssize_t i):
+        """x and w number i."""
+        if i < 0 or i >= self.data.k or i >= self.data.n:
+            raise IndexError(i)
+        return self.x[i], self.w[i]
+
     cdef double _dual_bound(self) noexcept nogil:
         """Lower bound proven by the current multipliers, computed from them and the data alone."""
         cdef Py_ssize_t j, i, n = self.data.n
@@ -456,30 +473,33 @@ cdef class QPState:
         slip, a = fmin(slip, fmin(a, b)), slip + a + b - c
         return (slip + LEAST) * (a - slip + LEAST) * sqrt(c + LEAST)
 
-    def forced(self, signed char[::1] codes, BranchingRule rule, double target):
+    def forced(self, given, BranchingRule rule, double target):
         """Undecided contact nodes of which one dual step excludes all children but one (see choose)."""
         cdef Py_ssize_t i
         cdef double gap = fmax(target - self.bound, 1e-300)
+        rule.take(given)
+        cdef signed char[::1] codes = rule.codes
         found = []
         for i in range(rule.p):
             if codes[i] == UNDECIDED_ and self._promise(i, codes[i], rule, gap, False) == HUGE_VAL:
                 found.append(i)
         return tuple(found)
 
-    def choose(self, signed char[::1] codes, BranchingRule rule, double target):
+    def choose(self, codes, BranchingRule rule, double target):
         """The contact node to branch on, -1 when every node is decided (see BranchingRule).
 
         Parameters
         ----------
-        codes : (p,) int8 array
+        codes : p status codes
             The partial assignment whose minimiser this state holds.
         rule : BranchingRule
         target : float
             The bound at which a partial assignment is pruned.
         """
         cdef Py_ssize_t best
+        rule.take(codes)
         with nogil:
-            best = self._choose(codes, rule, target)
+            best = self._choose(rule.codes, rule, target)
         return best
 
     cdef Py_ssize_t _choose(self, signed char[::1] codes, BranchingRule rule, double target) noexcept nogil:

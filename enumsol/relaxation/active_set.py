@@ -145,6 +145,10 @@ class ActiveSetRelaxation:
         """w at the minimiser, shape (2p,), scaled."""
         return self._state.w_array
 
+    def at(self, i: int) -> tuple[float, float]:
+        """Number i of the forces and of the displacements."""
+        return self._state.at(i)
+
     def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Rows of statuses and their multipliers, which prove ``bound``."""
         rows, values = self._state.multipliers()
@@ -156,12 +160,12 @@ class ActiveSetRelaxation:
     def choose(self, codes: Codes) -> int:
         """The contact node to branch on, -1 when all are decided."""
         engine = self._engine
-        return self._state.choose(np.array(codes, dtype=np.int8), engine.rule, PRUNE_MARGIN + engine.offset)
+        return self._state.choose(codes, engine.rule, PRUNE_MARGIN + engine.offset)
 
     def forced(self, codes: Codes) -> tuple[int, ...]:
         """Undecided contact nodes with at most one child that no known bound excludes."""
         engine = self._engine
-        return self._state.forced(np.array(codes, dtype=np.int8), engine.rule, PRUNE_MARGIN + engine.offset)
+        return self._state.forced(codes, engine.rule, PRUNE_MARGIN + engine.offset)
 
     def gap_closed(self, codes: Codes) -> float:
         """Mean share of the gap to zero that one dual step closes in the better child of an undecided node."""

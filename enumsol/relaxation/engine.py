@@ -43,6 +43,9 @@ class Relaxation(Protocol):
     def displacements(self) -> NDArray[np.float64]:
         """w at the minimiser, shape (2p,), scaled."""
 
+    def at(self, i: int) -> tuple[float, float]:
+        """Number i of the forces and of the displacements."""
+
     def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Rows and their multipliers, which prove ``bound``."""
 

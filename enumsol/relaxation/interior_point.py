@@ -116,6 +116,10 @@ class _InteriorPointRelaxation:
         keep = self._values != 0
         return self._rows[keep], self._values[keep]
 
+    def at(self, i: int) -> tuple[float, float]:
+        """Number i of the forces and of the displacements."""
+        return float(self.forces[i]), float(self.displacements[i])
+
     def choose(self, codes: Codes) -> int:
         """The undecided node at which complementarity is violated most, -1 when all are decided."""
         return largest_violation(codes, self._engine.system.F, self.forces, self.displacements)

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 #: Part of the secant's slope that makes the form in (lambda, tau) definite: what it costs vanishes with the interval.
 RIDGE = 1e-2
+#: Least curvature of a form by its mean curvature.
+_CURVATURE = 1e-9
 
 
 class IntervalRowKind(enum.IntEnum):
@@ -115,8 +117,57 @@ class IntervalSystem:
         return bool(np.any(self.half))
 
 
+@dataclass(frozen=True)
+class PieceForm:
+    """lambda'H lambda - (h + tau half)'lambda: the energy over an interval, or another form (theory, section 5.8).
+
+    Attributes
+    ----------
+    H : (2p, 2p) array
+    h, half : (2p,) arrays
+    """
+
+    H: NDArray[np.float64]
+    h: NDArray[np.float64]
+    half: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, system: IntervalSystem, multipliers: NDArray[np.float64]) -> PieceForm | None:
+        """The form of four multipliers a node, (4, p), with F_lo in place of F; None where it is hardly convex."""
+        p = system.p
+        mu, nu, alpha, beta = multipliers
+        left, right = np.concatenate([mu, nu]), np.concatenate([system.F_lo * (beta - alpha), alpha + beta])
+
+        def combined(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+            """D' applied to rows."""
+            normal, tangential = np.concatenate([rows[:p]] * 2), np.concatenate([rows[p:]] * 2)
+            return np.asarray((left * normal.T + right * tangential.T).T)
+
+        turned = combined(system.S)
+        H = 0.5 * (turned + turned.T)
+        try:
+            np.linalg.cholesky(H - _CURVATURE * np.mean(np.diagonal(H)) * np.eye(2 * p))
+        except np.linalg.LinAlgError:
+            return None
+        return cls(H, combined(system.g), combined(system.half))
+
+    def convex(self) -> NDArray[np.float64]:
+        """Matrix of the convex form in (lambda, tau), shape (2p + 1, 2p + 1).
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            H is not positive definite.
+        """
+        q = float(np.linalg.norm(np.linalg.solve(np.linalg.cholesky(self.H), self.half))) ** 2
+        # a load that hardly varies: its q may underflow
+        curvature = 0.25 * (q + RIDGE * max(q, 1e-12))
+        across = -0.5 * self.half[:, None]
+        return np.block([[self.H, across], [across.T, np.array([[curvature]])]])
+
+
 class IntervalEngine(CompiledEngine):
-    """Relaxations over an interval.
+    """Relaxations over an interval, with the energy or another form.
 
     Raises
     ------
@@ -124,7 +175,7 @@ class IntervalEngine(CompiledEngine):
         The compiled solver is not available.
     """
 
-    def __init__(self, system: IntervalSystem) -> None:
+    def __init__(self, system: IntervalSystem, form: PieceForm | None = None) -> None:
         try:
             from enumsol.relaxation import _active_set
         except ImportError as error:
@@ -138,11 +189,11 @@ class IntervalEngine(CompiledEngine):
         rule = _active_set.BranchingRule(system.F, *_slip_rows(system), BRANCHING_CANDIDATES)
         start, index, value = _all_rows(system)
         rows = len(start) - 1
+        form = PieceForm(system.S, system.g, system.half) if form is None else form
         if not system.loaded:
-            data = _active_set.QPData(system.S, system.g, -system.S, system.g, start, index, value, np.zeros(rows))
+            data = _active_set.QPData(form.H, form.h, -system.S, system.g, start, index, value, np.zeros(rows))
             super().__init__(data, rule, 2 * p)
             return
-        form = _form(system)
         # the last unknown is tau, between -1 and 1; w follows the 2p + 1 unknowns
         index = np.append(np.where(index >= 2 * p, index + 1, index), [2 * p, 2 * p])
         start = np.append(start, start[-1] + np.array([1, 2], dtype=np.intp))
@@ -150,23 +201,14 @@ class IntervalEngine(CompiledEngine):
         rhs = np.append(np.zeros(rows), [-1.0, -1.0])
         W = np.column_stack([-system.S, system.half])
         try:
-            data = _active_set.QPData(form, np.append(system.g, 0.0), W, system.g, start, index, value, rhs)
+            convex = form.convex()
+            data = _active_set.QPData(convex, np.append(form.h, 0.0), W, system.g, start, index, value, rhs)
         except np.linalg.LinAlgError as error:
             raise InvalidProblemError(
                 "the energy over an interval of alpha is not convex to working precision; expected contact rows "
                 "[Bn; Bt] that are independent beyond rounding (are two contact nodes almost the same point?)"
             ) from error
-        super().__init__(data, rule, 2 * p, offset=float(form[-1, -1]), always=(rows, rows + 1))
-
-
-def _form(system: IntervalSystem) -> NDArray[np.float64]:
-    """Matrix of the convex form in (lambda, tau), shape (2p + 1, 2p + 1)."""
-    # half' S^-1 half by the factor that is known to exist
-    q = float(np.linalg.norm(np.linalg.solve(system.scaled.cholesky, system.half))) ** 2
-    # a load that hardly varies: its q may underflow
-    curvature = 0.25 * (q + RIDGE * max(q, 1e-12))
-    across = -0.5 * system.half[:, None]
-    return np.block([[system.S, across], [across.T, np.array([[curvature]])]])
+        super().__init__(data, rule, 2 * p, offset=float(convex[-1, -1]), always=(rows, rows + 1))
 
 
 def _all_rows(system: IntervalSystem) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:

@@ -41,23 +41,15 @@ _STATUS_ROWS = {code: _rows_of(code) for code in CONDITIONS}
 
 def row_terms(p: int, F: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
     """All rows as sparse combinations of y = (lambda, w), w of shape (2p,): start, index and value arrays."""
-    start, index, value = [0], [], []
-    for kind in RowKind:
-        for i in range(p):
-            terms = {
-                _R.NORMAL_FORCE: ((i, 1.0),),
-                _R.TANGENTIAL_FORCE: ((p + i, 1.0),),
-                _R.CONE_PLUS: ((i, F[i]), (p + i, -1.0)),
-                _R.CONE_MINUS: ((i, F[i]), (p + i, 1.0)),
-                _R.PENETRATION: ((2 * p + i, -1.0),),
-                _R.SLIP_FORWARD: ((3 * p + i, 1.0),),
-                _R.SLIP_BACKWARD: ((3 * p + i, -1.0),),
-            }[kind]
-            for j, v in terms:
-                index.append(j)
-                value.append(v)
-            start.append(len(index))
-    return np.array(start, dtype=np.intp), np.array(index, dtype=np.intp), np.array(value, dtype=np.float64)
+    nodes, one = np.arange(p), np.ones(p)
+    cones = np.stack([nodes, p + nodes], axis=1).ravel()
+    plus, minus = (np.stack([F, sign * one], axis=1).ravel() for sign in (-1.0, 1.0))
+    # lambda_n, lambda_t, both cones, -w_n, w_t, -w_t
+    index = np.concatenate([nodes, p + nodes, cones, cones, 2 * p + nodes, 3 * p + nodes, 3 * p + nodes])
+    value = np.concatenate([one, one, plus, minus, -one, one, -one])
+    lengths = np.repeat([1, 1, 2, 2, 1, 1, 1], p)
+    start = np.concatenate([[0], np.cumsum(lengths)])
+    return start.astype(np.intp), index.astype(np.intp), value
 
 
 def row_normals(

@@ -205,6 +205,10 @@ class SpaceRelaxation:
         """w at the minimiser, shape (m,), scaled."""
         return self._state.w_array if self._kept is None else self._kept[1]
 
+    def at(self, i: int) -> tuple[float, float]:
+        """Number i of the forces and of the displacements."""
+        return float(self.forces[i]), float(self.displacements[i])
+
     def multipliers(self) -> tuple[NDArray[np.intp], Array]:
         """Rows and their multipliers, which prove ``bound``."""
         return self._state.multipliers() if self._kept is None else self._kept[2]

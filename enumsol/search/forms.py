@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from enumsol.search.splitting import ImposedRows
     from enumsol.selections.solution import Codes
 
+    Rows = tuple[list[int], list[int]]
+
 #: Nodes examined with the energy, for every contact node, before a form is tried: more than what that costs. Small
 #: problems count as ones with so many contact nodes.
 NODES, _SMALL = 10, 100
@@ -77,22 +79,10 @@ class Forms:
         """Whether a form at the root of the search is clearly tighter than the energy; if so it is in use."""
         if not isinstance(engine, ActiveSetEngine):
             return False
-        from enumsol.relaxation.forms import FormAscent
-
-        ascent = FormAscent(self._scaled, self._enclosed, engine)
-        imposed = rows.over(codes, range(len(codes)))
-        plain = engine.root(*imposed)
-        found = ascent.improve(codes, ascent.energy, imposed, TRIAL)
-        if found is None or not isinstance(plain, ActiveSetRelaxation) or plain.stalled or plain.pruned:
+        form = ascended(self._scaled, self._enclosed, engine, codes, rows.over(codes, range(len(codes))))
+        if form is None or not form.smallest_eigenvalue > 0:
             return False
-        if not found[1].pruned:
-            before, after = plain.gap_closed(codes), found[1].gap_closed(codes)
-            if after < min(before + MORE, TIMES * before):
-                return False
-            found = ascent.improve(codes, found[0].multipliers, imposed, STEPS) or found
-        if not found[0].smallest_eigenvalue > 0:
-            return False
-        self._form, self._engine = found[0], FormEngine(engine, self._scaled, found[0])
+        self._form, self._engine = form, FormEngine(engine, self._scaled, form)
         return True
 
     @property
@@ -100,6 +90,36 @@ class Forms:
         """Relaxations with the form of the root."""
         assert self._engine is not None
         return self._engine
+
+
+def ascended(
+    scaled: ScaledSystem, enclosed: EnclosedSystem, engine: ActiveSetEngine, codes: Codes, rows: Rows
+) -> EnclosedForm | None:
+    """A form that is clearly tighter than the energy over a partial assignment; None: there is none.
+
+    Parameters
+    ----------
+    scaled : ScaledSystem
+    enclosed : EnclosedSystem
+        Balls for the same system.
+    engine : ActiveSetEngine
+        Relaxations with the energy.
+    codes : status codes
+    rows : numbers and modes of the rows of the assignment
+    """
+    from enumsol.relaxation.forms import FormAscent
+
+    ascent = FormAscent(scaled, enclosed, engine)
+    plain = engine.root(*rows)
+    found = ascent.improve(codes, ascent.energy, rows, TRIAL)
+    if found is None or not isinstance(plain, ActiveSetRelaxation) or plain.stalled or plain.pruned:
+        return None
+    if not found[1].pruned:
+        before, after = plain.gap_closed(codes), found[1].gap_closed(codes)
+        if after < min(before + MORE, TIMES * before):
+            return None
+        found = ascent.improve(codes, found[0].multipliers, rows, STEPS) or found
+    return found[0]
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ import itertools
 import time
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 from enumsol.relaxation.interval import IntervalSystem
@@ -21,11 +22,16 @@ from enumsol.statuses import UNDECIDED
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.selections.solution import Codes
 
 #: Pieces are not cut below this part of the interval.
 SMALLEST_PIECE = 2.0**-40
+#: Trees are given up over pieces longer than this part of the interval, which only have to be cut.
+LONG_PIECE = 2.0**-9
 #: Into how many trees what a tree of the largest size left is divided.
 FURTHER_TREES = 8
 
@@ -72,6 +78,9 @@ class SearchedPiece:
 class IntervalCertifier(Protocol):
     """Decides in one arithmetic whether multipliers prove a leaf empty on the whole piece."""
 
+    #: Whether leaves may be excluded by forms other than the energy.
+    forms: bool
+
     @property
     def checkable(self) -> bool:
         """Whether a checker can repeat what was accepted so far, so that it makes a proof."""
@@ -79,16 +88,24 @@ class IntervalCertifier(Protocol):
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
 
+    def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
+        """Whether the form of these multipliers is proven convex on the piece."""
+
 
 class FastIntervalCertifier:
     """Floats: the result of the engine is trusted."""
 
-    checkable = False
+    checkable = forms = False
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Accept the pruning."""
         del piece, system, leaf
         return True
+
+    def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
+        """Floats prove nothing."""
+        del piece, system, form
+        return False
 
 
 @dataclass(frozen=True)
@@ -136,7 +153,7 @@ class Worker:
         leaves: IntervalCertifier,
     ) -> None:
         self._condensed, self._origin, self.leaves = condensed, origin, leaves
-        self._smallest = SMALLEST_PIECE * float(interval[1] - interval[0])
+        self._length = float(interval[1] - interval[0])
         self._trees: tuple[Piece, IntervalSystem, PieceTree] | None = None
 
     def run(self, task: Task, max_nodes: int | None = None, deadline: float | None = None) -> TreeResult:
@@ -153,9 +170,13 @@ class Worker:
     def _on(self, piece: Piece) -> tuple[Piece, IntervalSystem, PieceTree]:
         if self._trees is None or self._trees[0] != piece:
             system, middle = self._make(piece), None
-            if float(piece.b - piece.a) > self._smallest:
+            share = float(piece.b - piece.a) / self._length
+            if share > SMALLEST_PIECE:
                 middle = self._make(Piece(piece.middle, piece.middle))
-            trees = PieceTree(system, middle, lambda leaf: self.leaves.excluded(piece, system, leaf))
+            convex = partial(self.leaves.convex, piece, system) if self.leaves.forms else None
+            trees = PieceTree(
+                system, middle, partial(self.leaves.excluded, piece, system), convex, long=share > LONG_PIECE
+            )
             self._trees = (piece, system, trees)
         return self._trees
 

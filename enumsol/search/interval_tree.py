@@ -13,14 +13,15 @@ from __future__ import annotations
 import time
 from collections import defaultdict
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from enumsol.relaxation.interval import IntervalEngine, IntervalSystem, interval_rows
+from enumsol.relaxation.interval import IntervalEngine, IntervalSystem, PieceForm, interval_rows
+from enumsol.search.interval_forms import PairedTerms, better_form
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, branching_node
 from enumsol.statuses import CONTACT, OPEN, UNDECIDED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -35,11 +36,14 @@ TRIED_AT_THE_END = 128
 #: What was left so many times in a row gets twice as many nodes every further time: some alpha may be an event of it.
 PATIENCE = 2
 #: Nodes of one tree, after which the rest of it goes to further trees over the same piece.
-LARGEST_TREE = 2048
+LARGEST_TREE = 4096
+#: A tree that leaves so many subtrees more than two for each of its roots is given up.
+MOST_CUT = 192
+#: Nodes of one tree, after which a form is tried in place of the energy.
+FORM_AFTER = 2048
 
 
-@dataclass(frozen=True)
-class EmptyLeaf:
+class EmptyLeaf(NamedTuple):
     """A partial assignment that holds no solution on a piece, with the multipliers that prove it.
 
     Attributes
@@ -47,19 +51,32 @@ class EmptyLeaf:
     codes : status codes, CONTACT and UNDECIDED included
     rows : int array, kind * p + node with the kinds of RowKind and IntervalRowKind
     values : float array, multipliers in the scaling of the piece's IntervalSystem
+    form : (4, p) array or None
+        Multipliers of the form whose bound they prove (theory, section 5.8); None for the energy.
     """
 
     codes: Codes
     rows: NDArray[np.intp]
     values: NDArray[np.float64]
+    form: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Subtree:
-    """A partial assignment to be searched below, and how many pieces in a row have left it to their halves."""
+    """A partial assignment to be searched below.
+
+    Attributes
+    ----------
+    codes : status codes
+    left : int
+        How many pieces in a row have left it to their halves.
+    form : PairedTerms or None
+        The form with which it was searched last.
+    """
 
     codes: Codes
     left: int = 0
+    form: PairedTerms | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass
@@ -109,9 +126,9 @@ class IntervalSplitting(PlaneSplitting):
 class _Program:
     """Relaxations over one piece, or at one alpha."""
 
-    def __init__(self, system: IntervalSystem) -> None:
+    def __init__(self, system: IntervalSystem, form: PieceForm | None = None) -> None:
         self.splitting = IntervalSplitting(system)
-        self._engine, self._p = IntervalEngine(system), system.p
+        self._engine, self._p = IntervalEngine(system, form), system.p
         self._rows = ImposedRows(self.splitting, system.p)
 
     def relax(self, item: _Item, parent: Relaxation | None) -> Relaxation:
@@ -161,34 +178,79 @@ class PieceTree:
         At its middle; None for a piece that is not to be cut.
     excluded : callable
         Whether a leaf is proven empty on the whole piece.
+    convex : callable or None
+        Whether a form of these multipliers is proven convex on the piece; None: forms are not to be used.
+    long : bool
+        Trees over the piece may be given up.
     """
 
     def __init__(
-        self, system: IntervalSystem, middle: IntervalSystem | None, excluded: Callable[[EmptyLeaf], bool]
+        self,
+        system: IntervalSystem,
+        middle: IntervalSystem | None,
+        excluded: Callable[[EmptyLeaf], bool],
+        convex: Callable[[NDArray[np.float64]], bool] | None = None,
+        *,
+        long: bool = False,
     ) -> None:
-        self._over, self._middle = _Program(system), None if middle is None else _Program(middle)
-        self._excluded = excluded
+        self._system, self._at_middle, self._long = system, middle, long
+        self._excluded, self._convex = excluded, convex
         self._result = TreeResult()
+        self._form: PairedTerms | None = None
+        self._multipliers: NDArray[np.float64] | None = None
+        self._over, self._middle = _Program(system), None if middle is None else _Program(middle)
 
     def run(self, roots: Sequence[Subtree], max_nodes: int, deadline: float | None = None) -> TreeResult:
         """Search below the roots, which are leaves of one tree, until a limit is reached."""
         self._result = result = TreeResult()
+        self._use(roots[0].form)
+        tried = self._convex is None
         stack = [_first(roots)]
         while stack:
+            if not tried and result.nodes >= FORM_AFTER:
+                tried = True
+                if self._use(better_form(self._system)):
+                    self._result = result = TreeResult(nodes=result.nodes)
+                    stack = [_first(roots)]
             if result.nodes >= max_nodes or (deadline is not None and time.perf_counter() > deadline):
                 for item in reversed(stack):
-                    result.rest += item.roots if item.above else [Subtree(item.codes, item.roots[0].left)]
+                    left = item.roots if item.above else [Subtree(item.codes, item.roots[0].left)]
+                    result.rest += self._with_form(left)
                 return result
             item = stack.pop()
-            children = list(self._examine(item, self._middle))
+            children = self._examine(item, self._middle)
             if children and children[0].middle is not None and children[0].middle.pruned and not item.above:
                 # empty at the middle
                 if not self._settled(children[::-1], TRIED_AT_ONCE):
-                    result.cut.append(Subtree(item.codes, item.roots[0].left + 1))
+                    result.cut.append(Subtree(item.codes, item.roots[0].left + 1, self._form))
+                    if self._long and len(result.cut) > MOST_CUT + 2 * len(roots):
+                        # the halves of the piece fare better from the beginning
+                        return TreeResult(cut=self._with_form(roots), nodes=result.nodes)
                 continue
-            stack.extend(reversed(children))
+            stack += children[::-1]
         self._try_again(max_nodes)
         return result
+
+    def _with_form(self, roots: Sequence[Subtree]) -> list[Subtree]:
+        return [Subtree(root.codes, root.left, self._form) for root in roots]
+
+    def _use(self, form: PairedTerms | None) -> bool:
+        """Solve relaxations with a form in place of the energy; whether it is convex."""
+        if form is self._form:
+            return form is not None
+        middle = self._at_middle
+        multipliers = over = at_middle = None
+        if form is not None and self._convex is not None:
+            multipliers = form.multipliers(self._system.F_lo)
+            over = PieceForm.of(self._system, multipliers) if self._convex(multipliers) else None
+        if form is None or over is None:
+            form = multipliers = None
+        elif middle is not None:
+            at_middle = PieceForm.of(middle, form.multipliers(middle.F_lo))
+        self._form, self._multipliers = form, multipliers
+        self._over = _Program(self._system, over)
+        self._middle = None if middle is None else _Program(middle, at_middle)
+        return form is not None
 
     def _try_again(self, max_nodes: int) -> None:
         """A last attempt at what is to be left to the halves, if it is little."""
@@ -203,20 +265,21 @@ class PieceTree:
         """Search a stack of nodes to its end without looking at the middle; if that takes too many, nothing is kept."""
         result = self._result
         before, kept = result.nodes, (len(result.empty), len(result.selections))
-        while stack and result.nodes - before <= nodes:
-            stack.extend(reversed(list(self._examine(stack.pop(), None))))
+        # every node that waits takes one at least
+        while stack and result.nodes - before + len(stack) <= nodes + 1:
+            stack += self._examine(stack.pop(), None)[::-1]
         if stack:
             del result.empty[kept[0] :], result.selections[kept[1] :]
         return not stack
 
-    def _examine(self, item: _Item, middle: _Program | None) -> Iterator[_Item]:
+    def _examine(self, item: _Item, middle: _Program | None) -> list[_Item]:
         """Settle one node of the tree, or give its children in the order in which they are examined."""
         result = self._result
         result.nodes += 1
         over: Relaxation | None = self._over.relax(item, item.over)
         assert over is not None
         if over.pruned and self._empty(item, over):
-            return
+            return []
         if over.pruned or over.stalled:
             # no other engine handles intervals: branched on without its minimiser
             over = None
@@ -229,58 +292,64 @@ class PieceTree:
                 at_middle = middle.relax(item, at_middle)
                 at_middle = None if at_middle.stalled else at_middle
         if item.above:
-            yield from _towards_roots(item, over, at_middle)
-            return
+            return _towards_roots(item, over, at_middle)
         guide = over if at_middle is None or at_middle.pruned else at_middle
         node, forced = branching_node(item.codes, item.forced, guide)
         if node < 0:
             result.selections.append(item.codes)
-            return
-        children = self._over.splitting.children(item.codes, node, guide)
+            return []
+        found, children = [], self._over.splitting.children(item.codes, node, guide)
         for k, code in enumerate(children):
             codes = (*item.codes[:node], code, *item.codes[node + 1 :])
-            yield _Item(codes, over, at_middle, (node,), k + 1 == len(children), item.roots, above=False, forced=forced)
+            last = k + 1 == len(children)
+            found.append(_Item(codes, over, at_middle, (node,), last, item.roots, above=False, forced=forced))
+        return found
 
     def _empty(self, item: _Item, over: Relaxation) -> bool:
         """Whether the relaxation proves the node empty, or all roots below it; roots that it does are taken out."""
         rows, values = over.multipliers()
-        leaves = [EmptyLeaf(root.codes, rows, values) for root in item.roots]
-        if not item.above:
-            leaves = [EmptyLeaf(item.codes, rows, values)]
-        proven = [self._excluded(leaf) for leaf in leaves]
-        self._result.empty += [leaf for leaf, empty in zip(leaves, proven, strict=True) if empty]
+        waiting = []
+        for root in item.roots if item.above else [item]:
+            leaf = EmptyLeaf(root.codes, rows, values, self._multipliers)
+            if self._excluded(leaf):
+                self._result.empty.append(leaf)
+            else:
+                waiting.append(root)
         if item.above:
-            item.roots = [root for root, empty in zip(item.roots, proven, strict=True) if not empty]
-        return all(proven)
+            item.roots = [root for root in waiting if isinstance(root, Subtree)]
+        return not waiting
 
 
 def _first(roots: Sequence[Subtree]) -> _Item:
     """The node from which the search comes to all roots."""
     roots = list(roots)
-    codes = _common([root.codes for root in roots])
+    codes = _common(roots)
     forced = () if set(codes) == {UNDECIDED} else None
     return _Item(codes, None, None, (), last=False, roots=roots, above=codes != roots[0].codes, forced=forced)
 
 
-def _common(roots: Sequence[Codes]) -> Codes:
+def _common(roots: Sequence[Subtree]) -> Codes:
     """The finest assignment that holds all of these."""
-    return tuple(_coarse(set(column)) for column in zip(*roots, strict=True))
+    first = roots[0].codes
+    if len(roots) == 1:
+        return first
+    columns = zip(first, *(root.codes for root in roots[1:]), strict=True)
+    return tuple(column[0] if column.count(column[0]) == len(column) else _coarse(column) for column in columns)
 
 
-def _coarse(codes: set[int]) -> int:
-    if len(codes) == 1:
-        return next(iter(codes))
+def _coarse(codes: Sequence[int]) -> int:
     return UNDECIDED if UNDECIDED in codes or OPEN in codes else CONTACT
 
 
-def _towards_roots(item: _Item, over: Relaxation | None, middle: Relaxation | None) -> Iterator[_Item]:
+def _towards_roots(item: _Item, over: Relaxation | None, middle: Relaxation | None) -> list[_Item]:
     """The children that hold the roots below a node."""
-    groups = _parted(item)
+    found, groups = [], _parted(item)
     for k, roots in enumerate(groups):
-        codes = _common([root.codes for root in roots])
+        codes = _common(roots)
         changed = tuple(i for i, (mine, its) in enumerate(zip(item.codes, codes, strict=True)) if mine != its)
-        above = len(roots) > 1
-        yield _Item(codes, over, middle, changed, k + 1 == len(groups), roots, above=above, forced=None)
+        last = k + 1 == len(groups)
+        found.append(_Item(codes, over, middle, changed, last, roots, above=len(roots) > 1, forced=None))
+    return found
 
 
 def _parted(item: _Item) -> list[list[Subtree]]:

@@ -47,7 +47,8 @@ class SpaceSplitting:
         if relaxation is None:
             return children
         if codes[node] == UNDECIDED:
-            return children[:: -1 if relaxation.forces[node] > -relaxation.displacements[node] else 1]
+            force, w = relaxation.at(node)
+            return children[:: -1 if force > -w else 1]
         if codes[node] == CONTACT and self._engine.tangents[node] == 1:
             return children
         tau, v = (self._system.tangential(x)[node] for x in (relaxation.forces, relaxation.displacements))

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
-
 from enumsol.kernel.rows import coverings_of, refines
 from enumsol.relaxation.rows import status_rows
 from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIDING, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
@@ -16,6 +14,7 @@ from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIDING, SLIP_MINUS, S
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from enumsol.relaxation.engine import Relaxation
@@ -60,8 +59,10 @@ class ImposedRows:
             self._known[node, code] = rows
         return rows
 
-    def over(self, codes: Codes, nodes: Iterable[int]) -> tuple[list[int], list[int]]:
+    def over(self, codes: Codes, nodes: Sequence[int]) -> tuple[list[int], list[int]]:
         """The rows of some nodes in a partial assignment, and their modes."""
+        if len(nodes) == 1:
+            return self.of(nodes[0], codes[nodes[0]])
         parts = [self.of(node, codes[node]) for node in nodes]
         return [row for rows, _ in parts for row in rows], [mode for _, modes in parts for mode in modes]
 
@@ -110,7 +111,7 @@ class PlaneSplitting:
         allowed: Sequence[frozenset[int]] | None = None,
         sliding: Mapping[int, int] | None = None,
     ) -> None:
-        self._F = F
+        self._F: list[float] = F.tolist()
         self._sliding = sliding if sliding is not None else {}
         self.friction = [bool(f > 0) for f in F]
         every = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS))
@@ -132,9 +133,8 @@ class PlaneSplitting:
         """Codes of the children, the one nearest to the minimiser first."""
         allowed = self._allowed[node]
         contact = [c for c in (STICK, SLIP_PLUS, SLIP_MINUS) if c in allowed]
-        p = len(codes)
         if relaxation is not None:
-            force, w = relaxation.forces, relaxation.displacements
+            normal, w_n = relaxation.at(node)
         if codes[node] in SLIDING:
             return list(SLIDING[codes[node]])
         if codes[node] == UNDECIDED and self.friction[node] and node in self._sliding:
@@ -145,16 +145,13 @@ class PlaneSplitting:
             children = [OPEN] if OPEN in allowed else []
             if (FRICTIONLESS in allowed) if touching == FRICTIONLESS else contact:
                 children.append(touching)
-            if relaxation is not None and force[node] > -w[node]:
+            if relaxation is not None and normal > -w_n:
                 children.reverse()
             return children
         if relaxation is not None:
-            w_t = w[p + node]
-            slack = self._F[node] * force[node] - abs(force[p + node])
-            order = {
-                STICK: 0.0 if slack > abs(w_t) else 2.0,
-                SLIP_PLUS: 1.0 - np.sign(w_t),
-                SLIP_MINUS: 1.0 + np.sign(w_t),
-            }
+            tangential, w_t = relaxation.at(len(codes) + node)
+            sign = (w_t > 0) - (w_t < 0)
+            sticks = self._F[node] * normal - abs(tangential) > abs(w_t)
+            order = {STICK: 0 if sticks else 2, SLIP_PLUS: 1 - sign, SLIP_MINUS: 1 + sign}
             contact.sort(key=lambda c: order[c])
         return contact

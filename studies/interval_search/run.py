@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 NOW = (interval_tree.TRIED_AT_ONCE, interval_tree.TRIED_AT_THE_END, interval.LARGEST_TREE)
 #: Nodes tried at once and at the end, largest tree.
-RULES = (NOW, (0, 128, 2048), (8, 128, 2048), (32, 128, 2048), (2, 32, 2048), (2, 1024, 2048), (2, 128, 512))
+RULES = (NOW, (0, 128, 4096), (8, 128, 4096), (32, 128, 4096), (2, 32, 4096), (2, 1024, 4096), (2, 128, 512))
 MAX_NODES = 60_000
 
 

@@ -52,6 +52,7 @@ def cases(*, smoke, large):
     yield "block p = 16, friction", lambda: gallery.clamped_block(16, 8), (0.1, 3), True
     if not large:
         return
+    yield "wedge p = 32, friction", lambda: gallery.wedge(4, 16), (0, 3), False
     yield "block p = 32, friction", lambda: gallery.clamped_block(32, 8), (0.1, 3), True
     yield "block p = 64, friction", lambda: gallery.clamped_block(64, 8), (0.1, 3), False
     yield "block p = 64, n = 8704, load", lambda: under_load(64, 67), (0, 1), False

@@ -7,8 +7,9 @@ is what arcs took as exact functions of alpha, of S and g as computed, in the sa
 than 24 degrees of freedom before there were balls (left out where it takes minutes). With ``--against`` an older
 version takes turns with this one; its times are in columns that end with ``before``.
 
-Read ``whole``: the checker found that every solution for every alpha of the interval lies on the arcs, for the
-problem's own matrices. ``width`` is the largest of the bounds of critical alphas, relative to alpha.
+Seconds are those of one processor. Read ``whole``: the checker found that every solution for every alpha of the
+interval lies on the arcs, for the problem's own matrices. ``width`` is the largest of the bounds of critical alphas,
+relative to alpha.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ CHILD = str(Path(__file__).with_name("cases.py"))
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--large", action="store_true", help="also p = 32 and 64, and n = 8704 (some minutes)")
+    parser.add_argument("--large", action="store_true", help="also p = 32 and 64, and n = 8704 (five minutes a round)")
     version_options(parser, rounds=3)
 
 

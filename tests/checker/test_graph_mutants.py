@@ -1,12 +1,13 @@
 """Mutation testing of graph proofs: a mutant that is accepted names every selection that holds somewhere, exactly."""
 
 import functools
+from contextlib import nullcontext
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from generators import through_the_unloaded_state
-from graph_proofs import without_arcs
+from graph_proofs import forms_at_once, without_arcs
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from oracles import exact_solutions
@@ -35,11 +36,20 @@ PATHS = {
 }
 
 
+#: The same with forms in place of the energy.
+BY_FORMS = {
+    "forms, friction": lambda: (PATHS["friction"]()[0], (0.5, 6.0)),
+    "forms, loading": PATHS["loading"],
+    "forms, both": PATHS["both"],
+}
+
+
 @functools.cache
 def case(name):
     """The problem, its proof's records, and per alpha the selections that hold there, in rationals."""
-    problem, interval = PATHS[name]()
-    graph = branch_graph(problem, interval)
+    problem, interval = (PATHS | BY_FORMS)[name]()
+    with forms_at_once() if name in BY_FORMS else nullcontext():
+        graph = branch_graph(problem, interval)
     a, b = (Fraction(end) for end in interval)
     alphas = {a + (b - a) * Fraction(k, SAMPLES) for k in range(SAMPLES + 1)}
     alphas |= {Fraction(float(v.alpha)) for v in graph.vertices} | {Fraction(0)}
@@ -109,10 +119,16 @@ def mutate(draw, records):
         records[k], records[other] = records[other], records[k]
     elif isinstance(record, dict):
         _mutate_header(draw, record)
-    elif how == "kind":
-        records[k] = [draw(st.sampled_from("sc")), record[1]]
-    elif record[0] == "x" and draw(st.booleans()):
+    elif how == "kind" and record[0] != "q":
+        kind = draw(st.sampled_from("scxf"))
+        records[k] = [kind, *record[1:]] if kind in "xf" else [kind, record[1]]
+    elif record[0] in ("x", "f") and draw(st.booleans()):
         _mutate_values(draw, record)
+    elif record[0] == "q":
+        values, j = record[draw(st.integers(1, 4))], draw(st.integers(0, len(record[1]) - 1))
+        values[j] = values[j] * draw(st.sampled_from((-1.0, 0.5, 1 + 1e-9, 2.0, 30.0))) + draw(
+            st.sampled_from((0.0, 0.1))
+        )
     else:
         _mutate_codes(draw, record)
 
@@ -122,14 +138,14 @@ def recount(records):
     lists = [record for record in records if isinstance(record, list)]
     claim = {
         "pieces": sum(isinstance(record, dict) and "piece" in record for record in records),
-        "leaves": sum(record[0] == "x" for record in lists),
+        "leaves": sum(record[0] in ("x", "f") for record in lists),
         "selections": len({record[1] for record in lists if record[0] == "s"}),
     }
     if isinstance(records[-1], dict) and "pieces" in records[-1]:
         records[-1] = claim
 
 
-@pytest.mark.parametrize("name", PATHS)
+@pytest.mark.parametrize("name", [*PATHS, *BY_FORMS])
 def test_accepted_mutants_name_every_selection_that_holds(name):
     problem, original, holding = case(name)
     accepted = []
@@ -158,10 +174,12 @@ def test_accepted_mutants_name_every_selection_that_holds(name):
 
 
 def test_the_originals_name_every_selection_that_holds():
-    for name in PATHS:
+    for name in (*PATHS, *BY_FORMS):
         problem, records, holding = case(name)
         report = verify(problem, proof_of(records))
         assert report.ok
         assert set().union(*holding.values()) <= report.selections
         # and there is something to lose: selections that hold at some alphas only
         assert len({frozenset(codes) for codes in holding.values()}) > 1
+        by_forms = sum(isinstance(record, list) and record[0] == "f" for record in records)
+        assert (by_forms > 0) == (name in BY_FORMS)

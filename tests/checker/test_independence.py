@@ -47,7 +47,9 @@ SHARED = {
     "condensation.unloaded": {"CondensedData", "vanishing_alpha"},
     "kernel.arc_selections": None,
     "kernel.arcs": None,
-    "kernel.interval": {"EnclosedPiece", "as_computed", "interval_exclusion_margin"},
+    "kernel.interval": {
+        *("EnclosedPiece", "as_computed", "interval_exclusion_margin", "interval_form_margins", "piece_forms"),
+    },
     "kernel.precise": None,
     "kernel.selection_rows": None,
     "kernel.closing": {"ClosedSolution", "closed_solution", "definite_sign", "same_solution"},

@@ -1,5 +1,6 @@
 """Whatever a result that was cut short prints or returns is true of the complete one (random problems and limits)."""
 
+import re
 from functools import cache
 
 import numpy as np
@@ -11,7 +12,7 @@ from generators import integer_problem as integer_data
 from generators import random_problem, singular_problem
 
 from enumsol import branch_graph, enumerate_roots, gallery, multiplicity_table
-from enumsol.branches import BranchGraph
+from enumsol.branches import BranchGraph, construction, tracing
 from enumsol.errors import Interrupted
 
 KINDS = ("friction", "load", "both")
@@ -92,6 +93,42 @@ def test_an_interruption_while_arcs_are_worked_out_keeps_those_that_are_done(nam
         branch_graph(problem, (0.0, 5.0), progress=progress)
     partial = caught.value.partial
     assert "interrupted after the arcs of" in partial.reasons[0]
+    assert list(false_claims_of_graph(partial, full)) == []
+
+
+def test_an_interruption_keeps_the_selections_of_a_group_that_are_finished(monkeypatch):
+    full = complete_graph("wedge-8-3")
+    asked, over_parts = [], tracing.over_parts
+
+    def interrupted(parts):
+        asked.append(len(parts))
+        if len(asked) == 6:
+            raise KeyboardInterrupt
+        return over_parts(parts)
+
+    monkeypatch.setattr(tracing, "over_parts", interrupted)
+    with pytest.raises(Interrupted) as caught:
+        branch_graph(full.problem, (0.0, 5.0))
+    partial = caught.value.partial
+    done = int(re.search(r"the arcs of (\d+) of", partial.reasons[0])[1])
+    assert 0 < done < full.stats.selections
+    assert partial.arcs
+    assert list(false_claims_of_graph(partial, full)) == []
+
+
+def test_exact_algebra_stops_soon_after_an_interrupted_search(monkeypatch):
+    full = complete_graph("chain-4")
+    assert full.stats.selections > 8
+    monkeypatch.setattr(construction, "_SELECTIONS_AFTER_INTERRUPT", 0)
+
+    def progress(stage, share):
+        if stage == "search" and share == 1.0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted) as caught:
+        branch_graph(full.problem, (0.0, 5.0), "fast", progress=progress)
+    partial = caught.value.partial
+    assert "the arcs of 8 of" in partial.reasons[1]
     assert list(false_claims_of_graph(partial, full)) == []
 
 

@@ -5,18 +5,26 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
-from enumsol.kernel.interval import EnclosedPiece, as_computed, interval_exclusion_margin
+from enumsol.kernel.interval import (
+    EnclosedPiece,
+    as_computed,
+    interval_exclusion_margin,
+    interval_form_margins,
+    piece_forms,
+)
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from fractions import Fraction
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from enumsol.condensation.exact import ExactCondensed
+    from enumsol.kernel.forms import EnclosedForm
     from enumsol.problem import ContactProblem
     from enumsol.relaxation.interval import IntervalSystem
     from enumsol.search.interval import Piece
@@ -27,6 +35,8 @@ if TYPE_CHECKING:
 
 #: Bounds must be this large [energy unit of the piece], so that a checker that sums in another order agrees.
 _MARGIN = 1e-12
+#: How often the error bound of an exclusion with a form is subtracted.
+_FORM_ERRORS = 4.0
 
 
 class VerifiedIntervalCertifier:
@@ -51,7 +61,10 @@ class VerifiedIntervalCertifier:
         self._rationals = ExactIntervalCertifier(exact) if exact is not None and exactly else None
         self._zero = zero if exact is None else exact.zero
         self._used_rationals = False
-        self._piece: tuple[Piece, Margin | None] | None = None
+        self._piece: tuple[Piece, EnclosedPiece | None, Margin | None] | None = None
+        self._forms: tuple[EnclosedPiece, NDArray[np.float64], tuple[EnclosedForm, ...]] | None = None
+
+    forms = True
 
     @property
     def checkable(self) -> bool:
@@ -60,7 +73,12 @@ class VerifiedIntervalCertifier:
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
-        margin = self._margin_on(piece, system)
+        enclosed, margin = self._on(piece, system)
+        if enclosed is not None and leaf.form is not None:
+            forms = self._forms_on(enclosed, leaf.form)
+            alone = np.array([leaf.codes], dtype=np.intp), np.zeros(len(leaf.rows), dtype=np.intp)
+            found = interval_form_margins(enclosed, forms, *alone, leaf.rows, leaf.values, _FORM_ERRORS)
+            return bool(found[0] > 0)
         if margin is not None:
             return margin(leaf.codes, leaf.rows, leaf.values) > _MARGIN
         if self._rationals is None:
@@ -68,11 +86,21 @@ class VerifiedIntervalCertifier:
         self._used_rationals = True
         return self._rationals.excluded(piece, system, leaf)
 
-    def _margin_on(self, piece: Piece, system: IntervalSystem) -> Margin | None:
+    def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
+        """Whether the form of these multipliers is proven convex on the piece, for all data in the balls."""
+        enclosed = self._on(piece, system)[0]
+        return enclosed is not None and all(one.smallest_eigenvalue > 0 for one in self._forms_on(enclosed, form))
+
+    def _forms_on(self, enclosed: EnclosedPiece, form: NDArray[np.float64]) -> tuple[EnclosedForm, ...]:
+        if self._forms is None or self._forms[0] is not enclosed or self._forms[1] is not form:
+            self._forms = enclosed, form, piece_forms(enclosed, form)
+        return self._forms[2]
+
+    def _on(self, piece: Piece, system: IntervalSystem) -> tuple[EnclosedPiece | None, Margin | None]:
         if self._piece is None or self._piece[0] != piece:
             enclosed = self._make(piece, system)
-            self._piece = (piece, None if enclosed is None else _margin(enclosed))
-        return self._piece[1]
+            self._piece = (piece, enclosed, None if enclosed is None else _margin(enclosed))
+        return self._piece[1:]
 
     def _make(self, piece: Piece, system: IntervalSystem) -> EnclosedPiece | None:
         if self._enclosure is None:

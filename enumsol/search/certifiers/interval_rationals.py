@@ -15,6 +15,9 @@ from enumsol.statuses import RowKind
 if TYPE_CHECKING:
     from fractions import Fraction
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.relaxation.interval import IntervalSystem
     from enumsol.search.interval import Piece
@@ -36,7 +39,7 @@ class ExactIntervalCertifier:
     exact : ExactCondensed
     """
 
-    checkable = False
+    checkable = forms = False
 
     def __init__(self, exact: ExactCondensed) -> None:
         self._exact = exact
@@ -58,6 +61,11 @@ class ExactIntervalCertifier:
 
         terms = list(accepted(leaf.rows, leaf.values, imposed, system.scaled))
         return all(self._positive(terms, *solvers) for solvers in ends)
+
+    def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
+        """Forms are not used."""
+        del piece, system, form
+        return False
 
     def _systems_of(self, piece: Piece) -> list[tuple[ExactSelections, ExactSelections]]:
         """At both ends, with the smallest and with the largest coefficients on the piece."""
