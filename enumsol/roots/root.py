@@ -164,14 +164,19 @@ class Root(ContactState):
         return self._condensed.problem
 
     def plot_body(self, ax: Any = None, *, scale: float | None = None) -> Any:
-        """The deformed body with contact forces as arrows and contact nodes by status; matplotlib Axes.
+        """The deformed body with contact forces as arrows and contact nodes by status.
 
         Parameters
         ----------
         ax : matplotlib Axes or None
-            None: those of a new figure.
+            Draw there; None: in a new figure.
         scale : float, optional
             Displacements are multiplied by it; default so that they can be seen. The title tells it.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Notebooks show it.
 
         Raises
         ------

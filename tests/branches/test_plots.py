@@ -202,6 +202,8 @@ def test_title_units_and_other_axes(graphs):
     axes = new_figure().subplots(1, 2)
     assert graphs["square"].plot("lambda_n", [0], ax=axes[1]) is axes[1].figure
     assert not axes[0].lines
+    above, _ = new_figure().subfigures(2)
+    assert graphs["square"].plot(ax=above.subplots()) is above.canvas.figure
     assert "side by side" not in axes[1].get_xlabel()
     assert axes[1].get_legend() is not None
     assert figure._repr_png_().startswith(b"\x89PNG")
