@@ -11,7 +11,7 @@ from references import NUMBER, OWN_REFERENCE, THEORY_REFERENCE, headings, labels
 
 ROOT = Path(__file__).parent.parent
 THEORY = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
-DOCUMENTS = [ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 SOURCES = sorted(
     path
     for folder in ("enumsol", "tests", "studies", "tools")
@@ -103,7 +103,9 @@ def test_references_in_documents(path):
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_equations_referred_to_inside_documents(path):
     text = path.read_text(encoding="utf-8")
-    body = THEORY_REFERENCE.sub("", re.sub(r"^    .*$", "", text, flags=re.MULTILINE))
+    body = THEORY_REFERENCE.sub(
+        "", joined(re.sub(r"^    [^\n]*$|^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL))
+    )
     # pairs of data, such as (1.5, -4), have no such form
     assert set(re.findall(r"\((\d+\.\d+)\)", body)) <= set(labels(text))
 
