@@ -1,5 +1,7 @@
 """What README shows runs as it stands, and what its comments say comes out."""
 
+import re
+
 import pytest
 from documents import ROOT, blocks, follow, write_wedge
 
@@ -42,6 +44,12 @@ def test_branches(seen):
     assert graph.complete
     assert graph.multiplicity_at(3.5) == 5
     assert graph.uniqueness_limit == 3
+
+
+def test_links_lead_somewhere():
+    links = re.findall(r"\]\(([^)]+)\)", README.read_text(encoding="utf-8"))
+    assert len(links) >= 10
+    assert [link for link in links if not (ROOT / link).is_file()] == []
 
 
 def test_the_two_commands_are_there():
