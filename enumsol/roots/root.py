@@ -282,6 +282,16 @@ class RootFamily:
         """All vertices, shape (k, p, 2), without repetition, in lexical order."""
         return sealed(np.unique(np.concatenate([part.vertices for part in self.polytopes]), axis=0))
 
+    def _repr_html_(self) -> str:
+        index = "unknown" if self.index is None else f"{self.index:+d}"
+        heading = f"RootFamily at alpha = {float(self.alpha):g}: index {index}, dimension {self.dimension}"
+        rows = [
+            (k, part.dimension, len(part.vertices), f"{np.max(part.vertices[..., 0]):.6g}", summary(part.statuses))
+            for k, part in enumerate(self.polytopes)
+        ]
+        heads = ("polytope", "dimension", "vertices", "largest lambda_n", "contact")
+        return html_lines([heading]) + html_table(heads, rows[:_PRINTED_NODES])
+
 
 def root_heading(root: Any) -> str:
     """The first line of a printed root, in 2D or 3D."""
