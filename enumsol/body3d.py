@@ -101,7 +101,7 @@ class BodyMesh(Sealed):
 
 
 class SlipMean(Immutable):
-    """The slip that coefficients depend on, as weighted means of |u_t|: the return operator r_h (paper, Section 3).
+    """The slip that coefficients depend on, as weighted means of ``|u_t|``: the return operator r_h (paper, Section 3).
 
     The slips are ``weights @ |(T1 u, T2 u) - offset|``.
 

@@ -45,6 +45,11 @@ def _figure_class() -> Any:
     return NotebookFigure
 
 
+def figure_of(ax: Any) -> Any:
+    """The whole figure that axes belong to, through subfigures."""
+    return ax.figure.canvas.figure
+
+
 def axes_or_none(ax: Any) -> Any:
     """The axes that a picture is drawn into; None for those of a new figure.
 

@@ -55,7 +55,7 @@ class ConstantFriction(Sealed):
 
 
 class FrictionTable(Immutable):
-    """Coefficients as piecewise linear functions of the slip |u_t|, constant beyond the last one.
+    """Coefficients as piecewise linear functions of the slip ``|u_t|``, constant beyond the last one.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class FrictionFunction:
     Attributes
     ----------
     function : callable
-        Of the row number of a contact node and its slip |u_t| [length]; returns one coefficient, or F1 and F2 [-].
+        Of the row number of a contact node and its slip ``|u_t|`` [length]; returns one coefficient, or F1 and F2 [-].
     labels : tuple
         Names of the contact nodes, for messages.
     """

@@ -55,8 +55,8 @@ class ContactProblem3D(ContactBody):
         Initial normal gap [length]; negative is a press fit.
     friction : float, pair, FrictionTable or callable
         Coefficients [-]: one number; a pair (F1, F2), each a number or a (p,) array; or, for successive approximations
-        only, Lipschitz functions of the slip |u_t|: a `FrictionTable`, or a callable F(node, slip) of the row number
-        and the slip that returns one coefficient or two.
+        only, Lipschitz functions of the slip ``|u_t|``: a `FrictionTable`, or a callable F(node, slip) of the row
+        number and the slip that returns one coefficient or two.
     friction_slope : float or pair
         Derivatives of F1 and F2 with respect to alpha [1 / unit of alpha].
     load_slope : (n,) array_like or None
@@ -72,7 +72,7 @@ class ContactProblem3D(ContactBody):
     mesh : BodyMesh or None
         The mesh the problem was made of.
     slip_mean : SlipMean or None
-        The slip that friction depends on, where it is not |u_t| of the node itself.
+        The slip that friction depends on, where it is not ``|u_t|`` of the node itself.
 
     Raises
     ------

@@ -43,7 +43,7 @@ class Browser:
         targets = self.call("Target.getTargets")["targetInfos"]
         target = next(item["targetId"] for item in targets if item["type"] == "page")
         self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        for domain in ("Page", "Runtime", "Log", "Network"):
+        for domain in ("Page", "Runtime", "Log", "Network", "Inspector"):
             self.call(f"{domain}.enable")
         self.size(width, height)
 
@@ -59,6 +59,7 @@ class Browser:
             if answer.get("id") == number:
                 assert "error" not in answer, answer
                 return answer["result"]
+            assert answer.get("method") != "Inspector.targetCrashed", "the page has crashed: it will never answer"
             self._events.append(answer)
 
     def _message(self):

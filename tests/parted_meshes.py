@@ -9,7 +9,7 @@ EDGES = {3: ((0, 1), (1, 2), (2, 0)), 4: ((0, 1), (1, 2), (2, 3), (3, 0))}
 
 
 def grid(nx, ny, kind, length=1.0, height=1.0, shake=0.0, seed=0):
-    """A rectangle of triangles (3, 6) or quadrilaterals (4, 9) with four sides, distorted inside."""
+    """A rectangle of triangles (3, 6) or quadrilaterals (4, 8, 9) with four sides, distorted inside."""
     x, y = np.meshgrid(np.linspace(0, length, nx + 1), np.linspace(0, height, ny + 1))
     points = np.stack([x.ravel(), y.ravel()], axis=1)
     number = np.arange(len(points)).reshape(ny + 1, nx + 1)
@@ -18,7 +18,7 @@ def grid(nx, ny, kind, length=1.0, height=1.0, shake=0.0, seed=0):
     cells = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) if corners == 3 else quads
     sides = {"bottom": number[0], "top": number[-1], "left": number[:, 0], "right": number[:, -1]}
     edges = {name: np.stack([line[:-1], line[1:]], axis=1) for name, line in sides.items()}
-    if kind in (6, 9):
+    if kind in (6, 8, 9):
         points, cells, edges = _second_order(points, cells, edges, kind)
     inside = np.all((points > 1e-9) & (points < np.array([length, height]) - 1e-9), axis=1)
     points[inside] += np.random.default_rng(seed).uniform(-shake, shake, (inside.sum(), 2))

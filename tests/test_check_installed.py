@@ -4,6 +4,7 @@ import struct
 
 import pytest
 from check_installed import complaints, sections
+from documents import ROOT
 
 
 def elf(*names):
@@ -41,3 +42,14 @@ def test_a_file_of_another_system_has_no_sections(tmp_path):
     file = tmp_path / "module.so"
     file.write_bytes(b"\xcf\xfa\xed\xfe" + bytes(100))
     assert sections(file) == []
+
+
+def test_a_source_distribution_holds_every_folder_and_document():
+    words = (ROOT / "MANIFEST.in").read_text(encoding="utf-8").split()
+    made = {"enumsol", "build", "dist", "site"}
+    folders = {path.name for path in ROOT.iterdir() if path.is_dir() and not path.name.startswith((".", "_"))}
+    assert {name for name in folders - made if not name.endswith(".egg-info")} == {"docs", "studies", "tests", "tools"}
+    assert set(words) >= {"docs", "studies", "tests", "tools", ".ci"}
+    # README, licence and pyproject.toml come by themselves
+    documents = {path.name for path in ROOT.iterdir() if path.suffix in {".md", ".cff"}} - {"README.md"}
+    assert set(words) >= documents

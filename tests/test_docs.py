@@ -7,40 +7,25 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from references import NUMBER, OWN_REFERENCE, THEORY_REFERENCE, headings, labels
 
 ROOT = Path(__file__).parent.parent
 THEORY = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
-DOCUMENTS = [ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 SOURCES = sorted(
     path
-    for folder in ("enumsol", "tests", "studies")
+    for folder in ("enumsol", "tests", "studies", "tools")
     for suffix in ("py", "pyx")
     for path in (ROOT / folder).rglob(f"*.{suffix}")
     if path != Path(__file__)
 )
 
-NUMBER = r"\d+(?:\.\d+)?"
-_SECTIONS = rf"section {NUMBER}|sections {NUMBER}(?:(?:, | and | to |-){NUMBER})+"
-_EQUATIONS = r"\(\d+\.\d+\)(?:(?:, | and | to )\(\d+\.\d+\))*"
-_ITEM = rf"(?:{_SECTIONS}|{_EQUATIONS})"
-THEORY_REFERENCE = re.compile(rf"theory, {_ITEM}(?:(?:, | and |; ){_ITEM})*")
 THEORY_WORD = re.compile(r"\btheory\b(?!\.md)", re.IGNORECASE)
-OWN_REFERENCE = re.compile(rf"\b(?:{_SECTIONS})")
 PAPER_ITEM = re.compile(
     rf"\b(Algorithm|Definition|Theorem|Lemma|Remark|Examples?|Sections?) ({NUMBER})(?:(?:, | and | to |-)({NUMBER}))?"
 )
 #: Where a theorem may come from: the paper, or a work in the theory's list of references.
 SOURCE = re.compile(r"(?:\bpaper,|\bpaper's|\bHigham(?: 2002)?,) $")
-
-
-def headings(text):
-    """Numbers of the sections of a document, in order."""
-    return re.findall(rf"^#+ ({NUMBER})\.? ", text, re.MULTILINE)
-
-
-def labels(text):
-    """Numbers of the equations of a document, in order: each ends a line of an indented block."""
-    return re.findall(r"^    .*\((\d+\.\d+)\)$", text, re.MULTILINE)
 
 
 def paper_items(text):
@@ -118,7 +103,9 @@ def test_references_in_documents(path):
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_equations_referred_to_inside_documents(path):
     text = path.read_text(encoding="utf-8")
-    body = THEORY_REFERENCE.sub("", re.sub(r"^    .*$", "", text, flags=re.MULTILINE))
+    body = THEORY_REFERENCE.sub(
+        "", joined(re.sub(r"^    [^\n]*$|^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL))
+    )
     # pairs of data, such as (1.5, -4), have no such form
     assert set(re.findall(r"\((\d+\.\d+)\)", body)) <= set(labels(text))
 

@@ -1,33 +1,36 @@
 """What docs/from_a_mesh.md shows runs as it stands, and what it says comes out; gmsh's own mesh where gmsh is."""
 
-import re
-import shlex
 import subprocess
 import sys
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
+from documents import ROOT, blocks, follow, write_wedge
 
 import enumsol
 from enumsol import fem
-from enumsol.cli import main
 
-TEXT = (Path(__file__).parent.parent / "docs" / "from_a_mesh.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
-(GMSH,) = re.findall(r"```text\n(.*?)```", TEXT, re.DOTALL)
-(TOML,) = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
-LINES = re.findall(r"^    (enumsol (?:.*\\\n)*.*)$", TEXT, re.MULTILINE)
-COMMANDS = [shlex.split(line.replace("\\\n", " "))[1:] for line in LINES]
+PAGE = ROOT / "docs" / "from_a_mesh.md"
+(GMSH,) = [text for kind, text in blocks(PAGE) if kind == "text"]
 
 
 @pytest.fixture(scope="module")
-def seen():
-    names = {}
-    for block in BLOCKS:
-        exec(block, names)
-    return names
+def seen(tmp_path_factory):
+    """The page, followed with a wedge of another program in place of gmsh's."""
+    pytest.importorskip("meshio")
+    folder = tmp_path_factory.mktemp("page")
+    write_wedge(folder / "punch.msh")
+    return {**follow(PAGE, folder), "folder": folder}
+
+
+def test_the_commands(seen):
+    assert len(seen["outputs"]) == 3
+    for _, text in seen["outputs"]:
+        assert "complete: yes (proven)" in text
+    written, described = seen["folder"] / "punch.npz", seen["folder"] / "punch.toml"
+    assert enumsol.read_problem(written).fingerprint == fem.read_mesh_problem(described).fingerprint
+    assert seen["body"].p == seen["block"].p
 
 
 def test_a_block(seen):
@@ -82,38 +85,7 @@ def test_a_mirrored_pair_is_half_of_it_on_a_rigid_foundation(seen):
 
 
 @pytest.mark.skipif(find_spec("gmsh") is None, reason="gmsh is not installed")
-def test_from_gmsh_to_the_roots(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    Path("punch.py").write_text(GMSH)
-    subprocess.run([sys.executable, "punch.py"], check=True, capture_output=True)
-    _commands(capsys)
-
-
-def test_the_commands_on_a_mesh_of_another_program(tmp_path, monkeypatch, capsys):
-    """The same body as gmsh makes it, structured."""
-    meshio = pytest.importorskip("meshio")
-    monkeypatch.chdir(tmp_path)
-    mesh = fem.trapezoid(3, 3, bottom=1.0, top=1.8, height=1.0)
-    lines = [fem.edges_along(part) for part in (mesh.bottom, mesh.right, mesh.top, mesh.left)]
-    blocks = [("triangle", mesh.triangles), *(("line", edges) for edges in lines)]
-    tags = [np.full(len(block[1]), k) for k, block in enumerate(blocks)]
-    body = meshio.Mesh(
-        np.c_[mesh.points, np.zeros(16)],
-        blocks,
-        cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
-        field_data={name: np.array([k + 1, 1]) for k, name in enumerate(SIDES)},
-    )
-    body.write("punch.msh", file_format="gmsh22", binary=False)
-    _commands(capsys)
-
-
-SIDES = ("tip", "right", "top", "left")
-
-
-def _commands(capsys):
-    Path("punch.toml").write_text(TOML)
-    assert len(COMMANDS) == 2
-    for command in COMMANDS:
-        assert main(command) == 0, capsys.readouterr()
-        assert "complete: yes (proven)" in capsys.readouterr().out
-    assert enumsol.read_problem("punch.npz").fingerprint == fem.read_mesh_problem("punch.toml").fingerprint
+def test_from_gmsh_to_the_roots(tmp_path):
+    subprocess.run([sys.executable, "-c", GMSH], check=True, capture_output=True, cwd=tmp_path)
+    seen = follow(PAGE, tmp_path)
+    assert all("complete: yes (proven)" in text for _, text in seen["outputs"])

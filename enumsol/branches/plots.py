@@ -14,7 +14,7 @@ from enumsol.branches.quantities import Quantity, quantity_of, state_columns
 from enumsol.branches.zooms import narrow_changes
 from enumsol.checks import alpha_interval, positive_number, shown
 from enumsol.errors import InvalidArgumentError
-from enumsol.figures import axes_or_none, new_figure
+from enumsol.figures import axes_or_none, figure_of, new_figure
 from enumsol.texts import counted
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def plot_graph(
     if ax is None:
         figure, axes = _grid(len(rows), multiplicity, len(windows), figsize)
     else:
-        figure, axes = ax.figure, [[ax]]
+        figure, axes = figure_of(ax), [[ax]]
     columns = [graph.interval, *windows]
     panels, dots = [], False
     for column, window in zip(axes, columns, strict=True):

@@ -169,7 +169,7 @@ def _basins(
     roots = enumerate_roots(body, alpha)
     table, ended = so_far(lambda: basin_table(body, roots, starts, **options))
     deliver(
-        (plot_file, lambda path: write_figure(path, plot_basins(table).figure)),
+        (plot_file, lambda path: write_figure(path, plot_basins(table))),
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: _basin_text(table, len(roots), roots.completeness()),

@@ -260,10 +260,10 @@ class _Followed:
 
     def draw(self, over: BranchGraph | None, node: int, quantity: str) -> Any:
         """A figure of all paths."""
-        axes = self.paths[0].plot(over, node=node, quantity=quantity)
+        figure = self.paths[0].plot(over, node=node, quantity=quantity)
         for path in self.paths[1:]:
-            path.plot(ax=axes, node=node, quantity=quantity)
-        return axes.figure
+            path.plot(ax=figure.axes[0], node=node, quantity=quantity)
+        return figure
 
 
 def _passes(path: Path, root: Root) -> bool:

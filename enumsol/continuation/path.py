@@ -72,7 +72,7 @@ class Path(PathData):
     def plot(
         self, graph: Any = None, *, node: int = 0, quantity: str = "lambda_n", ax: Any = None, **graph_options: Any
     ) -> Any:
-        """Axes with the accepted steps as dots, transition points as circles, folds as squares and the start as a star.
+        """A figure of the accepted steps as dots, transition points as circles, folds as squares, the start as a star.
 
         The spacing of the dots is the step control. With a graph its branches are drawn underneath.
 
@@ -84,7 +84,12 @@ class Path(PathData):
             Contact node (row number).
         quantity : {"lambda_n", "lambda_t", "u_n", "u_t"}
         ax : matplotlib Axes or None
-            Of an earlier plot, to add a path to it; ``ax.figure.savefig`` writes the figure.
+            Draw there, for example in ``figure.axes[0]`` of an earlier plot to add a path to it.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Notebooks show it.
 
         Raises
         ------

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from enumsol.checks import one_of, row_number
 from enumsol.continuation.path_data import PointKind
 from enumsol.errors import InvalidArgumentError
-from enumsol.figures import new_figure
+from enumsol.figures import axes_or_none, figure_of, new_figure
 
 if TYPE_CHECKING:
     from enumsol.continuation.path_data import PathData
@@ -24,7 +24,7 @@ def draw_path(path: PathData, graph: Any, node: int, quantity: str, ax: Any, gra
     if graph is not None:
         # the graph draws a figure of its own; its first panel is this node's, and no zoom shows the path
         ax = graph.plot(quantity, [path.node_ids[node]], **{"zoom": False, **graph_options}).axes[0]
-    elif ax is None:
+    elif axes_or_none(ax) is None:
         ax = new_figure().subplots()
     values = getattr(path, quantity)[:, node]
     dots = [k for k, kind in enumerate(path.kinds) if kind in (PointKind.STEP, PointKind.END)]
@@ -45,4 +45,4 @@ def draw_path(path: PathData, graph: Any, node: int, quantity: str, ax: Any, gra
         ax.set_title(f"path for alpha in [{path.alpha.min():g}, {path.alpha.max():g}]: {path.status.value}", fontsize=9)
     named = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))  # of several paths once
     ax.legend(handles=list(named.values()), labels=list(named), fontsize=7, frameon=False)
-    return ax
+    return figure_of(ax)

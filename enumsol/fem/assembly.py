@@ -1,6 +1,6 @@
 """A plane body on a rigid foundation: stiffness by scikit-fem, loads, and the ContactProblem.
 
-Cells are triangles or quadrilaterals of first or second order, with 3, 6, 4 or 9 nodes in the order of VTK and gmsh.
+Cells are triangles or quadrilaterals of first or second order, with 3, 6, 4, 8 or 9 nodes in the order of VTK and gmsh.
 Degrees of freedom before constraints are ``2 node + component``. A problem is put together from plain arrays::
 
     loads = edge_forces(points, top_edges, (0.3, -1.0))
@@ -47,8 +47,9 @@ def stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) ->
     ----------
     points : (N, 2) array_like
         Positions of the nodes [length].
-    cells : (M, 3), (M, 4), (M, 6) or (M, 9) array_like of int
-        Nodes of each cell: its corners, then those on its edges, then that inside; edges of 6 or 9 may be curved.
+    cells : (M, k) array_like of int
+        Nodes of each cell: its corners, then those on its edges, then that inside; 3 or 6 nodes of triangles, 4, 8
+        or 9 of quadrilaterals. Edges with three nodes may be curved.
     lame : (float, float)
         Lame coefficients l, m [force / length^2]; for plane stress those of `lame`.
 
@@ -83,7 +84,7 @@ def plane_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[NDArray[np.float64]
         They are not of the form that `stiffness` takes.
     """
     nodes = positions(points, 2)
-    return nodes, elements(cells, "cells", (3, 4, 6, 9), len(nodes))
+    return nodes, elements(cells, "cells", (3, 4, 6, 8, 9), len(nodes))
 
 
 def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> NDArray[np.float64]:

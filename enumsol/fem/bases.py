@@ -6,7 +6,7 @@ Degrees of freedom here are ``dimension node + component``; scikit-fem has an or
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,7 +38,7 @@ class CellKind:
     Attributes
     ----------
     name : in messages
-    mesh, element : scikit-fem's classes
+    mesh, element : scikit-fem's classes; of "MeshQuadS2" it has the element only
     corners, facet_corners : nodes of a cell, and of a facet of it, that are corners
     degree : of the quadrature of its stiffness
     simplex : whether the corners may come in any order
@@ -58,6 +58,7 @@ KINDS = {
     (2, 3): CellKind("triangles", "MeshTri1", "ElementTriP1", 3, 2, 0, simplex=True),
     (2, 4): CellKind("quadrilaterals", "MeshQuad1", "ElementQuad1", 4, 2, 3),
     (2, 6): CellKind("quadratic triangles", "MeshTri2", "ElementTriP2", 3, 2, 4),
+    (2, 8): CellKind("quadratic quadrilaterals with 8 nodes", "MeshQuadS2", "ElementQuadS2", 4, 2, 5),
     (2, 9): CellKind("quadratic quadrilaterals", "MeshQuad2", "ElementQuad2", 4, 2, 5),
     (3, 4): CellKind("tetrahedra", "MeshTet1", "ElementTetP1", 4, 3, 0, simplex=True),
     (3, 8): CellKind("hexahedra", "MeshHex1", "ElementHex1", 8, 4, 3),
@@ -70,6 +71,7 @@ CELL_FACETS = {
     (2, 3): np.array([[0, 1], [1, 2], [2, 0]]),
     (2, 4): np.array([[0, 1], [1, 2], [2, 3], [3, 0]]),
     (2, 6): np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]]),
+    (2, 8): np.array([[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]]),
     (2, 9): np.array([[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]]),
     (3, 4): np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
     (3, 8): np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]),
@@ -188,12 +190,26 @@ def nodal_basis(nodes: Floats, cells: Integers, degree: int = 0) -> NodalBasis:
     element = getattr(skfem, kind.element)()
     order = max(kind.degree, degree)
     _check_jacobians(nodes[rows], element, get_quadrature(element, order)[0])
-    mesh = getattr(skfem, kind.mesh)(np.ascontiguousarray(nodes.T), np.ascontiguousarray(rows.T))
+    mesh_class = _serendipity() if kind.mesh == "MeshQuadS2" else getattr(skfem, kind.mesh)
+    mesh = mesh_class(np.ascontiguousarray(nodes.T), np.ascontiguousarray(rows.T))
     basis = skfem.Basis(mesh, skfem.ElementVector(element), intorder=order)
     dofs = np.empty(nodes.shape, dtype=np.int64)
     local = basis.element_dofs.reshape(cells.shape[1], dimension, len(cells))
     dofs[rows.T] = np.swapaxes(local, 1, 2)
     return NodalBasis(basis, dofs, np.unique(cells[:, : kind.corners]))
+
+
+@cache
+def _serendipity() -> Any:
+    """A mesh class of quadrilaterals without a node inside, like scikit-fem's MeshQuad2 but for its element."""
+    import skfem  # as above
+
+    names = {
+        "__annotations__": {"elem": type},
+        "elem": skfem.ElementQuadS2,
+        "bndelem": property(lambda mesh: skfem.ElementLineP2()),
+    }
+    return dataclass(repr=False)(type("MeshQuadS2", (skfem.MeshQuad2,), names))
 
 
 def _check_jacobians(corners: Floats, element: Any, quadrature: Floats) -> None:

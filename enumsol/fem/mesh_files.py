@@ -30,20 +30,23 @@ if TYPE_CHECKING:
 
 #: By dimension: the facets of each kind of cell, by meshio's names.
 _FACET_OF = {
-    2: {"triangle": "line", "quad": "line", "triangle6": "line3", "quad9": "line3"},
+    2: {"triangle": "line", "quad": "line", "triangle6": "line3", "quad8": "line3", "quad9": "line3"},
     3: {"tetra": "triangle", "hexahedron": "quad"},
 }
 #: By dimension: other cells that files may hold.
 _IGNORED = {2: ("vertex",), 3: ("vertex", "line")}
 _EXPECTED = {
-    2: "either triangle or quad with line, or triangle6 or quad9 with line3",
+    2: "either triangle or quad with line, or triangle6, quad8 or quad9 with line3",
     3: "either tetra with triangle or hexahedron with quad (of first order)",
 }
 _BODIES = {2: "triangles or quadrilaterals", 3: "tetrahedra or hexahedra"}
 #: What makes gmsh write other cells.
 _HINTS = {
-    ("quad8",): " (for quad9 set Mesh.SecondOrderIncomplete = 0 in gmsh)",
+    (
+        "tetra10",
+    ): " (for tetra set Mesh.ElementOrder = 1 in gmsh; facets of 6 nodes carry no pressure at their corners)",
     ("quad", "triangle"): " (for quad alone set Mesh.SubdivisionAlgorithm = 1 in gmsh)",
+    ("quad8", "triangle6"): " (for quad8 alone set Mesh.SubdivisionAlgorithm = 1 in gmsh)",
     ("quad9", "triangle6"): " (for quad9 alone set Mesh.SubdivisionAlgorithm = 1 in gmsh)",
 }
 #: Third coordinates of a plane mesh may differ by this share of its extent.
@@ -73,7 +76,7 @@ _DAMAGE = (
 def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -> PartedMesh:
     """Mesh of a body in 2D or 3D with its named parts, from a file that meshio reads or from a meshio.Mesh.
 
-    In 2D the cells are triangles or quadrilaterals, of first or of second order (6 or 9 nodes), in 3D tetrahedra or
+    In 2D the cells are triangles or quadrilaterals, of first or of second order (6, 8 or 9 nodes), in 3D tetrahedra or
     hexahedra of first order. The third coordinate of a plane mesh is left out; it must be the same everywhere.
 
     Parts are the lines (in 3D triangles or quadrilaterals) that the file holds, by the names of their cell sets or

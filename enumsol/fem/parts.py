@@ -29,7 +29,7 @@ class PartedMesh:
         Positions of the nodes [length].
     cells : (M, k) int array
         Nodes of each cell, in the order of VTK and gmsh: its corners, then those on its edges, then that inside. In 2D
-        3 or 6 nodes of triangles, 4 or 9 of quadrilaterals; in 3D 4 of tetrahedra, 8 of hexahedra.
+        3 or 6 nodes of triangles, 4, 8 or 9 of quadrilaterals; in 3D 4 of tetrahedra, 8 of hexahedra.
     facets : mapping of names to (k, m) int arrays
         Nodes of the facets of parts of the boundary: corners, then, on edges of second order, the node between them.
     node_sets : mapping of names to (k,) int arrays

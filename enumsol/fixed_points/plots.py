@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.figures import new_figure
+from enumsol.figures import axes_or_none, figure_of, new_figure
 from enumsol.texts import counted
 
 if TYPE_CHECKING:
@@ -25,12 +25,12 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     table : DataFrame
         Of `basin_table`.
     ax : matplotlib Axes or None
-        None: those of a new figure.
+        Draw there; None: in a new figure.
 
     Returns
     -------
-    matplotlib.axes.Axes
-        The roots that no start reaches are named in its title.
+    matplotlib.figure.Figure
+        The roots that no start reaches are named in its title. Notebooks show it.
 
     Raises
     ------
@@ -42,9 +42,7 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     missing = {"size", "iterations", "root", "outcome"} - set(getattr(table, "columns", ()))
     if missing:
         raise InvalidArgumentError(f"table lacks {', '.join(sorted(missing))}; expected what basin_table returns")
-    if ax is not None and not hasattr(ax, "set_xscale"):
-        raise InvalidArgumentError(f"ax is a {type(ax).__name__}; expected the Axes of a figure, or None")
-    if ax is None:
+    if axes_or_none(ax) is None:
         ax = new_figure(figsize=(6.4, 4.2)).subplots()
     from matplotlib.ticker import MaxNLocator  # there, where there are axes
 
@@ -70,4 +68,4 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     names = ", ".join(map(str, never))
     ax.set_title(f"never reached: {'roots' if len(never) > 1 else 'root'} {names}" if names else "never reached: none")
     ax.legend()
-    return ax
+    return figure_of(ax)

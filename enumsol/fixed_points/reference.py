@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class TrescaReference:
-    """Minimise u' A u / 2 - f' u + sum_i s_i |F_i u_t,i| subject to Bn u <= gap.
+    """Minimise u' A u / 2 - f' u + sum_i s_i ``|F_i u_t,i|`` subject to Bn u <= gap.
 
     Slip bounds, coefficients and load are parameters, so that CVXPY canonicalizes the problem only once
     for many solutions. The multipliers of the constraints are the contact forces.

@@ -73,8 +73,8 @@ def solve_tresca(
 ) -> TrescaSolution:
     """The one solution of the contact problem with friction of Tresca's type (theory, section 11.2).
 
-    |tau| <= s replaces |tau| <= lambda_n, lambda_t = F(alpha) tau: slip bounds s are given where Coulomb's law has the
-    unknown normal force.
+    ``|tau| <= s`` replaces ``|tau| <= lambda_n``, lambda_t = F(alpha) tau: slip bounds s are given where Coulomb's law
+    has the unknown normal force.
 
     Parameters
     ----------

@@ -25,6 +25,7 @@ directory
     One MatrixMarket file a name: ``A.mtx``, ``Bn.mtx``, ``Bt.mtx``, ``f.mtx`` and optionally ``gap.mtx``,
     ``friction0.mtx`` and so on, with the names above. Vectors are matrices with one column (or one row), one entry
     stands for all nodes. Labels are in ``node_ids.json``, a list. Files of other kinds are ignored.
+
 In 3D both take ``Bt1`` and ``Bt2`` instead of ``Bt``, which tell a problem in 3D from one in 2D, and optionally
 
 - ``friction``: one number; or ``friction_1`` and ``friction_2``: F1 and F2, each a number or a (p,) array; or

@@ -22,15 +22,15 @@ _MOST_NUMBERS = 150_000
 _DIGITS = 7
 
 
-def body_record(problem: ContactProblem) -> dict[str, Any] | None:
-    """Nodes, cells or boundary edges, and what moves them; None without a mesh, or if it is too large for a page.
+def body_record(problem: ContactProblem) -> dict[str, Any] | str:
+    """Nodes, cells or boundary edges, and what moves them; or why the body cannot be drawn.
 
     Displacements of the nodes, x and y in turn, are ``u0 + alpha u1 - sum_k f_k c[k]`` over the 2p contact forces; a
     unit of force k acts on nodes as ``acts[k]``, triples (node, x, y); contact row i stands at the mean of nodes
     ``rows[i]``, pairs (node, weight).
     """
     if problem.mesh is None:
-        return None
+        return "The problem has no mesh"
     shape = body_shape(problem)
     columns = 2 * problem.p + 2
     cells = shape.cells[:, list(OUTLINES[shape.cells.shape[1]])]
@@ -40,13 +40,17 @@ def body_record(problem: ContactProblem) -> dict[str, Any] | None:
         lines = _boundary(cells)
         nodes = np.unique(lines)
     if 2 * len(nodes) * columns > _MOST_NUMBERS:
-        return None
+        return (
+            f"The mesh is too large to draw: the displacements of {len(nodes):,} nodes on its boundary by "
+            f"{2 * problem.p:,} contact forces and the load are {2 * len(nodes) * columns:,} numbers, and a page holds "
+            f"at most {_MOST_NUMBERS:,}"
+        )
     new = np.full(len(shape.points), -1)
     new[nodes] = np.arange(len(nodes))
     rows = sp.csr_array(shape.weights)
     acts = _forces(problem, shape)
     if np.any(new[rows.indices] < 0) or any(new[node] < 0 for row in acts for node, _, _ in row):
-        return None  # contact inside the body: its nodes are not on the boundary that is drawn
+        return "The mesh is drawn by its boundary, as large as it is, and some contact nodes are not on it"
     dofs = np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()
     motion = sp.csr_array(shape.motion[dofs])
     moved = [motion @ problem.factorization.solve(np.asarray(column)) for column in _loads(problem)]

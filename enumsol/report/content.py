@@ -40,7 +40,7 @@ def report_content(graph: BranchGraph) -> dict[str, Any]:
     displacements, normal ones first, at the points ``a`` of an arc.
     """
     drawn, tolerance = _sampled(graph)
-    steps = graph.claims.steps()
+    steps, body = graph.claims.steps(), body_record(graph.problem)
     return {
         "interval": list(graph.interval),
         "complete": graph.complete,
@@ -62,7 +62,8 @@ def report_content(graph: BranchGraph) -> dict[str, Any]:
         },
         "beside": _beside(graph, drawn),
         "slider": slider_alphas([v.alpha for v in graph.vertices], graph.interval),
-        "body": body_record(graph.problem),
+        "body": None if isinstance(body, str) else body,
+        "no_body": body if isinstance(body, str) else "",
     }
 
 

@@ -151,14 +151,14 @@ function drawBody(item, { scale, arrow, least }) {
   return picture;
 }
 
-// -- without a mesh: forces and displacements of the nodes ----------------------------------------------------------
+// -- where the body cannot be drawn: forces and displacements of the nodes -------------------------------------------
 
 function barScales(solutions) {
   const largest = (key) => Math.max(1e-300, ...solutions.flatMap((item) => item[key].map(Math.abs)));
   const unit = (k) => (data.units ? ` ${data.units[k]}` : "");
   return {
     f: largest("f"), w: largest("w"),
-    words: `The problem has no mesh: upper bars are forces (largest ${short(largest("f"))}${unit(0)}), lower bars displacements (largest ${short(largest("w"))}${unit(1)}); left of a node normal, right tangential`,
+    words: `${data.no_body}. Upper bars are forces (largest ${short(largest("f"))}${unit(0)}), lower bars displacements (largest ${short(largest("w"))}${unit(1)}); left of a node normal, right tangential`,
   };
 }
 

@@ -9,7 +9,7 @@ import numpy as np
 from enumsol.body2d import OUTLINES
 from enumsol.checks import positive_number
 from enumsol.errors import InvalidArgumentError
-from enumsol.figures import axes_or_none, new_figure
+from enumsol.figures import axes_or_none, figure_of, new_figure
 from enumsol.shapes import BodyShape, arrow_scale, body_shape, boundary_faces, round_scale
 from enumsol.statuses import ContactStatus
 
@@ -34,7 +34,7 @@ _ACROSS, MOST_BODIES = 3, 12
 
 
 def draw_body(root: Any, problem: Any, ax: Any = None, scale: float | None = None) -> Any:
-    """The axes with one deformed body; see Root.plot_body."""
+    """A figure of one deformed body; see Root.plot_body."""
     axes_or_none(ax)
     shape = body_shape(problem)
     factors = _factors([root], problem, shape, scale)
@@ -46,7 +46,7 @@ def draw_body(root: Any, problem: Any, ax: Any = None, scale: float | None = Non
     _draw(ax, root, problem, shape, factors)
     ax.set_title(f"alpha = {float(root.alpha):g}, {_index(root)}; {_scale_words(factors[0])}", fontsize=9)
     _legend(ax, [root])
-    return ax
+    return figure_of(ax)
 
 
 def draw_bodies(roots: Sequence[Any], scale: float | None = None) -> Any:

@@ -164,14 +164,19 @@ class Root(ContactState):
         return self._condensed.problem
 
     def plot_body(self, ax: Any = None, *, scale: float | None = None) -> Any:
-        """The deformed body with contact forces as arrows and contact nodes by status; matplotlib Axes.
+        """The deformed body with contact forces as arrows and contact nodes by status.
 
         Parameters
         ----------
         ax : matplotlib Axes or None
-            None: those of a new figure.
+            Draw there; None: in a new figure.
         scale : float, optional
             Displacements are multiplied by it; default so that they can be seen. The title tells it.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Notebooks show it.
 
         Raises
         ------
@@ -276,6 +281,16 @@ class RootFamily:
     def vertices(self) -> NDArray[np.float64]:
         """All vertices, shape (k, p, 2), without repetition, in lexical order."""
         return sealed(np.unique(np.concatenate([part.vertices for part in self.polytopes]), axis=0))
+
+    def _repr_html_(self) -> str:
+        index = "unknown" if self.index is None else f"{self.index:+d}"
+        heading = f"RootFamily at alpha = {float(self.alpha):g}: index {index}, dimension {self.dimension}"
+        rows = [
+            (k, part.dimension, len(part.vertices), f"{np.max(part.vertices[..., 0]):.6g}", summary(part.statuses))
+            for k, part in enumerate(self.polytopes)
+        ]
+        heads = ("polytope", "dimension", "vertices", "largest lambda_n", "contact")
+        return html_lines([heading]) + html_table(heads, rows[:_PRINTED_NODES])
 
 
 def root_heading(root: Any) -> str:

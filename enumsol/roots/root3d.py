@@ -63,7 +63,7 @@ class Root3D(ContactState):
         return self._condensed.displacement(self.alpha, forces)
 
     def plot(self, ax: Any = None) -> Any:
-        """Statuses and directions of slip on the contact surface; matplotlib Axes, those of a new figure for None.
+        """A figure of statuses and directions of slip on the contact surface, drawn in ``ax`` if that is given.
 
         Raises
         ------
@@ -82,14 +82,19 @@ class Root3D(ContactState):
         return self._condensed.problem
 
     def plot_body(self, ax: Any = None, *, scale: float | None = None) -> Any:
-        """The deformed body with contact forces as arrows and contact nodes by status; matplotlib Axes.
+        """The deformed body with contact forces as arrows and contact nodes by status.
 
         Parameters
         ----------
         ax : matplotlib Axes or None
-            With ``projection="3d"``; None: those of a new figure.
+            Draw there, with ``projection="3d"``; None: in a new figure.
         scale : float, optional
             Displacements are multiplied by it; default so that they can be seen. The title tells it.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Notebooks show it.
 
         Raises
         ------

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.figures import new_figure
+from enumsol.figures import axes_or_none, figure_of, new_figure
 from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def draw_slips(root: Any, problem: ContactProblem3D, ax: Any) -> Any:
     # the two coordinate axes along which the contact surface extends most
     shown = np.sort(np.argsort(np.ptp(places, axis=0), kind="stable")[1:])
     moves = np.einsum("pk,pkc->pc", root.u_t, _axes(problem, shown))[:, shown]
-    if ax is None:
+    if axes_or_none(ax) is None:
         ax = new_figure(figsize=(6.4, 5.0)).subplots()
     for status, (marker, face) in _MARKS.items():
         at = places[[found is status for found in root.statuses]][:, shown]
@@ -48,7 +48,7 @@ def draw_slips(root: Any, problem: ContactProblem3D, ax: Any) -> Any:
     ax.set_ylabel("xyz"[shown[1]])
     ax.set_title(f"directions of slip at alpha = {float(root.alpha):g}, index {root.index:+d}")
     ax.legend()
-    return ax
+    return figure_of(ax)
 
 
 def _axes(problem: ContactProblem3D, shown: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -115,6 +115,9 @@ def steps(alphas, between):
         ([0, 3, 3.01, 3.02, 10], [1, 3, 5, 7], [(2.985, 3.035)]),
         ([0, 1, 1.01, 5, 5.01, 8, 8.01, 10], [1, 2, 1, 5, 1, 3, 1], [(4.9925, 5.0175), (7.9925, 8.0175)]),
         ([0, 9.99, 10], [1, 3], [(9.9825, 10)]),
+        # a step that would not be seen in the window of its neighbour has its own
+        ([0, 3, 3.1, 3.1001, 10], [1, 3, 5, 3], [(2.925, 3.175), (3.099925, 3.100175)]),
+        ([0, 3, 3.1, 3.1001, 7, 7.01, 10], [1, 3, 5, 3, 5, 3], [(3.099925, 3.100175), (6.9925, 7.0175)]),
         ([0, 0.001], [5], []),
     ],
 )
@@ -202,6 +205,8 @@ def test_title_units_and_other_axes(graphs):
     axes = new_figure().subplots(1, 2)
     assert graphs["square"].plot("lambda_n", [0], ax=axes[1]) is axes[1].figure
     assert not axes[0].lines
+    above, _ = new_figure().subfigures(2)
+    assert graphs["square"].plot(ax=above.subplots()) is above.canvas.figure
     assert "side by side" not in axes[1].get_xlabel()
     assert axes[1].get_legend() is not None
     assert figure._repr_png_().startswith(b"\x89PNG")

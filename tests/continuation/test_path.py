@@ -93,9 +93,13 @@ def test_prints_why_it_ended(path):
 
 
 def test_plot(path):
-    ax = path.plot()
+    figure = path.plot()
+    (ax,) = figure.axes
     assert {line.get_label() for line in ax.lines} == {"steps", "folds", "start"}
-    assert len(path.plot(ax=ax).lines) == 6
+    assert path.plot(ax=ax) is figure
+    assert len(ax.lines) == 6
+    with pytest.raises(enumsol.InvalidArgumentError, match="ax is a NotebookFigure; expected the Axes"):
+        path.plot(ax=figure)
     with pytest.raises(enumsol.InvalidArgumentError, match="quantity"):
         path.plot(quantity="stress")
     with pytest.raises(enumsol.InvalidArgumentError, match="node"):
@@ -105,8 +109,9 @@ def test_plot(path):
 def test_plot_over_a_graph(problem, path, tmp_path):
     from enumsol import branches
 
-    ax = path.plot(branches.branch_graph(problem, (0.0, 20.0)))
-    ax.figure.savefig(tmp_path / "figure.png")
+    figure = path.plot(branches.branch_graph(problem, (0.0, 20.0)))
+    ax = figure.axes[0]
+    figure.savefig(tmp_path / "figure.png")
     assert "steps" in {line.get_label() for line in ax.lines}
     with pytest.raises(enumsol.InvalidArgumentError, match="both given"):
         path.plot(branches.branch_graph(problem, (0.0, 20.0)), ax=ax)

@@ -3,8 +3,9 @@
 import meshio
 import numpy as np
 import pytest
+from parted_meshes import grid
 
-from enumsol import InvalidArgumentError, fem
+from enumsol import InvalidArgumentError, enumerate_roots, fem
 
 GMSH_2 = """$MeshFormat
 2.2 0 8
@@ -136,6 +137,32 @@ def test_node_sets_of_abaqus(tmp_path):
         mesh.nodes("lid")
 
 
+@pytest.mark.parametrize("kind", ["triangle6", "quad8", "quad9"])
+def test_cells_of_second_order(kind, tmp_path):
+    body = grid(3, 2, int(kind[-1]), 2.0, 1.0, shake=0.05)
+    edges = [("line3", body.facets[name]) for name in ("bottom", "left")]
+    tags = [np.zeros(len(body.cells), int), np.full(3, 1), np.full(2, 2)]
+    names = {"all": np.array([0, 2]), "bottom": np.array([1, 1]), "left": np.array([2, 1])}
+    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    points = np.c_[body.points, np.zeros(len(body.points))]
+    meshio.Mesh(points, [(kind, body.cells), *edges], cell_data=data, field_data=names).write(
+        tmp_path / "body.msh", file_format="gmsh22", binary=False
+    )
+    read = fem.read_mesh(tmp_path / "body.msh")
+    assert np.array_equal(read.cells, body.cells)
+    data = {
+        "young": 2.0,
+        "poisson": 0.3,
+        "contact": "bottom",
+        "clamp": "left",
+        "body_force": (0.1, -1),
+        "friction": 0.4,
+    }
+    one, two = (enumerate_roots(fem.mesh_problem(mesh, **data), 0)[0] for mesh in (read, body))
+    assert np.max(one.lambda_n) > 0.1
+    assert np.allclose(one.lambda_n, two.lambda_n, rtol=1e-12)
+
+
 def test_sets_of_a_mesh_in_memory():
     cells = [("triangle", [[0, 1, 2], [0, 2, 3]]), ("line", [[0, 1], [1, 2]])]
     mesh = fem.read_mesh(meshio.Mesh(SQUARE, cells, cell_sets={"wall": [None, [1]]}, point_sets={"two": [0, 2]}))
@@ -152,7 +179,8 @@ def test_sets_of_a_mesh_in_memory():
         (SQUARE, [QUAD], "the mesh has no contact facets: no line cells on its boundary"),
         (SQUARE, [LINE], "the mesh has no triangles or quadrilaterals; expected a body in 2D"),
         (SQUARE, [QUAD, ("triangle", [[0, 1, 2]]), LINE], r"type quad and triangle; .*Mesh\.SubdivisionAlgorithm = 1"),
-        (SQUARE, [("quad8", [[0, 1, 2, 3] * 2]), LINE], r"type quad8; .*Mesh\.SecondOrderIncomplete = 0"),
+        (SQUARE, [("tetra10", [[0, 1, 2, 3, 0, 1, 2, 3, 0, 1]]), LINE], r"type tetra10; .*Mesh\.ElementOrder = 1"),
+        (SQUARE, [("quad8", [[0, 1, 2, 3] * 2]), ("triangle6", [[0, 1, 2] * 2]), LINE], "type quad8 and triangle6; .*"),
         (SQUARE, [QUAD, ("line3", [[0, 1, 2]])], "the mesh has line3 cells beside quad; expected facets of type line"),
         (
             np.c_[SQUARE, [0, 0, 0, 1]],

@@ -8,7 +8,7 @@ import enumsol
 from enumsol import InvalidArgumentError, InvalidProblemError, fem
 
 E, NU = 2.0, 0.3
-KINDS = (3, 4, 6, 9)
+KINDS = (3, 4, 6, 8, 9)
 STEEL = {"young": E, "poisson": NU}
 
 

@@ -189,3 +189,17 @@ def test_a_graph_cut_short_never_counts_as_complete(browser, pages):
     assert "complete: yes" not in text
     assert "at least" in browser.evaluate("byId('diagram').textContent")
     assert browser.complaints() == []
+
+
+def test_a_page_that_has_crashed_is_not_waited_for():
+    other = Browser(find_browser())
+
+    def crash():
+        other.call("Page.navigate", url="chrome://crash")
+        other.evaluate("1")
+
+    try:
+        with pytest.raises(AssertionError, match="the page has crashed"):
+            crash()
+    finally:
+        other.close()

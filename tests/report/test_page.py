@@ -11,6 +11,7 @@ import pytest
 import enumsol
 from enumsol import InvalidArgumentError, MissingDependencyError, branch_graph, enumerate_roots, gallery, write_report
 from enumsol.cli import main
+from enumsol.report import body as bodies
 from enumsol.report import content
 from enumsol.report.body import body_record
 from enumsol.report.content import rounded, slider_alphas
@@ -133,9 +134,26 @@ def test_large_meshes_are_drawn_by_their_boundary_or_not_at_all():
     assert body["cells"] is None
     assert len(body["lines"]) == 320  # edges along the four sides
     assert len(body["points"]) == 320
-    assert body_record(gallery.clamped_block(100, 100)) is None  # 200 forces on 400 nodes
+    # two components of 400 nodes by 200 forces, load and slope of the load
+    said = body_record(gallery.clamped_block(100, 100))
+    assert said.startswith("The mesh is too large to draw: the displacements of 400 nodes on its boundary")
+    assert "are 161,600 numbers, and a page holds at most 150,000" in said
+
+
+def test_what_is_said_of_a_body_that_is_not_drawn(monkeypatch):
     square = gallery.two_node_square()
-    assert body_record(enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f)) is None
+    bare = enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f)
+    graph = enumsol.branch_graph(bare, (0, 1))
+    made = content.report_content(graph)
+    assert (made["body"], made["no_body"]) == (None, "The problem has no mesh")
+    monkeypatch.setattr(bodies, "_MOST_NUMBERS", 10)
+    made = content.report_content(enumsol.branch_graph(square, (0, 1)))
+    assert made["body"] is None
+    assert "too large to draw: the displacements of 4 nodes" in made["no_body"]
+    monkeypatch.undo()
+    made = content.report_content(enumsol.branch_graph(square, (0, 1)))
+    assert len(made["body"]["points"]) == 4
+    assert made["no_body"] == ""
 
 
 def test_the_slider_reaches_every_narrow_step():

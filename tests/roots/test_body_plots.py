@@ -45,7 +45,7 @@ def test_turned_degrees_of_freedom_of_the_square():
 def test_what_is_drawn(wedge):
     problem, roots = wedge
     root = next(root for root in roots if len(set(root.statuses)) > 1)
-    ax = root.plot_body(scale=20)
+    (ax,) = root.plot_body(scale=20).axes
     assert "displacements times 20" in ax.get_title()
     (arrows,) = [part for part in ax.collections if hasattr(part, "U")]
     assert len(arrows.U) == np.count_nonzero(root.lambda_n)
@@ -81,7 +81,7 @@ def test_in_space():
             root.lambda_t * np.stack([problem.Bt1 @ root.u, problem.Bt2 @ root.u], axis=1)
         )
         assert np.sum(forces * moves) == pytest.approx(-work, rel=1e-9, abs=1e-18)
-    ax = roots[0].plot_body()
+    (ax,) = roots[0].plot_body().axes
     assert ax.name == "3d"
     assert len(roots.plot_bodies().axes) == len(roots)
     from enumsol.figures import new_figure

@@ -52,6 +52,13 @@ def test_roots_and_root_sets():
         assert text in one.cells
 
 
+def test_a_family():
+    family = enumerate_roots(gallery.get("one-node-6.3").build(), 2).families[0]
+    cells = Cells(family._repr_html_())
+    assert cells.cells[0] == "RootFamily at alpha = 2: index +1, dimension 1"
+    assert cells.cells[-5:] == ["0", "1", "2", "1", "slip-"]
+
+
 def test_many_nodes_and_many_roots_are_cut():
     roots = enumerate_roots(gallery.chain(4), 5.0)
     cells = Cells(roots._repr_html_())

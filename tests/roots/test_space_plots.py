@@ -10,7 +10,7 @@ import enumsol
 def test_arrows_point_along_the_slips():
     problem = enumsol.gallery.get("block3d-9").build()
     root = enumsol.enumerate_roots(problem, 0.5)[0]
-    ax = root.plot()
+    (ax,) = root.plot().axes
     slides = [str(status) == "slip" for status in root.statuses]
     (arrows,) = [part for part in ax.collections if hasattr(part, "U")]
     # the axes of the gallery's block are x and -y
@@ -24,7 +24,7 @@ def test_arrows_point_along_the_slips():
 
 def test_without_a_mesh_the_local_axes_are_drawn():
     root = enumsol.enumerate_roots(enumsol.gallery.one_node_3d(), 0)[0]
-    (arrows,) = [part for part in root.plot().collections if hasattr(part, "U")]
+    (arrows,) = [part for part in root.plot().axes[0].collections if hasattr(part, "U")]
     np.testing.assert_allclose([arrows.U[0], arrows.V[0]], root.u_t[0] / np.linalg.norm(root.u_t))
 
 

@@ -1,0 +1,27 @@
+"""The site of the documents, by Sphinx: .venv/bin/python -m sphinx -W docs site."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tools"))
+
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_nb", "references"]
+project = "enumsol"
+html_title = "enumsol"
+html_theme = "furo"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_copyright = False
+default_role = "py:obj"
+smartquotes = False  # A' is a transpose
+highlight_language = "none"
+add_module_names = False
+autodoc_typehints = "none"  # docstrings say what arguments are
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True}
+napoleon_use_ivar = True
+myst_heading_anchors = 3
+nb_execution_mode = "force"  # notebooks are kept without outputs
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300

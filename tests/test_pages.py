@@ -1,0 +1,103 @@
+"""Every page of the documents is followed, and what it says comes out; README and the page on meshes elsewhere."""
+
+import re
+
+import pytest
+from documents import DOCUMENTS, ROOT, blocks, follow, runs
+
+import enumsol
+from enumsol import fem
+
+DOCS = ROOT / "docs"
+
+
+def page(name):
+    """A fixture: what the page leaves behind, and the folder where it was followed."""
+
+    @pytest.fixture(scope="module", name=name)
+    def followed(tmp_path_factory):
+        folder = tmp_path_factory.mktemp(name)
+        return {**follow(DOCS / f"{name}.md", folder), "folder": folder}
+
+    return followed
+
+
+NAMES = ("branches", "command_line", "results", "three_dimensions", "tutorial")
+branches, command_line, results, three_dimensions, tutorial = (page(name) for name in NAMES)
+
+
+def test_no_page_is_forgotten():
+    elsewhere = {ROOT / "README.md", DOCS / "from_a_mesh.md"}
+    assert {path for path in DOCUMENTS if runs(path)} == elsewhere | {DOCS / f"{name}.md" for name in NAMES}
+
+
+def test_blocks_that_are_run_are_found():
+    assert [kind for kind, _ in blocks(DOCS / "tutorial.md")].count("command") == 5
+    for path in DOCUMENTS:
+        text = path.read_text(encoding="utf-8")
+        kinds = [kind for kind, _ in blocks(path)]
+        assert kinds.count("python") == text.count("```python\n")
+        assert kinds.count("command") == len(re.findall(r"^    .*\benumsol [a-z]", text, re.MULTILINE)), path
+
+
+def test_tutorial(tutorial):
+    printed = [text for kind, text in blocks(DOCS / "tutorial.md") if kind == "text"]
+    outputs = [text for _, text in tutorial["outputs"]]
+    assert printed == [outputs[0]]
+    assert "one solution below alpha = 1.3726" in outputs[2]
+    assert all("complete: yes" in outputs[k] for k in (1, 2, 4))
+    assert "every solution for every alpha in [0, 4] lies on these arcs" in outputs[3]
+    graph, problem = tutorial["graph"], tutorial["problem"]
+    assert [round(fold.alpha, 3) for fold in graph.folds] == [1.373, 3.588]
+    assert [graph.multiplicity_at(alpha) for alpha in (1, 2, 3.6)] == [1, 3, 5]
+    assert tutorial["limit"] == pytest.approx(1.3726, abs=1e-4)
+    assert str(tutorial["jammed"].statuses[0]) == "stick"
+    assert problem.fingerprint == enumsol.read_problem(tutorial["folder"] / "wedge.npz").fingerprint
+    assert (tutorial["folder"] / "wedge.html").stat().st_size > 100_000
+
+
+def test_the_wedge_of_the_tutorial_is_that_of_its_study(tutorial):
+    mesh = fem.trapezoid(6, 4, bottom=1.0, top=1.8, height=1.0).parted()
+    wedge = fem.mesh_problem(
+        mesh,
+        young=2.5,
+        poisson=0.25,
+        contact=["left", "right"],
+        gap=-5e-4,
+        friction=(0.0, 1.0),
+        spring={"top": (0.02, 0.02)},
+        load={"top": (1e-4, 1e-3)},
+    )
+    roots = enumsol.enumerate_roots(wedge, 4)
+    assert [root.statuses for root in roots] == [root.statuses for root in tutorial["roots"]]
+
+
+def test_branches_and_continuation(branches):
+    graph, path = branches["graph"], branches["path"]
+    assert graph.complete
+    assert graph.multiplicity_at(3.5) == 5
+    assert graph.uniqueness_limit == 3
+    assert "of them 3 folds" in str(path)
+    assert not branches["report"].complete
+    assert branches["everything"].complete
+    assert list(branches["table"]["roots"]) == [1, 1, 1]
+    assert enumsol.verify(branches["problem"], graph.proof).complete
+    assert {path.name for path in branches["folder"].iterdir()} >= {"branches.png", "graph.json", "POINTS.csv"}
+
+
+def test_three_dimensions(three_dimensions):
+    assert three_dimensions["limit"].converged
+    assert three_dimensions["weakening"].converged
+    assert [str(root.statuses[0]) for root in three_dimensions["roots"]] == ["stick", "slip", "open"]
+    assert three_dimensions["roots"].complete
+    assert (three_dimensions["folder"] / "block.vtu").stat().st_size > 1000
+
+
+def test_results(results):
+    report = results["report"]
+    assert (report.roots, report.undecided) == (5, 0)
+    assert "complete: yes" in results["outputs"][-1][1]
+
+
+def test_reports(command_line):
+    assert {path.name for path in command_line["folder"].iterdir()} == {"wedge.html", "wedge.proof"}

@@ -1,0 +1,71 @@
+"""Whether a built site of the documents is whole: python tools/check_site.py SITE.
+
+Its pages load nothing from the network, and every public name is in the reference.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import enumsol
+from enumsol import fem, gallery
+
+#: What of an element a browser loads without being asked.
+LOADED = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src", "video": "src"}
+#: Styles load this way.
+IN_STYLES = re.compile(r"(?:url\(|@import)\s*[\"']?((?:https?:)?//[^\"')\s]+)")
+
+
+class Page(HTMLParser):
+    """What a page loads, and its anchors."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.loaded: list[str] = []
+        self.anchors: set[str] = set()
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note an element."""
+        given = dict(attrs)
+        if given.get("id"):
+            self.anchors.add(str(given["id"]))
+        value = given.get(LOADED.get(tag, ""))
+        if value and not (tag == "link" and given.get("rel") in {"next", "prev", "canonical", "index", "search"}):
+            self.loaded.append(value)
+
+
+def public_names() -> list[str]:
+    """Full names of what a user may call, but for modules."""
+    homes = (enumsol, fem, gallery)
+    names = [(home, name) for home in homes for name in home.__all__]
+    return [f"{home.__name__}.{name}" for home, name in names if not inspect.ismodule(getattr(home, name))]
+
+
+def complaints(site: Path) -> list[str]:
+    """What is wrong with the site, a line each."""
+    found, anchors = [], set()
+    for file in sorted(site.rglob("*.html")):
+        page = Page(file.read_text(encoding="utf-8"))
+        anchors |= page.anchors
+        loaded = [item for item in page.loaded if re.match(r"(?:https?:)?//", item)]
+        found += [f"{file.relative_to(site)} loads {item}" for item in loaded]
+    for file in sorted(site.rglob("*.css")):
+        loaded = IN_STYLES.findall(file.read_text(encoding="utf-8"))
+        found += [f"{file.relative_to(site)} loads {item}" for item in loaded]
+    return found + [f"{name} is not in the reference" for name in public_names() if name not in anchors]
+
+
+def main() -> int:
+    site = Path(sys.argv[1])
+    found = complaints(site)
+    print("\n".join(found) or f"{len(list(site.rglob('*.html')))} pages, nothing from the network")
+    return bool(found)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
