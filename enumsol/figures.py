@@ -45,6 +45,12 @@ def _figure_class() -> Any:
     return NotebookFigure
 
 
+def shown_alone(ax: Any) -> Any:
+    """Axes of a new figure; notebooks show the figure for them."""
+    ax._repr_png_ = ax.figure._repr_png_
+    return ax
+
+
 def axes_or_none(ax: Any) -> Any:
     """The axes that a picture is drawn into; None for those of a new figure.
 

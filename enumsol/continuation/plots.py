@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from enumsol.checks import one_of, row_number
 from enumsol.continuation.path_data import PointKind
 from enumsol.errors import InvalidArgumentError
-from enumsol.figures import new_figure
+from enumsol.figures import new_figure, shown_alone
 
 if TYPE_CHECKING:
     from enumsol.continuation.path_data import PathData
@@ -23,9 +23,10 @@ def draw_path(path: PathData, graph: Any, node: int, quantity: str, ax: Any, gra
         raise InvalidArgumentError("graph and ax are both given; draw further paths with path.plot(ax=...) alone")
     if graph is not None:
         # the graph draws a figure of its own; its first panel is this node's, and no zoom shows the path
-        ax = graph.plot(quantity, [path.node_ids[node]], **{"zoom": False, **graph_options}).axes[0]
+        figure = graph.plot(quantity, [path.node_ids[node]], **{"zoom": False, **graph_options})
+        ax = shown_alone(figure.axes[0])
     elif ax is None:
-        ax = new_figure().subplots()
+        ax = shown_alone(new_figure().subplots())
     values = getattr(path, quantity)[:, node]
     dots = [k for k, kind in enumerate(path.kinds) if kind in (PointKind.STEP, PointKind.END)]
     ax.plot(path.alpha[dots], values[dots], ".", color="black", markersize=3, label="steps", zorder=3)

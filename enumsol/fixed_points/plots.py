@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.figures import new_figure
+from enumsol.figures import new_figure, shown_alone
 from enumsol.texts import counted
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
     if ax is not None and not hasattr(ax, "set_xscale"):
         raise InvalidArgumentError(f"ax is a {type(ax).__name__}; expected the Axes of a figure, or None")
     if ax is None:
-        ax = new_figure(figsize=(6.4, 4.2)).subplots()
+        ax = shown_alone(new_figure(figsize=(6.4, 4.2)).subplots())
     from matplotlib.ticker import MaxNLocator  # there, where there are axes
 
     for root in sorted(table["root"].dropna().astype(int).unique().tolist()):

@@ -9,7 +9,7 @@ import numpy as np
 from enumsol.body2d import OUTLINES
 from enumsol.checks import positive_number
 from enumsol.errors import InvalidArgumentError
-from enumsol.figures import axes_or_none, new_figure
+from enumsol.figures import axes_or_none, new_figure, shown_alone
 from enumsol.shapes import BodyShape, arrow_scale, body_shape, boundary_faces, round_scale
 from enumsol.statuses import ContactStatus
 
@@ -40,7 +40,7 @@ def draw_body(root: Any, problem: Any, ax: Any = None, scale: float | None = Non
     factors = _factors([root], problem, shape, scale)
     if ax is None:
         figure = new_figure(figsize=(6.4, 5.0))
-        ax = _axes(figure, 111, shape)
+        ax = shown_alone(_axes(figure, 111, shape))
     elif shape.points.shape[1] == 3 and not hasattr(ax, "set_zlim"):
         raise InvalidArgumentError("ax is plane and the body is not; expected Axes with projection '3d', or None")
     _draw(ax, root, problem, shape, factors)

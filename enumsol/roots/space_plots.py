@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.figures import new_figure
+from enumsol.figures import new_figure, shown_alone
 from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def draw_slips(root: Any, problem: ContactProblem3D, ax: Any) -> Any:
     shown = np.sort(np.argsort(np.ptp(places, axis=0), kind="stable")[1:])
     moves = np.einsum("pk,pkc->pc", root.u_t, _axes(problem, shown))[:, shown]
     if ax is None:
-        ax = new_figure(figsize=(6.4, 5.0)).subplots()
+        ax = shown_alone(new_figure(figsize=(6.4, 5.0)).subplots())
     for status, (marker, face) in _MARKS.items():
         at = places[[found is status for found in root.statuses]][:, shown]
         if len(at):

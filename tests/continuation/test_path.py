@@ -96,6 +96,7 @@ def test_plot(path):
     ax = path.plot()
     assert {line.get_label() for line in ax.lines} == {"steps", "folds", "start"}
     assert len(path.plot(ax=ax).lines) == 6
+    assert ax._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(enumsol.InvalidArgumentError, match="quantity"):
         path.plot(quantity="stress")
     with pytest.raises(enumsol.InvalidArgumentError, match="node"):
@@ -108,6 +109,7 @@ def test_plot_over_a_graph(problem, path, tmp_path):
     ax = path.plot(branches.branch_graph(problem, (0.0, 20.0)))
     ax.figure.savefig(tmp_path / "figure.png")
     assert "steps" in {line.get_label() for line in ax.lines}
+    assert ax._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(enumsol.InvalidArgumentError, match="both given"):
         path.plot(branches.branch_graph(problem, (0.0, 20.0)), ax=ax)
 

@@ -58,6 +58,7 @@ def test_fifty_starts_end_on_a_root_or_say_that_they_did_not(name, alpha, count)
     assert repelling <= set(table.attrs["never"])
     assert table["root"].nunique() >= 2
     axes = plot_basins(table)
+    assert axes._repr_png_().startswith(b"\x89PNG")
     assert axes.get_title().startswith("never reached: root")
     few = table["iterations"].max() <= 20
     assert axes.get_yscale() == ("linear" if few else "log")

@@ -46,6 +46,7 @@ def test_what_is_drawn(wedge):
     problem, roots = wedge
     root = next(root for root in roots if len(set(root.statuses)) > 1)
     ax = root.plot_body(scale=20)
+    assert ax._repr_png_().startswith(b"\x89PNG")
     assert "displacements times 20" in ax.get_title()
     (arrows,) = [part for part in ax.collections if hasattr(part, "U")]
     assert len(arrows.U) == np.count_nonzero(root.lambda_n)

@@ -11,6 +11,7 @@ def test_arrows_point_along_the_slips():
     problem = enumsol.gallery.get("block3d-9").build()
     root = enumsol.enumerate_roots(problem, 0.5)[0]
     ax = root.plot()
+    assert ax._repr_png_().startswith(b"\x89PNG")
     slides = [str(status) == "slip" for status in root.statuses]
     (arrows,) = [part for part in ax.collections if hasattr(part, "U")]
     # the axes of the gallery's block are x and -y
