@@ -19,6 +19,7 @@ VERSIONS = ("proven_graphs", "requirements", "search_profile")
 PEERS = {
     "against_scip": ("pyscipopt", "pyscipopt is not installed: SCIP is left out", "roots"),
     "fixed_points_scaling": ("cvxpy", "cvxpy is not installed: it is left out", "iterations"),
+    "peers": ("pyscipopt", "pyscipopt is not installed: it is left out", "known"),
     "qp_engines": ("daqp", "daqp is not installed: it is left out", "proven by multipliers"),
 }
 #: What studies at their smoke size conclude.
@@ -32,6 +33,7 @@ CONCLUSIONS = {
     "fixed_points_scaling": ("all converged: yes", "Newton needed no help: yes"),
     "grazing": ("chains: all complete and checked: yes; at most", "rows of equal discs: 4 of 4 complete"),
     "paper_examples": ("all 19 facts hold", "no arc or continuum missed, no jump"),
+    "peers": ("enumsol: ended on 3 of 3", "4^p selections: ended on 3 of 3"),
     "requirements": ("both interpreters import the same enumsol", "import enumsol: "),
     "same_body_by_other_codes": ("the same roots to 1e-09, all complete: yes",),
     "samples_vs_graph": ("branches of length 0.001 are missed by 50 samples", "40 of 40 root sets agree"),
