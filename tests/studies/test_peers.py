@@ -56,6 +56,7 @@ def test_deflation_leaves_the_roots_that_it_has_found():
     from peers.deflation import deflated_newton
 
     system, known = system_and_forces("two-node-6.4")
-    found = np.array(deflated_newton(system, 40)) / system.force
+    found = np.array(deflated_newton(system, 40, 40)[0]) / system.force
     assert len(found) == len(known) == 5
     assert all(np.min(np.max(np.abs(known - x), axis=1)) < 1e-8 for x in found)
+    assert len(deflated_newton(system, 40, 1)[0]) < 5
