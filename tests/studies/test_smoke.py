@@ -28,6 +28,7 @@ CONCLUSIONS = {
     "branch_shapes": ("40 squares, 0 not complete; 2 closed branches",),
     "continuation_coverage": ("random: 8 of 8 problems settled",),
     "continuation_steps": ("checked steps, h_max 1 5: jumps 0 0",),
+    "discs": ("unequal radii, soft: 2 of 2 complete", "unequal weights, stiff: 2 of 2 complete"),
     "extremes": ("all: 28 cases, 28 right, 0 undecided, 0 wrong",),
     "fixed_points_basins": ("sign of the index at all: yes", "none of the repelling ones: yes"),
     "fixed_points_scaling": ("all converged: yes", "Newton needed no help: yes"),
