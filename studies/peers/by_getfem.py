@@ -10,6 +10,7 @@ corrections. What was found so far is in POINTS.npz all the while. Imports nothi
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 
@@ -119,7 +120,8 @@ def follow(iterations):
 def save(*, ended):
     seconds = time.process_time() - started
     ended = ended and seconds < given["limit"]
-    np.savez(sys.argv[2], points=np.reshape(points, (-1, 2 * p)), seconds=seconds, ended=ended)
+    np.savez("part.npz", points=np.reshape(points, (-1, 2 * p)), seconds=seconds, ended=ended)
+    os.replace("part.npz", sys.argv[2])  # whole whenever this process is killed
 
 
 for iterations in CORRECTIONS:

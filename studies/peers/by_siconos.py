@@ -7,6 +7,7 @@ was found so far is in POINTS.npz all the while. Imports nothing of enumsol.
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 
@@ -30,4 +31,5 @@ while not ended:
     if not ended:
         points.append(z)
     seconds = time.process_time() - started
-    np.savez(sys.argv[2], points=np.reshape(points, (-1, size)), seconds=seconds, ended=ended)
+    np.savez("part.npz", points=np.reshape(points, (-1, size)), seconds=seconds, ended=ended)
+    os.replace("part.npz", sys.argv[2])  # whole whenever this process is killed

@@ -7,6 +7,7 @@ multiple of that of the equation (P. E. Farrell, A. Birkisson, S. W. Funke, SIAM
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,8 +60,12 @@ def solve(system: ScaledSystem, x: np.ndarray, roots: list[np.ndarray]) -> np.nd
     return None
 
 
-def deflated_newton(system: ScaledSystem, starts: int, seed: int = 0) -> list[np.ndarray]:
-    """Forces (2p,) with units, from zero and from random points of the ellipsoid of theory, (5.3)."""
+def deflated_newton(system: ScaledSystem, starts: int, in_vain: int, seed: int = 0) -> tuple[list[np.ndarray], float]:
+    """Forces (2p,) with units, from zero and from random points of the ellipsoid of theory, (5.3).
+
+    Ends after ``in_vain`` starts in a row without a new root; second comes the CPU time until the last one.
+    """
+    started, last, vain = time.process_time(), 0.0, 0
     rng = np.random.default_rng(seed)
     centre = 0.5 * np.linalg.solve(system.S, system.g)
     radius = np.sqrt(0.5 * (system.g @ centre))
@@ -72,4 +77,9 @@ def deflated_newton(system: ScaledSystem, starts: int, seed: int = 0) -> list[np
         found = solve(system, x, roots)
         if found is not None and all(np.max(np.abs(found - root)) > APART for root in roots):
             roots.append(found)
-    return [system.force * root for root in roots]
+            last, vain = time.process_time() - started, 0
+        else:
+            vain += 1
+        if vain == in_vain:
+            break
+    return [system.force * root for root in roots], last

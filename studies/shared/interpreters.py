@@ -17,10 +17,13 @@ def interpreter(library: str, more: str | None = None) -> str | None:
     return None
 
 
-def call(*command: str, seconds: int | None = None) -> subprocess.CompletedProcess[str]:
-    """Run a command with one thread, without the environment of this Python; killed after so many CPU seconds."""
+def call(*command: str, seconds: int | None = None, folder: str | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a command with one thread, without the environment of this Python; killed after so many CPU seconds.
+
+    ``folder`` is where it runs.
+    """
     hidden = ("PYTHONPATH", "PYTHONWARNINGS", "VIRTUAL_ENV")
     environment = {name: value for name, value in os.environ.items() if name not in hidden} | {"OMP_NUM_THREADS": "1"}
     if seconds is not None:
         command = ("sh", "-c", f'ulimit -t {seconds}; exec "$@"', "sh", *command)
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, cwd=folder)
