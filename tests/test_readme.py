@@ -22,7 +22,14 @@ def seen(tmp_path_factory):
 
 
 def test_commands(seen):
-    assert [command.split()[1] for command, _ in seen["outputs"]] == ["roots", "roots", "verify", "solve", "report", "roots"]
+    assert [command.split()[1] for command, _ in seen["outputs"]] == [
+        "roots",
+        "roots",
+        "verify",
+        "solve",
+        "report",
+        "roots",
+    ]
     for _, text in seen["outputs"]:
         assert "complete: yes" in text
 

@@ -27,6 +27,8 @@ T = TypeVar("T")
 _GALLERY = "gallery:"
 #: Ending of files that describe a problem by a mesh and what acts on its parts.
 TOML = ".toml"
+#: Usual endings of files that meshio reads and that are no problems.
+MESHES = (".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".med", ".bdf", ".mesh", ".e", ".exo")
 #: As many processes as Windows lets one wait for.
 _MOST_ON_WINDOWS = 61
 
@@ -74,6 +76,10 @@ def load_any_problem(name: str) -> ContactProblem | ContactProblem3D:
         from enumsol.fem import read_mesh_problem  # as above
 
         return read_mesh_problem(name)
+    if Path(name).suffix.lower() in MESHES and Path(name).is_file():
+        raise InvalidArgumentError(
+            f"{name} is a mesh; expected a problem, which enumsol solve {name} --output FILE.npz or a {TOML} file makes"
+        )
     if not Path(name).exists() and (close := _close_names(name)):
         raise InvalidArgumentError(f"{name}: there is no such file or directory; did you mean {', '.join(close)}?")
     from enumsol.io import read_problem  # as above

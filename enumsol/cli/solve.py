@@ -165,6 +165,8 @@ def solve(
     check_files(proof_file, json_file, csv_file, resume=resume)
     value = None if alpha is None else parse_alpha(alpha)
     problem = _problem(mesh, {name: entry for name, entry in given.items() if entry is not None})
+    if _at_rest(problem):
+        note("nothing acts on the body: it has no load, press fit or given displacement, and rests")
     if output is not None:
         _write(problem, output)
     if value is None and problem.depends_on_alpha:
@@ -187,6 +189,12 @@ def _problem(mesh: str, options: dict[str, Any]) -> ContactProblem | ContactProb
 
     check_keys(options)
     return fem.mesh_problem(mesh, **options)
+
+
+def _at_rest(problem: ContactProblem | ContactProblem3D) -> bool:
+    """Whether u = 0 solves the problem because it has no data that are not zero, for every alpha."""
+    acting = [problem.f, problem.load_slope, problem.slip_offset]
+    return not any(part is not None and part.any() for part in acting) and not (problem.gap < 0).any()
 
 
 def _write(problem: ContactProblem | ContactProblem3D, place: str) -> None:

@@ -239,7 +239,10 @@ def _kinds(kinds: list[str], dimension: int) -> tuple[str, str]:
             f"the mesh has cells of type {' and '.join(strange or bodies)}; expected {expected}{hint}"
         )
     if not bodies:
-        raise InvalidArgumentError(f"the mesh has no {_BODIES[dimension]}; expected a body in {dimension}D")
+        raise InvalidArgumentError(
+            f"the mesh has no {_BODIES[dimension]}; expected a body in {dimension}D (gmsh writes only what is in "
+            "physical groups, if there are any: the body needs one, too)"
+        )
     facet = facet_of[bodies[0]]
     other = [kind for kind in others if kind not in (bodies[0], facet)]
     if other:

@@ -70,6 +70,7 @@ _A_PLACE = "the name of a file or directory"
 #: Endings of the files that hold a problem.
 SUFFIXES = (".npz", *fclib.SUFFIXES)
 _FORMATS = "a .npz file, a directory of MatrixMarket files, or an fclib file (.h5, .hdf5)"
+_READABLE = f"{_FORMATS} (enumsol.fem makes problems of meshes and .toml files)"
 
 
 def read_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProblem3D:
@@ -153,7 +154,7 @@ def _read(place: Path) -> ContactProblem | ContactProblem3D:
     if place.is_dir():
         return matrix_market.read(place)
     if not place.exists():
-        raise InvalidProblemError(f"there is no such file or directory; expected {_FORMATS}")
+        raise InvalidProblemError(f"there is no such file or directory; expected {_READABLE}")
     if place.suffix == ".npz":
         return npz.read(place)
     if place.suffix in fclib.SUFFIXES:
@@ -163,7 +164,7 @@ def _read(place: Path) -> ContactProblem | ContactProblem3D:
             "one MatrixMarket file is no problem; expected a directory with A.mtx, Bn.mtx and so on"
         )
     found = f"its name ends in {place.suffix!r}" if place.suffix else "its name has no suffix"
-    raise InvalidProblemError(f"{found}; expected {_FORMATS}")
+    raise InvalidProblemError(f"{found}; expected {_READABLE}")
 
 
 def _write(problem: ContactProblem | ContactProblem3D, place: Path) -> None:

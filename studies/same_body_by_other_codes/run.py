@@ -12,9 +12,6 @@ contact forces and those of scikit-fem, relative to the largest force.
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -24,6 +21,7 @@ import numpy as np
 
 import enumsol
 from enumsol import fem
+from shared.interpreters import call, interpreter
 from shared.results import yes
 
 if TYPE_CHECKING:
@@ -50,21 +48,6 @@ MOST_NODES = 20_000
 
 def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--python", metavar="PYTHON", help="another interpreter to look for the codes in")
-
-
-def interpreter(library: str, more: str | None) -> str | None:
-    """A Python that has a library."""
-    found = [sys.executable, more, shutil.which("python3", path="/usr/bin"), shutil.which("python3")]
-    for python in filter(None, found):
-        if call(python, "-c", f"import {library}").returncode == 0:
-            return python
-    return None
-
-
-def call(*command: str) -> subprocess.CompletedProcess[str]:
-    hidden = ("PYTHONPATH", "PYTHONWARNINGS", "VIRTUAL_ENV")
-    environment = {name: value for name, value in os.environ.items() if name not in hidden}
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
 def write_mesh(place: Path, nx: int, ny: int) -> None:

@@ -105,6 +105,24 @@ def test_every_command_takes_the_toml_file(here, capsys, command):
     assert out
 
 
+def test_a_mesh_is_no_problem_yet(here, capsys):
+    status, out, err = run(capsys, "roots", "body.msh", "--alpha", "0.5")
+    assert (status, out) == (2, "")
+    assert err == (
+        "enumsol: error: body.msh is a mesh; expected a problem, which enumsol solve body.msh --output FILE.npz or a "
+        ".toml file makes\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "rests"), [((), True), (("--gap", "0.1"), True), (("--gap", "-0.1"), False), (OPTIONS[-2:], False)]
+)
+def test_a_forgotten_load_is_noted(here, capsys, options, rests):
+    status, _, err = run(capsys, "solve", "body.msh", *OPTIONS[:-2], "--friction", "0.5", *options)
+    assert status == 0
+    assert ("nothing acts on the body" in err) is rests
+
+
 def test_friction_and_loads_may_depend_on_alpha(here, capsys):
     command = ("solve", "body.msh", *OPTIONS, "--load-slope", "lid=0,-1", "--pressure-slope", "lid=-0.5")
     status, out, _ = run(capsys, *command, "--friction", "0.2,0.3", "-o", "p.npz")

@@ -284,6 +284,7 @@ def test_truncated_and_damaged_archives(tmp_path):
     [
         ("nowhere.npz", "there is no such file or directory; expected a .npz file, a directory of MatrixMarket"),
         ("nowhere", "there is no such file or directory"),
+        ("p.toml", r"expected a \.npz file, .* \(enumsol\.fem makes problems of meshes and \.toml files\)"),
         ("p.txt", r"its name ends in '\.txt'; expected a .npz file"),
         ("suffixless", "its name has no suffix; expected a .npz file"),
         ("f.mtx", r"one MatrixMarket file is no problem; expected a directory with A\.mtx"),

@@ -19,6 +19,7 @@ VERSIONS = ("proven_graphs", "requirements", "search_profile")
 PEERS = {
     "against_scip": ("pyscipopt", "pyscipopt is not installed: SCIP is left out", "roots"),
     "fixed_points_scaling": ("cvxpy", "cvxpy is not installed: it is left out", "iterations"),
+    "peers": ("pyscipopt", "pyscipopt is not installed: it is left out", "known"),
     "qp_engines": ("daqp", "daqp is not installed: it is left out", "proven by multipliers"),
 }
 #: What studies at their smoke size conclude.
@@ -27,12 +28,14 @@ CONCLUSIONS = {
     "branch_shapes": ("40 squares, 0 not complete; 2 closed branches",),
     "continuation_coverage": ("random: 8 of 8 problems settled",),
     "continuation_steps": ("checked steps, h_max 1 5: jumps 0 0",),
+    "discs": ("unequal radii, soft: 2 of 2 complete", "unequal weights, stiff: 2 of 2 complete"),
     "extremes": ("all: 28 cases, 28 right, 0 undecided, 0 wrong",),
     "fixed_points_basins": ("sign of the index at all: yes", "none of the repelling ones: yes"),
     "fixed_points_scaling": ("all converged: yes", "Newton needed no help: yes"),
     "grazing": ("chains: all complete and checked: yes; at most", "rows of equal discs: 4 of 4 complete"),
     "jamming_wedge": ("jams from F = 1.37, from coarse to fine; at most 5 solutions", "all complete, proven: yes"),
     "paper_examples": ("all 19 facts hold", "no arc or continuum missed, no jump"),
+    "peers": ("enumsol: ended on 3 of 3", "4^p selections: ended on 3 of 3"),
     "requirements": ("both interpreters import the same enumsol", "import enumsol: "),
     "same_body_by_other_codes": ("the same roots to 1e-09, all complete: yes",),
     "samples_vs_graph": ("branches of length 0.001 are missed by 50 samples", "40 of 40 root sets agree"),
