@@ -92,7 +92,7 @@ def forms(system, root):
     sliding = np.abs(w_t[free]) >= NEAR
     if not len(free):
         return 0, 0, "-", "-", "-"
-    reduction = Reduction(system, tuple(codes.tolist()), tuple(free.tolist()))
+    reduction = Reduction(system, tuple(codes.tolist()), tuple(free.tolist()), {})
     tau = reduction.weights(np.ones(len(free), dtype=bool))
     # one unknown for contacts that are open or slip forward, or open or slip backward; those with w = 0 keep two
     rubs = len(free) + np.flatnonzero(~sliding)

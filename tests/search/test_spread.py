@@ -154,7 +154,7 @@ def test_dask(small_parts, wedge):
     distributed = pytest.importorskip("distributed")
     problem, alpha, whole = wedge
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
         found = enumerate_roots(problem, alpha, executor=client.get_executor())
