@@ -81,7 +81,7 @@ def test_the_same_roots_and_one_proof_whatever_the_number_of_workers(name, execu
         assert roots.complete
         assert roots.index_sum == alone.index_sum == 1
         assert bytes_of(roots.proof) == bytes_of(together[0].proof)
-        assert roots.stats.nodes == pytest.approx(alone.stats.nodes, rel=0.1)
+        assert roots.stats.nodes == pytest.approx(alone.stats.nodes, rel=0.15)
     # subtrees start cold: other multipliers, of as many leaves but for ties
     report = verify(problem, together[0].proof)
     assert report.complete
