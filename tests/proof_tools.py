@@ -84,9 +84,11 @@ class Judge:
     def valid(self, records):
         """Every leaf proves what it says, the leaves cover all selections, the counts are right.
 
-        Closed subtrees are judged by the other rational checker, which tries all selections of their free nodes.
+        Closed subtrees are judged by the other rational checker, which tries all selections of their free nodes, and so
+        are splits by sides.
         """
-        if any(isinstance(record, list) and record[0] in ("m", "M") for record in records):
+        lists = [record for record in records if isinstance(record, list)]
+        if any(record[0] in ("m", "M") or (record[0] == "b" and max(record[2]) > 6) for record in lists):
             return _accepted(self.problem, records)
         header, footer = records[0], records[-1]
         alpha = Fraction(header["alpha"])

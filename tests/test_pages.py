@@ -100,4 +100,4 @@ def test_results(results):
 
 
 def test_reports(command_line):
-    assert {path.name for path in command_line["folder"].iterdir()} == {"wedge.html", "wedge.proof"}
+    assert {path.name for path in command_line["folder"].iterdir()} == {"FILE", "wedge.html", "wedge.proof"}

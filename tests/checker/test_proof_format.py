@@ -49,6 +49,7 @@ POINTS = {
     "everything": lambda: (three_with_everything(), Fraction(7, 3)),
     "all statuses": lambda: (integer_problem(np.random.default_rng(20), 2), 0.0),
     "grazing": lambda: (beside_a_loaded_node(3, slides=True, grazing=True), 0.0),
+    "sides": lambda: (beside_a_loaded_node(3, slides=True, grazing=True, friction=1.0), 0.0),
 }
 
 
