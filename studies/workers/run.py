@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from shared.results import Run
 
 #: Contact nodes of the wedge: a minute or so, and a second.
-SIZE, SMOKE_SIZE = 56, 16
+SIZE, SMOKE_SIZE = 48, 16
 
 
 def options(parser):
