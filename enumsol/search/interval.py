@@ -14,6 +14,8 @@ from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
+import numpy as np
+
 from enumsol.relaxation.interval import IntervalSystem
 from enumsol.search.interval_tree import LARGEST_TREE, EmptyLeaf, PieceTree, Subtree, TreeResult
 from enumsol.search.stopping import Stop, StopReason
@@ -22,7 +24,6 @@ from enumsol.statuses import UNDECIDED
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import CondensedProblem
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
 
 #: Pieces are not cut below this part of the interval.
 SMALLEST_PIECE = 2.0**-40
-#: Trees are given up over pieces longer than this part of the interval, which only have to be cut.
+#: Trees are given up over pieces longer than this part of the interval, which only have to be cut, where friction
+#: varies: a block with p = 64 takes a quarter of the nodes then, and under a varying load 1.6 times as many.
 LONG_PIECE = 2.0**-9
 #: Into how many trees what a tree of the largest size left is divided.
 FURTHER_TREES = 8
@@ -174,9 +176,8 @@ class Worker:
             if share > SMALLEST_PIECE:
                 middle = self._make(Piece(piece.middle, piece.middle))
             convex = partial(self.leaves.convex, piece, system) if self.leaves.forms else None
-            trees = PieceTree(
-                system, middle, partial(self.leaves.excluded, piece, system), convex, long=share > LONG_PIECE
-            )
+            long = share > LONG_PIECE and bool(np.any(system.F_lo != system.F))
+            trees = PieceTree(system, middle, partial(self.leaves.excluded, piece, system), convex, long=long)
             self._trees = (piece, system, trees)
         return self._trees
 
