@@ -125,9 +125,9 @@ def test_limits_hold_when_a_worker_dies(wedge):
 # -- pools that are made anew ------------------------------------------------------------------------------------------
 
 
-def dies_once(mark, value):
-    """A task that takes its process down the first time."""
-    if not os.path.exists(mark):
+def dies_once(home, mark, value):
+    """A task that takes its process down the first time, unless it is that process."""
+    if os.getpid() != home and not os.path.exists(mark):
         Path(mark).touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return value, os.getpid()
@@ -148,19 +148,26 @@ def results(pool, function, *arguments):
     return [crew.next().result for _ in arguments], crew.redone
 
 
+_ALONE = pytest.mark.skipif(
+    "PYTEST_XDIST_WORKER" in os.environ, reason="once took a process of the tests with it; run it with -n 0"
+)
+
+
+@_ALONE
 @pytest.mark.skipif(sys.platform == "win32", reason="kill -9")
 def test_a_pool_is_made_anew(tmp_path):
     pool = RenewedPool(2)
     pool.renew()
     mark = str(tmp_path / "mark")
     with pool, pytest.warns(RuntimeWarning, match="a worker died"):
-        found, redone = results(pool, dies_once, *((mark, k) for k in range(6)))
+        found, redone = results(pool, dies_once, *((os.getpid(), mark, k) for k in range(6)))
     assert sorted(value for value, _ in found) == list(range(6))
     # the work went on in processes, not here
     assert os.getpid() not in {pid for _, pid in found}
     assert redone > 0
 
 
+@_ALONE
 def test_what_kills_every_worker_is_done_here():
     pool = RenewedPool(1)
     pool.renew()
