@@ -1,4 +1,4 @@
-"""The site of the documents, by Sphinx: .venv/bin/python -m sphinx -W docs site."""
+"""The site of the documents, by Sphinx: .venv/bin/python -m sphinx -W docs site/html."""
 
 import sys
 from pathlib import Path

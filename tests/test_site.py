@@ -12,7 +12,7 @@ from check_site import complaints, public_names
 from documents import ROOT
 from references import places
 
-BUILD = 'pip install -e ".[docs]" && python -m sphinx -W docs site'
+BUILD = 'pip install -e ".[docs]" && python -m sphinx -W docs site/html'
 NOTEBOOK = ROOT / "docs" / "notebook.ipynb"
 missing = [name for name in ("sphinx", "myst_nb", "furo") if find_spec(name) is None]
 
