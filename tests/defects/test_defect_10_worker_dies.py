@@ -10,6 +10,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from documents import ROOT
 from dying import DyingExecutor
 from proof_tools import bytes_of
 
@@ -148,9 +149,7 @@ def results(pool, function, *arguments):
     return [crew.next().result for _ in arguments], crew.redone
 
 
-_ALONE = pytest.mark.skipif(
-    "PYTEST_XDIST_WORKER" in os.environ, reason="once took a process of the tests with it; run it with -n 0"
-)
+_ALONE = pytest.mark.skipif("PYTEST_XDIST_WORKER" in os.environ, reason="run by the test below")
 
 
 @_ALONE
@@ -173,6 +172,18 @@ def test_what_kills_every_worker_is_done_here():
     pool.renew()
     with pool, pytest.warns(RuntimeWarning, match="a worker died"):
         assert results(pool, dies_in_workers, (os.getpid(),)) == ([os.getpid()], 3)
+
+
+def test_pools_are_made_anew_in_a_process_of_their_own():
+    """A process of the tests was once lost beside them, and all that it had still to do."""
+    variables = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
+    tests = [
+        f"{__file__}::{test.__name__}" for test in (test_a_pool_is_made_anew, test_what_kills_every_worker_is_done_here)
+    ]
+    command = [sys.executable, "-m", "pytest", "-n", "0", *tests]
+    done = subprocess.run(command, check=False, env=variables, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "passed" in done.stdout
 
 
 # -- multiplicity_table ------------------------------------------------------------------------------------------------
