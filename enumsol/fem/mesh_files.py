@@ -14,7 +14,7 @@ import numpy as np
 
 from enumsol.checks import file_path, shown
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
-from enumsol.fem.bases import boundary_facets
+from enumsol.fem.file_cells import body_cells, body_kinds, facets_of_sets, solid_cells, with_centres
 from enumsol.fem.mesh_checks import positions
 from enumsol.fem.parts import PartedMesh
 from enumsol.texts import shortened
@@ -28,27 +28,6 @@ if TYPE_CHECKING:
 
     Integers = NDArray[np.int64]
 
-#: By dimension: the facets of each kind of cell, by meshio's names.
-_FACET_OF = {
-    2: {"triangle": "line", "quad": "line", "triangle6": "line3", "quad8": "line3", "quad9": "line3"},
-    3: {"tetra": "triangle", "hexahedron": "quad"},
-}
-#: By dimension: other cells that files may hold.
-_IGNORED = {2: ("vertex",), 3: ("vertex", "line")}
-_EXPECTED = {
-    2: "either triangle or quad with line, or triangle6, quad8 or quad9 with line3",
-    3: "either tetra with triangle or hexahedron with quad (of first order)",
-}
-_BODIES = {2: "triangles or quadrilaterals", 3: "tetrahedra or hexahedra"}
-#: What makes gmsh write other cells.
-_HINTS = {
-    (
-        "tetra10",
-    ): " (for tetra set Mesh.ElementOrder = 1 in gmsh; facets of 6 nodes carry no pressure at their corners)",
-    ("quad", "triangle"): " (for quad alone set Mesh.SubdivisionAlgorithm = 1 in gmsh)",
-    ("quad8", "triangle6"): " (for quad8 alone set Mesh.SubdivisionAlgorithm = 1 in gmsh)",
-    ("quad9", "triangle6"): " (for quad9 alone set Mesh.SubdivisionAlgorithm = 1 in gmsh)",
-}
 #: Third coordinates of a plane mesh may differ by this share of its extent.
 _PLANE = 1e-9
 _PHYSICAL = "gmsh:physical"
@@ -76,8 +55,9 @@ _DAMAGE = (
 def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -> PartedMesh:
     """Mesh of a body in 2D or 3D with its named parts, from a file that meshio reads or from a meshio.Mesh.
 
-    In 2D the cells are triangles or quadrilaterals, of first or of second order (6, 8 or 9 nodes), in 3D tetrahedra or
-    hexahedra of first order. The third coordinate of a plane mesh is left out; it must be the same everywhere.
+    In 2D the cells are triangles and quadrilaterals, of first or of second order (6, 8 or 9 nodes), in 3D tetrahedra or
+    hexahedra, of first or of second order (10, 20 or 27 nodes); those of 20 nodes are completed to 27, with the last
+    numbers for the new nodes. The third coordinate of a plane mesh is left out; it must be the same everywhere.
 
     Parts are the lines (in 3D triangles or quadrilaterals) that the file holds, by the names of their cell sets or
     physical groups (a group without a name gets its number); without any groups all of them are named "boundary".
@@ -95,8 +75,9 @@ def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -
     Raises
     ------
     InvalidArgumentError
-        The file cannot be read; it holds no cells of these kinds, several kinds, or others; it has no facets, or facets
-        that belong to no cell; a plane mesh is not in the x-y plane. The message begins with the path.
+        The file cannot be read; it holds no cells of these kinds, kinds that do not fit together, or others; it has no
+        facets, or facets that belong to no cell; a plane mesh is not in the x-y plane. The message begins with the
+        path.
     MissingDependencyError
         meshio is not installed.
 
@@ -181,8 +162,8 @@ def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     if dimension is None:
         spatial = any(kind.startswith(("tetra", "hexa", "wedge", "pyramid", "polyhedron")) for kind in kinds)
         dimension = 3 if spatial else 2
-    body, facet = _kinds(kinds, dimension)
-    cells = np.concatenate([np.asarray(block.data) for block in mesh.cells if block.type == body]).astype(np.int64)
+    bodies, facet = body_kinds(kinds, dimension)
+    cells = body_cells(mesh, bodies)
     used = np.unique(cells)
     if len(used) and not 0 <= used[0] <= used[-1] < len(mesh.points):
         raise InvalidArgumentError(
@@ -194,16 +175,16 @@ def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     number[used] = np.arange(len(used))
     inside = number[cells]
     if dimension == 3:
-        from enumsol.fem.solid_geometry import solid_mesh  # not for plane meshes
-
-        nodes, inside = solid_mesh(nodes, inside)
+        nodes, inside = solid_cells(nodes, inside)
     sets = {name: kept for name, rows in _node_sets(mesh).items() if len(kept := _inside(number, rows, name))}
     facets = {name: _inside(number, rows, name) for name, rows in _named(mesh, facet, groups, dimension).items()}
     lost = [name for name, rows in facets.items() if np.any(rows < 0)]
     if lost:
         raise InvalidArgumentError(f"facets of {lost[0]} have nodes of no cell; expected facets on the boundary")
-    if not facets:
-        facets = _facets_of_sets(nodes, inside, sets)
+    if facet == "quad8":
+        facets = {name: with_centres(rows, inside, name) for name, rows in facets.items()}
+    found, sets = facets_of_sets(dimension, inside, sets, len(used))
+    facets = facets or found
     if not facets:
         raise InvalidArgumentError(
             f"the mesh has no contact facets: no {facet} cells on its boundary; "
@@ -227,29 +208,6 @@ def _made(
     return SolidMesh(nodes, cells, MappingProxyType(facets), MappingProxyType(sets))
 
 
-def _kinds(kinds: list[str], dimension: int) -> tuple[str, str]:
-    """Kind of the cells of the body, and of its facets."""
-    facet_of, expected = _FACET_OF[dimension], _EXPECTED[dimension]
-    others = [kind for kind in kinds if not kind.startswith(_IGNORED[dimension])]
-    bodies = [kind for kind in others if kind in facet_of]
-    strange = [kind for kind in others if kind not in facet_of and kind not in facet_of.values()]
-    if strange or len(bodies) > 1:
-        hint = _HINTS.get(tuple(sorted(strange or bodies)), "")
-        raise InvalidArgumentError(
-            f"the mesh has cells of type {' and '.join(strange or bodies)}; expected {expected}{hint}"
-        )
-    if not bodies:
-        raise InvalidArgumentError(
-            f"the mesh has no {_BODIES[dimension]}; expected a body in {dimension}D (gmsh writes only what is in "
-            "physical groups, if there are any: the body needs one, too)"
-        )
-    facet = facet_of[bodies[0]]
-    other = [kind for kind in others if kind not in (bodies[0], facet)]
-    if other:
-        raise InvalidArgumentError(f"the mesh has {other[0]} cells beside {bodies[0]}; expected facets of type {facet}")
-    return bodies[0], facet
-
-
 def _plane(points: NDArray[Any]) -> NDArray[np.float64]:
     """Points (N, 2) of a plane mesh."""
     if points.ndim == 2 and points.shape[1] == 3:
@@ -271,15 +229,6 @@ def _inside(number: Integers, rows: Integers, name: str) -> Integers:
             f"{name} names nodes from {np.min(rows)} to {np.max(rows)}; expected them in 0 .. {len(number) - 1}"
         )
     return np.asarray(number[rows])
-
-
-def _facets_of_sets(nodes: NDArray[np.float64], cells: Integers, sets: dict[str, Integers]) -> dict[str, Integers]:
-    """Facets on the boundary all of whose nodes belong to a set, by the set's name."""
-    if not sets:
-        return {}
-    outer = boundary_facets(nodes.shape[1], cells)
-    found = {name: outer[np.all(np.isin(outer, rows), axis=1)] for name, rows in sets.items()}
-    return {name: rows for name, rows in found.items() if len(rows)}
 
 
 def _node_sets(mesh: Any) -> dict[str, Integers]:

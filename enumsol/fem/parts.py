@@ -11,7 +11,7 @@ import numpy as np
 
 from enumsol.checks import shown
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.bases import KINDS
+from enumsol.fem.cells import KINDS, by_kind
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,17 +21,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PartedMesh:
-    """A mesh of one kind of cell with named parts: sets of facets, and sets of nodes. In 3D it is a `SolidMesh`.
+    """A mesh with named parts: sets of facets, and sets of nodes. In 3D it is a `SolidMesh`.
 
     Attributes
     ----------
     points : (N, d) array
         Positions of the nodes [length].
     cells : (M, k) int array
-        Nodes of each cell, in the order of VTK and gmsh: its corners, then those on its edges, then that inside. In 2D
-        3 or 6 nodes of triangles, 4, 8 or 9 of quadrilaterals; in 3D 4 of tetrahedra, 8 of hexahedra.
+        Nodes of each cell, in the order of VTK: its corners, then those on its edges, on its facets, and inside. In 2D
+        3 or 6 nodes of triangles, 4, 8 or 9 of quadrilaterals; in 3D 4 or 10 of tetrahedra, 8 or 27 of hexahedra. Among
+        quadrilaterals a triangle is one whose last corner is named twice (a, b, c, c), in second order with this corner
+        for the node between the two and for that inside, too.
     facets : mapping of names to (k, m) int arrays
-        Nodes of the facets of parts of the boundary: corners, then, on edges of second order, the node between them.
+        Nodes of the facets of parts of the boundary: corners, then, in second order, the nodes between them, then that
+        inside.
     node_sets : mapping of names to (k,) int arrays
         Nodes of parts that are given by nodes.
     """
@@ -78,10 +81,13 @@ class PartedMesh:
 
     def __repr__(self) -> str:
         parts = ", ".join(f"{name} ({len(part)})" for name, part in self.facets.items()) or "none"
-        kind = KINDS[self.points.shape[1], self.cells.shape[1]].name
+        dimension = self.points.shape[1]
+        kinds = [
+            f"{len(rows)} {KINDS[dimension, cells.shape[1]].name}" for rows, cells in by_kind(dimension, self.cells)
+        ]
         lines = [
             f"{type(self).__name__} with {len(self.points)} nodes",
-            f"  cells   {len(self.cells)} {kind}",
+            f"  cells   {', '.join(kinds)}",
             f"  facets  {parts}",
         ]
         if self.node_sets:
