@@ -17,6 +17,7 @@ from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fem.file_cells import body_cells, body_kinds, facets_of_sets, solid_cells, with_centres
 from enumsol.fem.mesh_checks import positions
 from enumsol.fem.parts import PartedMesh
+from enumsol.files import unreadable
 from enumsol.texts import shortened
 
 if TYPE_CHECKING:
@@ -128,6 +129,8 @@ def _read(source: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     if isinstance(source, meshio.Mesh):
         return _checked(source, groups, dimension)
     place = file_path(source, "source", "the name of a file or a meshio.Mesh")
+    if (found := unreadable(place)) is not None:
+        raise InvalidArgumentError(f"{place}: {found}; expected a mesh that meshio reads")
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():

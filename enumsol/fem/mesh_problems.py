@@ -23,11 +23,12 @@ from enumsol.fem.mesh_checks import lame, unit_vectors
 from enumsol.fem.mesh_files import read_mesh
 from enumsol.fem.parts import PartedMesh
 from enumsol.fem.restrained import ContactNodes, movable, plain_dofs
+from enumsol.files import unreadable
 from enumsol.texts import shortened
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
@@ -205,13 +206,13 @@ def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactP
         name = file_path(options.pop("mesh", None), "mesh", "the name of a mesh file in quotes")
         check_keys(options)
         return mesh_problem(place.parent / name, **options)
-    except OSError as error:
-        raise InvalidProblemError(f"{place}: it cannot be read ({error.strerror or error})") from error
     except (InvalidArgumentError, InvalidProblemError) as error:
         raise InvalidProblemError(f"{place}: {error}") from error
 
 
 def _toml(place: Path) -> dict[str, Any]:
+    if (found := unreadable(place)) is not None:
+        raise InvalidArgumentError(f"{found}; expected a TOML file of options")
     with place.open("rb") as file:
         content = file.read(LARGEST_FILE + 1)
     if len(content) > LARGEST_FILE:
@@ -225,8 +226,10 @@ def _toml(place: Path) -> dict[str, Any]:
         ) from error
 
 
-def check_keys(options: Mapping[str, Any]) -> None:
+def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str) -> None:
     """Refuse options that `mesh_problem` does not have, and the lack of those that it must have.
+
+    ``spelled`` gives the name of an option as its user writes it.
 
     Raises
     ------
@@ -241,7 +244,8 @@ def check_keys(options: Mapping[str, Any]) -> None:
             raise InvalidArgumentError(f"there is no option {shown(name)}; {hint}")
     missing = [name for name, default in known.items() if default is inspect.Parameter.empty and name not in options]
     if missing:
-        raise InvalidArgumentError(f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing")
+        names = ", ".join(map(spelled, missing))
+        raise InvalidArgumentError(f"{names} {'is' if len(missing) == 1 else 'are'} missing")
 
 
 def _held(mesh: PartedMesh, clamp: Any, symmetry: Any, displacement: Any) -> Held:

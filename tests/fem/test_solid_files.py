@@ -221,8 +221,21 @@ def test_files_that_meshio_cannot_read(tmp_path, capsys, name, text):
 
 
 def test_other_arguments(tmp_path, monkeypatch):
-    with pytest.raises(InvalidArgumentError, match=r"meshio cannot read it .*not found"):
+    with pytest.raises(InvalidArgumentError, match="there is no such file; expected a mesh that meshio reads"):
         fem.read_solid(tmp_path / "nowhere.msh")
+    with pytest.raises(InvalidArgumentError, match="it is a directory; expected a mesh that meshio reads"):
+        fem.read_solid(tmp_path)
+    (tmp_path / "secret.msh").touch()
+    with monkeypatch.context() as patched:  # the user who runs the tests may read everything
+
+        def refused(*_):
+            raise PermissionError(13, "Permission denied")
+
+        patched.setattr("pathlib.Path.open", refused)
+        with pytest.raises(
+            InvalidArgumentError, match=r"secret\.msh: it cannot be read \(Permission denied\); expected"
+        ):
+            fem.read_solid(tmp_path / "secret.msh")
     with pytest.raises(InvalidArgumentError, match="source is a int; expected the name of a file or a meshio"):
         fem.read_solid(3)
     monkeypatch.setitem(sys.modules, "meshio", None)
