@@ -38,12 +38,15 @@ _EXPECTED = {
     3: "one of tetra, tetra10, hexahedron, hexahedron20, hexahedron27 with triangle, triangle6, quad, quad8, quad9",
 }
 _BODIES = {2: "triangles or quadrilaterals", 3: "tetrahedra or hexahedra"}
+#: Why gmsh leaves cells out.
+GROUPS_ONLY = "gmsh writes only what is in physical groups, if there are any:"
 #: What makes gmsh write other cells.
 _HINTS = {
     "pyramid": " (pyramids join tetrahedra to hexahedra: mesh all of the body by one of them)",
     "wedge": " (wedges are extruded triangles: recombine these to quadrilaterals, or do not recombine the layers)",
-    "tetra": " (tetrahedra and hexahedra fit together by pyramids only: mesh all of the body by one of them)",
+    "": " (for cells of higher order set Mesh.ElementOrder = 2 in gmsh)",
 }
+_APART = " (tetrahedra and hexahedra fit together by pyramids only: mesh all of the body by one of them)"
 
 
 def body_kinds(kinds: list[str], dimension: int) -> tuple[list[str], str]:
@@ -59,15 +62,15 @@ def body_kinds(kinds: list[str], dimension: int) -> tuple[list[str], str]:
     bodies = [kind for kind in others if kind in facet_of]
     strange = [kind for kind in others if kind not in facet_of and kind not in facet_of.values()]
     if strange or (len(bodies) > 1 and set(bodies) not in _TOGETHER):
-        named = strange or bodies
-        hint = next((text for start, text in _HINTS.items() if any(kind.startswith(start) for kind in named)), "")
+        hint = next((text for start, text in _HINTS.items() if any(kind.startswith(start) for kind in strange)), "")
+        hint = hint or (_APART if dimension == 3 else "")
         raise InvalidArgumentError(
-            f"the mesh has cells of type {' and '.join(named)}; expected {_EXPECTED[dimension]}{hint}"
+            f"the mesh has cells of type {' and '.join(strange or bodies)}; expected {_EXPECTED[dimension]}{hint}"
         )
     if not bodies:
         raise InvalidArgumentError(
-            f"the mesh has no {_BODIES[dimension]}; expected a body in {dimension}D (gmsh writes only what is in "
-            "physical groups, if there are any: the body needs one, too)"
+            f"the mesh has no {_BODIES[dimension]}; expected a body in {dimension}D ({GROUPS_ONLY} the body needs one, "
+            "too)"
         )
     facet = facet_of[bodies[0]]
     other = [kind for kind in others if kind not in (*bodies, facet)]

@@ -14,7 +14,7 @@ import numpy as np
 
 from enumsol.checks import file_path, shown
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
-from enumsol.fem.file_cells import body_cells, body_kinds, facets_of_sets, solid_cells, with_centres
+from enumsol.fem.file_cells import GROUPS_ONLY, body_cells, body_kinds, facets_of_sets, solid_cells, with_centres
 from enumsol.fem.mesh_checks import positions
 from enumsol.fem.parts import PartedMesh
 from enumsol.files import unreadable
@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 #: Third coordinates of a plane mesh may differ by this share of its extent.
 _PLANE = 1e-9
 _PHYSICAL = "gmsh:physical"
+#: What meshio calls the families of a MED file, of cells and of points; numbers of groups in formats without names.
+_FAMILIES = ("cell_tags", "point_tags")
+_NUMBERS = ("medit:ref", "su2:tag", "CellEntityIds")
 #: The name of all facets where nothing names groups of them.
 _ALL = "boundary"
 #: What meshio raises on damaged files or files of another kind; it may also exit.
@@ -61,7 +64,7 @@ def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -
     numbers for the new nodes. The third coordinate of a plane mesh is left out; it must be the same everywhere.
 
     Parts are the lines (in 3D triangles or quadrilaterals) that the file holds, by the names of their cell sets or
-    physical groups (a group without a name gets its number); without any groups all of them are named "boundary".
+    groups (a group without a name gets its number); without any groups all of them are named "boundary".
     Named points and point sets are parts given by nodes; where all nodes of a facet on the boundary belong to a point
     set, the facet is a part of this name, too. Nodes that belong to no cell are left out, and the others numbered from
     0 in the order of the file.
@@ -80,7 +83,7 @@ def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -
         facets, or facets that belong to no cell; a plane mesh is not in the x-y plane. The message begins with the
         path.
     MissingDependencyError
-        meshio is not installed.
+        meshio is not installed, or another package that it needs for the format.
 
     Examples
     --------
@@ -136,6 +139,11 @@ def _read(source: Any, groups: str | None, dimension: int | None) -> PartedMesh:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of numpy, about files that end too early
             mesh = meshio.read(place)
+    except ImportError as error:  # netCDF4 for Exodus, h5py for MED and XDMF
+        package = error.name or "another package"
+        raise MissingDependencyError(
+            f"{place}: meshio needs {package} for this format, which is not installed; expected it, or another format"
+        ) from error
     except (*_DAMAGE, meshio.ReadError) as error:
         reason = "" if isinstance(error, SystemExit) else str(error)
         if isinstance(error, LookupError):  # its text is the key alone
@@ -191,7 +199,7 @@ def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     if not facets:
         raise InvalidArgumentError(
             f"the mesh has no contact facets: no {facet} cells on its boundary; "
-            f"expected {facet} cells, best in groups with names"
+            f"expected {facet} cells, best in groups with names ({GROUPS_ONLY} its parts need some, too)"
         )
     sets = {name: rows[rows >= 0] for name, rows in sets.items() if np.any(rows >= 0)}
     return _made(dimension, nodes, inside, facets, sets)
@@ -237,6 +245,9 @@ def _inside(number: Integers, rows: Integers, name: str) -> Integers:
 def _node_sets(mesh: Any) -> dict[str, Integers]:
     """Nodes by the name of their point set or of the group of their points, in the numbers of the file."""
     sets = {str(name): np.asarray(rows, dtype=np.int64).ravel() for name, rows in mesh.point_sets.items()}
+    for tag, names in _families(mesh, _FAMILIES[1]).items():
+        of_family = np.flatnonzero(np.asarray(mesh.point_data[_FAMILIES[1]]) == tag)
+        sets |= {name: np.union1d(sets.get(name, of_family), of_family) for name in names}
     points = {name: rows.ravel() for name, rows in _grouped(mesh, "vertex", None, 0).items()}
     return sets | points
 
@@ -255,24 +266,41 @@ def _named(mesh: Any, facet: str, groups: str | None, dimension: int) -> dict[st
 
 def _grouped(mesh: Any, kind: str, groups: str | None, dimension: int) -> dict[str, Integers]:
     """Cells of a kind by the name of their cell set or group."""
-    blocks = [k for k, block in enumerate(mesh.cells) if block.type == kind]
-    rows = {k: np.asarray(mesh.cells[k].data).astype(np.int64) for k in blocks}
+    rows = {k: np.asarray(block.data).astype(np.int64) for k, block in enumerate(mesh.cells) if block.type == kind}
     named: dict[str, list[Integers]] = {}
     if groups is None:
         for name, sets in mesh.cell_sets.items():
-            for k in blocks:
+            for k in rows:
                 if not name.startswith("gmsh:") and sets[k] is not None and len(sets[k]):
                     named.setdefault(name, []).append(rows[k][np.asarray(sets[k], dtype=np.int64)])
-    data = _PHYSICAL if groups is None else groups
-    if not named and data in mesh.cell_data:
-        names = {
-            int(entry[0]): name for name, entry in mesh.field_data.items() if len(entry) > 1 and entry[1] == dimension
-        }
-        for k in blocks:
-            tags = np.asarray(mesh.cell_data[data][k])
+    data, names, numbered = _tags(mesh, list(rows), groups, dimension)
+    if not named and data is not None:
+        for k, cells in rows.items():
+            tags = np.asarray(mesh.cell_data[data][k]).reshape(len(cells))
             for tag in np.unique(tags):
-                if kind == "vertex" and int(tag) not in names:
-                    continue  # gmsh keeps points of no group, too
-                name = names.get(int(tag), f"{tag:g}") if groups is None else f"{tag:g}"
-                named.setdefault(name, []).append(rows[k][tags == tag])
+                for name in names.get(int(tag), [f"{tag:g}"] if numbered else []):
+                    named.setdefault(name, []).append(cells[tags == tag])
     return {name: np.concatenate(parts) for name, parts in named.items()}
+
+
+def _tags(
+    mesh: Any, blocks: list[int], groups: str | None, dimension: int
+) -> tuple[str | None, dict[int, list[str]], bool]:
+    """Cell data whose numbers group cells, the names of numbers, and whether the others are names themselves."""
+    if groups is not None:
+        return groups, {}, True
+    numbered = dimension > 0  # gmsh keeps points of no group, too
+    if _PHYSICAL in mesh.cell_data:
+        names = {int(entry[0]): [name] for name, entry in mesh.field_data.items() if list(entry[1:2]) == [dimension]}
+        return _PHYSICAL, names, numbered
+    if _FAMILIES[0] in mesh.cell_data:
+        return _FAMILIES[0], _families(mesh, _FAMILIES[0]), False
+    for name in _NUMBERS:
+        if name in mesh.cell_data and len(np.unique([tag for k in blocks for tag in mesh.cell_data[name][k]])) > 1:
+            return name, {}, numbered
+    return None, {}, False
+
+
+def _families(mesh: Any, name: str) -> dict[int, list[str]]:
+    """The names of the groups that each family of a MED file belongs to."""
+    return {int(tag): [str(group) for group in members] for tag, members in getattr(mesh, name, {}).items()}

@@ -184,6 +184,45 @@ def test_sets_of_a_mesh_in_memory():
     assert lifted.points.tolist() == SQUARE.tolist()
 
 
+def test_groups_of_formats_that_number_them(tmp_path):
+    """Medit in a file, SU2 and gmsh's VTK as meshio reads them; numbers that group nothing are no names."""
+    body = grid(2, 1, 3)
+    edges = [body.part("bottom"), body.part("left")]
+    cells = [("triangle", body.cells), ("line", np.concatenate(edges))]
+    tags = [np.full(len(body.cells), 1), np.array([7, 7, 8])]
+    meshio.Mesh(body.points, cells, cell_data={"medit:ref": tags}).write(tmp_path / "p.mesh")
+    for source in (tmp_path / "p.mesh", meshio.Mesh(body.points, cells, cell_data={"su2:tag": tags})):
+        read = fem.read_mesh(source)
+        assert {part: rows.tolist() for part, rows in read.facets.items()} == {
+            "7": edges[0].tolist(), "8": edges[1].tolist()
+        }  # fmt: skip
+    columns = [part[:, None] for part in tags]  # as meshio reads scalars of some VTK files
+    assert [*fem.read_mesh(meshio.Mesh(body.points, cells, cell_data={"CellEntityIds": columns})).facets] == ["7", "8"]
+    alike = [tags[0], np.full(3, 7)]
+    assert [*fem.read_mesh(meshio.Mesh(body.points, cells, cell_data={"medit:ref": alike})).facets] == ["boundary"]
+
+
+def test_families_of_med_files(tmp_path):
+    """A family is a set of cells in the same groups, and so for points."""
+    pytest.importorskip("h5py")
+    body = grid(2, 1, 3)
+    edges = np.concatenate([body.part("bottom"), body.part("left")])
+    points = np.zeros(len(body.points), int)
+    points[[0, 5]] = [1, 2]
+    given = meshio.Mesh(
+        body.points, [("triangle", body.cells), ("line", edges)], point_data={"point_tags": points},
+        cell_data={"cell_tags": [np.zeros(len(body.cells), int), np.array([-1, -2, -3])]},
+    )  # fmt: skip
+    given.cell_tags = {-1: ["floor"], -2: ["floor", "shoe"], -3: ["wall"]}
+    given.point_tags = {1: ["pin"], 2: ["pin", "peg"]}
+    given.write(tmp_path / "p.med")
+    read = fem.read_mesh(tmp_path / "p.med")
+    assert {name: sorted(rows.tolist()) for name, rows in read.facets.items()} == {
+        "floor": edges[:2].tolist(), "shoe": edges[1:2].tolist(), "wall": edges[2:].tolist()
+    }  # fmt: skip
+    assert {name: rows.tolist() for name, rows in read.node_sets.items()} == {"pin": [0, 5], "peg": [5]}
+
+
 @pytest.mark.parametrize(
     ("points", "cells", "message"),
     [
@@ -195,6 +234,11 @@ def test_sets_of_a_mesh_in_memory():
             SQUARE,
             [("quad8", [[0, 1, 2, 3] * 2]), ("triangle6", [[0, 1, 2] * 2]), LINE],
             "has line cells beside quad8 and triangle6; expected facets of type line3",
+        ),
+        (
+            SQUARE,
+            [("triangle10", [[0, 1, 2] * 3 + [0]]), LINE],
+            r"type triangle10; .*for cells of higher order set Mesh\.ElementOrder = 2",
         ),
         (SQUARE, [QUAD, ("line3", [[0, 1, 2]])], "the mesh has line3 cells beside quad; expected facets of type line"),
         (

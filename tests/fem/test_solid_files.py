@@ -238,6 +238,12 @@ def test_other_arguments(tmp_path, monkeypatch):
             fem.read_solid(tmp_path / "secret.msh")
     with pytest.raises(InvalidArgumentError, match="source is a int; expected the name of a file or a meshio"):
         fem.read_solid(3)
+    monkeypatch.setitem(sys.modules, "netCDF4", None)
+    (tmp_path / "p.exo").touch()
+    with pytest.raises(
+        MissingDependencyError, match=r"p\.exo: meshio needs netCDF4 for this format, which is not inst"
+    ):
+        fem.read_solid(tmp_path / "p.exo")
     monkeypatch.setitem(sys.modules, "meshio", None)
     with pytest.raises(MissingDependencyError, match=r'need the package meshio, .* "enumsol\[meshes\]"'):
         fem.read_solid(tmp_path / "p.msh")
