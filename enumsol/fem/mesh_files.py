@@ -16,7 +16,7 @@ from enumsol.checks import file_path, shown
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fem.file_cells import GROUPS_ONLY, body_cells, body_kinds, facets_of_sets, solid_cells, with_centres
 from enumsol.fem.mesh_checks import positions
-from enumsol.fem.parts import PartedMesh
+from enumsol.fem.parts import ALL, PartedMesh
 from enumsol.files import unreadable
 from enumsol.texts import shortened
 
@@ -35,8 +35,6 @@ _PHYSICAL = "gmsh:physical"
 #: What meshio calls the families of a MED file, of cells and of points; numbers of groups in formats without names.
 _FAMILIES = ("cell_tags", "point_tags")
 _NUMBERS = ("medit:ref", "su2:tag", "CellEntityIds")
-#: The name of all facets where nothing names groups of them.
-_ALL = "boundary"
 #: What meshio raises on damaged files or files of another kind; it may also exit.
 _DAMAGE = (
     ArithmeticError,
@@ -261,7 +259,7 @@ def _named(mesh: Any, facet: str, groups: str | None, dimension: int) -> dict[st
     named = _grouped(mesh, facet, groups, dimension - 1)
     if named or not rows or _node_sets(mesh):
         return named
-    return {_ALL: np.concatenate(rows)}
+    return {ALL: np.concatenate(rows)}
 
 
 def _grouped(mesh: Any, kind: str, groups: str | None, dimension: int) -> dict[str, Integers]:

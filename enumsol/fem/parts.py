@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
+
+
+#: The name of all facets where nothing names groups of them.
+ALL = "boundary"
 
 
 @dataclass(frozen=True)
@@ -74,7 +79,12 @@ class PartedMesh:
 
     def _unknown(self, name: str, what: str, known: Mapping[str, object]) -> InvalidArgumentError:
         close = difflib.get_close_matches(str(name), known, n=1)
+        several = [part for part in re.split(r"[\s,;]+", str(name)) if part]
         hint = f" (did you mean {close[0]}?)" if close else ""
+        if len(several) > 1 and all(part in known for part in several):
+            hint = f" (give {' and '.join(several)} one by one)"
+        elif [*known] == [ALL]:
+            hint = " (the file names no parts of its boundary; in gmsh physical groups do)"
         return InvalidArgumentError(
             f"the mesh has no {what} named {shown(name)}; expected one of {', '.join(known) or 'none'}{hint}"
         )

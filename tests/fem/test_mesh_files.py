@@ -179,7 +179,12 @@ def test_sets_of_a_mesh_in_memory():
     mesh = fem.read_mesh(meshio.Mesh(SQUARE, cells, cell_sets={"wall": [None, [1]]}, point_sets={"two": [0, 2]}))
     assert [*mesh.facets] == ["wall"]
     assert mesh.nodes("two").tolist() == [0, 2]
-    assert [*fem.read_mesh(meshio.Mesh(SQUARE, cells)).facets] == ["boundary"]
+    nameless = fem.read_mesh(meshio.Mesh(SQUARE, cells))
+    assert [*nameless.facets] == ["boundary"]
+    with pytest.raises(
+        InvalidArgumentError, match=r"expected one of boundary \(the file names no parts .* in gmsh phys"
+    ):
+        nameless.part("floor")
     lifted = fem.read_mesh(meshio.Mesh(np.c_[SQUARE, np.full(4, 3.0)], cells))
     assert lifted.points.tolist() == SQUARE.tolist()
 

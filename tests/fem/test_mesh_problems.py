@@ -202,6 +202,29 @@ def test_half_of_a_symmetric_body(kind):
     assert part.u_t[axis] == 0
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_all_kinds_of_cells_agree(kind):
+    """A wedge that jams: as many roots with every kind, and the contact forces of each add up to the same."""
+    fine = kind in (3, 4, (3, 4))
+
+    def found(kind, count):
+        flat = grid(count, count, kind)
+        wedge = moved(flat, lambda p: np.c_[(p[:, 0] - 0.5) * (1 + 0.8 * p[:, 1]), p[:, 1]])
+        problem = fem.mesh_problem(
+            wedge, **STEEL, contact=["left", "right"], spring={"top": (0.02, 0.02)}, gap=-5e-4,
+            load={"top": (1e-4, 1e-3)},
+        )  # fmt: skip
+        roots = enumsol.enumerate_roots(problem, 2.5, max_nodes=20_000)
+        assert roots.complete
+        forces = [-(problem.contact_rows.T @ np.r_[root.lambda_n, root.lambda_t]) for root in roots]
+        return sorted((force.reshape(-1, 2).sum(axis=0) for force in forces), key=lambda force: force[1])
+
+    one, two = found(kind, 4 if fine else 2), found(9, 3)
+    assert len(one) == len(two) == 3
+    largest = np.max(np.abs(two))
+    assert np.allclose(one, two, rtol=0, atol=0.05 * largest)
+
+
 def test_normals_on_a_plane_of_symmetry_are_those_of_the_whole_body():
     """A curved contact boundary, cut where its own normal is oblique but for the other half."""
 
@@ -325,6 +348,7 @@ GOOD = {**STEEL, "contact": "bottom", "clamp": "top"}
     ("changes", "message"),
     [
         ({"contact": "botom"}, r"no facets named 'botom'; expected one of bottom, .* \(did you mean bottom\?\)"),
+        ({"contact": "bottom, left"}, r"no facets named 'bottom, left'; .* \(give bottom and left one by one\)"),
         ({"clamp": "roof"}, "no facets named 'roof'; expected one of bottom, top, left, right"),
         ({"contact": ()}, "contact names no part"),
         ({"contact": 3}, "contact is 3; expected the name of a part"),
