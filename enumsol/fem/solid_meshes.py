@@ -34,10 +34,10 @@ class SolidMesh(PartedMesh):
     ----------
     points : (N, 3) array
         Positions of the nodes [length].
-    cells : (M, 4) or (M, 8) int array
-        Nodes of each tetrahedron, or of each hexahedron in the order of VTK.
-    facets : mapping of names to (k, 3) or (k, 4) int arrays
-        Nodes of the triangles or quadrilaterals of parts of the boundary.
+    cells : (M, k) int array
+        Nodes of each tetrahedron (k = 4 or 10) or hexahedron (k = 8 or 27), in the order of VTK.
+    facets : mapping of names to (k, m) int arrays
+        Nodes of the triangles (m = 3 or 6) or quadrilaterals (m = 4 or 9) of parts of the boundary.
     node_sets : mapping of names to (k,) int arrays
         Nodes of parts that are given by nodes.
     """

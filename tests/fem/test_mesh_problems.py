@@ -222,7 +222,7 @@ def test_all_kinds_of_cells_agree(kind):
     one, two = found(kind, 4 if fine else 2), found(9, 3)
     assert len(one) == len(two) == 3
     largest = np.max(np.abs(two))
-    assert np.allclose(one, two, rtol=0, atol=0.05 * largest)
+    assert np.allclose(one, two, rtol=0, atol=0.005 * largest)
 
 
 def test_normals_on_a_plane_of_symmetry_are_those_of_the_whole_body():
