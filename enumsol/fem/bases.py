@@ -108,7 +108,7 @@ class NodalBasis:
         Raises
         ------
         InvalidArgumentError
-            A facet is no facet on the boundary of the body, or comes twice.
+            A facet is no facet on the boundary of the body, has another number of nodes, or comes twice.
         """
         from skfem import LinearForm  # as below
 
@@ -127,7 +127,12 @@ class NodalBasis:
         InvalidArgumentError
             As in `on_part`.
         """
-        corners = len(self.blocks[0].basis.mesh.facets)
+        mesh = self.blocks[0].basis.mesh
+        corners, count = len(mesh.facets), len(mesh.bndelem.doflocs)
+        if facets.shape[1] != count:
+            raise InvalidArgumentError(
+                f"{name} has facets of {facets.shape[1]} nodes; expected {count}, as the cells have"
+            )
         keys = [tuple(key) for key in np.sort(facets[:, :corners], axis=1).tolist()]
         numbers = np.array([self._outer.get(key, (-1, -1)) for key in keys], dtype=np.int64)
         if np.any(numbers < 0):

@@ -293,9 +293,11 @@ def _tags(
         return _PHYSICAL, names, numbered
     if _FAMILIES[0] in mesh.cell_data:
         return _FAMILIES[0], _families(mesh, _FAMILIES[0]), False
-    for name in _NUMBERS:
-        if name in mesh.cell_data and len(np.unique([tag for k in blocks for tag in mesh.cell_data[name][k]])) > 1:
-            return name, {}, numbered
+    for name in _NUMBERS if blocks else ():
+        if name in mesh.cell_data:
+            tags = np.concatenate([np.ravel(mesh.cell_data[name][k]) for k in blocks])
+            if np.any(tags != tags[:1]):
+                return name, {}, numbered
     return None, {}, False
 
 

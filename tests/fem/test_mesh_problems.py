@@ -426,6 +426,13 @@ def test_facets_inside_the_body_are_refused():
         fem.mesh_problem(inside, **STEEL, contact="cut", clamp="top")
 
 
+def test_facets_without_their_nodes_between_are_refused():
+    mesh = grid(2, 2, 6)
+    bare = fem.parts.PartedMesh(mesh.points, mesh.cells, {name: part[:, :2] for name, part in mesh.facets.items()})
+    with pytest.raises(InvalidArgumentError, match="bottom has facets of 2 nodes; expected 3, as the cells have"):
+        fem.mesh_problem(bare, **GOOD)
+
+
 def test_a_folded_boundary_has_no_normal():
     """Both sides of a cut share its end."""
     points = [[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]]
