@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 FLAT = 1e-14
 #: Degree of the quadrature on facets: tractions and normals of quadratic curved edges.
 FACET_DEGREE = 5
+#: scikit-fem assembles cells with more functions than that by a long loop over their pairs.
+_FEW = 24
 #: Quadrature of degree two on triangles, at the nodes between corners: the nodes that can be in contact.
 _BETWEEN = (np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]), np.full(3, 1 / 6))
 
@@ -88,9 +90,12 @@ class NodalBasis:
 
     def matrix(self, form: Any) -> sp.csc_array:
         """The matrix of a bilinear form of scikit-fem, made exactly symmetric."""
+        return self._gathered(lambda block: form.assemble(block.basis))
+
+    def _gathered(self, assembled: Callable[[Block], Any]) -> sp.csc_array:
         rows, columns, data = [], [], []
         for block in self.blocks:
-            entries = sp.coo_array(form.assemble(block.basis))
+            entries = sp.coo_array(assembled(block))
             rows.append(block.ours[entries.coords[0]])
             columns.append(block.ours[entries.coords[1]])
             data.append(entries.data)
@@ -167,7 +172,11 @@ class NodalBasis:
 
         form = linear_elasticity(lam, mu) if self.shape[1] == 2 else BilinearForm(energy)
         with np.errstate(over="ignore", invalid="ignore"):  # problems refuse what is not finite
-            return self.matrix(form)
+            return self._gathered(
+                lambda block: (
+                    _solid_stiffness(block.basis, lam, mu) if block.basis.Nbfun > _FEW else form.assemble(block.basis)
+                )
+            )
 
     def volume_forces(self, density: Floats) -> Floats:
         """Nodal forces (N, dimension) of a force per volume that is constant on each cell, (M, dimension)."""
@@ -235,6 +244,20 @@ def between_corners(element: Any) -> bool:
     from skfem import ElementTetP2  # as above
 
     return isinstance(getattr(element, "elem", element), ElementTetP2)
+
+
+def _solid_stiffness(basis: Any, lam: float, mu: float) -> sp.coo_array:
+    """The same as of the form of the energy in 3D, for all pairs of functions of a cell at once."""
+    # degrees of freedom of a cell are node by node, and a gradient is that of one component
+    slopes = np.stack([basis.basis[j][0].grad[0] for j in range(0, basis.Nbfun, 3)])
+    nodes, _, cells, points = slopes.shape
+    G = slopes.transpose(2, 0, 1, 3).reshape(cells, 3 * nodes, points)
+    T = ((G * basis.dx[:, None]) @ G.transpose(0, 2, 1)).reshape(cells, nodes, 3, nodes, 3)
+    K = lam * T + mu * T.transpose(0, 1, 4, 3, 2)
+    K += mu * np.einsum("maibi,jk->majbk", T, np.eye(3))
+    dofs = basis.element_dofs.T
+    places = (np.repeat(dofs, basis.Nbfun, axis=1).ravel(), np.tile(dofs, basis.Nbfun).ravel())
+    return sp.coo_array((K.ravel(), places), shape=(basis.N, basis.N))
 
 
 @cache

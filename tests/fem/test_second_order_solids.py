@@ -49,6 +49,15 @@ def test_patch_test(kind):
 
 
 @pytest.mark.parametrize("kind", SECOND)
+def test_stiffness_is_that_of_scikit_fem(kind):
+    mesh = moved(solid((1, 1, 1), kind, shake=0.1), lambda p: p + 0.05 * np.sin(3 * p[:, ::-1]))
+    body = nodal_basis(mesh.points, mesh.cells)
+    (block,) = body.blocks
+    expected = linear_elasticity(*LAME).assemble(block.basis)[block.dofs.ravel()][:, block.dofs.ravel()]
+    assert abs(body.stiffness(*LAME) - expected).max() < 1e-13
+
+
+@pytest.mark.parametrize("kind", SECOND)
 def test_a_uniform_pressure_on_a_block_between_walls(kind):
     """Uniaxial strain: every contact node carries the pressure times its area, all of them positive."""
     mesh = solid((2, 2, 2), kind, (1.5, 1.0, 1.0), shake=0.1)
