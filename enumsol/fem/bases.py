@@ -66,6 +66,17 @@ class Block:
         ours[self.dofs] = dimension * self.nodes[:, None] + np.arange(dimension)
         return ours
 
+    def on_facets(self, numbers: Integers, *, lumped: bool) -> Any:
+        """`facet_basis`, which is slow to make, once for all that acts on the same facets."""
+        key = (numbers.tobytes(), lumped)
+        if key not in self._on_facets:
+            self._on_facets[key] = facet_basis(self.basis, numbers, lumped=lumped)
+        return self._on_facets[key]
+
+    @cached_property
+    def _on_facets(self) -> dict[tuple[bytes, bool], Any]:
+        return {}
+
     @property
     def outer(self) -> dict[tuple[int, ...], int]:
         """scikit-fem's numbers of the facets that belong to one of these cells only, by their corners."""
@@ -120,7 +131,7 @@ class NodalBasis:
         total = np.zeros(self.shape)
         for block, numbers in zip(self.blocks, self.facet_numbers(facets, name), strict=True):
             if len(numbers):
-                integrals = LinearForm(form).assemble(facet_basis(block.basis, numbers, lumped=lumped))
+                integrals = LinearForm(form).assemble(block.on_facets(numbers, lumped=lumped))
                 total[block.nodes] += np.asarray(integrals)[block.dofs]
         return total
 
