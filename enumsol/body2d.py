@@ -28,6 +28,29 @@ OUTLINES = {
 }
 
 
+#: Nodes of a triangle among those of the quadrilateral that it is, by the number of nodes of a quadrilateral.
+_TRIANGLE = {4: [0, 1, 2], 8: [0, 1, 2, 4, 5, 7], 9: [0, 1, 2, 4, 5, 7]}
+#: Nodes of the quadrilateral that a triangle is among quadrilaterals.
+_QUADRILATERAL = {4: [0, 1, 2, 2], 8: [0, 1, 2, 2, 3, 4, 2, 5], 9: [0, 1, 2, 2, 3, 4, 2, 5, 2]}
+
+
+def as_quadrilaterals(triangles: NDArray[np.int64], nodes: int) -> NDArray[np.int64]:
+    """Triangles among quadrilaterals of 4, 8 or 9 nodes: the last corner is named twice.
+
+    So is every node that a quadrilateral has between the two or inside.
+    """
+    return triangles[:, _QUADRILATERAL[nodes]]
+
+
+def triangles_apart(cells: NDArray[np.int64]) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Rows of the triangles among quadrilaterals with their nodes, and of the others, where there are any."""
+    count = cells.shape[1]
+    triangular = cells[:, 2] == cells[:, 3] if count in _TRIANGLE else np.zeros(len(cells), dtype=bool)
+    rows, others = np.flatnonzero(triangular), np.flatnonzero(~triangular)
+    apart = [(rows, cells[rows][:, _TRIANGLE[count]])] if len(rows) else []
+    return [*apart, (others, cells[others])] if len(others) else apart
+
+
 class PlaneMesh(Immutable):
     """The mesh a problem in 2D was made of; the displacements of its nodes are ``motion @ u + offset``.
 
@@ -36,7 +59,8 @@ class PlaneMesh(Immutable):
     points : (N, 2) array_like
         Positions of the nodes [length].
     cells : (M, k) array_like of int
-        Triangles (k = 3 or 6) or quadrangles (k = 4, 8 or 9), in the order of VTK.
+        Triangles (k = 3 or 6) or quadrilaterals (k = 4, 8 or 9), in the order of VTK; a triangle among quadrilaterals
+        names its last corner twice.
     motion : (2 N, n) array_like or sparse
         Row ``2 node + component`` gives that component of the node's displacement from u, in global axes; its columns
         are orthonormal, so that its transpose takes nodal forces to the problem's right-hand side.

@@ -15,6 +15,8 @@ from enumsol.sealed import Immutable, Sealed, SealedMatrix, sealed
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+#: Nodes of a cell, and of a facet.
+_CELLS, _FACETS = (4, 8, 10, 27), (3, 4, 6, 9)
 #: How far from 1 weights of a mean may add up to.
 _SUM_TOLERANCE = 1e-9
 
@@ -26,12 +28,13 @@ class BodyMesh(Sealed):
     Attributes
     ----------
     points : (N, 3) array [length]
-    cells : (M, 4) or (M, 8) array of int
-        Tetrahedra, or hexahedra in the order of VTK.
+    cells : (M, k) array of int
+        Tetrahedra (k = 4 or 10) or hexahedra (k = 8 or 27), in the order of VTK.
     dofs : (n,) array of int
         The degree of freedom ``3 node + component`` that each entry of u is; the others are held at 0.
-    facets : (k, 3) or (k, 4) array of int or None
-        Contact surface, counterclockwise as seen from outside.
+    facets : (k, m) array of int or None
+        Contact surface: corners counterclockwise as seen from outside (m = 3 or 4), then nodes between them and inside
+        (m = 6 or 9).
     rows : (k,) array of int or None
         Where contact rows stand for patches, the row of each facet (-1: held); None where they stand for nodes.
 
@@ -59,8 +62,10 @@ class BodyMesh(Sealed):
         if points.ndim != 2 or points.shape[1] != 3:
             raise InvalidProblemError(f"mesh_points has shape {points.shape}; expected (N, 3)")
         cells = _numbers(self.cells, "mesh_cells", len(points))
-        if cells.ndim != 2 or cells.shape[1] not in (4, 8):
-            raise InvalidProblemError(f"mesh_cells has shape {cells.shape}; expected (M, 4) or (M, 8)")
+        if cells.ndim != 2 or cells.shape[1] not in _CELLS:
+            raise InvalidProblemError(
+                f"mesh_cells has shape {cells.shape}; expected (M, k) with k among {', '.join(map(str, _CELLS))}"
+            )
         dofs = _numbers(self.dofs, "mesh_dofs", points.size)
         if dofs.ndim != 1 or len(np.unique(dofs)) != len(dofs):
             raise InvalidProblemError(
@@ -69,8 +74,10 @@ class BodyMesh(Sealed):
         facets = rows = None
         if self.facets is not None:
             facets = _numbers(self.facets, "mesh_facets", len(points))
-            if facets.ndim != 2 or facets.shape[1] not in (3, 4):
-                raise InvalidProblemError(f"mesh_facets has shape {facets.shape}; expected (k, 3) or (k, 4)")
+            if facets.ndim != 2 or facets.shape[1] not in _FACETS:
+                raise InvalidProblemError(
+                    f"mesh_facets has shape {facets.shape}; expected (k, m) with m among {', '.join(map(str, _FACETS))}"
+                )
         if self.rows is not None:
             rows = _numbers(self.rows, "mesh_rows", None, least=-1)
             if facets is None or rows.shape != facets.shape[:1]:

@@ -41,6 +41,24 @@ def writing(place: Path, name: str) -> Iterator[None]:
         ) from error
 
 
+def unreadable(place: Path) -> str | None:
+    """Why a place is no file that can be read, in the words of a message; None if it is one.
+
+    A pipe is none: what reads it would wait for who writes it.
+    """
+    try:
+        if place.is_dir():
+            return "it is a directory"
+        if place.exists() and not place.is_file():
+            return "it is no regular file"
+        with place.open("rb"):
+            return None
+    except FileNotFoundError:
+        return "there is no such file"
+    except OSError as error:
+        return f"it cannot be read ({error.strerror or error})"
+
+
 @contextmanager
 def reading(place: Path, content: str, writer: str) -> Iterator[None]:
     """A block that reads a file of ``content`` that ``writer`` wrote.

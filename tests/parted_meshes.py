@@ -9,13 +9,19 @@ EDGES = {3: ((0, 1), (1, 2), (2, 0)), 4: ((0, 1), (1, 2), (2, 3), (3, 0))}
 
 
 def grid(nx, ny, kind, length=1.0, height=1.0, shake=0.0, seed=0):
-    """A rectangle of triangles (3, 6) or quadrilaterals (4, 8, 9) with four sides, distorted inside."""
+    """A rectangle of triangles (3, 6) or quadrilaterals (4, 8, 9) with four sides, distorted inside.
+
+    Two kinds, as (3, 4): every second quadrilateral is cut into triangles.
+    """
     x, y = np.meshgrid(np.linspace(0, length, nx + 1), np.linspace(0, height, ny + 1))
     points = np.stack([x.ravel(), y.ravel()], axis=1)
     number = np.arange(len(points)).reshape(ny + 1, nx + 1)
     quads = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
-    corners = 3 if kind in (3, 6) else 4
-    cells = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) if corners == 3 else quads
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    cells = triangles if kind in (3, 6) else quads
+    if isinstance(kind, tuple):
+        cut, kind = np.arange(len(quads)) % 2 == 0, kind[1]
+        cells = np.concatenate([triangles[np.tile(cut, 2)][:, [0, 1, 2, 2]], quads[~cut]])
     sides = {"bottom": number[0], "top": number[-1], "left": number[:, 0], "right": number[:, -1]}
     edges = {name: np.stack([line[:-1], line[1:]], axis=1) for name, line in sides.items()}
     if kind in (6, 8, 9):
@@ -29,6 +35,8 @@ def _second_order(points, cells, edges, kind):
     points, between = list(points), {}
 
     def middle(one, two):
+        if one == two:  # a triangle among quadrilaterals
+            return one
         key = (min(one, two), max(one, two))
         if key not in between:
             between[key] = len(points)
@@ -38,7 +46,9 @@ def _second_order(points, cells, edges, kind):
     rows = []
     for cell in cells.tolist():
         row = cell + [middle(cell[a], cell[b]) for a, b in EDGES[len(cell)]]
-        if kind == 9:
+        if kind == 9 and cell[2] == cell[3]:
+            row.append(cell[3])
+        elif kind == 9:
             row.append(len(points))
             points.append(np.mean([points[node] for node in cell], axis=0))
         rows.append(row)

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_GALLERY = "gallery:"
+#: Beginning of the names of problems in the gallery.
+GALLERY = "gallery:"
 #: Ending of files that describe a problem by a mesh and what acts on its parts.
 TOML = ".toml"
 #: Usual endings of files that meshio reads and that are no problems.
@@ -68,39 +69,55 @@ def load_any_problem(name: str) -> ContactProblem | ContactProblem3D:
     InvalidProblemError, InvalidArgumentError
         It cannot be read, or the gallery has none of that name; the message gives names that are close.
     """
-    if name.startswith(_GALLERY):
+    if name.startswith(GALLERY):
         from enumsol import gallery  # numpy and scipy: not for --help
 
-        return gallery.get(name.removeprefix(_GALLERY)).build()
-    if name.endswith(TOML) and Path(name).is_file():
+        return gallery.get(name.removeprefix(GALLERY)).build()
+    refuse_misspelt(name)
+    if name.endswith(TOML) and not Path(name).is_dir():
         from enumsol.fem import read_mesh_problem  # as above
 
         return read_mesh_problem(name)
-    if Path(name).suffix.lower() in MESHES and Path(name).is_file():
+    if Path(name).suffix.lower() in MESHES and Path(name).exists() and not Path(name).is_dir():
         raise InvalidArgumentError(
             f"{name} is a mesh; expected a problem, which enumsol solve {name} --output FILE.npz or a {TOML} file makes"
         )
-    if not Path(name).exists() and (close := _close_names(name)):
-        raise InvalidArgumentError(f"{name}: there is no such file or directory; did you mean {', '.join(close)}?")
     from enumsol.io import read_problem  # as above
 
     return read_problem(name)
 
 
-def _close_names(name: str) -> list[str]:
-    """Problems of the gallery and files in the same directory whose names are close to one that is neither."""
+def refuse_misspelt(name: str, meshes: bool = False) -> None:
+    """Refuse the name of a problem, or of a mesh, that does not exist if there are ones that are close.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It names them: files in the same directory and, of a name without the ending of a file, problems of the gallery.
+    """
+    place = Path(name)
+    if not name or os.path.lexists(place):
+        return
     import difflib  # for nothing else
 
     from enumsol import gallery  # as above
     from enumsol.io import SUFFIXES
 
-    place = Path(name)
+    endings = MESHES if meshes else SUFFIXES
     try:
-        beside = [file.name for file in place.parent.iterdir() if file.suffix in (*SUFFIXES, TOML) or file.is_dir()]
+        beside = [
+            file.name
+            for file in place.parent.iterdir()
+            if file.suffix in (*endings, TOML) or (file.is_dir() and not meshes)
+        ]
     except OSError:
         beside = []  # no such directory either
-    files = [str(place.with_name(file)) for file in difflib.get_close_matches(place.name, beside, cutoff=0.75)]
-    return files + [_GALLERY + entry for entry in gallery.close_names(name.rpartition(":")[2])]
+    close = [str(place.with_name(file)) for file in difflib.get_close_matches(place.name, beside, cutoff=0.75)]
+    if not meshes and place.suffix not in (*SUFFIXES, *MESHES, TOML):
+        close += [GALLERY + entry for entry in gallery.close_names(name.rpartition(":")[2])]
+    if close:
+        what = "file" if meshes else "file or directory"
+        raise InvalidArgumentError(f"{name}: there is no such {what}; did you mean {', '.join(close)}?")
 
 
 def parse_alpha(text: str, option: str = "--alpha") -> Alpha:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from enumsol.cli.common import TOML, load_any_problem, note, parse_alpha
+from enumsol.cli.common import GALLERY, TOML, load_any_problem, note, parse_alpha, refuse_misspelt
 from enumsol.cli.options import LIMITS, OUTPUT, JsonFile, MaxNodes, Quiet
 from enumsol.cli.roots import (
     CsvFile,
@@ -185,9 +185,18 @@ def _problem(mesh: str, options: dict[str, Any]) -> ContactProblem | ContactProb
             raise InvalidArgumentError(f"--{name} is given beside {mesh}, which has all options; expected it there")
         return load_any_problem(mesh)
     from enumsol import fem  # numpy: not for --help
+    from enumsol.checks import file_path
     from enumsol.fem.mesh_problems import check_keys
+    from enumsol.files import unreadable
+    from enumsol.io import SUFFIXES
 
-    check_keys(options)
+    place = file_path(mesh, "MESH", "the name of a mesh file")
+    if place.suffix in SUFFIXES or mesh.startswith(GALLERY):
+        raise InvalidArgumentError(f"{mesh} is a problem; expected a mesh (enumsol roots {mesh} solves a problem)")
+    refuse_misspelt(mesh, meshes=True)
+    if (found := unreadable(place)) is not None:
+        raise InvalidArgumentError(f"{mesh}: {found}; expected a mesh with named parts, or a {TOML} file")
+    check_keys(options, lambda name: "--" + name.replace("_", "-"))
     return fem.mesh_problem(mesh, **options)
 
 

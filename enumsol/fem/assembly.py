@@ -1,7 +1,8 @@
 """A plane body on a rigid foundation: stiffness by scikit-fem, loads, and the ContactProblem.
 
-Cells are triangles or quadrilaterals of first or second order, with 3, 6, 4, 8 or 9 nodes in the order of VTK and gmsh.
-Degrees of freedom before constraints are ``2 node + component``. A problem is put together from plain arrays::
+Cells are triangles or quadrilaterals of first or second order, with 3, 6, 4, 8 or 9 nodes in the order of VTK, or both
+as in `PartedMesh`. Degrees of freedom before constraints are ``2 node + component``. A problem is put together from
+plain arrays::
 
     loads = edge_forces(points, top_edges, (0.3, -1.0))
     problem = contact_problem(

@@ -1,4 +1,4 @@
-"""Displacements on a mesh of one kind of cell: scikit-fem's basis, and its degrees of freedom by nodes.
+"""Displacements on a mesh: scikit-fem's basis of the cells of each kind, and its degrees of freedom by nodes.
 
 Degrees of freedom here are ``dimension node + component``; scikit-fem has an order of its own.
 """
@@ -13,129 +13,163 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.cells import KINDS, by_kind
 from enumsol.fem.mesh_checks import check_every_node_is_used
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
 
-#: Corners of the reference hexahedron (0, 1)^3.
-HEXAHEDRON = np.array(
-    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=np.float64
-)
 #: An area or volume below this share of the squared or cubed extent of its cell is rounding.
 FLAT = 1e-14
 #: Degree of the quadrature on facets: tractions and normals of quadratic curved edges.
 FACET_DEGREE = 5
+#: scikit-fem assembles cells with more functions than that by a long loop over their pairs.
+_FEW = 24
+#: Quadrature of degree two on triangles, at the nodes between corners: the nodes that can be in contact.
+_BETWEEN = (np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]), np.full(3, 1 / 6))
 
 
 @dataclass(frozen=True)
-class CellKind:
-    """A kind of cell, with the names that scikit-fem has for it.
-
-    Attributes
-    ----------
-    name : in messages
-    mesh, element : scikit-fem's classes; of "MeshQuadS2" it has the element only
-    corners, facet_corners : nodes of a cell, and of a facet of it, that are corners
-    degree : of the quadrature of its stiffness
-    simplex : whether the corners may come in any order
-    """
-
-    name: str
-    mesh: str
-    element: str
-    corners: int
-    facet_corners: int
-    degree: int
-    simplex: bool = False
-
-
-#: By dimension and nodes of a cell, which are in the order of VTK; gmsh's is the same for all of these.
-KINDS = {
-    (2, 3): CellKind("triangles", "MeshTri1", "ElementTriP1", 3, 2, 0, simplex=True),
-    (2, 4): CellKind("quadrilaterals", "MeshQuad1", "ElementQuad1", 4, 2, 3),
-    (2, 6): CellKind("quadratic triangles", "MeshTri2", "ElementTriP2", 3, 2, 4),
-    (2, 8): CellKind("quadratic quadrilaterals with 8 nodes", "MeshQuadS2", "ElementQuadS2", 4, 2, 5),
-    (2, 9): CellKind("quadratic quadrilaterals", "MeshQuad2", "ElementQuad2", 4, 2, 5),
-    (3, 4): CellKind("tetrahedra", "MeshTet1", "ElementTetP1", 4, 3, 0, simplex=True),
-    (3, 8): CellKind("hexahedra", "MeshHex1", "ElementHex1", 8, 4, 3),
-}
-
-
-#: Nodes of each facet of a cell: corners, in 3D counterclockwise as seen from outside a cell of positive volume, then
-#: the node between them. By dimension and nodes of a cell.
-CELL_FACETS = {
-    (2, 3): np.array([[0, 1], [1, 2], [2, 0]]),
-    (2, 4): np.array([[0, 1], [1, 2], [2, 3], [3, 0]]),
-    (2, 6): np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]]),
-    (2, 8): np.array([[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]]),
-    (2, 9): np.array([[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]]),
-    (3, 4): np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
-    (3, 8): np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]),
-}
-
-
-@dataclass(frozen=True)
-class NodalBasis:
-    """A basis of scikit-fem and what its degrees of freedom are.
+class Block:
+    """The cells of one kind.
 
     Attributes
     ----------
     basis : skfem.CellBasis
         Of nodal vectors.
-    dofs : (N, dimension) int array
-        scikit-fem's number of each component of each node.
+    dofs : (m, dimension) int array
+        scikit-fem's number of each component of each node of these cells.
+    nodes : (m,) int array
+        These nodes, in order.
+    rows : (k,) int array
+        Which cells of the mesh they are.
     corners : (v,) int array
         The nodes that are corners of cells, in order: scikit-fem's vertices.
     """
 
     basis: Any
     dofs: Integers
+    nodes: Integers
+    rows: Integers
     corners: Integers
 
-    def matrix(self, assembled: Any) -> sp.csc_array:
-        """A matrix that scikit-fem assembled, renumbered and made exactly symmetric."""
-        entries = sp.coo_array(assembled)
-        row, column = self._ours[entries.coords[0]], self._ours[entries.coords[1]]
-        A = sp.csc_array((entries.data, (row, column)), shape=entries.shape)
+    @cached_property
+    def ours(self) -> Integers:
+        """The number here of each degree of freedom of scikit-fem."""
+        ours = np.empty(self.dofs.size, dtype=np.int64)
+        dimension = self.dofs.shape[1]
+        ours[self.dofs] = dimension * self.nodes[:, None] + np.arange(dimension)
+        return ours
+
+    def on_facets(self, numbers: Integers, *, lumped: bool) -> Any:
+        """`facet_basis`, which is slow to make, once for all that acts on the same facets."""
+        key = (numbers.tobytes(), lumped)
+        if key not in self._on_facets:
+            self._on_facets[key] = facet_basis(self.basis, numbers, lumped=lumped)
+        return self._on_facets[key]
+
+    @cached_property
+    def _on_facets(self) -> dict[tuple[bytes, bool], Any]:
+        return {}
+
+    @property
+    def outer(self) -> dict[tuple[int, ...], int]:
+        """scikit-fem's numbers of the facets that belong to one of these cells only, by their corners."""
+        mesh = self.basis.mesh
+        numbers = mesh.boundary_facets()
+        keys = np.sort(self.corners[mesh.facets[:, numbers]], axis=0).T.tolist()
+        return {tuple(key): int(number) for key, number in zip(keys, numbers, strict=True)}
+
+
+@dataclass(frozen=True)
+class NodalBasis:
+    """Bases of scikit-fem on all cells of a mesh.
+
+    Attributes
+    ----------
+    blocks : tuple of Block
+    shape : (N, dimension)
+    """
+
+    blocks: tuple[Block, ...]
+    shape: tuple[int, int]
+
+    def matrix(self, form: Any) -> sp.csc_array:
+        """The matrix of a bilinear form of scikit-fem, made exactly symmetric."""
+        return self._gathered(lambda block: form.assemble(block.basis))
+
+    def _gathered(self, assembled: Callable[[Block], Any]) -> sp.csc_array:
+        rows, columns, data = [], [], []
+        for block in self.blocks:
+            entries = sp.coo_array(assembled(block))
+            rows.append(block.ours[entries.coords[0]])
+            columns.append(block.ours[entries.coords[1]])
+            data.append(entries.data)
+        size = self.shape[0] * self.shape[1]
+        places = (np.concatenate(rows), np.concatenate(columns))
+        A = sp.csc_array((np.concatenate(data), places), shape=(size, size))
         return sp.csc_array(0.5 * (A + A.T))
 
-    def vectors(self, assembled: Any) -> Floats:
-        """A vector that scikit-fem assembled, by nodes: (N, dimension)."""
-        return np.asarray(np.asarray(assembled)[self.dofs])
+    def on_part(self, facets: Integers, name: str, form: Callable[[Any, Any], Any], *, lumped: bool = False) -> Floats:
+        """Integrals over facets of a linear form of scikit-fem, by nodes: (N, dimension).
 
-    def facet_numbers(self, facets: Integers, name: str) -> Integers:
-        """scikit-fem's numbers of facets on the boundary, (k,), that are given by their nodes, corners first.
+        ``lumped`` takes the integrals on triangles of second order by their nodes between corners, so that those of
+        1 are positive there and zero at corners.
 
         Raises
         ------
         InvalidArgumentError
-            One is no facet on the boundary of the body, or comes twice.
+            A facet is no facet on the boundary of the body, has another number of nodes, or comes twice.
         """
-        mesh = self.basis.mesh
-        outer = mesh.boundary_facets()
-        keys = np.sort(self.corners[mesh.facets[:, outer]], axis=0).T.tolist()
-        known = {tuple(key): int(number) for key, number in zip(keys, outer, strict=True)}
-        rows = np.sort(facets[:, : len(mesh.facets)], axis=1)
-        numbers = np.array([known.get(tuple(key), -1) for key in rows.tolist()], dtype=np.int64)
+        from skfem import LinearForm  # as below
+
+        total = np.zeros(self.shape)
+        for block, numbers in zip(self.blocks, self.facet_numbers(facets, name), strict=True):
+            if len(numbers):
+                integrals = LinearForm(form).assemble(block.on_facets(numbers, lumped=lumped))
+                total[block.nodes] += np.asarray(integrals)[block.dofs]
+        return total
+
+    def facet_numbers(self, facets: Integers, name: str) -> list[Integers]:
+        """scikit-fem's numbers, block by block, of facets that are given by their nodes, corners first.
+
+        Raises
+        ------
+        InvalidArgumentError
+            As in `on_part`.
+        """
+        mesh = self.blocks[0].basis.mesh
+        corners, count = len(mesh.facets), len(mesh.bndelem.doflocs)
+        if facets.shape[1] != count:
+            raise InvalidArgumentError(
+                f"{name} has facets of {facets.shape[1]} nodes; expected {count}, as the cells have"
+            )
+        keys = [tuple(key) for key in np.sort(facets[:, :corners], axis=1).tolist()]
+        numbers = np.array([self._outer.get(key, (-1, -1)) for key in keys], dtype=np.int64)
         if np.any(numbers < 0):
-            k = int(np.argmin(numbers))
+            k = int(np.argmin(numbers[:, 0]))
             raise InvalidArgumentError(
                 f"{name} row {k}, nodes {facets[k].tolist()}, is no facet on the boundary of the body; "
                 "expected facets of one cell each"
             )
-        if len(np.unique(numbers)) != len(numbers):
+        if len(set(keys)) != len(keys):
             raise InvalidArgumentError(f"{name} names a facet twice; expected distinct facets")
-        return numbers
+        return [numbers[numbers[:, 0] == k, 1] for k in range(len(self.blocks))]
 
-    def on_facets(self, numbers: Integers) -> Any:
-        """scikit-fem's basis on facets of these numbers."""
-        from skfem import FacetBasis  # as below
-
-        return FacetBasis(self.basis.mesh, self.basis.elem, facets=numbers, intorder=FACET_DEGREE)
+    @cached_property
+    def _outer(self) -> dict[tuple[int, ...], tuple[int, int]]:
+        """Block and number of each facet that belongs to one cell only, by its corners."""
+        known: dict[tuple[int, ...], tuple[int, int]] = {}
+        for k, block in enumerate(self.blocks):
+            for key, number in block.outer.items():
+                if known.pop(key, None) is None:  # between cells of two kinds
+                    known[key] = (k, number)
+        return known
 
     def stiffness(self, lam: float, mu: float) -> sp.csc_array:
         """Stiffness of a linear elastic body with these Lame coefficients, in 2D in plane strain."""
@@ -147,24 +181,24 @@ class NodalBasis:
             # as linear_elasticity has it, which makes an identity of every quadrature point and is slow in 3D
             return lam * div(u) * div(v) + 2.0 * mu * ddot(sym_grad(u), sym_grad(v))
 
-        plane = self.dofs.shape[1] == 2
-        form = linear_elasticity(lam, mu) if plane else BilinearForm(energy)
+        form = linear_elasticity(lam, mu) if self.shape[1] == 2 else BilinearForm(energy)
         with np.errstate(over="ignore", invalid="ignore"):  # problems refuse what is not finite
-            return self.matrix(form.assemble(self.basis))
+            return self._gathered(
+                lambda block: (
+                    _solid_stiffness(block.basis, lam, mu) if block.basis.Nbfun > _FEW else form.assemble(block.basis)
+                )
+            )
 
     def volume_forces(self, density: Floats) -> Floats:
         """Nodal forces (N, dimension) of a force per volume that is constant on each cell, (M, dimension)."""
         from skfem import LinearForm  # as below
         from skfem.helpers import dot
 
-        form = LinearForm(lambda v, w: dot(w.density, v))
-        return self.vectors(form.assemble(self.basis, density=np.asarray(density).T[:, :, None]))
-
-    @cached_property
-    def _ours(self) -> Integers:
-        ours = np.empty(self.dofs.size, dtype=np.int64)
-        ours[self.dofs.ravel()] = np.arange(self.dofs.size)
-        return ours
+        form, total = LinearForm(lambda v, w: dot(w.density, v)), np.zeros(self.shape)
+        for block in self.blocks:
+            of_block = np.asarray(density)[block.rows].T[:, :, None]
+            total[block.nodes] += np.asarray(form.assemble(block.basis, density=of_block))[block.dofs]
+        return total
 
 
 def nodal_basis(nodes: Floats, cells: Integers, degree: int = 0) -> NodalBasis:
@@ -175,28 +209,66 @@ def nodal_basis(nodes: Floats, cells: Integers, degree: int = 0) -> NodalBasis:
     InvalidArgumentError
         A node belongs to no cell, or a cell is flat, folded or inside out at a corner.
     """
+    kinds = by_kind(nodes.shape[1], cells)
+    used = np.unique(np.concatenate([nodes_of.ravel() for _, nodes_of in kinds]))
+    check_every_node_is_used(used, len(nodes), "cells", "cell")
+    blocks = tuple(_block(nodes, rows, nodes_of, degree) for rows, nodes_of in kinds)
+    return NodalBasis(blocks, (nodes.shape[0], nodes.shape[1]))
+
+
+def _block(points: Floats, rows: Integers, cells: Integers, degree: int) -> Block:
     # scikit-fem takes a while to import and is needed for meshes only
     import skfem
     from skfem.quadrature import get_quadrature
 
-    dimension = nodes.shape[1]
+    dimension = points.shape[1]
     kind = KINDS[dimension, cells.shape[1]]
-    check_every_node_is_used(cells, len(nodes), "cells", "cell")
+    nodes, local = np.unique(cells, return_inverse=True)
+    local = local.reshape(cells.shape)
     # sorted here, so that scikit-fem neither renumbers nor logs
-    rows = np.sort(cells, axis=1) if kind.simplex else cells
-    if kind.corners == 8:  # scikit-fem has an order of its own
-        places = skfem.ElementHex1.doflocs
-        rows = rows[:, [int(np.argmin(np.linalg.norm(HEXAHEDRON - place, axis=1))) for place in places]]
+    ordered = np.sort(local, axis=1) if kind.simplex else local
     element = getattr(skfem, kind.element)()
+    if kind.places is not None:
+        places = kind.places
+        ordered = ordered[:, [int(np.argmin(np.linalg.norm(places - place, axis=1))) for place in element.doflocs]]
     order = max(kind.degree, degree)
-    _check_jacobians(nodes[rows], element, get_quadrature(element, order)[0])
+    _check_jacobians(points[nodes][ordered], element, get_quadrature(element, order)[0], rows)
     mesh_class = _serendipity() if kind.mesh == "MeshQuadS2" else getattr(skfem, kind.mesh)
-    mesh = mesh_class(np.ascontiguousarray(nodes.T), np.ascontiguousarray(rows.T))
+    mesh = mesh_class(np.ascontiguousarray(points[nodes].T), np.ascontiguousarray(ordered.T))
     basis = skfem.Basis(mesh, skfem.ElementVector(element), intorder=order)
-    dofs = np.empty(nodes.shape, dtype=np.int64)
-    local = basis.element_dofs.reshape(cells.shape[1], dimension, len(cells))
-    dofs[rows.T] = np.swapaxes(local, 1, 2)
-    return NodalBasis(basis, dofs, np.unique(cells[:, : kind.corners]))
+    dofs = np.empty((len(nodes), dimension), dtype=np.int64)
+    dofs[ordered.T] = np.swapaxes(basis.element_dofs.reshape(cells.shape[1], dimension, len(cells)), 1, 2)
+    return Block(basis, dofs, nodes, rows, np.unique(cells[:, : kind.corners]))
+
+
+def facet_basis(basis: Any, facets: Integers, *, lumped: bool = False) -> Any:
+    """scikit-fem's basis on facets; see `NodalBasis.on_part`."""
+    from skfem import FacetBasis  # as above
+
+    if lumped and between_corners(basis.elem):
+        return FacetBasis(basis.mesh, basis.elem, facets=facets, quadrature=_BETWEEN)
+    return FacetBasis(basis.mesh, basis.elem, facets=facets, intorder=FACET_DEGREE)
+
+
+def between_corners(element: Any) -> bool:
+    """Whether facets are triangles of second order, of which the nodes between corners can be in contact."""
+    from skfem import ElementTetP2  # as above
+
+    return isinstance(getattr(element, "elem", element), ElementTetP2)
+
+
+def _solid_stiffness(basis: Any, lam: float, mu: float) -> sp.coo_array:
+    """The same as of the form of the energy in 3D, for all pairs of functions of a cell at once."""
+    # degrees of freedom of a cell are node by node, and a gradient is that of one component
+    slopes = np.stack([basis.basis[j][0].grad[0] for j in range(0, basis.Nbfun, 3)])
+    nodes, _, cells, points = slopes.shape
+    G = slopes.transpose(2, 0, 1, 3).reshape(cells, 3 * nodes, points)
+    T = ((G * basis.dx[:, None]) @ G.transpose(0, 2, 1)).reshape(cells, nodes, 3, nodes, 3)
+    K = lam * T + mu * T.transpose(0, 1, 4, 3, 2)
+    K += mu * np.einsum("maibi,jk->majbk", T, np.eye(3))
+    dofs = basis.element_dofs.T
+    places = (np.repeat(dofs, basis.Nbfun, axis=1).ravel(), np.tile(dofs, basis.Nbfun).ravel())
+    return sp.coo_array((K.ravel(), places), shape=(basis.N, basis.N))
 
 
 @cache
@@ -212,7 +284,7 @@ def _serendipity() -> Any:
     return dataclass(repr=False)(type("MeshQuadS2", (skfem.MeshQuad2,), names))
 
 
-def _check_jacobians(corners: Floats, element: Any, quadrature: Floats) -> None:
+def _check_jacobians(corners: Floats, element: Any, quadrature: Floats, rows: Integers) -> None:
     """Refuse cells whose area or volume vanishes or changes its sign at a corner or a quadrature point."""
     places = np.concatenate([element.refdom.init_refdom()[0], quadrature], axis=1)
     slopes = [np.broadcast_to(element.lbasis(places, i)[1], places.shape) for i in range(corners.shape[1])]
@@ -223,14 +295,6 @@ def _check_jacobians(corners: Floats, element: Any, quadrature: Floats) -> None:
     wrong |= np.abs(np.sum(np.sign(values), axis=1)) < values.shape[1]
     if np.any(wrong):
         raise InvalidArgumentError(
-            f"cells row {int(np.argmax(wrong))} is flat, folded or inside out at a corner; expected proper cells with "
-            "their nodes in the order of VTK or gmsh"
+            f"cells row {rows[np.argmax(wrong)]} is flat, folded or inside out at a corner; expected proper cells with "
+            "their nodes in the order of VTK"
         )
-
-
-def boundary_facets(dimension: int, cells: Integers) -> Integers:
-    """Facets (k, m) that belong to one cell only; in 3D counterclockwise as seen from outside the body."""
-    local = CELL_FACETS[dimension, cells.shape[1]]
-    facets = cells[:, local].reshape(-1, local.shape[1])
-    _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
-    return np.asarray(facets[np.sort(first[count == 1])])

@@ -11,7 +11,7 @@ from enumsol.array_checks import plain_array, real_array, real_matrix
 from enumsol.checks import shown
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.assembly import plane_problem
-from enumsol.fem.bases import FACET_DEGREE
+from enumsol.fem.bases import between_corners, facet_basis
 from enumsol.fem.mesh_checks import unit_vectors, vectors_of_all
 from enumsol.fem.restrained import ContactNodes, Supports, check_axes, movable, restrained
 
@@ -49,7 +49,8 @@ def basis_contact_problem(
     """Contact problem of a body that scikit-fem assembled, in 2D or 3D; the held degrees of freedom are eliminated.
 
     ``u`` of the problem and of its roots holds the degrees of freedom of the basis that are not held, in their order.
-    The contact nodes are all nodes of the contact facets that are not held, corners first, then those on edges.
+    The contact nodes are all nodes of the contact facets that are not held, corners first, then those on edges; of
+    tetrahedra of second order those on edges only, as in `mesh_problem`.
 
     Parameters
     ----------
@@ -85,7 +86,8 @@ def basis_contact_problem(
     ------
     InvalidArgumentError
         An argument has the wrong shape; the basis has no vectors at nodes; facets are not on the boundary; a contact
-        node is held in some components only; in 3D the facets are of second order, whose corners carry no pressure.
+        node is held in some components only; a uniform pressure would pull at a contact node or not act on it, as at
+        the corners of ElementHexS2.
     InvalidProblemError
         The body is free to move as a rigid body, or the data are not admissible.
 
@@ -113,6 +115,7 @@ def basis_contact_problem(
     supports = Supports(fixed[dofs], moved[dofs])
     facets = _facets(basis.mesh, contact)
     touching = _touching(basis, facets, dofs)
+    _check_pressed(basis, facets, dofs, touching)
     nodes = movable(touching, _normals(basis, facets, touching, dofs, places, normals), supports)
     at = places[nodes.nodes]
     more = {"gap": [gap(place) for place in at] if callable(gap) else gap, "coordinates": at, **more}
@@ -212,35 +215,53 @@ def _facets(mesh: Any, contact: Any) -> Integers:
 
 
 def _touching(basis: Any, facets: Integers, dofs: Integers) -> Integers:
-    """Nodes of facets."""
+    """Nodes of facets that can be in contact."""
     on_facets = np.zeros(dofs.size, dtype=bool)
     on_facets[basis.get_dofs(facets).flatten()] = True
+    if between_corners(basis.elem):
+        on_facets[np.asarray(basis.nodal_dofs)] = False
     return np.flatnonzero(np.all(on_facets[dofs], axis=1))
+
+
+def _check_pressed(basis: Any, facets: Integers, dofs: Integers, touching: Integers) -> None:
+    """Refuse nodes that a uniform pressure pulls at, or does not act on."""
+    shares = integrals_over(basis, facets, lambda v, _: v[0])[dofs[touching, 0]]
+    if np.min(shares) <= _NO_PRESSURE * np.max(shares):
+        raise InvalidArgumentError(
+            f"a uniform pressure pulls at contact node {touching[np.argmin(shares)]} or does not act on it (as at the "
+            "corners of ElementHexS2); expected elements whose facets it presses on at every node"
+        )
 
 
 def _normals(basis: Any, facets: Integers, touching: Integers, dofs: Integers, places: Floats, given: Any) -> Floats:
     if given is not None:
         values = [given(place) for place in places[touching]] if callable(given) else given
         return unit_vectors(vectors_of_all(values, "normals", (len(touching), dofs.shape[1])), "normals")
-    return unit_vectors(pressed(nodal_normals(basis, facets)[dofs[touching]], touching), "normals of the boundary")
+    integrals = integrals_over(basis, facets, outward_normal)[dofs[touching]]
+    return unit_vectors(pressed(integrals, touching), "normals of the boundary")
 
 
-def nodal_normals(basis: Any, facets: Integers) -> Floats:
-    """Integrals over facets of the outward normals times each node's shape function, by degrees of freedom."""
-    from skfem import FacetBasis, LinearForm  # here, too
-    from skfem.helpers import dot
+def integrals_over(basis: Any, facets: Integers, form: Callable[[Any, Any], Any]) -> Floats:
+    """Integrals over facets of a linear form, by degrees of freedom; lumped as in `NodalBasis.on_part`."""
+    from skfem import LinearForm  # here, too
 
-    on_facets = FacetBasis(basis.mesh, basis.elem, facets=facets, intorder=FACET_DEGREE)
-    return np.asarray(LinearForm(lambda v, w: dot(w.n, v)).assemble(on_facets))
+    return np.asarray(LinearForm(form).assemble(facet_basis(basis, facets, lumped=True)))
+
+
+def outward_normal(v: Any, w: Any) -> Any:
+    """The linear form whose values at a node are the integral of the outward normal times its shape function."""
+    from skfem.helpers import dot  # as above
+
+    return dot(w.n, v)
 
 
 def pressed(vectors: Floats, nodes: Integers) -> Floats:
-    """Nodal normals (p, d), which must not vanish: a pressure would act on none of these nodes."""
+    """Nodal normals (p, d), which must not vanish."""
     lengths = np.linalg.norm(vectors, axis=1)
     if np.min(lengths) <= _NO_PRESSURE * np.max(lengths):
         raise InvalidArgumentError(
-            f"the normals around contact node {nodes[np.argmin(lengths)]} cancel, or no pressure acts on it (as on "
-            "corners of quadratic facets in 3D); expected normals, or parts of the boundary without a fold"
+            f"the normals around contact node {nodes[np.argmin(lengths)]} cancel; expected normals, or parts of the "
+            "boundary without a fold"
         )
     return vectors
 

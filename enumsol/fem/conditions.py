@@ -185,25 +185,29 @@ def _rigid_motions(points: Floats, inside: NDArray[np.bool_]) -> Floats:
 
 def part_forces(body: NodalBasis, mesh: PartedMesh, loads: Any, pressures: Any, slope: str = "") -> Floats:
     """Nodal forces (N, d) of tractions and of pressures, which push into the body, on parts."""
-    from skfem import LinearForm  # as in nodal_basis
-    from skfem.helpers import dot
+    from skfem.helpers import dot  # as in nodal_basis
 
     total, dimension = np.zeros(mesh.points.shape), mesh.points.shape[1]
     for part, value in by_part(loads, f"load{slope}").items():
         traction = short_vector(value, f"load{slope} of {part}", dimension)
-        form = LinearForm(lambda v, _, t=traction: dot(t[:, None, None], v))
-        total += body.vectors(form.assemble(body.on_facets(body.facet_numbers(mesh.part(part), part))))
+
+        def along(v: Any, _: Any, t: Floats = traction[:, None, None]) -> Any:
+            return dot(t, v)
+
+        total += body.on_part(mesh.part(part), part, along)
     for part, value in by_part(pressures, f"pressure{slope}").items():
         pressure = finite_number(value, f"pressure{slope} of {part}")
-        form = LinearForm(lambda v, w, p=pressure: -p * dot(w.n, v))
-        total += body.vectors(form.assemble(body.on_facets(body.facet_numbers(mesh.part(part), part))))
+
+        def inward(v: Any, w: Any, p: float = pressure) -> Any:
+            return -p * dot(w.n, v)
+
+        total += body.on_part(mesh.part(part), part, inward)
     return total
 
 
 def part_springs(body: NodalBasis, mesh: PartedMesh, springs: Any) -> sp.csc_array:
     """Stiffness (dN, dN) of springs between parts and the ground, lumped at the nodes."""
-    from skfem import LinearForm  # as above
-    from skfem.helpers import dot
+    from skfem.helpers import dot  # as above
 
     count, dimension = mesh.points.shape
     blocks = np.zeros((count, dimension, dimension))
@@ -213,14 +217,14 @@ def part_springs(body: NodalBasis, mesh: PartedMesh, springs: Any) -> sp.csc_arr
             raise InvalidArgumentError(
                 f"spring of {part} is {shown(value)}; expected stiffnesses >= 0 along the normal and across it"
             )
-        facets = body.on_facets(body.facet_numbers(mesh.part(part), part))
         for k, axis in enumerate(np.eye(dimension)):
-            form = LinearForm(
-                lambda v, w, e=axis[:, None, None], k=k, kn=normal, kt=tangential: dot(
-                    kt * e + (kn - kt) * w.n[k] * w.n, v
-                )
-            )
-            blocks[:, :, k] += body.vectors(form.assemble(facets))
+
+            def density(
+                v: Any, w: Any, k: int = k, e: Floats = axis, kn: float = normal, kt: float = tangential
+            ) -> Any:
+                return dot(kt * e[:, None, None] + (kn - kt) * w.n[k] * w.n, v)
+
+            blocks[:, :, k] += body.on_part(mesh.part(part), part, density, lumped=True)
     shape = (count * dimension, count * dimension)
     K = sp.csc_array(sp.bsr_array((blocks, np.arange(count), np.arange(count + 1)), shape=shape))
     K.eliminate_zeros()

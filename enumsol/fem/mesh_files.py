@@ -14,9 +14,10 @@ import numpy as np
 
 from enumsol.checks import file_path, shown
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
-from enumsol.fem.bases import boundary_facets
+from enumsol.fem.file_cells import GROUPS_ONLY, body_cells, body_kinds, facets_of_sets, solid_cells, with_centres
 from enumsol.fem.mesh_checks import positions
-from enumsol.fem.parts import PartedMesh
+from enumsol.fem.parts import ALL, PartedMesh
+from enumsol.files import unreadable
 from enumsol.texts import shortened
 
 if TYPE_CHECKING:
@@ -28,32 +29,12 @@ if TYPE_CHECKING:
 
     Integers = NDArray[np.int64]
 
-#: By dimension: the facets of each kind of cell, by meshio's names.
-_FACET_OF = {
-    2: {"triangle": "line", "quad": "line", "triangle6": "line3", "quad8": "line3", "quad9": "line3"},
-    3: {"tetra": "triangle", "hexahedron": "quad"},
-}
-#: By dimension: other cells that files may hold.
-_IGNORED = {2: ("vertex",), 3: ("vertex", "line")}
-_EXPECTED = {
-    2: "either triangle or quad with line, or triangle6, quad8 or quad9 with line3",
-    3: "either tetra with triangle or hexahedron with quad (of first order)",
-}
-_BODIES = {2: "triangles or quadrilaterals", 3: "tetrahedra or hexahedra"}
-#: What makes gmsh write other cells.
-_HINTS = {
-    (
-        "tetra10",
-    ): " (for tetra set Mesh.ElementOrder = 1 in gmsh; facets of 6 nodes carry no pressure at their corners)",
-    ("quad", "triangle"): " (for quad alone set Mesh.SubdivisionAlgorithm = 1 in gmsh)",
-    ("quad8", "triangle6"): " (for quad8 alone set Mesh.SubdivisionAlgorithm = 1 in gmsh)",
-    ("quad9", "triangle6"): " (for quad9 alone set Mesh.SubdivisionAlgorithm = 1 in gmsh)",
-}
 #: Third coordinates of a plane mesh may differ by this share of its extent.
 _PLANE = 1e-9
 _PHYSICAL = "gmsh:physical"
-#: The name of all facets where nothing names groups of them.
-_ALL = "boundary"
+#: What meshio calls the families of a MED file, of cells and of points; numbers of groups in formats without names.
+_FAMILIES = ("cell_tags", "point_tags")
+_NUMBERS = ("medit:ref", "su2:tag", "CellEntityIds")
 #: What meshio raises on damaged files or files of another kind; it may also exit.
 _DAMAGE = (
     ArithmeticError,
@@ -76,11 +57,12 @@ _DAMAGE = (
 def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -> PartedMesh:
     """Mesh of a body in 2D or 3D with its named parts, from a file that meshio reads or from a meshio.Mesh.
 
-    In 2D the cells are triangles or quadrilaterals, of first or of second order (6, 8 or 9 nodes), in 3D tetrahedra or
-    hexahedra of first order. The third coordinate of a plane mesh is left out; it must be the same everywhere.
+    In 2D the cells are triangles and quadrilaterals, of first or of second order (6, 8 or 9 nodes), in 3D tetrahedra or
+    hexahedra, of first or of second order (10, 20 or 27 nodes); those of 20 nodes are completed to 27, with the last
+    numbers for the new nodes. The third coordinate of a plane mesh is left out; it must be the same everywhere.
 
     Parts are the lines (in 3D triangles or quadrilaterals) that the file holds, by the names of their cell sets or
-    physical groups (a group without a name gets its number); without any groups all of them are named "boundary".
+    groups (a group without a name gets its number); without any groups all of them are named "boundary".
     Named points and point sets are parts given by nodes; where all nodes of a facet on the boundary belong to a point
     set, the facet is a part of this name, too. Nodes that belong to no cell are left out, and the others numbered from
     0 in the order of the file.
@@ -95,10 +77,11 @@ def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -
     Raises
     ------
     InvalidArgumentError
-        The file cannot be read; it holds no cells of these kinds, several kinds, or others; it has no facets, or facets
-        that belong to no cell; a plane mesh is not in the x-y plane. The message begins with the path.
+        The file cannot be read; it holds no cells of these kinds, kinds that do not fit together, or others; it has no
+        facets, or facets that belong to no cell; a plane mesh is not in the x-y plane. The message begins with the
+        path.
     MissingDependencyError
-        meshio is not installed.
+        meshio is not installed, or another package that it needs for the format.
 
     Examples
     --------
@@ -147,11 +130,18 @@ def _read(source: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     if isinstance(source, meshio.Mesh):
         return _checked(source, groups, dimension)
     place = file_path(source, "source", "the name of a file or a meshio.Mesh")
+    if (found := unreadable(place)) is not None:
+        raise InvalidArgumentError(f"{place}: {found}; expected a mesh that meshio reads")
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of numpy, about files that end too early
             mesh = meshio.read(place)
+    except ImportError as error:  # netCDF4 for Exodus, h5py for MED and XDMF
+        package = error.name or "another package"
+        raise MissingDependencyError(
+            f"{place}: meshio needs {package} for this format, which is not installed; expected it, or another format"
+        ) from error
     except (*_DAMAGE, meshio.ReadError) as error:
         reason = "" if isinstance(error, SystemExit) else str(error)
         if isinstance(error, LookupError):  # its text is the key alone
@@ -181,8 +171,8 @@ def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     if dimension is None:
         spatial = any(kind.startswith(("tetra", "hexa", "wedge", "pyramid", "polyhedron")) for kind in kinds)
         dimension = 3 if spatial else 2
-    body, facet = _kinds(kinds, dimension)
-    cells = np.concatenate([np.asarray(block.data) for block in mesh.cells if block.type == body]).astype(np.int64)
+    bodies, facet = body_kinds(kinds, dimension)
+    cells = body_cells(mesh, bodies)
     used = np.unique(cells)
     if len(used) and not 0 <= used[0] <= used[-1] < len(mesh.points):
         raise InvalidArgumentError(
@@ -194,20 +184,20 @@ def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     number[used] = np.arange(len(used))
     inside = number[cells]
     if dimension == 3:
-        from enumsol.fem.solid_geometry import solid_mesh  # not for plane meshes
-
-        nodes, inside = solid_mesh(nodes, inside)
+        nodes, inside = solid_cells(nodes, inside)
     sets = {name: kept for name, rows in _node_sets(mesh).items() if len(kept := _inside(number, rows, name))}
     facets = {name: _inside(number, rows, name) for name, rows in _named(mesh, facet, groups, dimension).items()}
     lost = [name for name, rows in facets.items() if np.any(rows < 0)]
     if lost:
         raise InvalidArgumentError(f"facets of {lost[0]} have nodes of no cell; expected facets on the boundary")
-    if not facets:
-        facets = _facets_of_sets(nodes, inside, sets)
+    if facet == "quad8":
+        facets = {name: with_centres(rows, inside, name) for name, rows in facets.items()}
+    found, sets = facets_of_sets(dimension, inside, sets, len(used))
+    facets = facets or found
     if not facets:
         raise InvalidArgumentError(
             f"the mesh has no contact facets: no {facet} cells on its boundary; "
-            f"expected {facet} cells, best in groups with names"
+            f"expected {facet} cells, best in groups with names ({GROUPS_ONLY} its parts need some, too)"
         )
     sets = {name: rows[rows >= 0] for name, rows in sets.items() if np.any(rows >= 0)}
     return _made(dimension, nodes, inside, facets, sets)
@@ -225,29 +215,6 @@ def _made(
     from enumsol.fem.solid_meshes import SolidMesh  # not for plane meshes
 
     return SolidMesh(nodes, cells, MappingProxyType(facets), MappingProxyType(sets))
-
-
-def _kinds(kinds: list[str], dimension: int) -> tuple[str, str]:
-    """Kind of the cells of the body, and of its facets."""
-    facet_of, expected = _FACET_OF[dimension], _EXPECTED[dimension]
-    others = [kind for kind in kinds if not kind.startswith(_IGNORED[dimension])]
-    bodies = [kind for kind in others if kind in facet_of]
-    strange = [kind for kind in others if kind not in facet_of and kind not in facet_of.values()]
-    if strange or len(bodies) > 1:
-        hint = _HINTS.get(tuple(sorted(strange or bodies)), "")
-        raise InvalidArgumentError(
-            f"the mesh has cells of type {' and '.join(strange or bodies)}; expected {expected}{hint}"
-        )
-    if not bodies:
-        raise InvalidArgumentError(
-            f"the mesh has no {_BODIES[dimension]}; expected a body in {dimension}D (gmsh writes only what is in "
-            "physical groups, if there are any: the body needs one, too)"
-        )
-    facet = facet_of[bodies[0]]
-    other = [kind for kind in others if kind not in (bodies[0], facet)]
-    if other:
-        raise InvalidArgumentError(f"the mesh has {other[0]} cells beside {bodies[0]}; expected facets of type {facet}")
-    return bodies[0], facet
 
 
 def _plane(points: NDArray[Any]) -> NDArray[np.float64]:
@@ -273,18 +240,12 @@ def _inside(number: Integers, rows: Integers, name: str) -> Integers:
     return np.asarray(number[rows])
 
 
-def _facets_of_sets(nodes: NDArray[np.float64], cells: Integers, sets: dict[str, Integers]) -> dict[str, Integers]:
-    """Facets on the boundary all of whose nodes belong to a set, by the set's name."""
-    if not sets:
-        return {}
-    outer = boundary_facets(nodes.shape[1], cells)
-    found = {name: outer[np.all(np.isin(outer, rows), axis=1)] for name, rows in sets.items()}
-    return {name: rows for name, rows in found.items() if len(rows)}
-
-
 def _node_sets(mesh: Any) -> dict[str, Integers]:
     """Nodes by the name of their point set or of the group of their points, in the numbers of the file."""
     sets = {str(name): np.asarray(rows, dtype=np.int64).ravel() for name, rows in mesh.point_sets.items()}
+    for tag, names in _families(mesh, _FAMILIES[1]).items():
+        of_family = np.flatnonzero(np.asarray(mesh.point_data[_FAMILIES[1]]) == tag)
+        sets |= {name: np.union1d(sets.get(name, of_family), of_family) for name in names}
     points = {name: rows.ravel() for name, rows in _grouped(mesh, "vertex", None, 0).items()}
     return sets | points
 
@@ -298,29 +259,48 @@ def _named(mesh: Any, facet: str, groups: str | None, dimension: int) -> dict[st
     named = _grouped(mesh, facet, groups, dimension - 1)
     if named or not rows or _node_sets(mesh):
         return named
-    return {_ALL: np.concatenate(rows)}
+    return {ALL: np.concatenate(rows)}
 
 
 def _grouped(mesh: Any, kind: str, groups: str | None, dimension: int) -> dict[str, Integers]:
     """Cells of a kind by the name of their cell set or group."""
-    blocks = [k for k, block in enumerate(mesh.cells) if block.type == kind]
-    rows = {k: np.asarray(mesh.cells[k].data).astype(np.int64) for k in blocks}
+    rows = {k: np.asarray(block.data).astype(np.int64) for k, block in enumerate(mesh.cells) if block.type == kind}
     named: dict[str, list[Integers]] = {}
     if groups is None:
         for name, sets in mesh.cell_sets.items():
-            for k in blocks:
+            for k in rows:
                 if not name.startswith("gmsh:") and sets[k] is not None and len(sets[k]):
                     named.setdefault(name, []).append(rows[k][np.asarray(sets[k], dtype=np.int64)])
-    data = _PHYSICAL if groups is None else groups
-    if not named and data in mesh.cell_data:
-        names = {
-            int(entry[0]): name for name, entry in mesh.field_data.items() if len(entry) > 1 and entry[1] == dimension
-        }
-        for k in blocks:
-            tags = np.asarray(mesh.cell_data[data][k])
+    data, names, numbered = _tags(mesh, list(rows), groups, dimension)
+    if not named and data is not None:
+        for k, cells in rows.items():
+            tags = np.asarray(mesh.cell_data[data][k]).reshape(len(cells))
             for tag in np.unique(tags):
-                if kind == "vertex" and int(tag) not in names:
-                    continue  # gmsh keeps points of no group, too
-                name = names.get(int(tag), f"{tag:g}") if groups is None else f"{tag:g}"
-                named.setdefault(name, []).append(rows[k][tags == tag])
+                for name in names.get(int(tag), [f"{tag:g}"] if numbered else []):
+                    named.setdefault(name, []).append(cells[tags == tag])
     return {name: np.concatenate(parts) for name, parts in named.items()}
+
+
+def _tags(
+    mesh: Any, blocks: list[int], groups: str | None, dimension: int
+) -> tuple[str | None, dict[int, list[str]], bool]:
+    """Cell data whose numbers group cells, the names of numbers, and whether the others are names themselves."""
+    if groups is not None:
+        return groups, {}, True
+    numbered = dimension > 0  # gmsh keeps points of no group, too
+    if _PHYSICAL in mesh.cell_data:
+        names = {int(entry[0]): [name] for name, entry in mesh.field_data.items() if list(entry[1:2]) == [dimension]}
+        return _PHYSICAL, names, numbered
+    if _FAMILIES[0] in mesh.cell_data:
+        return _FAMILIES[0], _families(mesh, _FAMILIES[0]), False
+    for name in _NUMBERS if blocks else ():
+        if name in mesh.cell_data:
+            tags = np.concatenate([np.ravel(mesh.cell_data[name][k]) for k in blocks])
+            if np.any(tags != tags[:1]):
+                return name, {}, numbered
+    return None, {}, False
+
+
+def _families(mesh: Any, name: str) -> dict[int, list[str]]:
+    """The names of the groups that each family of a MED file belongs to."""
+    return {int(tag): [str(group) for group in members] for tag, members in getattr(mesh, name, {}).items()}

@@ -16,17 +16,19 @@ from enumsol.checks import exact_number, file_path, finite_number, shown
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.assembly import plane_problem
 from enumsol.fem.bases import nodal_basis
-from enumsol.fem.basis_problems import nodal_normals, pressed, space_problem
+from enumsol.fem.basis_problems import outward_normal, pressed, space_problem
+from enumsol.fem.cells import contact_nodes
 from enumsol.fem.conditions import Held, Obstacle, by_part, check_held, names_of, part_forces, part_springs
 from enumsol.fem.mesh_checks import lame, unit_vectors
 from enumsol.fem.mesh_files import read_mesh
 from enumsol.fem.parts import PartedMesh
 from enumsol.fem.restrained import ContactNodes, movable, plain_dofs
+from enumsol.files import unreadable
 from enumsol.texts import shortened
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
@@ -69,9 +71,10 @@ def mesh_problem(
 ) -> ContactProblem | ContactProblem3D:
     """Contact problem of a body whose mesh has named parts.
 
-    Contact is by nodes: every node of the contact parts that is not held has a row, on edges of second order the nodes
-    between the ends as well. Rows are displacements of nodes, not weighted, and lambda are the nodal forces that do the
-    work on them. In 2D rows are in the order of the nodes along the boundary.
+    Contact is by nodes: every node of the contact parts that is not held has a row, in second order the nodes between
+    corners as well; of triangles with six nodes, which in 3D tetrahedra of second order have, these only, since a
+    uniform pressure on them has no part at corners. Rows are displacements of nodes, not weighted, and lambda are the
+    nodal forces that do the work on them. In 2D rows are in the order of the nodes along the boundary.
 
     Normals are those of the boundary, averaged around each node with its shape function as weight, or those of the
     obstacle. At nodes on a plane of symmetry they are projected on it; the component across it stays in the problem,
@@ -159,7 +162,7 @@ def mesh_problem(
         **_coefficients(dimension, friction, friction2),
     }
     if dimension == 3:
-        more |= _space_fields(parted, facets, nodes, displaced=bool(np.any(held.supports.values)))
+        more |= _space_fields(body, parted, facets, nodes, displaced=bool(np.any(held.supports.values)))
     else:
         more["mesh"] = lambda left: PlaneMesh.of_dofs(parted.points, parted.cells, left, held.supports.values)
     springs = part_springs(body, parted, spring)
@@ -203,13 +206,13 @@ def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactP
         name = file_path(options.pop("mesh", None), "mesh", "the name of a mesh file in quotes")
         check_keys(options)
         return mesh_problem(place.parent / name, **options)
-    except OSError as error:
-        raise InvalidProblemError(f"{place}: it cannot be read ({error.strerror or error})") from error
     except (InvalidArgumentError, InvalidProblemError) as error:
         raise InvalidProblemError(f"{place}: {error}") from error
 
 
 def _toml(place: Path) -> dict[str, Any]:
+    if (found := unreadable(place)) is not None:
+        raise InvalidArgumentError(f"{found}; expected a TOML file of options")
     with place.open("rb") as file:
         content = file.read(LARGEST_FILE + 1)
     if len(content) > LARGEST_FILE:
@@ -223,8 +226,10 @@ def _toml(place: Path) -> dict[str, Any]:
         ) from error
 
 
-def check_keys(options: Mapping[str, Any]) -> None:
+def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str) -> None:
     """Refuse options that `mesh_problem` does not have, and the lack of those that it must have.
+
+    ``spelled`` gives the name of an option as its user writes it.
 
     Raises
     ------
@@ -239,7 +244,8 @@ def check_keys(options: Mapping[str, Any]) -> None:
             raise InvalidArgumentError(f"there is no option {shown(name)}; {hint}")
     missing = [name for name, default in known.items() if default is inspect.Parameter.empty and name not in options]
     if missing:
-        raise InvalidArgumentError(f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing")
+        names = ", ".join(map(spelled, missing))
+        raise InvalidArgumentError(f"{names} {'is' if len(missing) == 1 else 'are'} missing")
 
 
 def _held(mesh: PartedMesh, clamp: Any, symmetry: Any, displacement: Any) -> Held:
@@ -268,14 +274,15 @@ def _contact(
     body: NodalBasis, mesh: PartedMesh, facets: Integers, held: Held, obstacle: Any
 ) -> tuple[ContactNodes, Floats]:
     """Contact nodes with their normals, and the distances to the obstacle."""
-    touching = along(facets) if mesh.points.shape[1] == 2 else np.unique(facets)
+    dimension = mesh.points.shape[1]
+    touching = along(facets) if dimension == 2 else np.unique(contact_nodes(dimension, facets))
     if np.all(held.supports.fixed[touching]):
         raise InvalidArgumentError("contact has no node that clamp or displacement leave free; expected some")
     if obstacle is None:
-        integrals = body.vectors(nodal_normals(body.basis, body.facet_numbers(facets, "contact")))
+        integrals = body.on_part(facets, "contact", outward_normal, lumped=True)
         normals, gaps = pressed(integrals[touching], touching), np.zeros(len(touching))
     else:
-        normals, gaps = Obstacle.of(obstacle, mesh.points.shape[1]).normals_and_gaps(mesh.points[touching])
+        normals, gaps = Obstacle.of(obstacle, dimension).normals_and_gaps(mesh.points[touching])
     normals = unit_vectors(normals, "normals of the boundary")
     if obstacle is None:  # what averages with the other half of the body would be
         normals = unit_vectors(np.where(held.mirrored[touching], 0.0, normals), "normals at the plane of symmetry")
@@ -336,15 +343,16 @@ def _axes(nodes: ContactNodes, axis: Any, dimension: int) -> Any:
     return first, np.cross(nodes.normals, first)
 
 
-def _space_fields(mesh: PartedMesh, facets: Integers, nodes: ContactNodes, *, displaced: bool) -> dict[str, Any]:
+def _space_fields(
+    body: NodalBasis, mesh: PartedMesh, facets: Integers, nodes: ContactNodes, *, displaced: bool
+) -> dict[str, Any]:
     """Areas, and the mesh as a function of the degrees of freedom that are left."""
     from enumsol.body3d import BodyMesh  # not for plane bodies
     from enumsol.fem.solid_geometry import outward
-    from enumsol.fem.surfaces import ContactSurface
 
-    surface = ContactSurface(mesh.points, outward(facets, mesh.cells))
-    areas = np.bincount(surface.facets.ravel(), surface.shares.ravel(), len(mesh.points))
+    areas = body.on_part(facets, "contact", lambda v, _: v[0], lumped=True)[:, 0]
+    surface = outward(facets, mesh.cells)
     return {
         "areas": areas[nodes.nodes],
-        "mesh": None if displaced else lambda left: BodyMesh(mesh.points, mesh.cells, left, surface.facets),
+        "mesh": None if displaced else lambda left: BodyMesh(mesh.points, mesh.cells, left, surface),
     }

@@ -88,7 +88,7 @@ def h1_norms(problem: ContactProblem3D) -> MeshNorms:
     >>> norms.dual.shape
     (6, 6)
     """
-    from skfem import BilinearForm  # as in solids
+    from skfem import BilinearForm  # as in bases
     from skfem.helpers import ddot, dot, grad
 
     instance_of(problem, ContactProblem3D, "problem")
@@ -100,7 +100,7 @@ def h1_norms(problem: ContactProblem3D) -> MeshNorms:
 
     # products of linear functions have degree two: exact on tetrahedra and parallelepipeds
     body = nodal_basis(problem.mesh.points, problem.mesh.cells, degree=2)
-    G = body.matrix(BilinearForm(product).assemble(body.basis))
+    G = body.matrix(BilinearForm(product))
     dofs = problem.mesh.dofs
     return MeshNorms(sp.csc_array(G[dofs][:, dofs]), problem.Bn, problem.areas)
 

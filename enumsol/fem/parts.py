@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ import numpy as np
 
 from enumsol.checks import shown
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.bases import KINDS
+from enumsol.fem.cells import KINDS, by_kind
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,19 +20,26 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+#: The name of all facets where nothing names groups of them.
+ALL = "boundary"
+
+
 @dataclass(frozen=True)
 class PartedMesh:
-    """A mesh of one kind of cell with named parts: sets of facets, and sets of nodes. In 3D it is a `SolidMesh`.
+    """A mesh with named parts: sets of facets, and sets of nodes. In 3D it is a `SolidMesh`.
 
     Attributes
     ----------
     points : (N, d) array
         Positions of the nodes [length].
     cells : (M, k) int array
-        Nodes of each cell, in the order of VTK and gmsh: its corners, then those on its edges, then that inside. In 2D
-        3 or 6 nodes of triangles, 4, 8 or 9 of quadrilaterals; in 3D 4 of tetrahedra, 8 of hexahedra.
+        Nodes of each cell, in the order of VTK: its corners, then those on its edges, on its facets, and inside. In 2D
+        3 or 6 nodes of triangles, 4, 8 or 9 of quadrilaterals; in 3D 4 or 10 of tetrahedra, 8 or 27 of hexahedra. Among
+        quadrilaterals a triangle is one whose last corner is named twice (a, b, c, c), in second order with this corner
+        for the node between the two and for that inside, too.
     facets : mapping of names to (k, m) int arrays
-        Nodes of the facets of parts of the boundary: corners, then, on edges of second order, the node between them.
+        Nodes of the facets of parts of the boundary: corners, then, in second order, the nodes between them, then that
+        inside.
     node_sets : mapping of names to (k,) int arrays
         Nodes of parts that are given by nodes.
     """
@@ -71,17 +79,25 @@ class PartedMesh:
 
     def _unknown(self, name: str, what: str, known: Mapping[str, object]) -> InvalidArgumentError:
         close = difflib.get_close_matches(str(name), known, n=1)
+        several = [part for part in re.split(r"[\s,;]+", str(name)) if part]
         hint = f" (did you mean {close[0]}?)" if close else ""
+        if len(several) > 1 and all(part in known for part in several):
+            hint = f" (give {' and '.join(several)} one by one)"
+        elif [*known] == [ALL]:
+            hint = " (the file names no parts of its boundary; in gmsh physical groups do)"
         return InvalidArgumentError(
             f"the mesh has no {what} named {shown(name)}; expected one of {', '.join(known) or 'none'}{hint}"
         )
 
     def __repr__(self) -> str:
         parts = ", ".join(f"{name} ({len(part)})" for name, part in self.facets.items()) or "none"
-        kind = KINDS[self.points.shape[1], self.cells.shape[1]].name
+        dimension = self.points.shape[1]
+        kinds = [
+            f"{len(rows)} {KINDS[dimension, cells.shape[1]].name}" for rows, cells in by_kind(dimension, self.cells)
+        ]
         lines = [
             f"{type(self).__name__} with {len(self.points)} nodes",
-            f"  cells   {len(self.cells)} {kind}",
+            f"  cells   {', '.join(kinds)}",
             f"  facets  {parts}",
         ]
         if self.node_sets:

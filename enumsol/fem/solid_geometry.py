@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.bases import FLAT, HEXAHEDRON, KINDS, boundary_facets
+from enumsol.fem.bases import FLAT
+from enumsol.fem.cells import HEXAHEDRON, KINDS, boundary_facets
 from enumsol.fem.mesh_checks import check_every_node_is_used, elements, positions
 
 if TYPE_CHECKING:
@@ -19,12 +20,19 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
 
+#: Nodes of a tetrahedron, and of a hexahedron, of the other orientation, by the number of corners.
+_TURNED = {
+    4: [0, 2, 1, 3, 6, 5, 4, 7, 9, 8],
+    8: [0, 3, 2, 1, 4, 7, 6, 5, 11, 10, 9, 8, 15, 14, 13, 12, 16, 19, 18, 17, 22, 23, 20, 21, 24, 25, 26],
+}
 _GAUSS_2 = (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)), (0.5, 0.5)
 _GAUSS_3 = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)), (5 / 18, 8 / 18, 5 / 18)
 
 
-def solid_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[Floats, Integers]:
-    """Points (N, 3) and cells (M, 4) or (M, 8) of positive volume; tetrahedra may come in any orientation.
+def solid_mesh(points: ArrayLike, cells: ArrayLike, kinds: tuple[int, ...] = (4, 8)) -> tuple[Floats, Integers]:
+    """Points (N, 3) and cells (M, k) of positive volume, k among ``kinds``; they may come in any orientation.
+
+    What the nodes of second order (10 or 27 in all) do to a cell is checked by `nodal_basis`.
 
     Raises
     ------
@@ -32,18 +40,18 @@ def solid_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[Floats, Integers]:
         The mesh is not valid: shapes, node numbers, a node in no cell, a cell that is flat or inside out.
     """
     nodes = positions(points, 3)
-    bodies = elements(cells, "cells", (4, 8), len(nodes))
-    corners = nodes[bodies]
+    bodies = elements(cells, "cells", kinds, len(nodes))
+    corners = nodes[bodies[:, : KINDS[3, bodies.shape[1]].corners]]
     size = np.max(np.ptp(corners, axis=1), axis=1) ** 3
-    volumes = _tetrahedron_volumes(corners)[:, None] if bodies.shape[1] == 4 else _corner_volumes(corners)
-    if bodies.shape[1] == 4:
-        turned = volumes[:, 0] < 0
-        bodies[turned] = bodies[turned][:, [0, 2, 1, 3]]
-        volumes = np.abs(volumes)
+    count = corners.shape[1]
+    volumes = _tetrahedron_volumes(corners)[:, None] if count == 4 else _corner_volumes(corners)
+    turned = np.all(volumes < 0, axis=1)
+    bodies[turned] = bodies[turned][:, _TURNED[count][: bodies.shape[1]]]
+    volumes[turned] *= -1
     _refuse(np.max(np.abs(volumes), axis=1) <= FLAT * size, "has no volume; expected proper cells")
     _refuse(
         np.min(volumes, axis=1) <= FLAT * size,
-        "is turned inside out at a corner; expected hexahedra of positive volume with corners in the order of VTK",
+        "is turned inside out at a corner; expected hexahedra with corners in the order of VTK",
     )
     check_every_node_is_used(bodies, len(nodes), "cells", "cell")
     return nodes, bodies

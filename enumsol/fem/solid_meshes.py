@@ -10,7 +10,7 @@ import numpy as np
 from enumsol.array_checks import short_vector
 from enumsol.checks import one_of, positive_integer, shown
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.bases import KINDS, boundary_facets
+from enumsol.fem.cells import KINDS, boundary_facets
 from enumsol.fem.mesh_checks import elements, positions
 from enumsol.fem.parts import PartedMesh
 
@@ -34,10 +34,10 @@ class SolidMesh(PartedMesh):
     ----------
     points : (N, 3) array
         Positions of the nodes [length].
-    cells : (M, 4) or (M, 8) int array
-        Nodes of each tetrahedron, or of each hexahedron in the order of VTK.
-    facets : mapping of names to (k, 3) or (k, 4) int arrays
-        Nodes of the triangles or quadrilaterals of parts of the boundary.
+    cells : (M, k) int array
+        Nodes of each tetrahedron (k = 4 or 10) or hexahedron (k = 8 or 27), in the order of VTK.
+    facets : mapping of names to (k, m) int arrays
+        Nodes of the triangles (m = 3 or 6) or quadrilaterals (m = 4 or 9) of parts of the boundary.
     node_sets : mapping of names to (k,) int arrays
         Nodes of parts that are given by nodes.
     """

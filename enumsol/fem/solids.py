@@ -27,7 +27,7 @@ def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, floa
     points : (N, 3) array_like
         Positions of the nodes [length].
     cells : (M, 4) or (M, 8) array_like of int
-        Nodes of each tetrahedron, in any orientation, or of each hexahedron, in the order of VTK.
+        Nodes of each tetrahedron, or of each hexahedron in the order of VTK; in any orientation.
     lame : (float, float)
         Lame coefficients l, m with m > 0, 3 l + 2 m > 0 [force / length^2].
 

@@ -33,8 +33,8 @@ In 3D both take ``Bt1`` and ``Bt2`` instead of ``Bt``, which tell a problem in 3
   none of them F = 0.5, as in `ContactProblem3D`. A friction given by a callable cannot be written.
 - ``friction_slope_1``, ``friction_slope_2``: derivatives with respect to alpha, 0 when left out.
 - ``gap``, ``load_slope``, ``slip_offset`` (p, 2), ``coordinates`` (p, 3), ``areas`` (p,), ``node_ids``.
-- ``mesh_points`` (N, 3), ``mesh_cells`` (M, 4) or (M, 8), ``mesh_dofs`` (n,): a `BodyMesh`, all or none; with it
-  ``mesh_facets`` (k, 3) or (k, 4) and ``mesh_rows`` (k,).
+- ``mesh_points`` (N, 3), ``mesh_cells`` (M, k), ``mesh_dofs`` (n,): a `BodyMesh`, all or none; with it ``mesh_facets``
+  (k, m) and ``mesh_rows`` (k,).
 - ``slip_mean_T1``, ``slip_mean_T2``, ``slip_mean_offset``, ``slip_mean_weights``: a `SlipMean`, all or none; like the
   other matrices dense or in sparse parts.
 
@@ -155,6 +155,8 @@ def _read(place: Path) -> ContactProblem | ContactProblem3D:
         return matrix_market.read(place)
     if not place.exists():
         raise InvalidProblemError(f"there is no such file or directory; expected {_READABLE}")
+    if not place.is_file():
+        raise InvalidProblemError(f"it is no regular file; expected {_READABLE}")
     if place.suffix == ".npz":
         return npz.read(place)
     if place.suffix in fclib.SUFFIXES:

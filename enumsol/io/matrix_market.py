@@ -38,6 +38,8 @@ _DIGITS = 17
 def read(path: Path) -> ContactProblem | ContactProblem3D:
     """The problem in a directory of .mtx files."""
     files = {file.stem: file for file in sorted(path.glob("*.mtx")) if not file.name.startswith("_")}
+    if not files:
+        raise InvalidProblemError("the directory has no MatrixMarket files; expected A.mtx, Bn.mtx, Bt.mtx and f.mtx")
     layout = layout_of(files)
     check_names(files, layout, ".mtx")
     arrays: dict[str, Any] = {name: _values(name, file, layout) for name, file in files.items()}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from enumsol.array_checks import real_array
+from enumsol.body2d import triangles_apart
 from enumsol.checks import file_path
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.files import writing
@@ -24,9 +25,9 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-#: Names that meshio has for cells and facets, by their corners; a quadrilateral has as many as a tetrahedron.
-_CELLS, _FACETS = {4: "tetra", 8: "hexahedron"}, {3: "triangle", 4: "quad"}
-_PLANE_CELLS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
+#: Names that meshio has for cells and facets, by their nodes; a quadrilateral has as many as a tetrahedron.
+_CELLS = {4: "tetra", 8: "hexahedron", 10: "tetra10", 27: "hexahedron27"}
+_FACETS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
 _PLANE_STATUS = {status.value: float(code) for code, status in enumerate(STATUSES)}
 _STATUS = {"open": 0.0, "stick": 1.0}
 _SLIPS = 2.0
@@ -148,7 +149,7 @@ def _plane(meshio: Any, problem: ContactProblem, state: State) -> Any:
     forces = shape.contact_forces(problem, data["lambda_n"], data["lambda_t"])
     point_data = {"displacement": _in_space(moves), "contact_force": _in_space(forces)}
     point_data |= {name: _spread(values, nodes, count) for name, values in data.items()}
-    cells = [(_PLANE_CELLS[shape.cells.shape[1]], shape.cells)]
+    cells = [(_FACETS[part.shape[1]], part) for _, part in triangles_apart(shape.cells)]
     return meshio.Mesh(_in_space(shape.points), cells, point_data=point_data)
 
 

@@ -93,6 +93,7 @@ def _row(matrix: sp.csr_array, i: int) -> tuple[Any, Any]:
 def _boundary(outlines: NDArray[np.int64]) -> NDArray[np.int64]:
     """Edges that belong to one cell only, (k, 2)."""
     edges = np.concatenate([outlines[:, [k, (k + 1) % outlines.shape[1]]] for k in range(outlines.shape[1])])
+    edges = edges[edges[:, 0] != edges[:, 1]]  # triangles among quadrilaterals name a corner twice
     _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
     return np.asarray(edges[first[count == 1]])
 

@@ -409,7 +409,9 @@ def test_a_file_that_is_no_problem_file(capsys, tmp_path):
         file = tmp_path / "p.npz"
         file.write_bytes(content)
         assert_refused(*run(capsys, "roots", file, "--alpha", 5), f"{file}: it is no", "expected")
-    assert_refused(*run(capsys, "roots", tmp_path, "--alpha", 5), "A.mtx, Bn.mtx, Bt.mtx and f.mtx are missing")
+    assert_refused(
+        *run(capsys, "roots", tmp_path, "--alpha", 5), "no MatrixMarket files; expected A.mtx, Bn.mtx, Bt.mtx and f.mtx"
+    )
 
 
 def test_every_bad_input_is_status_2_of_the_process_too(tmp_path):

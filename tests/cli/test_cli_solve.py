@@ -1,6 +1,7 @@
 """``enumsol solve``: the same roots from options, from a TOML file, and from what --output wrote; one sentence else."""
 
 import json
+import os
 
 import pytest
 from typer.testing import CliRunner
@@ -153,8 +154,8 @@ def test_options_of_supports_and_obstacles(here, capsys):
     ("arguments", "part"),
     [
         (("solve",), "missing argument 'MESH'"),
-        (("solve", "body.msh"), "young, poisson, contact are missing"),
-        (("solve", "body.msh", *OPTIONS[:4]), "poisson is missing"),
+        (("solve", "body.msh"), "error: --young, --poisson, --contact are missing"),
+        (("solve", "body.msh", *OPTIONS[:4]), "error: --poisson is missing"),
         (("solve", "body.msh", *OPTIONS), "--alpha is missing, on which friction or load depend"),
         (
             ("solve", "body.msh", *OPTIONS, "--contact", "flor", "--alpha", 1),
@@ -170,7 +171,24 @@ def test_options_of_supports_and_obstacles(here, capsys):
             ("solve", "body.toml", "--young", "1", "--alpha", 1),
             "--young is given beside body.toml, which has all options",
         ),
-        (("solve", "nowhere.msh", *OPTIONS, "--alpha", 1), "nowhere.msh: meshio cannot read it"),
+        (("solve", "nowhere.msh", *OPTIONS, "--alpha", 1), "nowhere.msh: there is no such file; expected a mesh with"),
+        (("solve", "nowhere.msh"), "nowhere.msh: there is no such file; expected a mesh with"),
+        (("solve", "bdoy.msh", *OPTIONS), "bdoy.msh: there is no such file; did you mean body.msh"),
+        (("solve", "", *OPTIONS), "MESH is an empty text; expected the name of a mesh file"),
+        (("solve", "folder.msh", *OPTIONS), "folder.msh: it is a directory; expected a mesh with named parts"),
+        (("solve", "pipe.msh", *OPTIONS), "pipe.msh: it is no regular file; expected a mesh with named parts"),
+        (("solve", "dangling.msh", *OPTIONS), "dangling.msh: there is no such file; expected a mesh with named parts"),
+        (("solve", "p.npz", *OPTIONS), "p.npz is a problem; expected a mesh (enumsol roots p.npz solves a problem)"),
+        (("solve", "gallery:wedge-8-5"), "gallery:wedge-8-5 is a problem; expected a mesh"),
+        (("solve", "pipe.toml"), "pipe.toml: it is no regular file; expected a TOML file of options"),
+        (("roots", "pipe.npz", "--alpha", 1), "pipe.npz: it is no regular file; expected a .npz file"),
+        (("roots", "pipe.toml", "--alpha", 1), "pipe.toml: it is no regular file; expected a TOML file of options"),
+        (("roots", "pipe.msh", "--alpha", 1), "pipe.msh is a mesh; expected a problem"),
+        (
+            ("roots", "folder.toml", "--alpha", 1),
+            "folder.toml: the directory has no MatrixMarket files; expected A.mtx",
+        ),
+        (("roots", "nowhere.h5", "--alpha", 1), "nowhere.h5: there is no such file or directory; expected a .npz file"),
         (("solve", "nowhere.toml", "--alpha", 1), "nowhere.toml: there is no such file"),
         (("roots", "body.tml", "--alpha", 1), "did you mean body.toml?"),
         (("solve", "body.msh", *OPTIONS, "--alpha", 1, "-o", "p.txt"), "p.txt: its name ends in '.txt'"),
@@ -179,6 +197,11 @@ def test_options_of_supports_and_obstacles(here, capsys):
     ],
 )
 def test_bad_calls_get_one_sentence(here, capsys, arguments, part):
+    for name in ("folder.msh", "folder.toml"):
+        (here / name).mkdir()
+    for name in ("pipe.msh", "pipe.toml", "pipe.npz"):
+        os.mkfifo(here / name)
+    (here / "dangling.msh").symlink_to(here / "nothing")
     status, out, err = run(capsys, *arguments)
     assert (status, out) == (2, "")
     assert err.startswith("enumsol: error: ")

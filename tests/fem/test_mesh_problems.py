@@ -8,7 +8,7 @@ import enumsol
 from enumsol import InvalidArgumentError, InvalidProblemError, fem
 
 E, NU = 2.0, 0.3
-KINDS = (3, 4, 6, 8, 9)
+KINDS = (3, 4, 6, 8, 9, (3, 4), (6, 8), (6, 9))
 STEEL = {"young": E, "poisson": NU}
 
 
@@ -51,6 +51,32 @@ def test_rigid_motions_alone_have_no_energy(kind):
     mesh = grid(2, 2, kind, shake=0.05)
     values = np.linalg.eigvalsh(fem.stiffness(mesh.points, mesh.cells, (1, 1)).toarray())
     assert np.sum(values < 1e-11) == 3
+
+
+def quadrilateral_stiffness(corners, lam, mu):
+    """By two by two Gauss points."""
+    K, C = np.zeros((8, 8)), np.array([[lam + 2 * mu, lam, 0], [lam, lam + 2 * mu, 0], [0, 0, mu]])
+    for x, y in np.array(list(np.ndindex(2, 2))) / np.sqrt(3) + (1 - np.sqrt(1 / 3)) / 2:
+        slopes = np.array([[y - 1, 1 - y, y, -y], [x - 1, -x, x, 1 - x]])
+        jacobian = slopes @ corners
+        dx, dy = np.linalg.solve(jacobian, slopes)
+        B = np.zeros((3, 8))
+        B[0, ::2], B[1, 1::2], B[2, ::2], B[2, 1::2] = dx, dy, dy, dx
+        K += B.T @ C @ B * np.linalg.det(jacobian) / 4
+    return K
+
+
+def test_cells_of_two_kinds_are_assembled_as_by_hand():
+    mesh = grid(3, 2, (3, 4), 2.0, 1.0, shake=0.05)
+    assert "6 triangles, 3 quadrilaterals" in repr(mesh)
+    expected = np.zeros((mesh.points.size,) * 2)
+    for cell in mesh.cells.tolist():
+        triangle = cell[2] == cell[3]
+        nodes = cell[:3] if triangle else cell
+        local = fem.triangle_stiffness if triangle else lambda corners, lame: quadrilateral_stiffness(corners, *lame)
+        dofs = np.ravel([[2 * node, 2 * node + 1] for node in nodes])
+        expected[np.ix_(dofs, dofs)] += local(mesh.points[nodes], (1.3, 0.7))
+    assert np.allclose(fem.stiffness(mesh.points, mesh.cells, (1.3, 0.7)).toarray(), expected, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -138,7 +164,7 @@ def test_pressure_pushes_into_the_body():
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_turned_body_has_the_same_roots(kind):
     """A wedge that jams, with normals of its own, turned by an angle."""
-    flat = grid(2, 3 if kind < 6 else 2, kind)
+    flat = grid(2, 3 if kind in (3, 4, (3, 4)) else 2, kind)
     wedge = moved(flat, lambda p: np.c_[(p[:, 0] - 0.5) * (1 + 0.8 * p[:, 1]), p[:, 1]])
     c, s = np.cos(0.7), np.sin(0.7)
     turn = np.array([[c, -s], [s, c]])
@@ -174,6 +200,29 @@ def test_half_of_a_symmetric_body(kind):
     axis = int(np.argmin(problem.coordinates[:, 0]))
     assert part.lambda_t[axis] == 0
     assert part.u_t[axis] == 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_all_kinds_of_cells_agree(kind):
+    """A wedge that jams: as many roots with every kind, and the contact forces of each add up to the same."""
+    fine = kind in (3, 4, (3, 4))
+
+    def found(kind, count):
+        flat = grid(count, count, kind)
+        wedge = moved(flat, lambda p: np.c_[(p[:, 0] - 0.5) * (1 + 0.8 * p[:, 1]), p[:, 1]])
+        problem = fem.mesh_problem(
+            wedge, **STEEL, contact=["left", "right"], spring={"top": (0.02, 0.02)}, gap=-5e-4,
+            load={"top": (1e-4, 1e-3)},
+        )  # fmt: skip
+        roots = enumsol.enumerate_roots(problem, 2.5, max_nodes=20_000)
+        assert roots.complete
+        forces = [-(problem.contact_rows.T @ np.r_[root.lambda_n, root.lambda_t]) for root in roots]
+        return sorted((force.reshape(-1, 2).sum(axis=0) for force in forces), key=lambda force: force[1])
+
+    one, two = found(kind, 4 if fine else 2), found(9, 3)
+    assert len(one) == len(two) == 3
+    largest = np.max(np.abs(two))
+    assert np.allclose(one, two, rtol=0, atol=0.005 * largest)
 
 
 def test_normals_on_a_plane_of_symmetry_are_those_of_the_whole_body():
@@ -299,6 +348,7 @@ GOOD = {**STEEL, "contact": "bottom", "clamp": "top"}
     ("changes", "message"),
     [
         ({"contact": "botom"}, r"no facets named 'botom'; expected one of bottom, .* \(did you mean bottom\?\)"),
+        ({"contact": "bottom, left"}, r"no facets named 'bottom, left'; .* \(give bottom and left one by one\)"),
         ({"clamp": "roof"}, "no facets named 'roof'; expected one of bottom, top, left, right"),
         ({"contact": ()}, "contact names no part"),
         ({"contact": 3}, "contact is 3; expected the name of a part"),
@@ -374,6 +424,13 @@ def test_facets_inside_the_body_are_refused():
     inside = fem.parts.PartedMesh(mesh.points, mesh.cells, {**mesh.facets, "cut": np.array([[3, 4]])})
     with pytest.raises(InvalidArgumentError, match=r"cut row 0, nodes \[3, 4\], is no facet on the boundary"):
         fem.mesh_problem(inside, **STEEL, contact="cut", clamp="top")
+
+
+def test_facets_without_their_nodes_between_are_refused():
+    mesh = grid(2, 2, 6)
+    bare = fem.parts.PartedMesh(mesh.points, mesh.cells, {name: part[:, :2] for name, part in mesh.facets.items()})
+    with pytest.raises(InvalidArgumentError, match="bottom has facets of 2 nodes; expected 3, as the cells have"):
+        fem.mesh_problem(bare, **GOOD)
 
 
 def test_a_folded_boundary_has_no_normal():

@@ -177,9 +177,16 @@ CUBE = fem.box(1, 1, 1)
         ([TETRA], "the mesh has no contact facets: no triangle cells on its boundary"),
         ([FACET], "the mesh has no tetrahedra or hexahedra"),
         ([("line", [[0, 1]])], "the mesh has no tetrahedra or hexahedra"),
-        ([TETRA, FACET, ("pyramid", [[0, 1, 2, 3, 4]])], "the mesh has cells of type pyramid; expected either"),
-        ([("tetra10", [[0, 1, 2, 3, 4, 0, 1, 2, 3, 4]]), FACET], "the mesh has cells of type tetra10"),
-        ([TETRA, FACET, ("hexahedron", [[0, 1, 2, 3, 0, 1, 2, 3]])], "cells of type tetra and hexahedron"),
+        (
+            [TETRA, FACET, ("pyramid", [[0, 1, 2, 3, 4]])],
+            "of type pyramid; expected one of tetra, .*mesh all of the body by one",
+        ),
+        ([TETRA, FACET, ("wedge", [[0, 1, 2, 3, 4, 0]])], "of type wedge; .*wedges are extruded triangles: recombine"),
+        ([("tetra10", [[0, 1, 2, 3, 4, 0, 1, 2, 3, 4]]), FACET], "triangle cells beside tetra10; .* of type triangle6"),
+        (
+            [TETRA, FACET, ("hexahedron", [[0, 1, 2, 3, 0, 1, 2, 3]])],
+            "of type tetra and hexahedron; .*fit together by pyramids only",
+        ),
         ([TETRA, FACET, ("quad", [[0, 1, 2, 3]])], "the mesh has quad cells beside tetra; expected facets of type tri"),
         ([TETRA, ("triangle", [[0, 1, 4]])], "facets of boundary have nodes of no cell"),
         ([("tetra", [[0, 1, 2, 9]]), FACET], r"the cells name nodes from 0 to 9; expected them in 0 \.\. 4"),
@@ -214,10 +221,29 @@ def test_files_that_meshio_cannot_read(tmp_path, capsys, name, text):
 
 
 def test_other_arguments(tmp_path, monkeypatch):
-    with pytest.raises(InvalidArgumentError, match=r"meshio cannot read it .*not found"):
+    with pytest.raises(InvalidArgumentError, match="there is no such file; expected a mesh that meshio reads"):
         fem.read_solid(tmp_path / "nowhere.msh")
+    with pytest.raises(InvalidArgumentError, match="it is a directory; expected a mesh that meshio reads"):
+        fem.read_solid(tmp_path)
+    (tmp_path / "secret.msh").touch()
+    with monkeypatch.context() as patched:  # the user who runs the tests may read everything
+
+        def refused(*_):
+            raise PermissionError(13, "Permission denied")
+
+        patched.setattr("pathlib.Path.open", refused)
+        with pytest.raises(
+            InvalidArgumentError, match=r"secret\.msh: it cannot be read \(Permission denied\); expected"
+        ):
+            fem.read_solid(tmp_path / "secret.msh")
     with pytest.raises(InvalidArgumentError, match="source is a int; expected the name of a file or a meshio"):
         fem.read_solid(3)
+    monkeypatch.setitem(sys.modules, "netCDF4", None)
+    (tmp_path / "p.exo").touch()
+    with pytest.raises(
+        MissingDependencyError, match=r"p\.exo: meshio needs netCDF4 for this format, which is not inst"
+    ):
+        fem.read_solid(tmp_path / "p.exo")
     monkeypatch.setitem(sys.modules, "meshio", None)
     with pytest.raises(MissingDependencyError, match=r'need the package meshio, .* "enumsol\[meshes\]"'):
         fem.read_solid(tmp_path / "p.msh")

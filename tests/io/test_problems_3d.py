@@ -209,10 +209,13 @@ def without(arrays, *names):
         (DENSE | MESH | {"mesh_points": np.zeros((2, 2))}, r"mesh_points has shape \(2, 2\); expected \(N, 3\)"),
         (DENSE | MESH | {"mesh_cells": [[0, 1, 2, 3]]}, r"mesh_cells holds other numbers than 0 \.\. 1"),
         (DENSE | MESH | {"mesh_cells": [[0, 1, 0, 0.5]]}, "mesh_cells holds other numbers than"),
-        (DENSE | MESH | {"mesh_cells": [[0, 1]]}, r"mesh_cells has shape \(1, 2\); expected \(M, 4\)"),
+        (
+            DENSE | MESH | {"mesh_cells": [[0, 1]]},
+            r"mesh_cells has shape \(1, 2\); expected \(M, k\) with k among 4, 8",
+        ),
         (DENSE | MESH | {"mesh_dofs": [0, 1, 2, 3, 4, 4]}, "repeats a number"),
         (DENSE | {"mesh_rows": [0, 1]}, "mesh_rows has no mesh; expected mesh_points, mesh_cells, mesh_dofs as well"),
-        (DENSE | MESH | {"mesh_facets": [[0, 1]]}, r"mesh_facets has shape \(1, 2\); expected \(k, 3\) or"),
+        (DENSE | MESH | {"mesh_facets": [[0, 1]]}, r"mesh_facets has shape \(1, 2\); expected \(k, m\) with m"),
         (
             DENSE | MESH | {"mesh_facets": [[0, 1, 0]], "mesh_rows": [2]},
             r"mesh_rows holds other numbers than -1 \.\. 1",

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from parted_meshes import grid
+from parted_solids import solid
 
 import enumsol
 from enumsol import InvalidArgumentError, PlaneMesh, fem
@@ -90,15 +92,43 @@ def test_in_space():
         roots[0].plot_body(new_figure().subplots())
 
 
-@pytest.mark.parametrize("cells", ["hexahedra", "tetrahedra"])
-def test_boundary_faces_enclose_the_body(cells):
-    mesh = fem.box(3, 2, 2, cells=cells)
+@pytest.mark.parametrize(("kind", "nodes"), [(4, 3), (8, 4), (10, 6), (27, 8)])
+def test_boundary_faces_enclose_the_body(kind, nodes):
+    mesh = solid((3, 2, 2), kind)
     faces = boundary_faces(mesh.cells)
     corners = mesh.points[faces]
     # every face lies in one of the six sides of the box
     flat = [np.all(corners[:, :, axis] == side, axis=1) for axis in range(3) for side in (0.0, 1.0)]
     assert np.all(np.any(flat, axis=0))
-    assert len(faces) == 2 * (3 * 2 + 3 * 2 + 2 * 2) * (1 if cells == "hexahedra" else 2)
+    assert faces.shape == (2 * (3 * 2 + 3 * 2 + 2 * 2) * (1 if kind in (8, 27) else 2), nodes)
+    # along the outline neighbours are near: each step is half of one along an edge
+    steps = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+    assert np.max(steps) < 0.8 * (1 if nodes < 5 else 0.5)
+
+
+@pytest.mark.parametrize("kind", [(3, 4), (6, 8), (6, 9)])
+def test_bodies_with_cells_of_two_kinds(kind, tmp_path):
+    """Pictures and files; the page draws a large body by the edges of its boundary."""
+    import meshio
+
+    from enumsol.report.body import _boundary, body_record
+
+    mesh = grid(3, 2, kind)
+    problem = fem.mesh_problem(
+        mesh, young=2, poisson=0.3, contact="bottom", clamp="left", load={"top": (0.1, -0.3)}, friction=0.4
+    )
+    root = enumsol.enumerate_roots(problem, 0)[0]
+    assert root.plot_body().axes
+    enumsol.write_vtu(problem, root, tmp_path / "p.vtu")
+    triangles, others = meshio.read(tmp_path / "p.vtu").cells
+    assert (len(triangles), len(others)) == (6, 3)
+    assert (triangles.type, others.type) == ("triangle6" if kind[0] == 6 else "triangle", f"quad{kind[1]}".rstrip("4"))
+    record = body_record(problem)
+    edges = _boundary(np.array(record["cells"]))
+    assert len(edges) == 10 * (1 if kind == (3, 4) else 2)
+    assert np.all(np.isin(edges, np.unique(np.concatenate([part.ravel() for part in mesh.facets.values()]))))
+    enumsol.write_problem(problem, tmp_path / "p.npz")
+    assert enumsol.read_problem(tmp_path / "p.npz").fingerprint == problem.fingerprint
 
 
 def test_scales_are_round():
