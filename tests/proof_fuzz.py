@@ -249,7 +249,9 @@ def _nudged(rng, old):
 def _numbers(rng, records, _):
     """Multipliers."""
     changed = copied(records)
-    places = [k for k, record in enumerate(changed) if isinstance(record, list) and record and record[0] in ("x", "X")]
+    lists = [k for k, record in enumerate(changed) if isinstance(record, list) and record]
+    # those of 3D are lists of numbers, which the mutations of fields reach
+    places = [k for k in lists if changed[k][0] in ("x", "X") and isinstance(changed[k][-1], str)]
     if not places:
         return _field(rng, records, _)
     at = _pick(rng, places)

@@ -21,7 +21,7 @@ What checker and search share
       positive definite;
     - ``kernel.point`` and ``kernel.interval``: the exclusion inequality, the verified solve of a selection and the
       contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled copy of
-      the inequality); ``kernel.forms``, the same with other forms than the energy;
+      the inequality); ``kernel.bounds``, what multipliers prove; ``kernel.forms``, other forms than the energy;
     - ``kernel.closing``, the test by which a subtree is closed by its only possible solution, and which of these
       solutions are the same; its linear systems of balls, ``kernel.ball_arrays``;
     - for the arcs of branch graphs: ``kernel.selection_rows``, the numbers of unknowns and conditions;

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, dense_eigenvalue_bound, gamma, upper_norm
-from enumsol.kernel.point import dots, margins
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, gamma, upper_norm
+from enumsol.kernel.bounds import form_bounds, margins
 from enumsol.kernel.rows import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED, row_signs
 
 if TYPE_CHECKING:
@@ -218,29 +218,3 @@ def form_margins(
         return np.full(len(codes), -np.inf)
     system = form.system
     return margins((form,), row_signs(codes, system.F), (system.F, system.F), leaf, rows, values, errors, form_bounds)
-
-
-def form_bounds(form: EnclosedForm, y: Array, c: Array, c_rad: Array, errors: float) -> Array:
-    """Lower bounds on q for multipliers y (m, 2p) on S lambda - g and c, a ball, on lambda; as energy_bounds."""
-    S, S_rad, g, g_rad = form.system.S, form.system.S_rad, form.system.g, form.system.g_rad
-    k = gamma(4 * len(g) + 16)
-    y_abs = np.abs(y)
-    v = form.h + c + y @ S
-    size = np.abs(form.h) + np.abs(c) + y_abs @ np.abs(S)
-    v_rad = (form.h_rad + c_rad + y_abs @ S_rad + k * size) * (1 + k) * SAFE
-    x = v @ form.inverse.T
-    # until the rest is that of rounding, which its bound covers: a checker, which adds up in another order, then finds
-    # nearly the same
-    for _ in range(_REFINEMENTS):
-        x += (v - x @ form.H) @ form.inverse.T
-    Hx = x @ form.H
-    x_abs, rest = np.abs(x), v - Hx
-    x_square, cross, x_form, first = dots(x, x), dots(x, v), dots(x, Hx), y @ g
-    rest_norm = np.sqrt(dots(rest, rest)) + np.sqrt(dots(v_rad, v_rad)) + k * np.sqrt(dots(v, v))
-    rest_norm = (rest_norm + form.form_error * np.sqrt(x_square) + ROOT_TINY) * (1 + k) * SAFE
-    tail = rest_norm * rest_norm / form.smallest_eigenvalue
-    total = form.k + first - 0.5 * cross + 0.25 * x_form
-    error = form.k_rad + y_abs @ (g_rad + k * np.abs(g)) + 0.5 * dots(x_abs, v_rad + k * np.abs(v))
-    error += 0.25 * (form.form_error * x_square + tail)
-    error += 8 * UNIT * (abs(form.k) + np.abs(first) + np.abs(cross) + np.abs(x_form))
-    return np.asarray(total - errors * error * (1 + k) * SAFE * SAFE - TINY)

@@ -18,8 +18,8 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.condensation.enclosure import CondensedEnclosure
-from enumsol.kernel.forms import EnclosedForm, form_bounds
-from enumsol.kernel.point import margins
+from enumsol.kernel.bounds import form_bounds, margins
+from enumsol.kernel.forms import EnclosedForm
 from enumsol.kernel.rows import BACKWARD, FORWARD, ROW_KINDS, STILL, UNDECIDED, row_table
 
 if TYPE_CHECKING:

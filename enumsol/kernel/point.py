@@ -8,18 +8,16 @@ in the search and in the checker alike. Codes and row kinds are plain integers w
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dtrtri
 
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma, upper_norm, upper_sum
+from enumsol.kernel.bounds import margins
 from enumsol.kernel.rows import (
     CONDITIONS,
-    FORBIDDEN,
-    NONNEGATIVE,
     OPEN,
-    ROW_KINDS,
     SLIP_MINUS,
     SLIP_PLUS,
     STICK,
@@ -27,7 +25,7 @@ from enumsol.kernel.rows import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -76,97 +74,6 @@ def exclusion_margins(
     (m,) array
     """
     return margins((system,), row_signs(codes, system.F), (system.F, system.F), leaf, rows, values, errors)
-
-
-def margins(
-    ends: Sequence[Any],
-    allowed: NDArray[np.int8],
-    friction: tuple[Array, Array],
-    leaf: NDArray[np.intp],
-    rows: NDArray[np.intp],
-    values: Array,
-    errors: float,
-    bounds_of: Callable[[Any, Array, Array, Array, float], Array] | None = None,
-) -> Array:
-    """Bounds as of exclusion_margins that hold at all ``ends``, -inf where one is not finite.
-
-    Parameters
-    ----------
-    ends : EnclosedSystems that differ in g only, and in F, which enters by its bounds; or an EnclosedForm
-    allowed : (m, p, kinds) array, what the multipliers may be: seven kinds of rows, or nine over an interval
-    friction : two (p,) arrays, the smallest and the largest coefficients; equal where friction is constant
-    bounds_of : what bounds one of ``ends``, by default energy_bounds
-    """
-    m, p, kinds = allowed.shape
-    low, high = friction
-    bad = (rows < 0) | (rows >= kinds * p) | ~np.isfinite(values)
-    rows, values = np.where(bad, 0, rows), np.where(bad, 0.0, values)
-    kind, node = np.divmod(rows, p)
-    signs = allowed[leaf, node, kind]
-    bad |= (signs == FORBIDDEN) | ((signs == NONNEGATIVE) & (values < 0))
-    refused = np.bincount(leaf[bad], minlength=m) > 0
-    # one table a leaf with a row for each kind; several multipliers of a row add up
-    place, count = leaf * (kinds * p) + rows, kinds * p * m
-    table = np.bincount(place, values, minlength=count).reshape(m, kinds, p)
-    size = np.bincount(place, np.abs(values), minlength=count).reshape(m, kinds, p)
-    # what overflows gives no bound
-    with np.errstate(over="ignore", invalid="ignore"):
-        cone_size = size[:, 2] + size[:, 3]
-        y = np.hstack([table[:, 4], table[:, 6] - table[:, 5]])
-        normal, tangential = table[:, 0] + high * (table[:, 2] + table[:, 3]), table[:, 1] - table[:, 2] + table[:, 3]
-        normal_size, tangential_size = size[:, 0] + high * cone_size, size[:, 1] + cone_size
-        if kinds > ROW_KINDS:
-            normal, tangential = normal - low * (table[:, 7] + table[:, 8]), tangential + table[:, 7] - table[:, 8]
-            least_size = size[:, 7] + size[:, 8]
-            normal_size, tangential_size = normal_size + low * least_size, tangential_size + least_size
-        c, c_size = np.hstack([normal, tangential]), np.hstack([normal_size, tangential_size])
-        # The rounded y is as good a choice of multipliers as the exact one: every component belongs to rows of one
-        # sign, or to rows that are free, and sums of one sign keep it. c is not free in this way: cone rows tie its two
-        # halves by F. A component of c is a sum over at most five kinds of rows, four at one alpha, each repeated at
-        # most so often.
-        repeated = int(np.bincount(place, minlength=1).max())
-        c_rad = gamma((5 if kinds > ROW_KINDS else 4) * repeated + 8) * c_size
-        # where friction is constant a cone row may be an equation, and its coefficient must be the exact one
-        c_rad[:, :p] += np.max([end.F_rad for end in ends], axis=0) * (low == high) * cone_size
-        bounds_of = bounds_of or energy_bounds
-        bounds = np.min([bounds_of(end, y, c, c_rad * SAFE, errors) for end in ends], axis=0)
-    return np.where(refused | ~np.isfinite(bounds), -np.inf, bounds)
-
-
-def energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array, errors: float = 1.0) -> Array:
-    """Lower bounds on the energy for multipliers y (m, 2p) on S lambda - g and c, a ball, on lambda.
-
-    ``errors`` is how often the error bound is subtracted: once proves the bound. A writer of proofs subtracts it twice,
-    so that a checker, which sums in another order, finds a positive bound too.
-    """
-    S, g = system.S, system.g
-    # every inner product of up to 2p terms below is off by at most k times that of the absolute values
-    k = gamma(4 * len(g) + 16)
-    q = g + c
-    q_abs, y_abs = np.abs(q), np.abs(y)
-    q_rad = (system.g_rad + c_rad + 2 * UNIT * q_abs) * SAFE
-    # Any x is a choice; a good one needs S x near q, which a computed inverse gives from the left, not its transpose.
-    # The step of refinement makes a checker's bound better than that of the search, which does without.
-    x = q @ system.inverse.T
-    x += (q - x @ S) @ system.inverse.T
-    Sx, Sy = x @ S, y @ S
-    first, cross = dots(y, g - c), dots(x, q)
-    y_form, x_form = dots(y, Sy), dots(x, Sx)
-    first_error = dots(y_abs, k * (np.abs(g) + np.abs(c)) + system.g_rad + c_rad)
-    cross_error = dots(np.abs(x), k * q_abs + q_rad)
-    y_square, x_square, rest = dots(y, y), dots(x, x), q - Sx
-    rest_norm = np.sqrt(dots(rest, rest)) + np.sqrt(dots(q_rad, q_rad)) + k * np.sqrt(dots(q, q))
-    rest_norm = (rest_norm + system.form_error * np.sqrt(x_square) + ROOT_TINY) * (1 + k) * SAFE
-    tail = rest_norm * rest_norm / system.smallest_eigenvalue
-    total = 0.5 * first - 0.25 * y_form - 0.5 * cross + 0.25 * x_form
-    error = 0.5 * (first_error + cross_error) + 0.25 * (system.form_error * (y_square + x_square) + tail)
-    error += 8 * UNIT * (np.abs(first) + np.abs(y_form) + np.abs(cross) + np.abs(x_form))
-    return np.asarray(total - errors * error * (1 + k) * SAFE * SAFE - TINY)
-
-
-def dots(a: Array, b: Array) -> Array:
-    """Inner products of the rows of two arrays."""
-    return np.asarray(np.einsum("ij,ij->i", a, b))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, gamma, upper_norm, upper_sum
-from enumsol.kernel.point import energy_bounds
+from enumsol.kernel.bounds import energy_bounds
 from enumsol.sectors import SECTORS, contains, direction, end_number
 
 if TYPE_CHECKING:

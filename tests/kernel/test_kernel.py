@@ -103,6 +103,27 @@ def test_margins_agree_with_rationals():
     assert refused >= 30
 
 
+def test_large_multipliers_of_an_infeasible_assignment():
+    # two nodes that hardly move against each other: the first cannot be open while the second is in contact. Along the
+    # multipliers that say so the bound grows in proportion, the forms of (6.2) with the square
+    little = 2.0**-30
+    n = np.array([[1.0, 1.0 - little], [1.0 - little, 1.0]])
+    S = np.block([[n, np.zeros((2, 2))], [np.zeros((2, 2)), np.eye(2)]])
+    problem = from_condensed(S, np.array([1.0 + 1e-8, 1.0, 0.0, 0.0]), np.zeros(2))
+    system, judge = system_of(problem), judge_of(problem)
+    compiled = Margins((system,), system.F, system.F)
+    codes, rows = (0, 4), np.array([0, 1, 8, 9], dtype=np.intp)
+    positive = 0
+    for length in 2.0 ** np.arange(10, 34):
+        values = length * np.array([-little, little, 1.0, -1.0])
+        bound = exact_bound(judge, rows, values)
+        for margin in exclusion_margin(system, codes, rows, values), compiled.margin(codes, rows, values):
+            assert Fraction(margin) <= bound
+            assert margin > 0 or bound < 1e-3
+            positive += margin > 0
+    assert positive == 18
+
+
 def exact_bound(judge, rows, values):
     """The dual bound itself in Fractions."""
     m = 2 * len(judge.F)

@@ -64,6 +64,7 @@ PROBLEMS = {
     "closed in balls": lambda: (touching_problem(np.random.default_rng(4), 3, inner=EXACT_DOF_LIMIT), 0.0),
     "undecided": beyond_rationals,
     "contradiction": lambda: (integer_problem(np.random.default_rng(57), 2), 0.0),
+    "no root": lambda: (integer_problem(np.random.default_rng(143), 2), 0.0),
     "nearly singular": nearly_singular,
     "family": lambda: (integer_problem(np.random.default_rng(34), 2), 0.0),
     "border": lambda: (integer_problem(np.random.default_rng(20), 2), 0.0),

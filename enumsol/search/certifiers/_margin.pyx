@@ -1,7 +1,7 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, initializedcheck=False
 """The exclusion inequalities of enumsol.kernel's point, interval and forms in compiled loops, for the search.
 
-Formula and error bounds are those of ``margins`` there, which the checker uses; tests compare the two. Sums in double
+Formulas and error bounds are those of ``margins`` there, which the checker uses; tests compare the two. Sums in double
 arithmetic: the a-priori bounds hold for any order of summation and for fused multiply-adds.
 """
 
@@ -13,6 +13,7 @@ cdef extern from "_dense.h" nogil:
 import numpy as np
 
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma
+from enumsol.kernel.bounds import EnergyForm
 from enumsol.kernel.interval import interval_row_tables
 from enumsol.kernel.rows import FORBIDDEN, NONNEGATIVE
 
@@ -94,9 +95,12 @@ cdef class Margins(Multipliers):
 
     cdef double[:, ::1] S, inverse, g, g_rad
     cdef double form_error, smallest
+    cdef object ends
+    cdef dict sharper
 
     def __init__(self, ends, low, high):
         first = ends[0]
+        self.ends, self.sharper = ends, {}
         super().__init__(low, high, np.max([end.F_rad for end in ends], axis=0))
         self.S = np.ascontiguousarray(first.S)
         self.inverse = np.ascontiguousarray(first.inverse)
@@ -112,16 +116,30 @@ cdef class Margins(Multipliers):
         if not self._add_up(codes, rows, values, gamma(len(rows) + 16)):
             return -np.inf
         matvec(&self.S[0, 0], n, n, &self.work[0, 0], &self.work[6, 0])
-        least = self._bound(0, k)
+        least = self._better(0, k)
         for j in range(1, len(self.g)):
             # what no end has proven positive is of no use
             if not least > 0.0:
                 break
-            bound = self._bound(j, k)
+            bound = self._better(j, k)
             least = bound if bound < least else least
         return least
 
-    cdef double _bound(self, Py_ssize_t end, double k) noexcept:
+    cdef double _better(self, Py_ssize_t end, double k) except? -1.0:
+        """The larger one of both bounds (see ``energy_bounds``); the second only where it may be positive."""
+        cdef double most = 0.0, bound = self._bound(end, k, &most)
+        cdef FormMargins form
+        if bound > 0.0 or not most > 0.0:
+            return bound
+        if end not in self.sharper:
+            self.sharper[end] = FormMargins(EnergyForm.of(self.ends[end]), 2.0)
+        form = self.sharper[end]
+        form.work[:3, :] = self.work[:3, :]
+        form.work[6, :] = self.work[6, :]
+        return max(bound, form._bound(k))
+
+    cdef double _bound(self, Py_ssize_t end, double k, double *most) noexcept:
+        """The first bound; ``most``: no bound is larger."""
         cdef Py_ssize_t i, n = 2 * self.p
         cdef double[::1] y = self.work[0], c = self.work[1], c_rad = self.work[2], q = self.work[3]
         cdef double[::1] x = self.work[4], Sx = self.work[5], Sy = self.work[6], q_rad = self.work[7]
@@ -151,8 +169,10 @@ cdef class Margins(Multipliers):
         total = 0.5 * first - 0.25 * y_form - 0.5 * cross + 0.25 * x_form
         error = 0.5 * (first_error + cross_error) + 0.25 * (self.form_error * (yy + xx) + tail)
         error += 8 * self.unit * (fabs(first) + fabs(y_form) + fabs(cross) + fabs(x_form))
+        error *= (1 + k) * self.safe * self.safe
+        most[0] = total + error
         # twice the error: whoever checks the proof adds up in another order, and must find a positive bound too
-        margin = total - 2 * error * (1 + k) * self.safe * self.safe - self.tiny
+        margin = total - 2 * error - self.tiny
         return margin if isfinite(margin) else -np.inf
 
 
@@ -174,7 +194,7 @@ cdef class FormMargins(Multipliers):
 
     def __init__(self, form, double errors):
         system = form.system
-        super().__init__(system.F, system.F, form.F_rad)
+        super().__init__(system.F, system.F, system.F_rad)
         self.S, self.H = np.ascontiguousarray(system.S), np.ascontiguousarray(form.H)
         self.inverse = np.ascontiguousarray(form.inverse)
         self.g, self.g_rad, self.h, self.h_rad = system.g.copy(), system.g_rad.copy(), form.h.copy(), form.h_rad.copy()
