@@ -63,7 +63,7 @@ PROBLEMS = {
     "closed": lambda: (touching_problem(np.random.default_rng(1), 3), 0.0),
     "closed in balls": lambda: (touching_problem(np.random.default_rng(4), 3, inner=EXACT_DOF_LIMIT), 0.0),
     "undecided": beyond_rationals,
-    "contradiction": lambda: (integer_problem(np.random.default_rng(57), 2), 0.0),
+    "contradiction": lambda: (integer_problem(np.random.default_rng(36), 2), 0.0),
     "nearly singular": nearly_singular,
     "family": lambda: (integer_problem(np.random.default_rng(34), 2), 0.0),
     "border": lambda: (integer_problem(np.random.default_rng(20), 2), 0.0),
@@ -377,7 +377,7 @@ CHILD = textwrap.dedent("""
     import signal, sys
     from enumsol import enumerate_roots, gallery
     from enumsol.search import forms
-    forms.NODES = 1
+    forms.NODES = 100
     path, at, resume = sys.argv[1], int(sys.argv[2]), sys.argv[3] == "resume"
     def wait(progress):
         if progress.nodes + progress.resumed >= at:
