@@ -157,6 +157,7 @@ def wedge(loaded):
     """A long search with the energy, and how many of its bounds were not proven at once."""
     problem = loaded.build()
     problem.enclosure  # noqa: B018
+    enumsol.enumerate_roots(problem, loaded.alpha, max_nodes=10)
     start = time.process_time()
     roots = enumsol.enumerate_roots(problem, loaded.alpha)
     seconds = time.process_time() - start
