@@ -98,34 +98,6 @@ class ActiveSetEngine(CompiledEngine):
         super().__init__(data, _active_set.BranchingRule(system.F, cones, modes, candidates), 2 * p)
 
 
-class SoftEngine(CompiledEngine):
-    """Relaxations with the energy whose bounds are those that an inexact S leaves to be proven (theory, section 5.3).
-
-    Rows of displacements may be broken by z at the cost |z|^2 / (4 doubt).
-
-    Parameters
-    ----------
-    engine : ActiveSetEngine
-        The same without doubt.
-    system : ScaledSystem
-    doubt : float
-        What a proof takes off a bound, by the sum of the squares of the multipliers of displacements.
-    """
-
-    def __init__(self, engine: ActiveSetEngine, system: ScaledSystem, doubt: float) -> None:
-        from enumsol.relaxation._active_set import QPData
-
-        n = 2 * system.p
-        unit = np.eye(n)
-        # unknowns lambda and z / (2 sqrt(doubt)), then w + z
-        H = np.block([[system.S, np.zeros((n, n))], [np.zeros((n, n)), unit]])
-        W = np.hstack([-system.S, 2.0 * np.sqrt(doubt) * unit])
-        start, index, value, rhs = engine.rows
-        index = np.where(index >= n, index + n, index)
-        data = QPData(H, np.append(system.g, np.zeros(n)), W, system.g, start, index, value, rhs)
-        super().__init__(data, engine.rule, n)
-
-
 class FormEngine(CompiledEngine):
     """Relaxations with a form in place of the energy, which bound it from below.
 
@@ -148,10 +120,10 @@ class FormEngine(CompiledEngine):
 class ActiveSetRelaxation:
     """A solved relaxation; the state that it holds is handed on to its last child."""
 
-    __slots__ = ("_state", "bound", "engine", "pruned", "stalled")
+    __slots__ = ("_engine", "_state", "bound", "pruned", "stalled")
 
     def __init__(self, engine: CompiledEngine, state: QPState, rows: list[int], modes: list[int]) -> None:
-        self.engine, self._state = engine, state
+        self._engine, self._state = engine, state
         state.switch(rows, modes)
         status = state.solve(PRUNE_MARGIN + engine.offset, FEASIBILITY_TOLERANCE, engine.limit)
         self.bound: float = state.bound - engine.offset
@@ -161,12 +133,12 @@ class ActiveSetRelaxation:
     @property
     def form(self) -> EnclosedForm | None:
         """The form that ``bound`` is about; None for the energy."""
-        return self.engine.form
+        return self._engine.form
 
     @property
     def forces(self) -> NDArray[np.float64]:
         """lambda at the minimiser, shape (2p,), scaled."""
-        return self._state.x_array[: self.engine.size]
+        return self._state.x_array[: self._engine.size]
 
     @property
     def displacements(self) -> NDArray[np.float64]:
@@ -180,19 +152,19 @@ class ActiveSetRelaxation:
     def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Rows of statuses and their multipliers, which prove ``bound``."""
         rows, values = self._state.multipliers()
-        if not self.engine.always:
+        if not self._engine.always:
             return rows, values
-        keep = rows < self.engine.always[0]
+        keep = rows < self._engine.always[0]
         return rows[keep], values[keep]
 
     def choose(self, codes: Codes) -> int:
         """The contact node to branch on, -1 when all are decided."""
-        engine = self.engine
+        engine = self._engine
         return self._state.choose(codes, engine.rule, PRUNE_MARGIN + engine.offset)
 
     def forced(self, codes: Codes) -> tuple[int, ...]:
         """Undecided contact nodes with at most one child that no known bound excludes."""
-        engine = self.engine
+        engine = self._engine
         return self._state.forced(codes, engine.rule, PRUNE_MARGIN + engine.offset)
 
     def gap_closed(self, codes: Codes) -> float:
@@ -207,4 +179,4 @@ class ActiveSetRelaxation:
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""
-        return ActiveSetRelaxation(self.engine, self._state if last else self._state.copy(), rows, modes)
+        return ActiveSetRelaxation(self._engine, self._state if last else self._state.copy(), rows, modes)

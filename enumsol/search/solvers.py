@@ -36,9 +36,6 @@ if TYPE_CHECKING:
     from enumsol.search.outcome import SearchLimits, SearchProgress
     from enumsol.selections.rationals import ExactSelections
 
-#: What balls take off a bound, by the error of forms and the squares of the multipliers of displacements.
-DOUBT = 1.25
-
 Arithmetic = Literal["fast", "verified", "exact"]
 
 
@@ -172,13 +169,7 @@ class Solvers:
             progress=progress,
             closer=Closer(closing),
             forms=self._forms,
-            doubt=self._doubt,
         )
-
-    @property
-    def _doubt(self) -> float:
-        """What the certifier takes off a bound, by the squares of the multipliers of displacements."""
-        return DOUBT * self.enclosed.form_error if self.arithmetic == "verified" and self.enclosed is not None else 0.0
 
     @cached_property
     def _relaxations(self) -> Engine:

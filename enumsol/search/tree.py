@@ -14,12 +14,11 @@ from __future__ import annotations
 import time
 import warnings
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from enumsol.condensation.condensed import ScaledSystem
 from enumsol.errors import MissingDependencyError
-from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, SoftEngine
+from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart
@@ -94,8 +93,6 @@ class TreeSearch:
         Closes subtrees by their only possible solution.
     forms : Forms, optional
         What a long search may bound with in place of the energy.
-    doubt : float
-        What the certifier takes off a bound, by the sum of the squares of the multipliers of displacements.
     """
 
     def __init__(
@@ -109,7 +106,6 @@ class TreeSearch:
         progress: Callable[[SearchProgress], object] | None = None,
         closer: Closer | None = None,
         forms: Forms | None = None,
-        doubt: float = 0.0,
     ) -> None:
         self.system = system
         self.certifier = certifier
@@ -122,7 +118,6 @@ class TreeSearch:
         self.forms = forms
         self.outcome = SearchOutcome()
         self._fallback: InteriorPointEngine | None = None
-        self._doubt = doubt
         self.splitting: Splitting = splitting or PlaneSplitting(system.F)
         self._rows = ImposedRows(self.splitting, system.p)
         self.covered = 0.0
@@ -256,13 +251,12 @@ class TreeSearch:
             if self.closed(item, None):
                 return
             relaxation = self._fall_back(codes)
-        while relaxation is not None and relaxation.pruned:
-            if self.excluded(item, relaxation):
-                return
-            relaxation = self._softened(codes, relaxation)
-        if self.closed(item, relaxation):
+        if relaxation is not None and relaxation.pruned and self.excluded(item, relaxation):
             return
-        node, forced = branching_node(codes, item.forced, relaxation)
+        usable = relaxation if relaxation is not None and not relaxation.pruned else None
+        if self.closed(item, usable):
+            return
+        node, forced = branching_node(codes, item.forced, usable)
         if node < 0:
             node = self._settle(item)
         if node < 0:
@@ -273,7 +267,7 @@ class TreeSearch:
         for k, code in enumerate(children):
             child = (*codes[:node], code, *codes[node + 1 :])
             last = k + 1 == len(children)
-            yield TreeNode(relaxation, child, node, last, item.weight / len(children), forced)
+            yield TreeNode(usable, child, node, last, item.weight / len(children), forced)
 
     def excluded(self, item: TreeNode, bound: Bound) -> bool:
         """Whether the subtree is proven to hold no solution."""
@@ -334,13 +328,6 @@ class TreeSearch:
             outcome, seconds = self.outcome, time.perf_counter() - self._start
             self.progress(SearchProgress(outcome.nodes, covered, len(outcome.solutions), seconds, outcome.resumed))
 
-    @cached_property
-    def _soft(self) -> SoftEngine | None:
-        """Relaxations with bounds that can be proven."""
-        if not (isinstance(self.engine, ActiveSetEngine) and isinstance(self.system, ScaledSystem) and self._doubt > 0):
-            return None
-        return SoftEngine(self.engine, self.system, self._doubt)
-
     # -- relaxations -----------------------------------------------------------------------------------------------
 
     def _relax(self, item: TreeNode) -> Relaxation:
@@ -363,15 +350,6 @@ class TreeSearch:
         """The relaxation of a partial assignment, if it is solved and leaves a minimiser."""
         relaxation = self._root(codes)
         return None if relaxation.stalled or relaxation.pruned else relaxation
-
-    def _softened(self, codes: Codes, refused: Relaxation) -> Relaxation | None:
-        """The relaxation with a bound that can be proven, in place of one whose bound is not; None if there is none."""
-        known = isinstance(refused, ActiveSetRelaxation) and refused.engine is self._soft
-        if self._soft is None or refused.form is not None or known:
-            return None
-        self.outcome.qps += 1
-        relaxation = self._soft.root(*self._rows.over(codes, range(len(codes))))
-        return None if relaxation.stalled else relaxation
 
     def _fall_back(self, codes: Codes) -> Relaxation | None:
         """The relaxation by the slower engine; None when that gives no answer either."""

@@ -7,7 +7,7 @@ from generators import dense_compliance, fe_compliance, friction, planted_load, 
 from oracles import brute_force
 
 from enumsol.condensation.condensed import CondensedSystem
-from enumsol.relaxation.active_set import ActiveSetEngine, SoftEngine
+from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.relaxation.rows import EQUALITY, INEQUALITY, imposed_rows, status_rows
@@ -191,30 +191,6 @@ def test_every_program_of_a_path_has_its_own_limit():
     engine.limit = int(np.max(np.diff([0, *counts])))
     assert engine.limit < counts[-1]
     assert path() == counts
-
-
-@pytest.mark.parametrize("doubt", [1e-12, 1e-6, 1e-2])
-def test_soft_programs_have_the_largest_bounds_that_doubt_leaves(doubt):
-    rng = np.random.default_rng(35)
-    compared = 0
-
-    def left(system, codes, node):
-        rows, values = node.multipliers()
-        return proven(system, codes, node) - doubt * np.sum(values[rows >= 4 * system.p] ** 2)
-
-    for _ in range(20):
-        system = random_system(rng, int(rng.integers(1, 7)))
-        engine = ActiveSetEngine(system)
-        soft = SoftEngine(engine, system, doubt)
-        for codes, node in descend(rng, system, soft):
-            if node.pruned:
-                assert left(system, codes, node) > 0.9 * PRUNE_MARGIN
-                continue
-            plain = engine.root(*rows_of(codes, system.F))
-            assert node.bound == pytest.approx(left(system, codes, node), abs=1e-8)
-            assert left(system, codes, plain) <= node.bound + 1e-8
-            compared += 1
-    assert compared > 40
 
 
 def test_infeasible_assignment_comes_with_a_proof():

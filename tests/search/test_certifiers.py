@@ -1,8 +1,6 @@
 """What every certifier offers, and that nothing asks for the class of one."""
 
 import ast
-from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
 
 import pytest
@@ -73,24 +71,3 @@ def test_nothing_asks_for_the_class_of_a_certifier():
 
 def test_nothing_is_kept_by_the_address_of_an_object():
     assert list(calls("id")) == []
-
-
-def test_wide_balls_make_the_search_little_longer(monkeypatch):
-    # what the multipliers of the best bound do not prove others may, that are smaller
-    problem, alpha = gallery.wedge(4, 4, (4e-4, 1e-3)), 2.2
-    narrow, of_problem = enumsol.enumerate_roots(problem, alpha), Solvers.__dict__["_enclosed"].func
-
-    def widened(solvers):
-        enclosed, data = of_problem(solvers)
-        return replace(enclosed, S_rad=enclosed.S_rad + 1e-7), data
-
-    wider = cached_property(widened)
-    wider.__set_name__(Solvers, "_enclosed")
-    monkeypatch.setattr(Solvers, "_enclosed", wider)
-    wide = enumsol.enumerate_roots(problem, alpha)
-    assert wide.stats.escalations.refined > 20
-    assert wide.stats.nodes < 1.2 * narrow.stats.nodes
-    assert [root.statuses for root in wide] == [root.statuses for root in narrow]
-    assert enumsol.verify(problem, wide.proof).complete
-    monkeypatch.setattr(TreeSearch, "_softened", lambda *_: None)
-    assert enumsol.enumerate_roots(problem, alpha).stats.nodes > 1.5 * wide.stats.nodes
