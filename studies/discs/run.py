@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import enumsol
-from enumsol.search.closing import NEAR, Reduction
+from enumsol.search.reduction import NEAR, Reduction
 from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from grazing.run import SOFT, STIFF
 from shared.results import yes
