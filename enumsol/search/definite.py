@@ -45,14 +45,14 @@ def weights_of(
     (b + k,) array, or (b,) array if all omega may be 1
     """
     try:
-        tau = _with_equal_terms(R, F, normal, tangential)
+        tau = tau_of(R, F, normal, tangential)
         return _Barrier(R, F, normal, tangential, tied).numbers() if tau is None else tau
     except np.linalg.LinAlgError:
         return None
 
 
-def _with_equal_terms(R: Array, F: Array, normal: NDArray[np.intp], tangential: NDArray[np.intp]) -> Array | None:
-    """tau, where all omega are 1."""
+def tau_of(R: Array, F: Array, normal: NDArray[np.intp], tangential: NDArray[np.intp]) -> Array | None:
+    """The same with omega = 1: tau, or None."""
     symmetric, T = 0.5 * (R + R.T), R[tangential]
     tau = F * np.sqrt(np.sum(T * T, axis=1))
     for _ in range(_WEIGHT_STEPS):
