@@ -26,14 +26,14 @@ class Closings:
         self.check(selection, free, codes)
         core = tuple(6 if i in free else code for i, code in enumerate(selection))
         reduced = Reduced(self.forms, core, self.friction)
-        tau = self.weights(free, tau) | {i: fmpq(0) for i in reduced.sliding}
-        need(reduced.definite(tau), "a form is not definite")
+        tau, omega = self.weights(free, tau, reduced)
+        need(reduced.definite(tau, omega), "a form is not definite")
         points = reduced.solutions()
         need(len(points) == 1, "a reduced problem has no solution or several")
         (point,) = points
         for i in free:
             if self.friction[i] and tau[i] == 0:
-                need(self.apart_from_contact(point, i) < 0, "a node needs a weight")
+                need(self.apart_from_contact(point, i, reduced, omega) < 0, "a node needs a weight")
         need(len(mid) == 2 * self.p, "a point has another size")
         values = [value for i in reduced.fixed for value in self.conditions(core[i], i, point)]
         values += [self.slides(core[i], i, point) for i in reduced.sliding]
@@ -57,14 +57,15 @@ class Closings:
         need(N.det() != 0, "a selection is singular")
         point = N.solve(column_of([-form[-1] for form in equations])).entries()
         reduced = Reduced(self.forms, tuple(6 if i in free else c for i, c in enumerate(selection)), self.friction)
-        tau = self.weights(free, tau)
-        need(reduced.definite(tau), "a form is not definite")
+        tau, omega = self.weights(free, tau, reduced)
+        need(reduced.definite(tau, omega), "a form is not definite")
         holds = {i: min(self.conditions(selection[i], i, point)) >= 0 for i in range(self.p)}
         need(all(holds[i] for i in free), "the reduced problem has another solution")
         for i in free:
             if self.friction[i] and tau[i] == 0:
                 n, t, w_n, w_t = self.values(point, i)
-                rests = t == 0 and ((n == 0 and w_n + self.forms.F[i] * abs(w_t) <= 0) or w_n == w_t == 0)
+                apart = n == 0 and self.apart_from_contact(point, i, reduced, omega) <= 0
+                rests = t == 0 and (apart or w_n == w_t == 0)
                 need(rests, "a node needs a weight")
         need([as_point(x) for x in reduced.solutions()] == [as_point(point)], "a reduced problem has several solutions")
         touching = all(self.values(point, i)[2] == 0 for i in free if codes[i] == 5)
@@ -87,19 +88,24 @@ class Closings:
             need(i in free or codes[i] in (code, *SIDES.get(code, ())), "a fixed node has another code")
         need(list(free) == sorted({integer(i) for i in free if 0 <= i < self.p}), "free nodes are out of order")
 
-    def weights(self, free, tau):
-        need(len(tau) == len(free), "there are not as many weights as free nodes")
-        found = {i: exact(value) * self.unit[i] for i, value in zip(free, tau, strict=True)}
-        need(all(value >= 0 for value in found.values()), "a weight is negative")
-        return found
+    def weights(self, free, numbers, reduced):
+        """tau by nodes, omega by components of x."""
+        size, components = len(free), len(reduced.places)
+        need(len(numbers) in (size, size + components), "there are not as many weights as free nodes")
+        tau = {i: exact(value) * self.unit[i] for i, value in zip(free, numbers[:size], strict=True)}
+        need(all(value >= 0 for value in tau.values()), "a weight is negative")
+        omega = [exact(value) for value in numbers[size:]] or [fmpq(1)] * components
+        need(all(value > 0 for value in omega), "a factor is not positive")
+        return tau | {i: fmpq(0) for i in reduced.sliding}, omega
 
     def values(self, point, i):
         w = [_value(self.forms.move(1, k), point) for k in (i, self.p + i)]
         return point[i], point[self.p + i], *w
 
-    def apart_from_contact(self, point, i):
+    def apart_from_contact(self, point, i, reduced, omega):
         _, _, w_n, w_t = self.values(point, i)
-        return w_n + self.forms.F[i] * abs(w_t)
+        along, across = (omega[reduced.places.index(k)] for k in (i, self.p + i))
+        return along * w_n + across * self.forms.F[i] * abs(w_t)
 
     def slides(self, code, i, point):
         """Positive where the node is open or slips to its side, strictly; negative where it must and does not."""
@@ -132,12 +138,13 @@ class Reduced:
         solved = N.solve(fmpq_mat(sides).transpose()).transpose().tolist()
         self.R = [[-_value(forms.move(1, k), x, 0) for x in solved[1:]] for k in self.places]
 
-    def definite(self, tau):
+    def definite(self, tau, omega):
         size, m = len(self.places), len(self.free)
-        Q = [[(self.R[a][b] + self.R[b][a]) / 2 for b in range(size)] for a in range(size)]
+        R = [[factor * value for value in row] for factor, row in zip(omega, self.R, strict=True)]
+        Q = [[(R[a][b] + R[b][a]) / 2 for b in range(size)] for a in range(size)]
         for n, i in enumerate(self.free):
             if self.friction[i] and tau[i] > 0:
-                r = self.R[m + self.rubbing.index(i)]
+                r = R[m + self.rubbing.index(i)]
                 Q[n][n] -= tau[i] / 2
                 factor = self.forms.F[i] ** 2 / tau[i] / 2
                 Q = [[q - factor * r[a] * r[b] for b, q in enumerate(row)] for a, row in enumerate(Q)]

@@ -40,7 +40,7 @@ from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 from enumsol.search.interval import FastIntervalCertifier, IntervalSearch
 from enumsol.search.interval_parallel import run_parallel
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.statuses import OPEN
+from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -55,6 +55,8 @@ if TYPE_CHECKING:
 
 Arithmetic = Literal["fast", "verified", "exact"]
 
+#: Exact algebra is not begun where it would take more than this by ``_exact_work``: some five minutes.
+LARGEST_EXACT_WORK = 2**22
 #: Boxes in which arcs are followed when the search was interrupted.
 _BOXES_AFTER_INTERRUPT = 500
 #: Selections whose arcs are then worked out without rounding: 8 at least, or so many by p^2.
@@ -86,8 +88,9 @@ def branch_graph(
         "verified": every leaf of the search is proven empty over its whole piece of the interval, and every selection
         handed on is followed, by rigorous error bounds for the problem's own matrices (theory, section 7.14). The graph
         is made of these arcs; up to 24 degrees of freedom, and up to 250 if bounds left something open, it is made by
-        exact algebra instead, for the same matrices (``graph.data.arcs_by`` says which). Beyond 250 what is left open
-        is a vertex of kind "unsettled", and the graph is not complete. Only where A is positive definite within
+        exact algebra instead, for the same matrices (``graph.data.arcs_by`` says which). Beyond 250, or where exact
+        algebra would take more than some minutes, what is left open is a vertex of kind "unsettled", and the graph is
+        not complete. Only where A is positive definite within
         rounding are more than 24 degrees of freedom about S and g as computed in floats (``graph.certified_data``).
         "fast": exact algebra, but the search trusts floats; never claimed to be complete; S and g as computed beyond 24
         degrees of freedom. "exact": everything in rationals, for the problem's own matrices of up to 250 degrees of
@@ -206,7 +209,8 @@ def _make(
         made.followed = follow(traced, search.pieces, tick, cut_short=bool(made.stops), most=most)
         joined, interrupted = made.followed.joined, made.followed.interrupted
         made.stops += [] if interrupted is None else [interrupted]
-        if (joined.ordered and not joined.open) or made.stops or problem.n > EXACT_DOF_LIMIT:
+        large = problem.n > EXACT_DOF_LIMIT or _exact_work(problem, candidates) > LARGEST_EXACT_WORK
+        if (joined.ordered and not joined.open) or made.stops or large:
             made.vertices, made.arcs = make_traced(traced, joined)
             made.reasons = made.followed.reasons
             return made
@@ -221,6 +225,18 @@ def _make(
     made.arcs = make_arcs(gluing)
     made.vertices, made.reasons = make_vertices(gluing, made.arcs), gluing.reasons
     return made
+
+
+def _exact_work(problem: ContactProblem, candidates: set[Codes]) -> int:
+    """What exact algebra of selections costs, roughly, in units of 7e-5 s: (slips whose friction varies + 1) size^3.
+
+    Measured with wedges of 6 to 32 contact nodes and 40 to 170 degrees of freedom.
+    """
+    varying = np.array(problem.friction[1]) != 0
+    codes = np.array(sorted(candidates), dtype=np.intp).reshape(-1, problem.p)
+    slips = np.sum(((codes == SLIP_PLUS) | (codes == SLIP_MINUS)) & varying, axis=1)
+    sizes = np.sum(codes != OPEN, axis=1) + np.sum(codes == STICK, axis=1)
+    return int(np.sum((slips + 1) * sizes**3))
 
 
 def _traced(problem: ContactProblem, interval: tuple[Fraction, Fraction]) -> TracedProblem | None:

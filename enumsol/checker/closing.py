@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from flint import fmpq_mat
+from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.arithmetic.rationals import to_fraction
@@ -38,9 +38,9 @@ def closed_by_balls(
     selection = _selection(record[1], system.F > 0, sliding=set(range(system.p)) - set(free))
     if any(not refines(code, selection[i]) for i, code in enumerate(codes) if i not in free):
         return "a node that has a status in its proof has another one in its assignment", None
-    tau = _weights(record[3], len(free))
+    weights = _weights(record[3], free, selection, system.F > 0)
     mid = numbers_from(record[4], 2 * system.p)
-    ball = closed_solution(system, selection, free, tau, mid / force)
+    ball = closed_solution(system, selection, free, weights, mid / force)
     if ball is None:
         return "its reduced problem is not proven to have one solution", None
     if len(record) == 5:
@@ -64,8 +64,8 @@ def closed_in_rationals(
     free = tuple(i for i, code in enumerate(codes) if code > FRICTIONLESS)
     if any(code != selection[i] for i, code in enumerate(codes) if i not in free):
         return "its selection is none below its assignment", selection, []
-    tau = _weights(record[2], len(free))
-    if not definite_sign(system, selection, free, tau):
+    weights = _weights(record[2], free, selection, friction)
+    if not definite_sign(system, selection, free, weights):
         return "its reduced form is not proven definite", selection, []
     point = _point(rational, selection)
     if point is None:
@@ -74,9 +74,10 @@ def closed_in_rationals(
     least = {i: min(rational.node_conditions(selection[i], i, point)) for i in range(rational.p)}
     if any(least[i] < 0 for i in free):
         return "the point of its selection does not solve the reduced problem", selection, []
-    for i, weight in zip(free, tau, strict=True):
-        if friction[i] and weight == 0 and not _rests(rational, point, w, i):
-            return "a node of its reduced form needs a weight", selection, []
+    factors = _factors(weights, free, friction)
+    uncounted = [i for i, tau in zip(free, weights, strict=False) if tau == 0 and friction[i]]
+    if not all(_rests(rational, point, w, i, *factors[i]) for i in uncounted):
+        return "a node of its reduced form needs a weight", selection, []
     touching = all(w[i] == 0 for i, code in enumerate(codes) if code == CONTACT)
     holds = touching and all(least[i] >= 0 for i in range(rational.p) if i not in free)
     if record[3] is not holds and (type(record[3]) is not int or record[3] != int(holds)):
@@ -117,11 +118,22 @@ def _nodes(value: Any, p: int) -> tuple[int, ...]:
     return tuple(value)
 
 
-def _weights(value: Any, size: int) -> Array:
-    tau = numbers_from(value, size)
-    if np.any(tau < 0):
-        raise ValueError("a weight is negative")
-    return tau
+def _weights(value: Any, free: Codes, selection: Codes, friction: NDArray[np.bool_]) -> Array:
+    """tau of the free nodes, and omega of the components of x if there are as many numbers."""
+    sliding = sum(code in (FORWARD, BACKWARD) for code in selection)
+    size, components = len(free), len(free) + sliding + int(np.count_nonzero(friction[list(free)]))
+    with_factors = isinstance(value, list) and len(value) == size + components
+    weights = numbers_from(value, size + components if with_factors else size)
+    if np.any(weights[:size] < 0) or np.any(weights[size:] <= 0):
+        raise ValueError("a weight is negative, or a factor is not positive")
+    return weights
+
+
+def _factors(weights: Array, free: Codes, friction: NDArray[np.bool_]) -> dict[int, tuple[Any, Any]]:
+    """Both omega of every free node with friction, where no node slides."""
+    size, rubbing = len(free), [k for k, i in enumerate(free) if friction[i]]
+    omega = [fmpq(*x.as_integer_ratio()) for x in weights[size:].tolist()] or [fmpq(1)] * (size + len(rubbing))
+    return {free[k]: (omega[k], omega[size + j]) for j, k in enumerate(rubbing)}
 
 
 def _point(rational: RationalSystem, selection: Codes) -> list[Any] | None:
@@ -152,10 +164,10 @@ def _displacements(rational: RationalSystem, point: list[Any]) -> list[Any]:
     return [g - x for g, x in zip(rational.g, moved, strict=True)]
 
 
-def _rests(rational: RationalSystem, point: list[Any], w: list[Any], node: int) -> bool:
-    """Whether the test of definiteness need not count a node (theory, (6.9))."""
+def _rests(rational: RationalSystem, point: list[Any], w: list[Any], node: int, along: Any, across: Any) -> bool:
+    """Whether the test of definiteness need not count a node with these omega (theory, (6.9))."""
     n, t = node, rational.p + node
     if point[t] != 0:
         return False
-    apart = point[n] == 0 and w[n] + rational.F[node] * abs(w[t]) <= 0
+    apart = point[n] == 0 and along * w[n] + across * rational.F[node] * abs(w[t]) <= 0
     return bool(apart or (w[n] == 0 and w[t] == 0))

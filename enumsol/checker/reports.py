@@ -109,13 +109,13 @@ class GraphVerificationReport:
 
     @property
     def complete(self) -> bool:
-        """Same as ok: a search that was cut short has no proof."""
-        return self.ok
+        """Every solution for every alpha in the interval lies on one of the arcs, whose ends are joined as proven."""
+        return self.ok and self.arcs is not None and not self.open
 
     @property
     def whole(self) -> bool:
-        """Every solution for every alpha in the interval lies on one of the arcs, whose ends are joined as proven."""
-        return self.ok and self.arcs is not None and not self.open
+        """Same as complete."""
+        return self.complete
 
     def _repr_html_(self) -> str:
         return html_lines(repr(self).splitlines())
@@ -132,14 +132,15 @@ class GraphVerificationReport:
                 f"  {found}; every solution lies in one of {counted(len(self.selections), 'selection')}",
                 *self._arcs(ends),
                 f"  certified data: {_DATA[self.data]}",
+                f"  complete: {'yes' if self.complete else 'no'}",
             )
         )
 
     def _arcs(self, ends: tuple[float, ...]) -> list[str]:
         if self.arcs is None:
-            return []
+            return ["  the proof does not hold their arcs"]
         arcs = counted(self.arcs, "arc")
-        if self.whole:
+        if self.complete:
             return [f"  every solution for every alpha in [{ends[0]:g}, {ends[1]:g}] lies on these arcs: {arcs}"]
         return [f"  {arcs}; left open in {counted(self.open, 'short interval')} of alpha"]
 

@@ -89,7 +89,7 @@ def final_codes(friction: bool) -> tuple[int, ...]:
 
 
 def closed_solution(
-    system: EnclosedSystem, selection: Codes, free: Sequence[int], tau: Array, force: Array
+    system: EnclosedSystem, selection: Codes, free: Sequence[int], weights: Array, force: Array
 ) -> ClosedSolution | None:
     """The only solution of the reduced problem, or None where that is not proven.
 
@@ -99,28 +99,25 @@ def closed_solution(
     selection : final codes, those of the free nodes only name a point near the solution; FORWARD or BACKWARD where a
         node slides
     free : ascending nodes, none of which slides
-    tau : one number a free node, positive, or 0 where it is open by more than its slip bound (theory, (6.9))
+    weights : tau of the free nodes, positive, or 0 where a node is open by more than its slip bound (theory, (6.9));
+        then omega of the components of x, all positive, unless all are 1
     force : (2p,) array, lambda near the solution; only that of nodes that are free or slide is read
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         reduced = Reduced.of(system, selection, free)
-        return None if reduced is None or not _are_weights(tau, free) else reduced.enclosed(reduced.of_all(tau), force)
+        numbers = None if reduced is None else reduced.numbers(weights)
+        return None if reduced is None or numbers is None else reduced.enclosed(*numbers, force)
 
 
-def definite_sign(system: EnclosedSystem, selection: Codes, free: Sequence[int], tau: Array) -> int:
-    """The determinant's sign of the fixed nodes' equations if the reduced form with tau is definite, 0 if not proven.
+def definite_sign(system: EnclosedSystem, selection: Codes, free: Sequence[int], weights: Array) -> int:
+    """The determinant's sign of the fixed nodes' equations if the reduced form is definite, 0 if not proven.
 
-    Where ``tau`` is zero nothing is asked of the node: that it may be so is to be shown otherwise (theory, (6.9)).
+    Where tau is zero nothing is asked of the node: that it may be so is to be shown otherwise (theory, (6.9)).
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         reduced = Reduced.of(system, selection, free)
-        if reduced is None or not _are_weights(tau, free):
-            return 0
-        return reduced.sign if reduced.least(reduced.of_all(tau)) > 0 else 0
-
-
-def _are_weights(tau: Array, free: Sequence[int]) -> bool:
-    return len(tau) == len(free) and bool(np.all(np.isfinite(tau) & (tau >= 0)))
+        numbers = None if reduced is None else reduced.numbers(weights)
+        return reduced.sign if reduced is not None and numbers is not None and reduced.least(*numbers) > 0 else 0
 
 
 def same_solution(
@@ -220,25 +217,33 @@ class Reduced:
         """Upper bounds of the nodes' friction coefficients."""
         return np.asarray((self.system.F + self.system.F_rad)[self.nodes] * SAFE)
 
-    def of_all(self, tau: Array) -> Array:
-        """The numbers of the free nodes with zeros for those that slide."""
-        return np.concatenate([tau, np.zeros(len(self.nodes) - len(tau))])
+    def numbers(self, weights: Array) -> tuple[Array, Array] | None:
+        """tau of all nodes, 0 where they slide, and omega of all components; None where these cannot be."""
+        size, count = len(self.places), sum(self.selection[node] not in _SLIDING for node in self.nodes)
+        tau, omega = weights[:count], weights[count:] if len(weights) > count else np.ones(size)
+        if len(tau) < count or len(omega) != size or not np.all(np.isfinite(weights)):
+            return None
+        if np.any(tau < 0) or np.any(omega <= 0):
+            return None
+        return np.concatenate([tau, np.zeros(len(self.nodes) - count)]), omega
 
-    def least(self, tau: Array) -> float:
+    def least(self, tau: Array, omega: Array) -> float:
         """Lower bound of the smallest eigenvalue of Q (theory, (6.9)), at most 0 where none positive is proven.
 
         Parameters
         ----------
         tau : one number a node
+        omega : one number a component of x
         """
         if not len(self.places):
             return 1.0
         used = np.flatnonzero((self.tangential >= 0) & (tau > 0))
+        R = self.R * Ball.exact(omega[:, None])
         # weights at least F / sqrt(tau), for any rounding
         weight = self._slope[used] / np.sqrt(tau[used]) * SAFE + TINY
-        T = self.R[self.tangential[used]] * Ball.exact(np.repeat(weight[:, None], len(self.places), axis=1))
+        T = R[self.tangential[used]] * Ball.exact(weight[:, None])
         square = Ball(T.mid.T, T.rad.T) @ T
-        Q = self.R - Ball.exact(np.diag(self._diagonal(used, tau))) - Ball(0.5 * square.mid, 0.5 * square.rad)
+        Q = R - Ball.exact(np.diag(self._diagonal(used, tau))) - Ball(0.5 * square.mid, 0.5 * square.rad)
         mid = 0.5 * (Q.mid + Q.mid.T)
         # the symmetric part of the form lies in the mean of both triangles
         rad = (np.maximum(Q.rad, Q.rad.T) + 4 * UNIT * np.abs(mid)) * SAFE
@@ -251,18 +256,18 @@ class Reduced:
         diagonal[used] = 0.5 * tau[used]
         return diagonal
 
-    def enclosed(self, tau: Array, force: Array) -> ClosedSolution | None:
+    def enclosed(self, tau: Array, omega: Array, force: Array) -> ClosedSolution | None:
         """The solution as a ball, None where it is not proven to exist and to be the only one."""
-        least = self.least(tau)
+        least = self.least(tau, omega)
         if not least > 0:
             return None
         x = self._point(force)
-        reach = self._distance(x.mid, self._displacements(x)) / least * SAFE
+        reach = self._distance(x.mid, self._displacements(x), omega) / least * SAFE
         if not np.isfinite(reach):
             return None
         x = Ball(x.mid, (x.rad + reach) * SAFE)
         easy = np.flatnonzero((tau == 0) & (self.tangential >= 0))
-        if not self._far_from_contact(easy, self._displacements(x)):
+        if not self._far_from_contact(easy, self._displacements(x), omega):
             return None
         # nodes that are open at all solutions
         x.rad[easy] = x.rad[self.tangential[easy]] = 0.0
@@ -272,11 +277,11 @@ class Reduced:
         """w of the free components."""
         return self.h - (self.R @ Ball(x.mid[:, None], x.rad[:, None]))[:, 0]
 
-    def _far_from_contact(self, nodes: NDArray[np.intp], w: Ball) -> bool:
-        """Whether nodes are open with w_n + F |w_t| < 0."""
+    def _far_from_contact(self, nodes: NDArray[np.intp], w: Ball, omega: Array) -> bool:
+        """Whether nodes are open with omega_n w_n + omega_t F |w_t| < 0."""
         n, t = nodes, self.tangential[nodes]
-        across = self._slope[nodes] * w.size[t]
-        largest = w.mid[n] + w.rad[n] + across + 8 * UNIT * (np.abs(w.mid[n]) + w.rad[n] + across) + TINY
+        away, across = omega[n] * (w.mid[n] + w.rad[n]), omega[t] * (self._slope[nodes] * w.size[t])
+        largest = away + across + 8 * UNIT * (omega[n] * (np.abs(w.mid[n]) + w.rad[n]) + across) + TINY
         named_open = all(self.selection[node] == OPEN for node in self.nodes[nodes])
         return named_open and bool(np.all(largest < 0))
 
@@ -300,8 +305,8 @@ class Reduced:
                 rad[t] = (system.F_rad[node] * n + 2 * UNIT * abs(mid[t])) * SAFE + TINY
         return Ball(mid, rad)
 
-    def _distance(self, point: Array, w: Ball) -> float:
-        """Bound of ||d|| + ||F d_t|| with d the change of h for which the point is a solution (theory, (6.10))."""
+    def _distance(self, point: Array, w: Ball, omega: Array) -> float:
+        """Bound of the numerator of theory, (6.10), for a point that is a solution with another h."""
         size, change = w.size, np.zeros(len(self.places))
         up, down = np.maximum(w.mid + w.rad, 0.0) * SAFE, np.maximum(w.rad - w.mid, 0.0) * SAFE
         for i, node in enumerate(self.nodes):
@@ -310,6 +315,7 @@ class Reduced:
             change[i] = up[i] if apart else size[i]
             if t >= 0:
                 change[t] = {OPEN: 0.0, STICK: size[t], SLIP_PLUS: down[t], SLIP_MINUS: up[t]}[code]
+        change = change * omega * SAFE + TINY
         rubbing = self.tangential >= 0
         return float((upper_norm(change) + upper_norm(self._slope[rubbing] * change[self.tangential[rubbing]])) * SAFE)
 

@@ -25,25 +25,27 @@ _LARGEST_SHIFT, _NO_RISE = 0.5, 1e-250
 _SUBNORMAL = 2.0**-1070
 
 
-def solutions_around(y: Any, rise: Any, P: Any) -> tuple[Any, Any] | None:
-    """Balls of the unknowns and of their slopes with tau in [-1, 1], given both at tau = 0 and P = M(0)^{-1} M'.
+def taylor_around(rise: Any, P: Any) -> tuple[Any, Any, Any] | None:
+    """The second term of the unknowns as functions of tau, and balls around zero for what is left of them.
 
-    They are y + tau (I + tau P)^{-1} rise and (I + tau P)^{-2} rise. With k = |P| < 1 in the norm max |x| / u they
-    differ from y + tau rise and from rise by at most 1 / (1 - k) - 1 and 1 / (1 - k)^2 - 1 times |rise|. None where k
-    is too large.
+    With M(0)^{-1} M' = P and the slopes ``rise`` at tau = 0 the unknowns are y + tau (I + tau P)^{-1} rise, and their
+    slopes (I + tau P)^{-2} rise (theory, (7.16)). The first result is bend = P rise, the second holds what the unknowns
+    differ by from y + tau rise - tau^2 bend, the third what their slopes do from rise - 2 tau bend, for all tau in
+    [-1, 1]. None where P is too large, in the norm max |x| / u.
     """
-    size = np.array([upper(rise[i, 0]) for i in range(rise.nrows())])
-    largest = float(np.max(size))
-    u = size / largest + 1e-3 if largest > _NO_RISE else np.ones(len(size))
+    bend = P * rise
+    third = P * bend
+    sizes, left = (np.array([upper(x[i, 0]) for i in range(x.nrows())]) for x in (rise, third))
+    largest = float(np.max(sizes))
+    u = sizes / largest + 1e-3 if largest > _NO_RISE else np.ones(len(sizes))
     rows = np.array([[upper(P[i, j]) for j in range(P.ncols())] for i in range(P.nrows())])
     k = float(np.max(upper_sum(rows * u, axis=1) / u)) * SAFE
     if not k < _LARGEST_SHIFT:
         return None
-    norm = float(np.max(size / u)) * SAFE
-    growths = (1.0 / (1.0 - k) ** power - 1.0 + 8 * UNIT for power in (1, 2))
+    norm = float(np.max(left / u)) * SAFE
+    growths = ((1.0 + 8 * UNIT) / (1.0 - k), (3.0 + 2.0 * k) * (1.0 + 8 * UNIT) / (1.0 - k) ** 2)
     first, second = (u * (norm * growth * SAFE) + _SUBNORMAL for growth in growths)
-    values = [y[i, 0] + arb(0, 1) * rise[i, 0] + arb(0, float(e)) for i, e in enumerate(first)]
-    return column(values), column([rise[i, 0] + arb(0, float(e)) for i, e in enumerate(second)])
+    return bend, *(column([arb(0, float(e)) for e in error]) for error in (first, second))
 
 
 def upper(value: Any) -> float:

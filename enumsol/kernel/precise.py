@@ -25,7 +25,7 @@ from enumsol.kernel.many_digits import (
     rounded,
     sign_of,
     signs_of,
-    solutions_around,
+    taylor_around,
 )
 from enumsol.kernel.rows import SLIP_PLUS
 from enumsol.kernel.selection_rows import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, SelectionRows
@@ -181,22 +181,23 @@ class PreciseSelection:
         """Sign of det M where M does not depend on alpha."""
         return sign_of(self._M[0].det()) if self._M[0].nrows() else 1
 
-    def solve(self, a: Any) -> tuple[Any, Any] | None:
+    def solve(self, a: Any, algorithm: str | None = None) -> tuple[Any, Any] | None:
         """Unknowns for every alpha in a ball, and the matrix; None where that is not proven regular."""
         M = self._M[0] + self._M[1] * a
         if not M.nrows():
             return arb_mat(0, 1), M
         try:
-            return M.solve(self._g[0] + self._g[1] * a), M
+            return M.solve(self._g[0] + self._g[1] * a, algorithm=algorithm), M
         except ZeroDivisionError:
             return None
 
     def slope(self, a: Any, y: Any, M: Any) -> Any:
-        """Slopes of the conditions."""
+        """Slopes of the conditions; no claim rests on them."""
         held = self._c[1] + self._C[1] * y
         if not M.nrows():
             return held
-        return held + (self._C[0] + self._C[1] * a) * M.solve(self._g[1] - self._M[1] * y)
+        rise = M.solve(self._g[1] - self._M[1] * y, algorithm="approx")
+        return held + (self._C[0] + self._C[1] * a) * rise
 
     def values(self, a: Any, y: Any) -> Any:
         """Values of the conditions."""
@@ -210,9 +211,14 @@ class PreciseSelection:
                 if self._lines is not None:
                     self._signs[alpha] = signs_of(self._lines[0] + self._lines[1] * a)
                 else:
-                    solved = self.solve(a)
-                    self._signs[alpha] = None if solved is None else signs_of(self.values(a, solved[0]))
+                    # the faster way gives wider balls
+                    signs = self._signs_by(a, "lu")
+                    self._signs[alpha] = self._signs_by(a, None) if signs is None or not np.all(signs) else signs
         return self._signs[alpha]
+
+    def _signs_by(self, a: Any, algorithm: str | None) -> Signs | None:
+        solved = self.solve(a, algorithm)
+        return None if solved is None else signs_of(self.values(a, solved[0]))
 
     def expansion(self, low: Number, high: Number) -> PreciseExpansion | None:
         """The conditions over [low, high]; None where the interval is too long."""
@@ -224,21 +230,36 @@ class PreciseSelection:
                 values = constant + slope * ball_of(first).union(ball_of(last))
                 near = constant + slope * middle
                 return PreciseExpansion(self, first, last, values, slope * radius, self._constant_index, near)
-            solved = self.solve(middle)
-            if solved is None:
-                return None
-            y, M = solved
-            a, index, near = ball_of(first).union(ball_of(last)), 1, self.values(middle, y)
-            rise = arb_mat(0, 1)
-            if M.nrows():
-                index = sign_of(M.det())
-                rise = M.solve((self._g[1] - self._M[1] * y) * radius)
-                found = solutions_around(y, rise, M.solve(self._M[1] * radius))
-                if found is None:
-                    return None
-                y, rise = found
-            slopes = (self._c[1] + self._C[1] * y) * radius + (self._C[0] + self._C[1] * a) * rise
-            return PreciseExpansion(self, first, last, self.values(a, y), slopes, index, near)
+            return self._expansion(first, last, middle, radius)
+
+    def _expansion(self, first: Fraction, last: Fraction, middle: Any, radius: Any) -> PreciseExpansion | None:
+        """The conditions by the powers of tau, with what is left of the unknowns (theory, (7.17))."""
+        M, M1 = self._M[0] + self._M[1] * middle, self._M[1] * radius
+        C, C1 = self._C[0] + self._C[1] * middle, self._C[1] * radius
+        if not M.nrows():
+            near, steep = self._c[0] + self._c[1] * middle, self._c[1] * radius
+            return PreciseExpansion(self, first, last, near + steep * arb(0, 1), steep, 1, near)
+        g = [[self._g[0][i, 0] + self._g[1][i, 0] * middle, self._g[1][i, 0] * radius] for i in range(M.nrows())]
+        try:
+            X = M.solve(matrix([[*g[i], *(M1[i, j] for j in range(M.ncols()))] for i in range(M.nrows())]))
+        except ZeroDivisionError:
+            return None
+        P = matrix([[X[i, j + 2] for j in range(M.ncols())] for i in range(M.nrows())])
+        y = column([X[i, 0] for i in range(M.nrows())])
+        rise = column([X[i, 1] for i in range(M.nrows())]) - P * y
+        found = taylor_around(rise, P)
+        if found is None:
+            return None
+        bend, left, left_slope = found
+        near = self.values(middle, y)
+        steep = (self._c[1] + self._C[1] * y) * radius + C * rise
+        curved, cubic = C1 * rise - C * bend, C1 * bend
+        # C + tau C1 and powers of tau, for |tau| <= 1
+        unit = arb(0, 1)
+        turned = C + C1 * unit
+        values = near + steep * unit + curved * arb(0.5, 0.5) - cubic * unit + turned * left
+        slopes = steep + curved * (2 * unit) - cubic * arb(1.5, 1.5) + C1 * left + turned * left_slope
+        return PreciseExpansion(self, first, last, values, slopes, sign_of(M.det()), near)
 
     def newton(
         self, condition: int, low: Fraction, high: Fraction, width: Fraction, steps: int = _STEPS
@@ -251,7 +272,7 @@ class PreciseSelection:
                 return None if slope == 0 else rounded(fraction_of((-constant / slope).mid()), low, high, unit)
             for _ in range(steps):
                 a = ball_of(alpha)
-                solved = self.solve(a)
+                solved = self.solve(a, "approx")
                 if solved is None:
                     return None
                 y, M = solved

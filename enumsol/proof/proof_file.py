@@ -20,9 +20,9 @@ Tree
     ``["D", [[point], ...], dimension]``: in rational arithmetic, the selection's roots are the hull of these points,
     each a list of 2p fractions ``"a/b"`` of lambda in the problem's units, in lowest terms and in hexadecimal digits
     (they may be long).
-    ``["m", selection, free, tau, [mid], [rad], index]``: one root, the only one with the statuses of the nodes that are
-    not free; ``["m", selection, free, tau, [mid]]``: no solution below. ``["M", selection, tau, count]``: the same in
-    rational arithmetic.
+    ``["m", selection, free, weights, [mid], [rad], index]``: one root, the only one with the statuses of the nodes that
+    are not free; ``["m", selection, free, weights, [mid]]``: no solution below. ``["M", selection, weights, count]``:
+    the same in rational arithmetic.
     ``["z"]``: the unloaded body; nothing but lambda = 0 solves.
     ``["u", reason]``: undecided.
 Footer

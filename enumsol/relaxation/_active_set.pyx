@@ -646,6 +646,8 @@ cdef class QPState:
         cdef int row, polished = 0
         cdef double value, worst, sgn, d2, t, t1, t2, s
         cdef bint full
+        # a state that its last child took over has counted those of its parents
+        limit += self.iterations
         self.pending = -1
         while True:
             row = -1

@@ -28,6 +28,9 @@ def apart(solutions: Iterable[SelectionSolution]) -> Kept:
             single.append(solution)
         else:
             closed[solution.codes] = solution
+    # a strict solution may have closed several subtrees, and be told by balls in one and by rationals in another
+    strict = {s.codes: s for s in single if s.strict and not s.exact}
+    single = [*strict.values(), *(s for s in single if s.codes not in strict)]
     kept: list[SelectionSolution] = []
     doubtful = []
     for core, solution in sorted(closed.items()):

@@ -309,6 +309,9 @@ class RootSet(Sequence[Root], Immutable):
         if self.stats.resumed:
             searched = f"{self.stats.nodes} more searched" if self.stats.nodes else "nothing was left to search"
             lines.append(f"resumed: {counted(self.stats.resumed, 'node')} of the tree from the file, {searched}")
+        if self.stats.fallback_qps:
+            of = counted(self.stats.qps, "relaxation")
+            lines.append(f"stalled: {self.stats.fallback_qps} of {of}, solved by a slower solver or not at all")
         total = self.index_sum
         # a sum other than +1 proves that something is missing or wrong
         note = "unknown" if total is None else f"{total:+d}" if total == 1 else f"{total:+d} (not +1!)"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from enumsol.search.reduction import NEAR, Reduction
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import (
     BACKWARD,
@@ -21,6 +22,7 @@ from enumsol.statuses import (
     SLIP_MINUS,
     SLIP_PLUS,
     STICK,
+    UNDECIDED,
 )
 
 if TYPE_CHECKING:
@@ -32,12 +34,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: A condition of a scaled problem within this of zero may hold as an equation; only the choice of what to try rests on
-#: it.
-NEAR = 1e-9
-#: Smallest eigenvalue below which a form counts as not definite.
-_DEFINITE = 1e-10
-_NEWTON_STEPS, _WEIGHT_STEPS = 16, 6
 #: So many nodes that slide without load make a search begin again.
 _MANY = 3
 
@@ -52,7 +48,9 @@ class Proposal:
     sliding : FORWARD or BACKWARD for nodes that in the proof are open or slip that way
     free : ascending nodes that have no status in the proof
     force : (2p,) array, lambda
-    tau : one number a free node for the test of definiteness; 0 where a node need not be in it
+    weights : tau, and omega unless all are 1, for the test of definiteness (theory, (6.9)); tau is one number a free
+        node, 0 where a node need not be in the test; None where none were found
+    hopeless : nor would rationals find any, which tell more nodes that need not be in the test
     strict : every status in the proof holds strictly
     least : least slack of the conditions of the fixed nodes
     sign : of the determinant of the fixed nodes' equations
@@ -62,10 +60,16 @@ class Proposal:
     sliding: dict[int, int]
     free: tuple[int, ...]
     force: Array
-    tau: Array
+    weights: Array | None
+    hopeless: bool
     strict: bool
     least: float
     sign: int
+
+    @property
+    def numbers(self) -> list[float]:
+        """The weights as a proof has them."""
+        return [] if self.weights is None else self.weights.tolist()
 
     @property
     def named(self) -> Codes:
@@ -101,16 +105,38 @@ class Closer:
 
     def __init__(self, certifier: Closing) -> None:
         self._certifier = certifier
-        self._alert = self._began_again = False
+        self._alert = self._began_again = self._looked = False
+        self._touching = 0
         self._wait = self._pause = 0
 
-    def begins_again(self) -> bool:
-        """Whether so much has become known that a search had better begin again; once at most."""
-        if self._began_again or len(self._certifier.sliding) < _MANY:
+    @property
+    def sliding(self) -> dict[int, int]:
+        """Those of the certifier."""
+        return self._certifier.sliding
+
+    def begins_again(self, system: ScaledSystem, nodes: int) -> bool:
+        """Whether so much has become known after some nodes that a search had better begin again; once at most."""
+        if self._began_again:
+            return False
+        if not self._looked and nodes >= system.p:
+            self._looked = True
+            self._look(system)
+        if max(len(self._certifier.sliding), self._touching) < _MANY:
             return False
         self._began_again = True
         self._wait = self._pause = 0
         return True
+
+    def _look(self, system: ScaledSystem) -> None:
+        """Take note of a degenerate solution, if Newton's method finds one."""
+        whole = Reduction(system, (UNDECIDED,) * system.p, tuple(range(system.p)), {})
+        found = whole.solution(*start(system, None))
+        if found is not None:
+            force, p = whole.forces(found[0]), system.p
+            w = system.g - system.S @ force
+            self._touching = int(np.count_nonzero((np.abs(force[:p]) <= NEAR) & (np.abs(w[:p]) <= NEAR)))
+            self._alert = self._alert or self._touching > 0
+            self._certifier.sliding |= without_load(system, force, w)
 
     def met(self, answer: object) -> None:
         """Take note of what a complete selection holds: a degenerate solution makes every node worth a try."""
@@ -129,7 +155,7 @@ class Closer:
             return None
         if max(codes) < CONTACT or not (alert or _touches(codes, relaxation)):
             return None
-        if self._wait > 0:
+        if self._wait > 0 and (CONTACT in codes or UNDECIDED in codes):
             self._wait -= 1
             return None
         found = self._certifier.closed(codes, relaxation)
@@ -145,156 +171,6 @@ def _touches(codes: Codes, relaxation: Relaxation | None) -> bool:
     p = len(codes)
     forces, w = relaxation.forces[:p], relaxation.displacements[:p]
     return any(code >= CONTACT and forces[i] <= NEAR and w[i] >= -NEAR for i, code in enumerate(codes))
-
-
-class Reduction:
-    """The reduced problem of the nodes that are not fixed, w = h - R x, in floats.
-
-    Parameters
-    ----------
-    system : ScaledSystem
-    codes : status codes; nodes with a final one that are neither free nor slide are fixed
-    free : ascending nodes
-    sliding : FORWARD or BACKWARD for other nodes
-    """
-
-    def __init__(self, system: ScaledSystem, codes: Codes, free: tuple[int, ...], sliding: dict[int, int]) -> None:
-        p, S, F = system.p, system.S, system.F
-        self.system, self.free = system, (*free, *sorted(sliding))
-        chosen = set(self.free)
-        fixed = [i for i in range(p) if i not in chosen and codes[i] != OPEN]
-        stuck = [i for i in fixed if codes[i] == STICK]
-        self.nodes = np.array(self.free, dtype=np.intp)
-        slides = np.arange(len(self.nodes)) >= len(free)
-        self.rubbing = (F[self.nodes] > 0) & ~slides
-        self.places = np.concatenate([self.nodes, p + self.nodes[self.rubbing]])
-        self.tangential = np.where(self.rubbing, len(self.free) + np.cumsum(self.rubbing) - 1, -1)
-        self.turn = np.array([(sliding.get(i, 0) == FORWARD) - (sliding.get(i, 0) == BACKWARD) for i in self.free])
-        self.turn = self.turn * F[self.nodes]
-        rows = np.array(fixed + [p + i for i in stuck], dtype=np.intp)
-        self.E = np.zeros((2 * p, len(rows)))
-        for k, i in enumerate(fixed):
-            self.E[i, k] = 1.0
-            if codes[i] in (SLIP_PLUS, SLIP_MINUS):
-                self.E[p + i, k] = F[i] if codes[i] == SLIP_PLUS else -F[i]
-        for k, i in enumerate(stuck, start=len(fixed)):
-            self.E[p + i, k] = 1.0
-        across = S[:, self.places]
-        across[:, : len(self.free)] += S[:, p + self.nodes] * self.turn
-        M = S[rows] @ self.E
-        self.sign = int(np.linalg.slogdet(M)[0])
-        # a singular matrix is refused by whoever proves something of it
-        self.Z = np.linalg.solve(M, np.column_stack([system.g[rows], across[rows]]))
-        moved = S[self.places] @ self.E @ self.Z
-        self.R, self.h = across[self.places] - moved[:, 1:], system.g[self.places] - moved[:, 0]
-
-    def forces(self, x: Array) -> Array:
-        """lambda for the forces of the nodes that are free or slide."""
-        force = np.asarray(self.E @ (self.Z[:, 0] - self.Z[:, 1:] @ x))
-        force[self.places] = x
-        turned = self.turn != 0
-        force[self.system.p + self.nodes[turned]] = (self.turn * x[: len(self.free)])[turned]
-        return force
-
-    def solution(self, force: Array, w: Array) -> tuple[Array, list[int]] | None:
-        """Forces and statuses that solve the reduced problem up to NEAR, by Newton's method; None if there are none."""
-        x, v = force[self.places], w[self.places]
-        for _ in range(_NEWTON_STEPS):
-            codes = [self._status(i, x, v) for i in range(len(self.free))]
-            x = self._selected(codes)
-            if x is None:
-                return None
-            v = self.h - self.R @ x
-            if self._solves(x, v):
-                return x, [self._named(i, x, v) for i in range(len(self.free))]
-        return None
-
-    def _status(self, i: int, x: Array, v: Array) -> int:
-        """The status whose test functions are active at a point (theory, (1.7))."""
-        if x[i] + v[i] <= 0:
-            return OPEN
-        t = self.tangential[i]
-        if t < 0:
-            return FRICTIONLESS
-        bound = self.system.F[self.free[i]] * x[i]
-        if x[t] + v[t] > bound:
-            return SLIP_PLUS
-        return SLIP_MINUS if x[t] + v[t] < -bound else STICK
-
-    def _selected(self, codes: list[int]) -> Array | None:
-        """The forces of the reduced problem's selection; None where its matrix is singular."""
-        F, rows, columns = self.system.F, [], []
-        for i, code in enumerate(codes):
-            if code == OPEN:
-                continue
-            column = np.zeros(len(self.places))
-            column[i] = 1.0
-            if code in (SLIP_PLUS, SLIP_MINUS):
-                column[self.tangential[i]] = F[self.free[i]] * (1 if code == SLIP_PLUS else -1)
-            rows.append(i)
-            columns.append(column)
-            if code == STICK:
-                rows.append(int(self.tangential[i]))
-                columns.append(np.eye(len(self.places))[rows[-1]])
-        if not rows:
-            return np.zeros(len(self.places))
-        E = np.column_stack(columns)
-        try:
-            return np.asarray(E @ np.linalg.solve(self.R[rows] @ E, self.h[rows]))
-        except np.linalg.LinAlgError:
-            return None
-
-    def _solves(self, x: Array, v: Array) -> bool:
-        m, t = len(self.free), self.tangential
-        if np.min(x[:m], initial=0.0) < -NEAR or np.max(v[:m], initial=0.0) > NEAR:
-            return False
-        sliding = t >= 0
-        bound = self.system.F[self.nodes][sliding] * x[:m][sliding]
-        xt, vt = x[t[sliding]], v[t[sliding]]
-        apart = np.minimum(np.abs(xt - np.sign(vt) * bound), np.abs(vt))
-        return bool(
-            np.all(np.minimum(x[:m], -v[:m]) <= NEAR)
-            and np.all(np.abs(xt) <= bound + NEAR)
-            and np.max(apart, initial=0.0) <= NEAR
-        )
-
-    def _named(self, i: int, x: Array, v: Array) -> int:
-        """The first status that holds up to NEAR: of those that do, one whose equations are regular with others'."""
-        if x[i] <= NEAR:
-            return OPEN
-        t = self.tangential[i]
-        if t < 0:
-            return FRICTIONLESS
-        if abs(v[t]) <= NEAR:
-            return STICK
-        return SLIP_PLUS if v[t] > 0 else SLIP_MINUS
-
-    # -- the test of definiteness ----------------------------------------------------------------------------------
-
-    def weights(self, counted: NDArray[np.bool_]) -> Array | None:
-        """tau for which Q of theory, (6.9), is definite, 0 at nodes that do not count; None if none was found."""
-        m = len(self.places)
-        symmetric = 0.5 * (self.R + self.R.T)
-        if not m:
-            return np.zeros(0)
-        used = np.flatnonzero(counted & self.rubbing)
-        F, T = self.system.F[self.nodes[used]], self.R[self.tangential[used]]
-        tau = F * np.sqrt(np.sum(T * T, axis=1) / 1.0)
-        for _ in range(_WEIGHT_STEPS):
-            form = symmetric - 0.5 * (T * (F**2 / tau)[:, None]).T @ T
-            form[used, used] -= 0.5 * tau
-            values, vectors = np.linalg.eigh(form)
-            if values[0] > _DEFINITE:
-                result = np.zeros(len(self.free))
-                result[used] = tau
-                return result
-            if not len(used):
-                break
-            v = vectors[:, 0]
-            # where the smallest eigenvalue is largest, both terms of a node are the same there
-            better = F * np.abs(T @ v) / np.maximum(np.abs(v[used]), 1e-12)
-            tau = np.sqrt(tau * np.clip(better, tau / 16, tau * 16))
-        return None
 
 
 def holds_below(codes: Codes, active: ActiveSets) -> bool:
@@ -351,12 +227,12 @@ def propose(
         resting = without_load(system, force, w)
         sliding |= {i: resting[i] for i in loose if codes[i] in SLIDING.get(resting.get(i, 0), ())}
         free = tuple(sorted({*free, *loose} - sliding.keys()))
-    tau = reduction.weights(_counted(reduction, selection, force, w, exactly=exactly))
-    if tau is None:
-        return None
+    counted = _counted(reduction, selection, force, w, exactly=exactly)
+    weights = reduction.weights(counted)
     least = float(np.min(slack[fixed], initial=np.inf))
     strict = bool(np.all(np.abs(slack) > NEAR))
-    return Proposal(tuple(selection), sliding, free, force, tau[: len(free)], strict, least, reduction.sign)
+    hopeless = weights is None and np.array_equal(counted, _counted(reduction, selection, force, w, exactly=True))
+    return Proposal(tuple(selection), sliding, free, force, weights, hopeless, strict, least, reduction.sign)
 
 
 def without_load(system: ScaledSystem, force: Array, w: Array) -> dict[int, int]:

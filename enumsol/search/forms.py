@@ -23,9 +23,8 @@ if TYPE_CHECKING:
 
     Rows = tuple[list[int], list[int]]
 
-#: Nodes examined with the energy, for every contact node, before a form is tried: more than what that costs. Small
-#: problems count as ones with so many contact nodes.
-NODES, _SMALL = 10, 100
+#: Nodes examined with the energy before a form is tried: more than what that costs.
+NODES = 1000
 #: A form is tried where at least this share of the tree is left.
 _LEFT = 0.5
 #: Steps of the ascent on trial, and those that follow once it pays.
@@ -65,7 +64,7 @@ class Forms:
 
     def tried(self, nodes: int) -> bool:
         """Whether a search of so many nodes has tried a form."""
-        return nodes >= NODES * max(self._scaled.p, _SMALL)
+        return nodes >= NODES
 
     def use(self, engine: Any, form: EnclosedForm | None) -> None:
         """Go on with a form that is known already, or with the energy."""

@@ -12,7 +12,7 @@ from enumsol.relaxation.rows import status_rows
 from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIDING, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -68,7 +68,7 @@ class ImposedRows:
 
 
 def branching_node(
-    codes: Codes, forced: tuple[int, ...] | None, relaxation: Relaxation | None
+    codes: Codes, forced: tuple[int, ...] | None, relaxation: Relaxation | None, last: Collection[int] = ()
 ) -> tuple[int, tuple[int, ...] | None]:
     """The contact node to branch on, -1 when all are decided; and the forced ones that the children begin with.
 
@@ -77,6 +77,7 @@ def branching_node(
     codes : status codes
     forced : those of the node of the tree (see TreeNode)
     relaxation : with its minimiser, or None
+    last : nodes that are branched on when no others are left
     """
     if relaxation is None:
         node = next((i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED)), -1)
@@ -85,7 +86,9 @@ def branching_node(
         forced = forced or relaxation.forced(codes)
         if forced:
             return forced[0], forced[1:]
-    node = relaxation.choose(codes)
+    node = relaxation.choose(tuple(OPEN if i in last else code for i, code in enumerate(codes))) if last else -1
+    if node < 0:
+        node = relaxation.choose(codes)
     return (node if node >= 0 else _sliding_node(codes)), None
 
 

@@ -156,7 +156,12 @@ class TreeSearch:
             return forms.due(self.outcome.nodes, self.covered)
 
         def known() -> bool:
-            return due() or (self.closer is not None and self.closer.begins_again())
+            closer, system = self.closer, self.system
+            return due() or (
+                closer is not None
+                and isinstance(system, ScaledSystem)
+                and closer.begins_again(system, self.outcome.nodes)
+            )
 
         stack = self.loop(start, known)
         if stack and not due():
@@ -256,7 +261,7 @@ class TreeSearch:
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
         if self.closed(item, usable):
             return
-        node, forced = branching_node(codes, item.forced, usable)
+        node, forced = branching_node(codes, item.forced, usable, () if self.closer is None else self.closer.sliding)
         if node < 0:
             node = self._settle(item)
         if node < 0:

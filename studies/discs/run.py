@@ -6,29 +6,28 @@ not move touch their neighbours without load: with equal weights w = 0 there, wi
 other, w_n = lambda_n = 0 and w_t not 0. With unequal radii normals are inclined, and all contacts carry load or are
 open.
 
-Read ``nodes`` and ``seconds``; the search is cut at a number of nodes. ``grazing`` counts the contacts with w_n =
-lambda_n = 0 at the root, ``sliding`` those of them with w_t not 0. The other contacts being fixed at their statuses,
+Read ``nodes`` and ``seconds``; the search is cut at a number of nodes. ``ones`` are the nodes of a search in which all
+omega of theory, (6.9), are 1. ``grazing`` counts the contacts with w_n = lambda_n = 0 at the root, ``sliding`` those of
+them with w_t not 0. The other contacts being fixed at their statuses,
 
-- ``weights`` says whether there are tau for which the form of theory, (6.9), is definite, so that closing needs no
-  status of the grazing ones. Where it says no, the tree decides sliding contacts one by one, and each has two statuses
-  that lead to the root.
+- ``weights`` says whether there are tau for which the form of theory, (6.9), is definite with omega = 1: then closing
+  needs no status of the grazing ones; ``factors`` whether there are tau and omega. Where it says no, the tree tells
+  sliding contacts one by one from sticking and from slipping to the other side.
 - ``halves`` says whether the form is definite in which every sliding contact is known to be open or to slip in one
-  direction, with lambda_t = F lambda_n or -F lambda_n: a partial status that the tree does not have. For two solutions
-  with difference d it has d_n (w_n - w*_n) >= 0, and the form is the sum of these over the contacts.
-- ``scaled`` says whether it is definite when every term is multiplied by a positive number of its own, which may be
-  done just as well (a semidefinite program; needs CVXPY).
+  direction, with lambda_t = F lambda_n or -F lambda_n, with omega = 1; ``scaled`` whether it is so with some omega.
 """
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
+from unittest.mock import patch
 
 import numpy as np
 
 import enumsol
-from enumsol.search.closing import NEAR, Reduction
-from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.search.definite import tau_of, weights_of
+from enumsol.search.reduction import NEAR, Reduction
+from enumsol.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from grazing.run import SOFT, STIFF
 from shared.results import yes
 
@@ -40,7 +39,7 @@ SEEDS, SMOKE_SEEDS = range(3), range(1)
 MAX_NODES, SMOKE_NODES = 3000, 500
 FRICTION, PULL = 0.9, 3.0
 #: What is asked of the grazing contacts; see above.
-FORMS = ("weights", "halves", "scaled")
+FORMS = ("weights", "factors", "halves", "scaled")
 
 
 def discs(radii, weights, stiffness):
@@ -79,59 +78,48 @@ def problems(run):
                     yield kind, name, count, seed, discs(radii, weights, stiffness)
 
 
+def with_ones(R, F, normal, tangential, tied):
+    """What is found if all omega are 1."""
+    del tied
+    return tau_of(R, F, normal, tangential)
+
+
 def forms(system, root):
-    """Grazing contacts, those that slide, and whether both forms are definite; see above."""
+    """Grazing contacts, those that slide, and which forms are definite; see above."""
     p = system.p
     force = np.concatenate([root.lambda_n, root.lambda_t]) / system.force
     w = system.g - system.S @ force
     n, w_n, w_t = force[:p], w[:p], w[p:]
     grazing = (np.abs(n) < NEAR) & (np.abs(w_n) < NEAR)
     slip = np.where(np.abs(w_t) < NEAR, STICK, np.where(w_t > 0, SLIP_PLUS, SLIP_MINUS))
-    codes = np.where(grazing, UNDECIDED, np.where(n < NEAR, OPEN, slip))
-    free = np.flatnonzero(grazing)
-    sliding = np.abs(w_t[free]) >= NEAR
-    if not len(free):
-        return 0, 0, "-", "-", "-"
-    reduction = Reduction(system, tuple(codes.tolist()), tuple(free.tolist()), {})
-    tau = reduction.weights(np.ones(len(free), dtype=bool))
-    # one unknown for contacts that are open or slip forward, or open or slip backward; those with w = 0 keep two
-    rubs = len(free) + np.flatnonzero(~sliding)
-    columns = np.eye(2 * len(free))[:, np.concatenate([np.arange(len(free)), rubs])]
-    columns[len(free) + np.flatnonzero(sliding), np.flatnonzero(sliding)] = (system.F[free] * np.sign(w_t[free]))[
-        sliding
-    ]
-    half = reduction.R[np.concatenate([np.arange(len(free)), rubs])] @ columns
-    node = np.concatenate([np.arange(len(free)), np.flatnonzero(~sliding)])
-    return len(free), int(sliding.sum()), yes(tau is not None), yes(is_definite(half)), scaled(half, node)
-
-
-def is_definite(form):
-    return np.linalg.eigvalsh(form + form.T)[0] > 0
-
-
-def scaled(form, node):
-    """Whether rows multiplied by positive numbers, one a node, make the form definite; a dash without CVXPY."""
-    if find_spec("cvxpy") is None:
-        return "-"
-    import cvxpy
-
-    numbers, least = cvxpy.Variable(max(node) + 1), cvxpy.Variable()
-    product = cvxpy.diag(numbers[node]) @ form
-    bounds = [product + product.T >> least * np.eye(len(node)), cvxpy.sum(numbers) == len(node), numbers >= 1e-3]
-    cvxpy.Problem(cvxpy.Maximize(least), bounds).solve(solver=cvxpy.CLARABEL)
-    return yes(is_definite(numbers.value[node][:, None] * form))
+    codes = tuple(np.where(grazing, UNDECIDED, np.where(n < NEAR, OPEN, slip)).tolist())
+    free = np.flatnonzero(grazing).tolist()
+    sides = {i: FORWARD if w_t[i] > 0 else BACKWARD for i in free if abs(w_t[i]) >= NEAR}
+    if not free:
+        return 0, 0, *("-" for _ in FORMS)
+    definite = []
+    for sliding in ({}, sides):
+        undecided = tuple(i for i in free if i not in sliding)
+        reduction = Reduction(system, codes, undecided, sliding)
+        for method in (with_ones, weights_of):
+            with patch("enumsol.search.reduction.weights_of", method):
+                definite.append(yes(reduction.weights(np.ones(len(free), dtype=bool)) is not None))
+    return len(free), len(sides), *definite
 
 
 def row(kind, name, count, seed, problem, most):
     system = problem.condensed.at(0.0).scaled
     roots = enumsol.enumerate_roots(problem, 0.0, max_nodes=most)
-    grazing, sliding, *definite = forms(system, roots[0]) if len(roots) else ("-",) * 5
+    with patch("enumsol.search.reduction.weights_of", with_ones):
+        ones = enumsol.enumerate_roots(problem, 0.0, max_nodes=most)
+    grazing, sliding, *definite = forms(system, roots[0]) if len(roots) else ("-",) * (2 + len(FORMS))
     return {
         "unequal": kind,
         "contacts": name,
         "discs": count,
         "seed": seed,
         "p": problem.p,
+        "ones": ones.stats.nodes if ones.complete else "-",
         "nodes": roots.stats.nodes,
         "closed": roots.stats.closed,
         "roots": len(roots),

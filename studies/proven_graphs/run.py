@@ -33,7 +33,7 @@ CHILD = str(Path(__file__).with_name("cases.py"))
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--large", action="store_true", help="also p = 32 and 64, and n = 8704 (five minutes a round)")
+    parser.add_argument("--large", action="store_true", help="also p = 32 and 64, and n = 8704 (ten minutes a round)")
     version_options(parser, rounds=3)
 
 

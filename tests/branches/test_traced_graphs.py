@@ -18,7 +18,7 @@ from branches.two_graphs import differences, steps, two_graphs
 from generators import through_the_unloaded_state, vanishing_problem
 
 from enumsol import ContactProblem, branch_graph, verify
-from enumsol.branches import tracing
+from enumsol.branches import construction, tracing
 
 KINDS = ("friction", "load", "both")
 
@@ -153,6 +153,29 @@ def test_a_pitchfork_is_left_open(push):
     # a determinant vanishes there together with a condition, whatever the load
     assert any(low <= 3 <= high for low, high, _ in graphs.open)
     assert 1.0 + push == 1.0 or all(high - low < 1e-6 for low, high, _ in graphs.open)
+
+
+def test_exact_algebra_that_would_take_too_long_is_not_begun(monkeypatch):
+    small = pair(0.0)
+    A, rows = np.eye(28), np.zeros((2, 2, 28))  # more degrees of freedom, which nothing touches
+    A[:4, :4], rows[0, :, :4], rows[1, :, :4] = small.A.toarray(), small.Bn.toarray(), small.Bt.toarray()
+    problem = ContactProblem(A, *rows, np.append(small.f, np.zeros(24)), friction=small.friction)
+    exactly = branch_graph(problem, (0.0, 6.0))
+    assert exactly.complete
+    assert [v.alpha for v in exactly.vertices if v.kind == "bifurcation"] == [3.0]
+    monkeypatch.setattr(construction, "LARGEST_EXACT_WORK", 0)
+    graph = branch_graph(problem, (0.0, 6.0))
+    assert not graph.complete
+    assert any("is not decided" in reason for reason in graph.reasons)
+    left = [v.enclosure for v in graph.vertices if v.kind == "unsettled"]
+    assert any(low <= 3 <= high for low, high in left)
+    # what is said elsewhere is the same
+    alphas = np.linspace(0.125, 5.875, 24).tolist()
+    elsewhere = [alpha for alpha in alphas if not any(low <= alpha <= high for low, high in left)]
+    assert len(elsewhere) > 12
+    for alpha in elsewhere:
+        assert graph.at_least(alpha) == exactly.multiplicity_at(alpha)
+    assert not verify(problem, graph.proof).complete
 
 
 def test_families_and_sheets_are_left_open(monkeypatch):

@@ -373,6 +373,8 @@ def test_proofs_of_degenerate_graphs_are_accepted():
         report = verify(problem, branch_graph(problem, (0.0, 6.0)).proof)
         assert report.ok
         assert not report.whole
+        assert not report.complete
+        assert repr(report).endswith("\n  complete: no")
 
 
 def _with_selection(records, codes, like):

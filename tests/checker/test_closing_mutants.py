@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from proof_tools import copied, proof_of, records_of
 from rational_checker import Refused, check_records
-from touching import beside_a_loaded_node, touching_problem
+from touching import beside_a_loaded_node, row_of_discs, touching_problem
 
 from enumsol import enumerate_roots, verify
 from enumsol.checker.stability import stability_radius
@@ -21,6 +21,8 @@ def cases(kind):
     """Problems with records of proofs that have such leaves."""
     if kind in ("slides", "sides"):
         return cases_with_sides(kind)
+    if kind == "factors":
+        return cases_with_factors()
     found = []
     with pytest.MonkeyPatch.context() as patch:
         before = closing.Closer.closed
@@ -48,8 +50,9 @@ def cases_with_sides(kind):
     found = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(closing, "_MANY", 1)
-        for k, slides, friction in product((2, 3), (False, True), (0.875, 1.0, 1.25, 1.5)):
-            problem = beside_a_loaded_node(k, slides=slides, grazing=True, friction=friction)
+        rows = [row_of_discs(k, weights=(2.0, 3.0), friction=F) for k, F in product((4, 5), (0.6, 0.9, 1.2))]
+        chains = [beside_a_loaded_node(3, slides=True, grazing=True, friction=F) for F in (2.5, 4.0)]
+        for problem in rows + chains:
             records = records_of(enumerate_roots(problem, 0).proof)
             if leaves(records, kind):
                 found.append((problem, records))
@@ -57,9 +60,32 @@ def cases_with_sides(kind):
     return found
 
 
+def cases_with_factors():
+    """Proofs in which the terms of contact nodes are multiplied by numbers of their own."""
+    found = []
+    for limit, slides, friction in product((0, 250), (False, True), (0.875, 1.25, 1.75, 2.5)):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(solvers, "EXACT_DOF_LIMIT", limit)
+            problem = beside_a_loaded_node(3, slides=slides, grazing=True, friction=friction)
+            records = records_of(enumerate_roots(problem, 0).proof)
+        if leaves(records, "factors"):
+            found.append((problem, records))
+    assert len(found) > 5
+    assert {records[k][0] for _, records in found for k in leaves(records, "factors")} == {"m", "M"}
+    return found
+
+
+def weights_in(record):
+    """Place of the weights in a record, and how many of them are tau, for leaves at whose root nothing is decided."""
+    return (3, len(record[2])) if record[0] == "m" else (2, len(record[1]))
+
+
 def leaves(records, kind):
-    """Numbers of the records of a kind: "m", "M", or "m" with sliding nodes; "b" with sides."""
+    """Numbers of the records of a kind: "m", "M", "m" with sliding nodes, or with factors; "b" with sides."""
     chosen = [(k, record) for k, record in enumerate(records) if isinstance(record, list)]
+    if kind == "factors":
+        closed = [(k, record, *weights_in(record)) for k, record in chosen if record[0] in ("m", "M")]
+        return [k for k, record, place, size in closed if len(record[place]) > size]
     if kind == "slides":
         return [k for k, record in chosen if record[0] == "m" and max(record[1]) > 6]
     if kind == "sides":
@@ -75,7 +101,7 @@ def accepted(problem, records):
     return report.ok
 
 
-KINDS = ["m", "M", "slides", "sides"]
+KINDS = ["m", "M", "slides", "sides", "factors"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -129,6 +155,18 @@ def test_forged_roots_are_refused():
                 forgeries += [[*record[:6], -record[6]], [*record[:5], [-1.0] * (2 * problem.p), record[6]]]
             for forged in forgeries:
                 assert not accepted(problem, [*records[:k], forged, *records[k + 1 :]])
+
+
+def test_forged_factors_are_refused():
+    for problem, records in cases("factors"):
+        for k in leaves(records, "factors"):
+            place, size = weights_in(records[k])
+            weights = records[k][place]
+            forgeries = [weights[:size], weights[:-1], [*weights, 1.0], weights[:size] + [0.0] * (len(weights) - size)]
+            forgeries += [[*weights[:-1], x] for x in (-weights[-1], 0.0, 1e200, 1e-200, True, "1")]
+            for forged in forgeries:
+                record = [*records[k][:place], forged, *records[k][place + 1 :]]
+                assert not verify(problem, proof_of([*records[:k], record, *records[k + 1 :]])).ok
 
 
 def test_forged_counts_are_refused():

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from branches.test_degenerate import pair
 from cli.test_cli import assert_refused, call, on_terminal, run
 
 from enumsol import BranchGraph, gallery, write_problem
@@ -131,12 +132,24 @@ def test_graph_files(capsys, tmp_path):
     assert files["plot"].read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_proof_that_leaves_arcs_open_is_not_complete(capsys, tmp_path):
+    problem, proof = tmp_path / "pair.npz", tmp_path / "pair.proof"
+    write_problem(pair(0.0), problem)  # two conditions vanish at one alpha
+    assert run(capsys, "graph", problem, "--from", "0", "--to", "6", "--proof", proof)[0] == 0
+    status, out, _ = run(capsys, "verify", problem, proof, "--json", tmp_path / "report.json")
+    assert (status, out.splitlines()[-1]) == (3, "  complete: no")
+    content = json.loads((tmp_path / "report.json").read_text())
+    assert content["ok"]
+    assert not content["complete"]
+
+
 def test_a_graph_has_a_proof(capsys, tmp_path):
     file = tmp_path / "graph.proof"
     assert run(capsys, *GRAPH, "--proof", file)[0] == 0
     status, out, _ = run(capsys, "verify", "gallery:one-node-6.1", file)
     assert status == 0
     assert "proof: verified for alpha in [0, 20]" in out
+    assert "complete: yes" in out
     assert run(capsys, "verify", "gallery:one-node-6.2", file)[0] == 2
     file.unlink()
     status, _, err = run(capsys, *GRAPH, "--proof", file, "--arithmetic", "exact")

@@ -34,15 +34,20 @@ def test_what_is_proven_is_so(seed):
         )
         tau = rng.choice([0.0, 0.1, 0.5, 1.0, 2.0], size=len(free))
         force = rng.normal(size=2 * problem.p)
-        ball = closed_solution(system, selection, free, tau, force)
+        sliding = sum(code > 6 for code in selection)
+        rubbing = sum(friction[i] for i in free)
+        omega = rng.choice([0.5, 1.0, 1.5], size=(len(free) + sliding + rubbing) * int(rng.integers(2)))
+        numbers = np.concatenate([tau, omega])
+        ball = closed_solution(system, selection, free, numbers, force)
         core = tuple(6 if i in free else code for i, code in enumerate(selection))
-        sign = definite_sign(system, selection, free, tau)
+        sign = definite_sign(system, selection, free, numbers)
         assert ball is None or (ball.sign == sign != 0 and ball.core == core)
         if sign:
             units = scaled.length[: problem.p] / scaled.force[: problem.p]
             weights = {i: exact(float(t * units[i])) for i, t in zip(free, tau, strict=True)}
             reduced = Reduced(forms, core, friction)
-            assert reduced.definite(weights | dict.fromkeys(reduced.sliding, exact(0.0)))
+            omega = [exact(float(x)) for x in numbers[len(free) :]] or [exact(1.0)] * len(reduced.places)
+            assert reduced.definite(weights | dict.fromkeys(reduced.sliding, exact(0.0)), omega)
             assert (reduced.determinant > 0) == (sign > 0)
         if ball is None:
             continue
@@ -79,6 +84,19 @@ def test_bad_proposals_prove_nothing():
         assert definite_sign(system, (1, 1, 1), free, tau) == 0
         assert closed_solution(system, (1, 1, 1), free, tau, near) is None
     assert definite_sign(system, (1, 1, 1), free, np.ones(2)) == 0
+    # too few of the six factors, both signs of zero, and ranges that overflow
+    proven, tau = (3, 1, 1), np.array([1.2, 1.7, 0.35])
+    assert definite_sign(system, proven, free, tau) == definite_sign(system, proven, free, np.r_[tau, np.ones(6)]) == 1
+    for omega in (np.ones(2), np.ones(7), np.r_[0.0, np.ones(5)], np.r_[-0.0, np.ones(5)], np.r_[-1.0, np.ones(5)]):
+        assert definite_sign(system, proven, free, np.r_[tau, omega]) == 0
+    for factor in (np.inf, np.nan, 1e308, 1e-308, 5e-324):
+        for k in range(6):
+            omega = np.ones(6)
+            omega[k] = factor
+            assert definite_sign(system, proven, free, np.r_[tau, omega]) == 0
+            assert closed_solution(system, proven, free, np.r_[tau, omega], near) is None
+    for factor in (1e308, 1e-308):
+        assert definite_sign(system, proven, free, np.r_[tau, np.full(6, factor)]) == 0
 
 
 def test_which_solutions_are_the_same():

@@ -9,7 +9,8 @@ from flint import arb, arb_mat
 from kernel.exact_arcs import Truth, beside, exact_of, interval_at, precise_system, random_data, two_zeros
 
 from enumsol.condensation.exact import ExactCondensed
-from enumsol.kernel.many_digits import ball_of, precision, solutions_around, upper
+from enumsol.gallery import wedge
+from enumsol.kernel.many_digits import ball_of, precision, taylor_around, upper
 from enumsol.kernel.precise import PreciseSelection, PreciseSystem
 from enumsol.kernel.rows import FRICTIONLESS
 
@@ -92,19 +93,38 @@ def test_balls_over_an_interval_hold_the_unknowns_and_their_slopes():
                 continue
             y, M = solved
             rise = M.solve((selection._g[1] - selection._M[1] * y) * ball_of(radius))
-            found = solutions_around(y, rise, M.solve(selection._M[1] * ball_of(radius)))
+            found = taylor_around(rise, M.solve(selection._M[1] * ball_of(radius)))
             if found is None:
                 continue
+            bend, left, left_slope = found
             for tau in (Fraction(-1), Fraction(1), Fraction(int(rng.integers(-99, 100)), 100)):
                 alpha = middle + tau * radius
                 there = selection.solve(ball_of(alpha))
                 slope = there[1].solve(selection._g[1] - selection._M[1] * there[0]) * ball_of(radius)
                 compared += 1
-                for ours, exact in zip(found, (there[0], slope), strict=True):
-                    for i in range(ours.nrows()):
+                t = ball_of(tau)
+                ours = y + rise * t - bend * (t * t) + left, rise - bend * (2 * t) + left_slope
+                for about, exact in zip(ours, (there[0], slope), strict=True):
+                    for i in range(about.nrows()):
                         # the value at one alpha is known to some ninety digits
-                        assert ours[i, 0].overlaps(exact[i, 0])
+                        assert about[i, 0].overlaps(exact[i, 0])
     assert compared > 100
+
+
+@pytest.mark.parametrize("first", [0, 2])
+def test_conditions_of_a_body_that_moves_almost_freely_are_known_over_long_intervals(first):
+    """All nodes slide: forces vary together, and a thousand times more than displacements do."""
+    problem = wedge(4, 4)
+    system = PreciseSystem.of(problem)
+    assert system is not None
+    selection = PreciseSelection(system, (first, *[2] * (problem.p - 1)))
+    low, high = Fraction(109, 100), Fraction(111, 100)
+    expansion = selection.expansion(low, high)
+    assert expansion is not None
+    known = expansion.over(low, high)
+    inside = [selection.signs_at(low + (high - low) * Fraction(k, 16)) for k in range(17)]
+    assert np.all(known.conditions != 0)
+    assert all(np.array_equal(signs, known.conditions) for signs in inside)
 
 
 def test_balls_around_the_smallest_and_largest_numbers():
@@ -112,11 +132,12 @@ def test_balls_around_the_smallest_and_largest_numbers():
         for exponent in (-2000, -1074, -1000, 0, 1000):
             size = arb(2) ** exponent
             for rate in (arb(1) / 4, arb(2) ** -30, arb(2) ** -300):
-                found = solutions_around(arb_mat([[arb(0)]]), arb_mat([[size]]), arb_mat([[rate]]))
+                found = taylor_around(arb_mat([[size]]), arb_mat([[rate]]))
                 assert found is not None
+                bend, left, left_slope = (part[0, 0] for part in found)
                 for tau in (-1, 1):
-                    assert found[0][0, 0].contains((tau * size / (1 + tau * rate)).mid())
-                    assert found[1][0, 0].contains((size / (1 + tau * rate) ** 2).mid())
+                    assert (tau * size - bend + left).contains((tau * size / (1 + tau * rate)).mid())
+                    assert (size - 2 * tau * bend + left_slope).contains((size / (1 + tau * rate) ** 2).mid())
 
 
 def test_floats_are_upper_bounds():

@@ -168,6 +168,31 @@ def test_bounds_grow_along_a_path_and_a_copy_leaves_its_parent_alone():
             node = child
 
 
+def test_every_program_of_a_path_has_its_own_limit():
+    rng = np.random.default_rng(31)
+    S, F = dense_compliance(rng, 6), np.full(6, 0.5)
+    # sticks everywhere, and no contact node is so without its equations
+    system = CondensedSystem(S, S @ np.concatenate([np.ones(6), 0.4 * (-1.0) ** np.arange(6)]), F).scaled
+    engine = ActiveSetEngine(system)
+
+    def path():
+        codes = [UNDECIDED] * 6
+        node = engine.root(*rows_of(codes, F))
+        counts = [node._state.iterations]
+        for i in range(6):
+            codes[i] = STICK
+            node = node.child(*rows_of(codes, F, [i]), last=True)
+            assert not node.stalled
+            assert not node.pruned
+            counts.append(node._state.iterations)
+        return counts
+
+    counts = path()
+    engine.limit = int(np.max(np.diff([0, *counts])))
+    assert engine.limit < counts[-1]
+    assert path() == counts
+
+
 def test_infeasible_assignment_comes_with_a_proof():
     # pressed together by a gap of -1 at a node without load: open is impossible
     S, F = np.eye(2), np.array([1.0])

@@ -92,6 +92,8 @@ def test_a_stalling_engine_is_replaced(monkeypatch, problem, alpha, share):
     roots = enumsol.enumerate_roots(problem, alpha, "fast")
     assert failing.count > 0
     assert roots.stats.fallback_qps == failing.count
+    assert f"stalled: {failing.count} of {roots.stats.qps} relaxation" in repr(roots)
+    assert "stalled" not in repr(want)
     assert not differences(roots, want)
 
 

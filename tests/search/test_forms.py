@@ -63,7 +63,7 @@ def test_the_roots_are_the_same(eager, monkeypatch):
 def test_a_long_search_is_shorter_with_forms(monkeypatch):
     problem = gallery.clamped_block(32, 16)
     plain = enumerate_roots(problem, 0.3)
-    monkeypatch.setattr(policy, "NODES", 1)
+    monkeypatch.setattr(policy, "NODES", 100)
     found = enumerate_roots(problem, 0.3)
     assert found.complete
     assert kinds_of(found.proof).count("f") > 20
@@ -84,7 +84,7 @@ def test_a_good_form_leaves_little_more_than_one_path(monkeypatch):
 def test_wedges_go_on_with_the_energy(monkeypatch):
     entry = gallery.get("wedge-8-5")
     plain = enumerate_roots(entry.build(), entry.alpha)
-    monkeypatch.setattr(policy, "NODES", 1)
+    monkeypatch.setattr(policy, "NODES", 100)
     found = enumerate_roots(entry.build(), entry.alpha)
     assert records_of(found.proof) == records_of(plain.proof)
 
@@ -342,7 +342,7 @@ def _row(kind, i, S, g, F):
 
 def test_a_search_that_is_stopped_after_it_began_again_claims_what_it_has(monkeypatch):
     problem = gallery.clamped_block(32, 16)
-    monkeypatch.setattr(policy, "NODES", 1)
+    monkeypatch.setattr(policy, "NODES", 100)
     cut = enumerate_roots(problem, 0.3, max_nodes=100)
     assert not cut.complete
     report = verify(problem, cut.proof)
@@ -352,7 +352,7 @@ def test_a_search_that_is_stopped_after_it_began_again_claims_what_it_has(monkey
 
 def test_workers_make_the_same_proof(monkeypatch):
     problem = gallery.clamped_block(32, 16)
-    monkeypatch.setattr(policy, "NODES", 1)
+    monkeypatch.setattr(policy, "NODES", 100)
     monkeypatch.setattr(policy, "MORE", -2.0)
     found = []
     for workers in (1, 2):

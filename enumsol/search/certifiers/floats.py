@@ -10,7 +10,8 @@ import numpy as np
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.margins import margin_of_form
 from enumsol.search.certifiers.protocol import UndecidedPart, WithoutProof
-from enumsol.search.closing import NEAR, holds_below, propose, start, without_load
+from enumsol.search.closing import holds_below, propose, start, without_load
+from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution, VertexLimitError
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ class FastCertifier(WithoutProof):
         """The solutions below a partial assignment, none or one, if it can hold one only; within the tolerance."""
         solver = self._selections
         proposal = propose(solver.system, codes, *start(solver.system, relaxation), exactly=True)
-        if proposal is None:
+        if proposal is None or proposal.weights is None:
             return None
         if proposal.least < -max(_CLEARLY, 2.0 * solver.tolerance):
             return []

@@ -59,16 +59,16 @@ class ExactCertifier(WithoutProof):
         if self._enclosed is None:
             return None
         proposal = propose(self._scaled, codes, force, w, exactly=True, sides=False)
-        if proposal is None:
+        if proposal is None or proposal.weights is None:
             return None
-        sign = definite_sign(self._enclosed, proposal.selection, proposal.free, proposal.tau)
+        sign = definite_sign(self._enclosed, proposal.selection, proposal.free, proposal.weights)
         solver = self._selections
         solved = solver.solve_equations(proposal.selection, solver.system.g) if sign else None
         if solved is None:
             return None
         point, determinant = solved
         active, resting = solver.active(point), solver.resting(point)
-        free = zip(proposal.free, proposal.tau, strict=True)
+        free = zip(proposal.free, proposal.weights[: len(proposal.free)], strict=True)
         uncounted = [not F or rests for F, rests in zip(solver.F_positive, resting, strict=True)]
         if not all(proposal.selection[i] in active[i] and (tau > 0 or uncounted[i]) for i, tau in free):
             return None

@@ -18,6 +18,7 @@ from enumsol.proof.proof_file import fraction_text, packed
 from enumsol.search.certifiers.margins import energy_margin, margin_of_form
 from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
 from enumsol.search.closing import propose, start, without_load
+from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import CONDITIONS, RowKind
 
@@ -206,10 +207,9 @@ class VerifiedCertifier:
             return None
         near = start(self._scaled, relaxation)
         proposal = propose(self._scaled, codes, *near, exactly=False)
-        found = self._closed(codes, proposal, near)
-        if found and proposal is not None:
+        if proposal is not None and proposal.least >= -NEAR:
             self._take_note(proposal.force, self._scaled.g - self._scaled.S @ proposal.force)
-        return found
+        return self._closed(codes, proposal, near)
 
     def _closed(
         self, codes: Codes, proposal: Proposal | None, near: tuple[Array, Array]
@@ -218,12 +218,12 @@ class VerifiedCertifier:
         # statuses that do not hold strictly are told by rationals, where there are any
         if proposal is not None and ball is not None and (proposal.strict or ball.is_excluded or self._is_known(ball)):
             return self._closed_by(proposal, ball)
-        certifier = self._exact()
+        certifier = None if proposal is not None and proposal.hopeless else self._exact()
         if certifier is not None and (exact := certifier.closing(codes, *near)) is not None:
             closing, solutions = exact
             self._known += [solution.codes for solution in solutions]
             self._escalations.rationals += 1
-            self._leaf(Leaf.CLOSED_IN_RATIONALS, closing.selection, closing.tau.tolist(), len(solutions))
+            self._leaf(Leaf.CLOSED_IN_RATIONALS, closing.selection, closing.numbers, len(solutions))
             return solutions
         found = None if proposal is None or ball is None else self._closed_by(proposal, ball)
         if found and proposal is not None and certifier is not None:
@@ -247,8 +247,10 @@ class VerifiedCertifier:
         return None if proposal is None or ball is None else self._closed_by(proposal, ball)
 
     def _proven(self, proposal: Proposal) -> ClosedSolution | None:
-        system, tau = _present(self._enclosed), proposal.tau
-        ball = closed_solution(system, proposal.named, proposal.free, tau, proposal.force)
+        system = _present(self._enclosed)
+        if proposal.weights is None:
+            return None
+        ball = closed_solution(system, proposal.named, proposal.free, proposal.weights, proposal.force)
         return ball if ball is not None and (ball.is_root or ball.is_excluded) else None
 
     def _is_known(self, ball: ClosedSolution) -> bool:
@@ -257,7 +259,12 @@ class VerifiedCertifier:
 
     def _closed_by(self, proposal: Proposal, ball: ClosedSolution) -> list[SelectionSolution] | None:
         """Write a leaf and give its solutions; None where a root could not be told from another one."""
-        record = [proposal.named, proposal.free, proposal.tau.tolist(), (ball.force * self._scaled.force).tolist()]
+        record = [
+            proposal.named,
+            proposal.free,
+            proposal.numbers,
+            (ball.force * self._scaled.force).tolist(),
+        ]
         if ball.is_excluded:
             self._escalations.balls += 1
             self._leaf(Leaf.CLOSED, *record)
