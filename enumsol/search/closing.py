@@ -54,6 +54,7 @@ class Proposal:
     strict : every status in the proof holds strictly
     least : least slack of the conditions of the fixed nodes
     sign : of the determinant of the fixed nodes' equations
+    sensitivity : how much a fixed node's force changes at most with a component of w
     """
 
     selection: Codes
@@ -65,6 +66,7 @@ class Proposal:
     strict: bool
     least: float
     sign: int
+    sensitivity: float
 
     @property
     def numbers(self) -> list[float]:
@@ -232,7 +234,8 @@ def propose(
     least = float(np.min(slack[fixed], initial=np.inf))
     strict = bool(np.all(np.abs(slack) > NEAR))
     hopeless = weights is None and np.array_equal(counted, _counted(reduction, selection, force, w, exactly=True))
-    return Proposal(tuple(selection), sliding, free, force, weights, hopeless, strict, least, reduction.sign)
+    sign, sensitivity = reduction.sign, reduction.sensitivity
+    return Proposal(tuple(selection), sliding, free, force, weights, hopeless, strict, least, sign, sensitivity)
 
 
 def without_load(system: ScaledSystem, force: Array, w: Array) -> dict[int, int]:

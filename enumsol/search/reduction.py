@@ -61,6 +61,7 @@ class Reduction:
         self.sign = int(np.linalg.slogdet(M)[0])
         # a singular matrix is refused by whoever proves something of it
         self.Z = np.linalg.solve(M, np.column_stack([system.g[rows], across[rows]]))
+        self.sensitivity = float(np.max(np.abs(np.linalg.inv(M)), initial=0.0))
         moved = S[self.places] @ self.E @ self.Z
         self.R, self.h = across[self.places] - moved[:, 1:], system.g[self.places] - moved[:, 0]
 

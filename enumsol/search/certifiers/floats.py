@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 #: A condition is broken beyond doubt: one that is broken by less may hold within the tolerance at another point.
 _CLEARLY = 1e-6
+#: A point whose conditions hold within the tolerance is near the solution of a closed subtree: nearer than this.
+_NEARBY = 1e-3
 
 
 def solve_or_open(solver: SelectionSolver, codes: Codes) -> SelectionSolution | UndecidedPart | None:
@@ -66,7 +68,10 @@ class FastCertifier(WithoutProof):
         """The solutions below a partial assignment, none or one, if it can hold one only; within the tolerance."""
         solver = self._selections
         proposal = propose(solver.system, codes, *start(solver.system, relaxation), exactly=True)
-        if proposal is None or proposal.weights is None:
+        if proposal is None or proposal.weights is None or 2.0 * solver.tolerance * proposal.sensitivity > _NEARBY:
+            return None
+        # with omega forms are definite where they nearly are not: several points may hold within the tolerance
+        if len(proposal.weights) > len(proposal.free):
             return None
         if proposal.least < -max(_CLEARLY, 2.0 * solver.tolerance):
             return []
