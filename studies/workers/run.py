@@ -7,6 +7,9 @@ compute, with the start of the workers; more than without workers is what sharin
 
 Read ``times one`` (how many times as fast as one worker). The proofs of all numbers of workers must be the same file.
 Nothing else may run on the machine, and threads of linear algebra must be off (OMP_NUM_THREADS=1).
+
+``--size 64`` once: 88 s with one worker, 57 s with two, 1.56 times as fast. One process puts together the proof, of 270
+MB.
 """
 
 from __future__ import annotations
