@@ -90,8 +90,8 @@ def branch_graph(
         is made of these arcs; up to 24 degrees of freedom, and up to 250 if bounds left something open, it is made by
         exact algebra instead, for the same matrices (``graph.data.arcs_by`` says which). Beyond 250, or where exact
         algebra would take more than some minutes, what is left open is a vertex of kind "unsettled", and the graph is
-        not complete. Only where A is positive definite within
-        rounding are more than 24 degrees of freedom about S and g as computed in floats (``graph.certified_data``).
+        not complete. Only where A is positive definite within rounding are more than 24 degrees of freedom about S and
+        g as computed in floats (``graph.certified_data``).
         "fast": exact algebra, but the search trusts floats; never claimed to be complete; S and g as computed beyond 24
         degrees of freedom. "exact": everything in rationals, for the problem's own matrices of up to 250 degrees of
         freedom, and slow beyond some ten contact nodes.

@@ -53,8 +53,7 @@ class Proposal:
     hopeless : nor would rationals find any, which tell more nodes that need not be in the test
     strict : every status in the proof holds strictly
     least : least slack of the conditions of the fixed nodes
-    sign : of the determinant of the fixed nodes' equations
-    sensitivity : how much a fixed node's force changes at most with a component of w
+    reduction : Reduction
     """
 
     selection: Codes
@@ -65,8 +64,7 @@ class Proposal:
     hopeless: bool
     strict: bool
     least: float
-    sign: int
-    sensitivity: float
+    reduction: Reduction
 
     @property
     def numbers(self) -> list[float]:
@@ -191,7 +189,14 @@ def start(system: ScaledSystem, relaxation: Relaxation | None) -> tuple[Array, A
 
 
 def propose(
-    system: ScaledSystem, codes: Codes, force: Array, w: Array, *, exactly: bool, sides: bool = True
+    system: ScaledSystem,
+    codes: Codes,
+    force: Array,
+    w: Array,
+    *,
+    exactly: bool,
+    sides: bool = True,
+    factors: bool = True,
 ) -> Proposal | None:
     """What may close a subtree, or None.
 
@@ -203,6 +208,7 @@ def propose(
     exactly : for a proof in rationals, in which statuses need not hold strictly; otherwise nodes whose status does not
         hold strictly are freed, or slide
     sides : nodes that are open or slip in one direction slide; otherwise they are free
+    factors : omega other than 1 may be proposed
     """
     free = tuple(i for i, code in enumerate(codes) if code not in _FINAL and (code not in SLIDING or not sides))
     sliding = {} if not sides else {i: code for i, code in enumerate(codes) if code in SLIDING}
@@ -230,12 +236,11 @@ def propose(
         sliding |= {i: resting[i] for i in loose if codes[i] in SLIDING.get(resting.get(i, 0), ())}
         free = tuple(sorted({*free, *loose} - sliding.keys()))
     counted = _counted(reduction, selection, force, w, exactly=exactly)
-    weights = reduction.weights(counted)
+    weights = reduction.weights(counted, factors=factors)
     least = float(np.min(slack[fixed], initial=np.inf))
     strict = bool(np.all(np.abs(slack) > NEAR))
     hopeless = weights is None and np.array_equal(counted, _counted(reduction, selection, force, w, exactly=True))
-    sign, sensitivity = reduction.sign, reduction.sensitivity
-    return Proposal(tuple(selection), sliding, free, force, weights, hopeless, strict, least, sign, sensitivity)
+    return Proposal(tuple(selection), sliding, free, force, weights, hopeless, strict, least, reduction)
 
 
 def without_load(system: ScaledSystem, force: Array, w: Array) -> dict[int, int]:

@@ -28,7 +28,13 @@ _LEAST_STEP, _SHORTER, _INSIDE = 1e-6, 0.7, 0.9
 
 
 def weights_of(
-    R: Array, F: Array, normal: NDArray[np.intp], tangential: NDArray[np.intp], tied: NDArray[np.intp]
+    R: Array,
+    F: Array,
+    normal: NDArray[np.intp],
+    tangential: NDArray[np.intp],
+    tied: NDArray[np.intp],
+    *,
+    factors: bool = True,
 ) -> Array | None:
     """tau and omega for which Q of theory, (6.9), is definite; None where none were found.
 
@@ -39,6 +45,7 @@ def weights_of(
     normal, tangential : (b,) arrays, places of their lambda_n and lambda_t in x
     tied : (k,) array of int
         Number of the omega of every component; those with the same number have the same.
+    factors : whether omega are sought where 1 will not do
 
     Returns
     -------
@@ -46,7 +53,7 @@ def weights_of(
     """
     try:
         tau = tau_of(R, F, normal, tangential)
-        return _Barrier(R, F, normal, tangential, tied).numbers() if tau is None else tau
+        return _Barrier(R, F, normal, tangential, tied).numbers() if tau is None and factors else tau
     except np.linalg.LinAlgError:
         return None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,13 +58,17 @@ class Reduction:
             self.E[p + i, k] = 1.0
         across = S[:, self.places]
         across[:, : len(self.free)] += S[:, p + self.nodes] * self.turn
-        M = S[rows] @ self.E
+        self.M = M = S[rows] @ self.E
         self.sign = int(np.linalg.slogdet(M)[0])
         # a singular matrix is refused by whoever proves something of it
         self.Z = np.linalg.solve(M, np.column_stack([system.g[rows], across[rows]]))
-        self.sensitivity = float(np.max(np.abs(np.linalg.inv(M)), initial=0.0))
         moved = S[self.places] @ self.E @ self.Z
         self.R, self.h = across[self.places] - moved[:, 1:], system.g[self.places] - moved[:, 0]
+
+    @cached_property
+    def sensitivity(self) -> float:
+        """How much a fixed node's force changes at most with a component of w."""
+        return float(np.max(np.abs(np.linalg.inv(self.M)), initial=0.0))
 
     def forces(self, x: Array) -> Array:
         """lambda for the forces of the nodes that are free or slide."""
@@ -148,10 +153,10 @@ class Reduction:
 
     # -- the test of definiteness ----------------------------------------------------------------------------------
 
-    def weights(self, counted: NDArray[np.bool_]) -> Array | None:
+    def weights(self, counted: NDArray[np.bool_], *, factors: bool) -> Array | None:
         """tau and omega for which Q of theory, (6.9), is definite, as a proof has them; None if none were found.
 
-        tau is 0 at nodes that do not count; without omega all of them are 1.
+        tau is 0 at nodes that do not count; without omega, which are sought with ``factors``, all of them are 1.
         """
         if not len(self.places):
             return np.zeros(0)
@@ -160,7 +165,7 @@ class Reduction:
         alike, tied = np.flatnonzero(self.rubbing & ~counted), np.arange(len(self.places))
         tied[self.tangential[alike]] = alike
         tied = np.unique(tied, return_inverse=True)[1]
-        found = weights_of(self.R, self.system.F[self.nodes[used]], used, self.tangential[used], tied)
+        found = weights_of(self.R, self.system.F[self.nodes[used]], used, self.tangential[used], tied, factors=factors)
         if found is None:
             return None
         tau = np.zeros(len(self.nodes))

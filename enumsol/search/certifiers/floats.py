@@ -67,18 +67,18 @@ class FastCertifier(WithoutProof):
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, none or one, if it can hold one only; within the tolerance."""
         solver = self._selections
-        proposal = propose(solver.system, codes, *start(solver.system, relaxation), exactly=True)
-        if proposal is None or proposal.weights is None or 2.0 * solver.tolerance * proposal.sensitivity > _NEARBY:
-            return None
         # with omega forms are definite where they nearly are not: several points may hold within the tolerance
-        if len(proposal.weights) > len(proposal.free):
+        proposal = propose(solver.system, codes, *start(solver.system, relaxation), exactly=True, factors=False)
+        if proposal is None or proposal.weights is None:
+            return None
+        if 2.0 * solver.tolerance * proposal.reduction.sensitivity > _NEARBY:
             return None
         if proposal.least < -max(_CLEARLY, 2.0 * solver.tolerance):
             return []
         solution = solver.solve(proposal.selection)
         if solution is None or solution.dimension > 0 or not holds_below(codes, solver.active(solution.vertices[0])):
             return None
-        return [replace(solution, index=proposal.sign if proposal.least > NEAR else None)]
+        return [replace(solution, index=proposal.reduction.sign if proposal.least > NEAR else None)]
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in the selection within the tolerance."""
