@@ -25,7 +25,7 @@ from unittest.mock import patch
 import numpy as np
 
 import enumsol
-from enumsol.search.definite import tau_of, weights_of
+from enumsol.search.definite import weights_of
 from enumsol.search.reduction import NEAR, Reduction
 from enumsol.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from grazing.run import SOFT, STIFF
@@ -78,10 +78,10 @@ def problems(run):
                     yield kind, name, count, seed, discs(radii, weights, stiffness)
 
 
-def with_ones(R, F, normal, tangential, tied):
+def with_ones(*form, factors):
     """What is found if all omega are 1."""
-    del tied
-    return tau_of(R, F, normal, tangential)
+    del factors
+    return weights_of(*form, factors=False)
 
 
 def forms(system, root):
@@ -101,9 +101,9 @@ def forms(system, root):
     for sliding in ({}, sides):
         undecided = tuple(i for i in free if i not in sliding)
         reduction = Reduction(system, codes, undecided, sliding)
-        for method in (with_ones, weights_of):
-            with patch("enumsol.search.reduction.weights_of", method):
-                definite.append(yes(reduction.weights(np.ones(len(free), dtype=bool)) is not None))
+        for factors in (False, True):
+            weights = reduction.weights(np.ones(len(free), dtype=bool), factors=factors)
+            definite.append(yes(weights is not None))
     return len(free), len(sides), *definite
 
 
