@@ -22,18 +22,15 @@ class Closings:
         self.unit = [length / force for length, force in zip(*units, strict=True)]
         self.points = {}
 
-    def leaf(self, codes, selection, free, tau, mid, rad=None, index=None):
+    def leaf(self, codes, selection, free, numbers, mid, rad=None, index=None):
         self.check(selection, free, codes)
         core = tuple(6 if i in free else code for i, code in enumerate(selection))
         reduced = Reduced(self.forms, core, self.friction)
-        tau, omega = self.weights(free, tau, reduced)
-        need(reduced.definite(tau, omega), "a form is not definite")
+        numbers = self.numbers(numbers, selection, reduced)
         points = reduced.solutions()
         need(len(points) == 1, "a reduced problem has no solution or several")
         (point,) = points
-        for i in free:
-            if self.friction[i] and tau[i] == 0:
-                need(self.apart_from_contact(point, i, reduced, omega) < 0, "a node needs a weight")
+        self.serves(numbers, reduced, point)
         need(len(mid) == 2 * self.p, "a point has another size")
         values = [value for i in reduced.fixed for value in self.conditions(core[i], i, point)]
         values += [self.slides(core[i], i, point) for i in reduced.sliding]
@@ -47,7 +44,7 @@ class Closings:
         need(integer(index) == (1 if reduced.determinant > 0 else -1), "an index is wrong")
         self.points[as_point(point)] = point
 
-    def exact_leaf(self, codes, selection, tau, count):
+    def exact_leaf(self, codes, selection, numbers, count):
         """The selection as a polytope to be counted, if the leaf holds its solution."""
         free = [i for i, code in enumerate(codes) if code > 4]
         self.check(selection, free, codes)
@@ -57,16 +54,9 @@ class Closings:
         need(N.det() != 0, "a selection is singular")
         point = N.solve(column_of([-form[-1] for form in equations])).entries()
         reduced = Reduced(self.forms, tuple(6 if i in free else c for i, c in enumerate(selection)), self.friction)
-        tau, omega = self.weights(free, tau, reduced)
-        need(reduced.definite(tau, omega), "a form is not definite")
+        self.serves(self.numbers(numbers, selection, reduced), reduced, point)
         holds = {i: min(self.conditions(selection[i], i, point)) >= 0 for i in range(self.p)}
         need(all(holds[i] for i in free), "the reduced problem has another solution")
-        for i in free:
-            if self.friction[i] and tau[i] == 0:
-                n, t, w_n, w_t = self.values(point, i)
-                apart = n == 0 and self.apart_from_contact(point, i, reduced, omega) <= 0
-                rests = t == 0 and (apart or w_n == w_t == 0)
-                need(rests, "a node needs a weight")
         need([as_point(x) for x in reduced.solutions()] == [as_point(point)], "a reduced problem has several solutions")
         touching = all(self.values(point, i)[2] == 0 for i in free if codes[i] == 5)
         need(integer(count) == int(touching and all(holds.values())), "a leaf holds another number of roots")
@@ -88,24 +78,41 @@ class Closings:
             need(i in free or codes[i] in (code, *SIDES.get(code, ())), "a fixed node has another code")
         need(list(free) == sorted({integer(i) for i in free if 0 <= i < self.p}), "free nodes are out of order")
 
-    def weights(self, free, numbers, reduced):
-        """tau by nodes, omega by components of x."""
-        size, components = len(free), len(reduced.places)
-        need(len(numbers) in (size, size + components), "there are not as many weights as free nodes")
-        tau = {i: exact(value) * self.unit[i] for i, value in zip(free, numbers[:size], strict=True)}
-        need(all(value >= 0 for value in tau.values()), "a weight is negative")
-        omega = [exact(value) for value in numbers[size:]] or [fmpq(1)] * components
-        need(all(value > 0 for value in omega), "a factor is not positive")
-        return tau | {i: fmpq(0) for i in reduced.sliding}, omega
+    def numbers(self, numbers, selection, reduced):
+        """mu, kappa, nu, theta / F and tau by nodes; what is asked of them without a solution."""
+        m, rubbing = len(reduced.free), reduced.rubbing
+        need(len(numbers) == m + 4 * len(rubbing), "there are not as many numbers as a form has")
+        numbers = [exact(value) for value in numbers]
+        mu = dict(zip(reduced.free, numbers[:m], strict=True))
+        parts = [numbers[m + k * len(rubbing) : m + (k + 1) * len(rubbing)] for k in range(4)]
+        kappa, nu, share, tau = (dict(zip(rubbing, part, strict=True)) for part in parts)
+        need(all(value > 0 for value in [*mu.values(), *kappa.values()]), "a number is not positive")
+        for i in rubbing:
+            need(abs(nu[i]) * self.forms.F[i] <= mu[i], "nu is too large")
+            need(abs(share[i]) <= 1, "theta is too large")
+            need(selection[i] not in (2, 3) or share[i] == 5 - 2 * selection[i], "theta does not serve slip")
+            need(tau[i] >= 0 and (tau[i] == 0 or share[i] == 0), "tau is wrong")
+        return mu, kappa, nu, share, {i: value * self.unit[i] for i, value in tau.items()}
+
+    def serves(self, numbers, reduced, point):
+        """Whether the form is definite with what theta has to be at a solution."""
+        mu, kappa, nu, share, tau = numbers
+        theta = {}
+        for i in reduced.rubbing:
+            F, (n, t, w_n, w_t) = self.forms.F[i], self.values(point, i)
+            theta[i] = share[i] * F
+            if tau[i] > 0:
+                continue
+            if n > 0:
+                theta[i] = t / n
+            else:
+                need((mu[i] + nu[i] * F) * -w_n >= kappa[i] * (F - theta[i]) * w_t, "theta does not serve slip+")
+                need((mu[i] - nu[i] * F) * -w_n >= kappa[i] * (F + theta[i]) * -w_t, "theta does not serve slip-")
+        need(reduced.definite(mu, kappa, nu, theta, tau), "a form is not definite")
 
     def values(self, point, i):
         w = [_value(self.forms.move(1, k), point) for k in (i, self.p + i)]
         return point[i], point[self.p + i], *w
-
-    def apart_from_contact(self, point, i, reduced, omega):
-        _, _, w_n, w_t = self.values(point, i)
-        along, across = (omega[reduced.places.index(k)] for k in (i, self.p + i))
-        return along * w_n + across * self.forms.F[i] * abs(w_t)
 
     def slides(self, code, i, point):
         """Positive where the node is open or slips to its side, strictly; negative where it must and does not."""
@@ -138,16 +145,21 @@ class Reduced:
         solved = N.solve(fmpq_mat(sides).transpose()).transpose().tolist()
         self.R = [[-_value(forms.move(1, k), x, 0) for x in solved[1:]] for k in self.places]
 
-    def definite(self, tau, omega):
-        size, m = len(self.places), len(self.free)
-        R = [[factor * value for value in row] for factor, row in zip(omega, self.R, strict=True)]
-        Q = [[(R[a][b] + R[b][a]) / 2 for b in range(size)] for a in range(size)]
-        for n, i in enumerate(self.free):
-            if self.friction[i] and tau[i] > 0:
-                r = R[m + self.rubbing.index(i)]
-                Q[n][n] -= tau[i] / 2
-                factor = self.forms.F[i] ** 2 / tau[i] / 2
-                Q = [[q - factor * r[a] * r[b] for b, q in enumerate(row)] for a, row in enumerate(Q)]
+    def definite(self, mu, kappa, nu, theta, tau):
+        size = len(self.places)
+        rows = [[mu[i] * value for value in self.R[k]] for k, i in enumerate(self.free)]
+        losses = []
+        for k, i in enumerate(self.rubbing, start=len(self.free)):
+            n = self.free.index(i)
+            r = [kappa[i] * value for value in self.R[k]]
+            rows[n] = [a - theta[i] * b for a, b in zip(rows[n], r, strict=True)]
+            rows.append([nu[i] * a + b for a, b in zip(self.R[n], r, strict=True)])
+            if tau[i] > 0:
+                losses.append((n, tau[i] / 2, r, self.forms.F[i] ** 2 / tau[i] / 2))
+        Q = [[(rows[a][b] + rows[b][a]) / 2 for b in range(size)] for a in range(size)]
+        for n, half, r, factor in losses:
+            Q[n][n] -= half
+            Q = [[q - factor * r[a] * r[b] for b, q in enumerate(row)] for a, row in enumerate(Q)]
         return all(fmpq_mat([row[:k] for row in Q[:k]]).det() > 0 for k in range(1, size + 1))
 
     def solutions(self):

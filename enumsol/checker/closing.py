@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from flint import fmpq, fmpq_mat
+from flint import fmpq_mat
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.arithmetic.rationals import to_fraction
-from enumsol.kernel.closing import closed_solution, definite_sign, final_codes, same_solution
+from enumsol.kernel.closing import closed_solution, final_codes, only_solution, same_solution
 from enumsol.kernel.rows import BACKWARD, CONTACT, FORWARD, FRICTIONLESS, OPEN, STICK, refines
 from enumsol.proof.reading import numbers_from
 
@@ -65,8 +65,6 @@ def closed_in_rationals(
     if any(code != selection[i] for i, code in enumerate(codes) if i not in free):
         return "its selection is none below its assignment", selection, []
     weights = _weights(record[2], free, selection, friction)
-    if not definite_sign(system, selection, free, weights):
-        return "its reduced form is not proven definite", selection, []
     point = _point(rational, selection)
     if point is None:
         return "its selection is singular", selection, []
@@ -74,10 +72,8 @@ def closed_in_rationals(
     least = {i: min(rational.node_conditions(selection[i], i, point)) for i in range(rational.p)}
     if any(least[i] < 0 for i in free):
         return "the point of its selection does not solve the reduced problem", selection, []
-    factors = _factors(weights, free, friction)
-    uncounted = [i for i, tau in zip(free, weights, strict=False) if tau == 0 and friction[i]]
-    if not all(_rests(rational, point, w, i, *factors[i]) for i in uncounted):
-        return "a node of its reduced form needs a weight", selection, []
+    if not only_solution(system, selection, free, weights, point, w):
+        return "its solution is not proven to be the only one", selection, []
     touching = all(w[i] == 0 for i, code in enumerate(codes) if code == CONTACT)
     holds = touching and all(least[i] >= 0 for i in range(rational.p) if i not in free)
     if record[3] is not holds and (type(record[3]) is not int or record[3] != int(holds)):
@@ -119,21 +115,9 @@ def _nodes(value: Any, p: int) -> tuple[int, ...]:
 
 
 def _weights(value: Any, free: Codes, selection: Codes, friction: NDArray[np.bool_]) -> Array:
-    """tau of the free nodes, and omega of the components of x if there are as many numbers."""
+    """The numbers of the form: one for every free or sliding node, and four more where a free node has friction."""
     sliding = sum(code in (FORWARD, BACKWARD) for code in selection)
-    size, components = len(free), len(free) + sliding + int(np.count_nonzero(friction[list(free)]))
-    with_factors = isinstance(value, list) and len(value) == size + components
-    weights = numbers_from(value, size + components if with_factors else size)
-    if np.any(weights[:size] < 0) or np.any(weights[size:] <= 0):
-        raise ValueError("a weight is negative, or a factor is not positive")
-    return weights
-
-
-def _factors(weights: Array, free: Codes, friction: NDArray[np.bool_]) -> dict[int, tuple[Any, Any]]:
-    """Both omega of every free node with friction, where no node slides."""
-    size, rubbing = len(free), [k for k, i in enumerate(free) if friction[i]]
-    omega = [fmpq(*x.as_integer_ratio()) for x in weights[size:].tolist()] or [fmpq(1)] * (size + len(rubbing))
-    return {free[k]: (omega[k], omega[size + j]) for j, k in enumerate(rubbing)}
+    return numbers_from(value, len(free) + sliding + 4 * int(np.count_nonzero(friction[list(free)])))
 
 
 def _point(rational: RationalSystem, selection: Codes) -> list[Any] | None:
@@ -162,12 +146,3 @@ def _point(rational: RationalSystem, selection: Codes) -> list[Any] | None:
 def _displacements(rational: RationalSystem, point: list[Any]) -> list[Any]:
     moved = (rational.S * fmpq_mat([[x] for x in point])).entries()
     return [g - x for g, x in zip(rational.g, moved, strict=True)]
-
-
-def _rests(rational: RationalSystem, point: list[Any], w: list[Any], node: int, along: Any, across: Any) -> bool:
-    """Whether the test of definiteness need not count a node with these omega (theory, (6.9))."""
-    n, t = node, rational.p + node
-    if point[t] != 0:
-        return False
-    apart = point[n] == 0 and along * w[n] + across * rational.F[node] * abs(w[t]) <= 0
-    return bool(apart or (w[n] == 0 and w[t] == 0))

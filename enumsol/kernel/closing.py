@@ -7,9 +7,8 @@ passes a test of definiteness it has exactly one solution, which is enclosed wit
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -99,25 +98,38 @@ def closed_solution(
     selection : final codes, those of the free nodes only name a point near the solution; FORWARD or BACKWARD where a
         node slides
     free : ascending nodes, none of which slides
-    weights : tau of the free nodes, positive, or 0 where a node is open by more than its slip bound (theory, (6.9));
-        then omega of the components of x, all positive, unless all are 1
-    force : (2p,) array, lambda near the solution; only that of nodes that are free or slide is read
+    weights : numbers of the form of theory, (6.9), as ``Weights.of`` takes them
+    force : (2p,) array, lambda near the solution; only lambda_n of nodes that are free or slide is read
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         reduced = Reduced.of(system, selection, free)
-        numbers = None if reduced is None else reduced.numbers(weights)
-        return None if reduced is None or numbers is None else reduced.enclosed(*numbers, force)
+        numbers = None if reduced is None else Weights.of(reduced, weights)
+        return None if reduced is None or numbers is None else reduced.enclosed(numbers, force)
 
 
-def definite_sign(system: EnclosedSystem, selection: Codes, free: Sequence[int], weights: Array) -> int:
-    """The determinant's sign of the fixed nodes' equations if the reduced form is definite, 0 if not proven.
+def only_solution(
+    system: EnclosedSystem,
+    selection: Codes,
+    free: Sequence[int],
+    weights: Array,
+    point: Sequence[Any],
+    w: Sequence[Any],
+) -> int:
+    """The determinant's sign of the fixed nodes' equations if a solution of the reduced problem is its only one.
 
-    Where tau is zero nothing is asked of the node: that it may be so is to be shown otherwise (theory, (6.9)).
+    0 where that is not proven.
+
+    Parameters
+    ----------
+    system, selection, free, weights : as for ``closed_solution``; no node slides
+    point, w : 2p rationals each, lambda in units of force and w in units of length
+        At a solution of the reduced problem that has the statuses of the selection.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         reduced = Reduced.of(system, selection, free)
-        numbers = None if reduced is None else reduced.numbers(weights)
-        return reduced.sign if reduced is not None and numbers is not None and reduced.least(*numbers) > 0 else 0
+        numbers = None if reduced is None else Weights.of(reduced, weights)
+        numbers = None if reduced is None or numbers is None else numbers.at(reduced, point, w)
+        return reduced.sign if reduced is not None and numbers is not None and reduced.least(numbers) > 0 else 0
 
 
 def same_solution(
@@ -137,6 +149,118 @@ def same_solution(
 
 
 _SLIDING = (FORWARD, BACKWARD)
+_SIGNS = {SLIP_PLUS: 1, SLIP_MINUS: -1}
+
+
+@dataclass(frozen=True)
+class Weights:
+    """The numbers of the form of theory, (6.9).
+
+    Attributes
+    ----------
+    mu : one number a node
+    kappa, nu, share, tau : one number for every free node with friction
+    slope : Ball
+        theta there.
+    friction : Ball
+        F there.
+    normal : places of lambda_n of free nodes with friction
+    """
+
+    mu: Array
+    kappa: Array
+    nu: Array
+    share: Array
+    tau: Array
+    slope: Ball
+    friction: Ball
+    normal: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, reduced: Reduced, numbers: Array) -> Weights | None:
+        """From one array: mu of all nodes, then kappa, nu, theta / F and tau of the free ones with friction.
+
+        mu and kappa are positive, |nu| F <= mu, |theta| <= F; theta = +-F at nodes that slip in the selection; tau is
+        not negative, and theta = 0 where it is positive. None where this is not so.
+        """
+        system, m, normal = reduced.system, len(reduced.nodes), np.flatnonzero(reduced.tangential >= 0)
+        if len(numbers) != m + 4 * len(normal) or not np.all(np.isfinite(numbers)):
+            return None
+        mu, (kappa, nu, share, tau) = numbers[:m], numbers[m:].reshape(4, -1)
+        nodes = reduced.nodes[normal]
+        friction = Ball(system.F[nodes], system.F_rad[nodes])
+        sides = np.array([_SIGNS.get(reduced.selection[i], 0) for i in nodes])
+        wrong = (np.abs(share) > 1) | ((sides != 0) & (share != sides)) | ((tau > 0) & (share != 0))
+        wrong |= np.abs(nu) * friction.size * SAFE + TINY > mu[normal]
+        if np.any(wrong) or np.any(mu <= 0) or np.any(kappa <= 0) or np.any(tau < 0):
+            return None
+        turned = friction * Ball.exact(share)
+        whole = np.abs(share) == 1
+        slope = Ball(np.where(whole, share * friction.mid, turned.mid), np.where(whole, friction.rad, turned.rad))
+        return cls(mu, kappa, nu, share, tau, slope, friction, normal)
+
+    def at(self, reduced: Reduced, point: Sequence[Any], w: Sequence[Any]) -> Weights | None:
+        """With theta = lambda_t / lambda_n where lambda_n > 0 at a rational solution; None if they do not serve it."""
+        p, slope = reduced.system.p, Ball(self.slope.mid.copy(), self.slope.rad.copy())
+        for k, i in enumerate(self.normal):
+            node = int(reduced.nodes[i])
+            if self.tau[k] > 0:
+                continue
+            if point[node] != 0:
+                ratio = point[p + node] / point[node]
+                slope.mid[k] = int(ratio.p) / int(ratio.q)
+                slope.rad[k] = 2 * UNIT * abs(slope.mid[k]) + TINY
+            elif self.beyond(k, *_bounds(w[node], w[p + node])) > 0:
+                return None
+        return replace(self, slope=slope)
+
+    def beyond(self, k: int, gap: float, up: float, down: float) -> float:
+        """What w_t of a node that is open is too large for the numbers, if -w_n >= gap and -down <= w_t <= up."""
+        excess = 0.0
+        for side, size in ((1.0, up), (-1.0, down)):
+            left = (1.0 - side * self.share[k]) * self.kappa[k] * self.friction.size[k] * SAFE
+            if left > 0 and size > 0:
+                normal = self.mu[self.normal[k]] + side * self.nu[k] * self.friction.mid[k]
+                normal -= (abs(self.nu[k]) * self.friction.rad[k] + 4 * UNIT * self.mu[self.normal[k]]) * SAFE
+                excess = max(excess, size - max(normal, 0.0) * gap / left / SAFE)
+        return float(excess * SAFE)
+
+    def off(self, k: int, n: Ball, t: Ball, w_n: Ball, w_t: Ball) -> float:
+        """How far theta is at most from one that serves a solution within a node's balls; infinite if that is open."""
+        share, F = float(self.share[k]), self.friction[k]
+        slips = np.sign(w_t.mid) if abs(w_t.mid) > w_t.rad else 0.0
+        if self.tau[k] > 0 or (slips and share == slips):
+            return 0.0
+        if w_n.mid + w_n.rad < 0:
+            up, down = (max(float(side), 0.0) * SAFE for side in (w_t.mid + w_t.rad, w_t.rad - w_t.mid))
+            return np.inf if self.beyond(k, -float(w_n.mid + w_n.rad) / SAFE, up, down) > 0 else 0.0
+        low = float(n.mid - n.rad) / SAFE
+        if low <= 0:
+            return np.inf
+        slope = self.slope[k]
+        if slips:
+            return float((abs(slips * F.mid - slope.mid) + F.rad + slope.rad) * SAFE)
+        # |lambda_t / lambda_n - theta| = |lambda_t - theta lambda_n| / lambda_n
+        apart = t - slope * n
+        return float(apart.size / low * SAFE)
+
+    def moved(self, change: Array) -> float:
+        """Upper bound of ||D'delta||, |delta| <= change."""
+        m, n = len(self.mu), self.normal
+        along = self.mu * change[:m]
+        along[n] += self.kappa * self.slope.size * change[m:]
+        across = np.abs(self.nu) * change[n] + self.kappa * change[m:]
+        return float(upper_norm(np.concatenate([along, across]) * SAFE + TINY) * SAFE)
+
+
+def _bounds(w_n: Any, w_t: Any) -> tuple[float, float, float]:
+    """-w_n >= 0 from below, and from above w_t and -w_t where they are positive, of rationals."""
+    try:
+        gap, slip = -int(w_n.p) / int(w_n.q), int(w_t.p) / int(w_t.q)
+    except OverflowError:
+        return 0.0, np.inf, np.inf
+    size = abs(slip) * SAFE + TINY
+    return max(gap / SAFE - TINY, 0.0), size * bool(w_t > 0), size * bool(w_t < 0)
 
 
 @dataclass(frozen=True)
@@ -212,38 +336,30 @@ class Reduced:
         R, h = across[places] - moved[:, 1:], g[places] - moved[:, 0]
         return cls(system, selection, nodes, places, tangential, rows, turn, forms, Z, R, h, sign)
 
-    @cached_property
-    def _slope(self) -> Array:
-        """Upper bounds of the nodes' friction coefficients."""
-        return np.asarray((self.system.F + self.system.F_rad)[self.nodes] * SAFE)
+    def form(self, numbers: Weights) -> Ball:
+        """D'R, of which (6.9) is the symmetric part."""
+        R, n, t = self.R, np.flatnonzero(self.tangential >= 0), self.tangential[self.tangential >= 0]
+        form = Ball(R.mid.copy(), R.rad.copy())
+        along = R[: len(self.nodes)] * Ball.exact(numbers.mu[:, None])
+        turned = (numbers.slope * Ball.exact(numbers.kappa))[:, None]
+        across = R[n] * Ball.exact(numbers.nu[:, None]) + R[t] * Ball.exact(numbers.kappa[:, None])
+        for rows, part in ((np.arange(len(self.nodes)), along), (n, along[n] - R[t] * turned), (t, across)):
+            form.mid[rows], form.rad[rows] = part.mid, part.rad
+        return form
 
-    def numbers(self, weights: Array) -> tuple[Array, Array] | None:
-        """tau of all nodes, 0 where they slide, and omega of all components; None where these cannot be."""
-        size, count = len(self.places), sum(self.selection[node] not in _SLIDING for node in self.nodes)
-        tau, omega = weights[:count], weights[count:] if len(weights) > count else np.ones(size)
-        if len(tau) < count or len(omega) != size or not np.all(np.isfinite(weights)):
-            return None
-        if np.any(tau < 0) or np.any(omega <= 0):
-            return None
-        return np.concatenate([tau, np.zeros(len(self.nodes) - count)]), omega
-
-    def least(self, tau: Array, omega: Array) -> float:
-        """Lower bound of the smallest eigenvalue of Q (theory, (6.9)), at most 0 where none positive is proven.
-
-        Parameters
-        ----------
-        tau : one number a node
-        omega : one number a component of x
-        """
+    def least(self, numbers: Weights) -> float:
+        """Lower bound of the smallest eigenvalue of Q (theory, (6.9)), at most 0 where none positive is proven."""
         if not len(self.places):
             return 1.0
-        used = np.flatnonzero((self.tangential >= 0) & (tau > 0))
-        R = self.R * Ball.exact(omega[:, None])
-        # weights at least F / sqrt(tau), for any rounding
-        weight = self._slope[used] / np.sqrt(tau[used]) * SAFE + TINY
-        T = R[self.tangential[used]] * Ball.exact(weight[:, None])
+        used = np.flatnonzero(numbers.tau > 0)
+        normal, tau = numbers.normal[used], numbers.tau[used]
+        # weights at least kappa F / sqrt(tau), for any rounding
+        weight = numbers.kappa[used] * numbers.friction.size[used] / np.sqrt(tau) * SAFE + TINY
+        T = self.R[self.tangential[normal]] * Ball.exact(weight[:, None])
         square = Ball(T.mid.T, T.rad.T) @ T
-        Q = R - Ball.exact(np.diag(self._diagonal(used, tau))) - Ball(0.5 * square.mid, 0.5 * square.rad)
+        Q = self.form(numbers) - Ball(0.5 * square.mid, 0.5 * square.rad)
+        Q.mid[normal, normal] -= 0.5 * tau
+        Q.rad[normal, normal] += UNIT * (np.abs(Q.mid[normal, normal]) + tau)
         mid = 0.5 * (Q.mid + Q.mid.T)
         # the symmetric part of the form lies in the mean of both triangles
         rad = (np.maximum(Q.rad, Q.rad.T) + 4 * UNIT * np.abs(mid)) * SAFE
@@ -251,73 +367,53 @@ class Reduced:
             return 0.0
         return float((dense_eigenvalue_bound(mid) - upper_norm(rad)) / SAFE)
 
-    def _diagonal(self, used: NDArray[np.intp], tau: Array) -> Array:
-        diagonal = np.zeros(len(self.places))
-        diagonal[used] = 0.5 * tau[used]
-        return diagonal
-
-    def enclosed(self, tau: Array, omega: Array, force: Array) -> ClosedSolution | None:
+    def enclosed(self, numbers: Weights, force: Array) -> ClosedSolution | None:
         """The solution as a ball, None where it is not proven to exist and to be the only one."""
-        least = self.least(tau, omega)
+        least = self.least(numbers)
         if not least > 0:
             return None
-        x = self._point(force)
-        reach = self._distance(x.mid, self._displacements(x), omega) / least * SAFE
+        x = self._point(force, numbers)
+        reach = self._distance(x.mid, self._displacements(x), numbers) / least * SAFE
         if not np.isfinite(reach):
             return None
         x = Ball(x.mid, (x.rad + reach) * SAFE)
-        easy = np.flatnonzero((tau == 0) & (self.tangential >= 0))
-        if not self._far_from_contact(easy, self._displacements(x), omega):
+        w = self._displacements(x)
+        for i, node in enumerate(self.nodes):
+            # open at every solution
+            if self.selection[node] == OPEN and w.mid[i] + w.rad[i] < 0:
+                x.rad[[i, self.tangential[i]] if self.tangential[i] >= 0 else i] = 0.0
+        w = self._displacements(x)
+        n, t = numbers.normal, self.tangential[numbers.normal]
+        off = np.array([numbers.off(k, x[a], x[b], w[a], w[b]) for k, (a, b) in enumerate(zip(n, t, strict=True))])
+        # at each of them Q is not smaller than this
+        if not least > upper_norm(numbers.kappa * off * upper_norm(self.R[t].size, axis=1)) * SAFE:
             return None
-        # nodes that are open at all solutions
-        x.rad[easy] = x.rad[self.tangential[easy]] = 0.0
-        return self._solution(x, self._displacements(x))
+        return self._solution(x, w)
 
     def _displacements(self, x: Ball) -> Ball:
         """w of the free components."""
         return self.h - (self.R @ Ball(x.mid[:, None], x.rad[:, None]))[:, 0]
 
-    def _far_from_contact(self, nodes: NDArray[np.intp], w: Ball, omega: Array) -> bool:
-        """Whether nodes are open with omega_n w_n + omega_t F |w_t| < 0."""
-        n, t = nodes, self.tangential[nodes]
-        away, across = omega[n] * (w.mid[n] + w.rad[n]), omega[t] * (self._slope[nodes] * w.size[t])
-        largest = away + across + 8 * UNIT * (omega[n] * (np.abs(w.mid[n]) + w.rad[n]) + across) + TINY
-        named_open = all(self.selection[node] == OPEN for node in self.nodes[nodes])
-        return named_open and bool(np.all(largest < 0))
-
-    def _point(self, force: Array) -> Ball:
+    def _point(self, force: Array, numbers: Weights) -> Ball:
         """Forces in the cones, with the statuses of the selection, near the given ones."""
-        p, system = self.system.p, self.system
-        mid, rad = np.zeros(len(self.places)), np.zeros(len(self.places))
-        for i, node in enumerate(self.nodes):
-            code, t = self.selection[node], self.tangential[i]
-            if code == OPEN:
-                continue
-            n = max(float(force[node]), 0.0)
-            mid[i] = n
-            if code in _SLIDING:
-                continue
-            if code == STICK:
-                bound = max(system.F[node] - system.F_rad[node], 0.0) * n / SAFE
-                mid[t] = min(max(float(force[p + node]), -bound), bound)
-            elif code in (SLIP_PLUS, SLIP_MINUS):
-                mid[t] = (1.0 if code == SLIP_PLUS else -1.0) * system.F[node] * n
-                rad[t] = (system.F_rad[node] * n + 2 * UNIT * abs(mid[t])) * SAFE + TINY
-        return Ball(mid, rad)
+        mid = np.array([0.0 if self.selection[i] == OPEN else max(float(force[i]), 0.0) for i in self.nodes])
+        turned = Ball.exact(mid[self.tangential >= 0]) * numbers.slope
+        radii = np.where(mid[self.tangential >= 0] > 0, turned.rad, 0.0)
+        return Ball(np.concatenate([mid, turned.mid]), np.concatenate([np.zeros(len(mid)), radii]))
 
-    def _distance(self, point: Array, w: Ball, omega: Array) -> float:
+    def _distance(self, point: Array, w: Ball, numbers: Weights) -> float:
         """Bound of the numerator of theory, (6.10), for a point that is a solution with another h."""
         size, change = w.size, np.zeros(len(self.places))
         up, down = np.maximum(w.mid + w.rad, 0.0) * SAFE, np.maximum(w.rad - w.mid, 0.0) * SAFE
+        gap = np.maximum(-(w.mid + w.rad), 0.0) / SAFE
         for i, node in enumerate(self.nodes):
             code, t = self.selection[node], self.tangential[i]
             apart = code == OPEN or (code in _SLIDING and point[i] == 0)
             change[i] = up[i] if apart else size[i]
             if t >= 0:
-                change[t] = {OPEN: 0.0, STICK: size[t], SLIP_PLUS: down[t], SLIP_MINUS: up[t]}[code]
-        change = change * omega * SAFE + TINY
-        rubbing = self.tangential >= 0
-        return float((upper_norm(change) + upper_norm(self._slope[rubbing] * change[self.tangential[rubbing]])) * SAFE)
+                slips = {STICK: size[t], SLIP_PLUS: down[t], SLIP_MINUS: up[t]}
+                change[t] = numbers.beyond(t - len(self.nodes), gap[i], up[t], down[t]) if apart else slips[code]
+        return numbers.moved(change)
 
     def _solution(self, x: Ball, w_free: Ball) -> ClosedSolution:
         system, p = self.system, self.system.p

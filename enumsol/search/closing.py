@@ -48,9 +48,8 @@ class Proposal:
     sliding : FORWARD or BACKWARD for nodes that in the proof are open or slip that way
     free : ascending nodes that have no status in the proof
     force : (2p,) array, lambda
-    weights : tau, and omega unless all are 1, for the test of definiteness (theory, (6.9)); tau is one number a free
-        node, 0 where a node need not be in the test; None where none were found
-    hopeless : nor would rationals find any, which tell more nodes that need not be in the test
+    weights : numbers for which the form of theory, (6.9), is definite, or None
+    hopeless : nor would a proof in rationals find any, which frees no nodes and need not serve all theta of one
     strict : every status in the proof holds strictly
     least : least slack of the conditions of the fixed nodes
     reduction : Reduction
@@ -208,7 +207,7 @@ def propose(
     exactly : for a proof in rationals, in which statuses need not hold strictly; otherwise nodes whose status does not
         hold strictly are freed, or slide
     sides : nodes that are open or slip in one direction slide; otherwise they are free
-    factors : omega other than 1 may be proposed
+    factors : as for ``weights_of``
     """
     free = tuple(i for i, code in enumerate(codes) if code not in _FINAL and (code not in SLIDING or not sides))
     sliding = {} if not sides else {i: code for i, code in enumerate(codes) if code in SLIDING}
@@ -220,10 +219,11 @@ def propose(
         found = reduction.solution(force, w)
         if found is None:
             return None
-        force = reduction.forces(found[0])
+        x, named = found
+        force = reduction.forces(x)
         w = system.g - system.S @ force
         selection = list(codes)
-        for i, code in zip(reduction.free, found[1], strict=True):
+        for i, code in zip(reduction.free, named, strict=True):
             selection[i] = code
             if i in sliding and code == FRICTIONLESS:
                 selection[i] = SLIDING[sliding[i]][1]
@@ -235,11 +235,12 @@ def propose(
         resting = without_load(system, force, w)
         sliding |= {i: resting[i] for i in loose if codes[i] in SLIDING.get(resting.get(i, 0), ())}
         free = tuple(sorted({*free, *loose} - sliding.keys()))
-    counted = _counted(reduction, selection, force, w, exactly=exactly)
-    weights = reduction.weights(counted, factors=factors)
+    v = reduction.h - reduction.R @ x
+    weights = reduction.weights(x, v, exactly=exactly, factors=factors)
     least = float(np.min(slack[fixed], initial=np.inf))
     strict = bool(np.all(np.abs(slack) > NEAR))
-    hopeless = weights is None and np.array_equal(counted, _counted(reduction, selection, force, w, exactly=True))
+    hopeless = weights is None and len(reduction.nodes) == sum(code not in _FINAL for code in codes)
+    hopeless = hopeless and not np.any(reduction.resting(x, v))
     return Proposal(tuple(selection), sliding, free, force, weights, hopeless, strict, least, reduction)
 
 
@@ -260,14 +261,3 @@ def _slack(system: ScaledSystem, selection: list[int], force: Array, w: Array) -
     cone = system.F * n - np.abs(t)
     slack = {OPEN: u, STICK: cone, SLIP_PLUS: np.minimum(n, v), SLIP_MINUS: np.minimum(n, -v), FRICTIONLESS: n}
     return np.array([slack[code][i] for i, code in enumerate(selection)])
-
-
-def _counted(reduction: Reduction, selection: list[int], force: Array, w: Array, *, exactly: bool) -> NDArray[np.bool_]:
-    """Free nodes that the test of definiteness has to count (theory, (6.9))."""
-    p, nodes = reduction.system.p, reduction.nodes
-    apart = w[nodes] + reduction.system.F[nodes] * np.abs(w[p + nodes])
-    resting = np.array([selection[i] == OPEN for i in nodes], dtype=bool)
-    if not exactly:
-        return ~(resting & (apart < -NEAR))
-    held = (np.abs(w[nodes]) <= NEAR) & (np.abs(w[p + nodes]) <= NEAR) & (np.abs(force[p + nodes]) <= NEAR)
-    return ~((resting & (apart <= NEAR)) | held)

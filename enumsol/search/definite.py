@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,163 +14,213 @@ if TYPE_CHECKING:
 
 #: Smallest eigenvalue below which a form counts as not definite.
 _DEFINITE = 1e-10
+#: Smallest eigenvalue, as a share of R's diagonal, that is worth the search for it.
+_WORTH = 1e-5
 #: Smallest eigenvalue at which Newton's method need not go on.
 _CLEARLY = 1e-3
-#: Steps with omega = 1, and of Newton's method where that is not enough.
-_WEIGHT_STEPS, _STEPS = 6, 40
+#: Steps of Newton's method.
+_STEPS = 40
+#: Steps after t was positive.
+_AFTER = 2
 #: What the weight of the objective is multiplied by, once so little is left of the Newton decrement, or a step raises t
 #: by less than this share of it.
-_GROWTH, _CENTRED, _STALLED = 10.0, 1.0, 0.03
+_GROWTH, _CENTRED, _STALLED = 5.0, 1.0, 0.1
 #: More components of x are not tried: a step costs as much as many nodes of the tree.
 _LARGEST = 300
-#: Least share of a Newton step, what is tried after a share that leaves the domain, and how much of one that does not
-#: is taken.
-_LEAST_STEP, _SHORTER, _INSIDE = 1e-6, 0.7, 0.9
+#: Of the way to the border, where the length of a step is sought first, and for so many steps.
+_INSIDE, _SHARES = 0.9, 8
+#: Of the gap that a node has, what at first may serve for its slip; largest theta / F that Newton's method begins with.
+_SHARED, _CHOSEN = 0.5, 0.999
 
 
-def weights_of(
-    R: Array,
-    F: Array,
-    normal: NDArray[np.intp],
-    tangential: NDArray[np.intp],
-    tied: NDArray[np.intp],
-    *,
-    factors: bool = True,
-) -> Array | None:
-    """tau and omega for which Q of theory, (6.9), is definite; None where none were found.
+@dataclass(frozen=True)
+class Nodes:
+    """The nodes of a reduced problem at a solution.
+
+    Attributes
+    ----------
+    count : nodes
+    normal, tangential : (b,) arrays
+        Places in x of lambda_n and lambda_t of the nodes with friction.
+    F : (b,) array
+    share : (b,) array
+        lambda_t / (F lambda_n) where lambda_n > 0, and the sign of w_t where w_n = lambda_n = 0; not finite elsewhere.
+    wide : (b,) bool array
+        Of these others, those where the form has to serve any theta; where it has not, theta may be chosen.
+    gap, slip : (b,) arrays
+        -w_n and w_t, of nodes where theta may be chosen.
+    """
+
+    count: int
+    normal: NDArray[np.intp]
+    tangential: NDArray[np.intp]
+    F: Array
+    share: Array
+    wide: NDArray[np.bool_]
+    gap: Array
+    slip: Array
+
+    @property
+    def chosen(self) -> NDArray[np.intp]:
+        """Nodes with friction where theta may be chosen."""
+        return np.flatnonzero(~np.isfinite(self.share) & ~self.wide)
+
+    @property
+    def first(self) -> Array:
+        """A share for every node with friction; where it may be chosen, the least in size that is clearly allowed."""
+        size = self.F * np.abs(self.slip)
+        least = 1.0 - _SHARED * self.gap / np.where(size > 0, size, np.inf)
+        chosen = np.sign(self.slip) * np.where(size > 0, np.clip(least, 0.0, 1.0), 0.0)
+        return np.where(np.isfinite(self.share), self.share, chosen)
+
+
+def weights_of(R: Array, nodes: Nodes, *, factors: bool = True) -> Array | None:
+    """mu, kappa, nu, theta / F and tau for which (6.9) is definite, as a proof has them; None where none were found.
 
     Parameters
     ----------
     R : (k, k) array
-    F : (b,) array, friction coefficients of the nodes that Q counts
-    normal, tangential : (b,) arrays, places of their lambda_n and lambda_t in x
-    tied : (k,) array of int
-        Number of the omega of every component; those with the same number have the same.
-    factors : whether omega are sought where 1 will not do
+    nodes : Nodes
+    factors : whether they are sought where mu = kappa = 1 and nu = 0 will not do
 
     Returns
     -------
-    (b + k,) array, or (b,) array if all omega may be 1
+    (count + 4 b,) array
     """
+    b, F, share, n = len(nodes.F), nodes.F, nodes.first, nodes.normal
+    T = F[:, None] * R[nodes.tangential]
+    tau = np.where(nodes.wide, np.sqrt(np.sum(T * T, axis=1)), 0.0)
+    form = R.copy()
+    form[n] -= share[:, None] * T
+    wide = np.flatnonzero(nodes.wide)
+    form -= 0.5 * (T[wide] / tau[wide, None]).T @ T[wide]
+    form[n, n] -= 0.5 * tau
     try:
-        tau = tau_of(R, F, normal, tangential)
-        return _Barrier(R, F, normal, tangential, tied).numbers() if tau is None and factors else tau
+        if np.linalg.eigvalsh(0.5 * (form + form.T))[0] > _DEFINITE:
+            return np.concatenate([np.ones(nodes.count + b), np.zeros(b), share, tau])
+        return _Barrier(R, nodes).numbers() if factors else None
     except np.linalg.LinAlgError:
         return None
-
-
-def tau_of(R: Array, F: Array, normal: NDArray[np.intp], tangential: NDArray[np.intp]) -> Array | None:
-    """The same with omega = 1: tau, or None."""
-    symmetric, T = 0.5 * (R + R.T), R[tangential]
-    tau = F * np.sqrt(np.sum(T * T, axis=1))
-    for _ in range(_WEIGHT_STEPS):
-        form = symmetric - 0.5 * (T * (F**2 / tau)[:, None]).T @ T
-        form[normal, normal] -= 0.5 * tau
-        values, vectors = np.linalg.eigh(form)
-        if values[0] > _DEFINITE:
-            return np.asarray(tau)
-        if not len(tau):
-            break
-        v = vectors[:, 0]
-        # where the smallest eigenvalue is largest, both terms of a node are the same there
-        better = F * np.abs(T @ v) / np.maximum(np.abs(v[normal]), 1e-12)
-        tau = np.sqrt(tau * np.clip(better, tau / 16, tau * 16))
-    return None
 
 
 class _Barrier:
     """The largest t for which M - t I is positive semidefinite, by a path of analytic centres.
 
-    M = [[H - D, G'], [G, diag(tau)]] with H the symmetric part of omega R, D = diag(tau) / 2 at the lambda_n of the
-    counted nodes, G the rows F omega r_t / sqrt(2): (6.9) is its Schur complement, and M is linear in (omega, tau).
-    The sum of all omega is fixed.
+    M is linear in z = (mu, kappa, nu, rho, tau): rho = kappa theta where theta may be chosen, tau where the form has to
+    serve any. It is the symmetric part of D'R, with -tau / 2 at the lambda_n of wide nodes, and beside it rows kappa F
+    r_t / sqrt(2) and diag(tau) for these: (6.9) is its Schur complement. The sum of all mu and kappa is fixed, and C z
+    >= 0 says what else is asked of them.
     """
 
-    def __init__(
-        self, R: Array, F: Array, normal: NDArray[np.intp], tangential: NDArray[np.intp], tied: NDArray[np.intp]
-    ) -> None:
-        self._k, self._b, self._m = len(R), len(F), int(np.max(tied)) + 1
-        k, b = self._k, self._b
-        self._normal, self._lower = normal, k + np.arange(b)
-        self._tied = tied
-        # omega of component i comes with the symmetric part of U_i V_i'
-        self._U, self._V = np.zeros((k + b, k)), np.zeros((k + b, k))
-        self._U[:k], self._V[:k] = np.eye(k), R.T
-        self._U[self._lower, tangential] = np.sqrt(2.0) * F
-        self._size = float(np.mean(np.abs(np.diag(R))))
+    def __init__(self, R: Array, nodes: Nodes) -> None:
+        self._nodes, m, b = nodes, nodes.count, len(nodes.F)
+        n, t, F, c, wide = nodes.normal, nodes.tangential, nodes.F, nodes.chosen, np.flatnonzero(nodes.wide)
+        ends = np.cumsum([0, m, b, b, len(c), len(wide)])
+        self._mu, self._kappa, self._nu, self._rho, self._tau = (slice(*ends[k : k + 2]) for k in range(5))
+        self._size, self._k = int(ends[-1]), len(R) + len(wide)
+        # each term is the symmetric part of u v'
+        eye, theta = np.eye(self._k), np.where(np.isfinite(nodes.share), F * nodes.share, 0.0)
+        V = np.pad(R, ((0, 0), (0, len(wide))))
+        lower, turned = eye[len(R) :], eye[t] - theta[:, None] * eye[n]
+        turned[wide] += np.sqrt(2.0) * F[wide, None] * lower
+        self._U = np.concatenate([eye[:m], turned, eye[t], -eye[n[c]], lower, -0.5 * eye[n[wide]]]).T
+        self._V = np.concatenate([V[:m], V[t], V[n], V[t[c]], lower, eye[n[wide]]]).T
+        self._of = np.concatenate([np.arange(self._size), np.arange(self._size)[self._tau]])
+        self._C = self._conditions()
+        self._scale = float(np.mean(np.abs(np.diag(R))))
+
+    def _conditions(self) -> Array:
+        nodes, c = self._nodes, self._nodes.chosen
+        z, F = np.eye(self._size), nodes.F[:, None]
+        mu, kappa, nu, rho = z[nodes.normal], z[self._kappa], z[self._nu], z[self._rho]
+        plain, fixed = np.setdiff1d(np.arange(nodes.count), nodes.normal), np.setdiff1d(np.arange(len(F)), c)
+        rows = [z[plain], mu + F * nu, mu - F * nu, kappa[fixed], F[c] * kappa[c] + rho, F[c] * kappa[c] - rho]
+        side, slip = np.sign(nodes.slip[c])[:, None], np.abs(nodes.slip[c])
+        # where a node is open with a slip: (mu +- nu F) |w_n| > (kappa F -+ rho) |w_t|
+        apart = slip > 0
+        share = (slip / np.where(apart, nodes.gap[c], 1.0))[:, None]
+        rows += [(mu[c] + side * F[c] * nu[c] - share * (F[c] * kappa[c] - side * rho))[apart], z[self._tau]]
+        return np.concatenate(rows)
+
+    def _start(self) -> Array:
+        nodes, z = self._nodes, np.zeros(self._size + 1)
+        z[self._mu], z[self._kappa], z[self._tau] = 1.0, 1.0, self._scale
+        # a share of one is on the border
+        z[self._rho] = (np.clip(nodes.first, -_CHOSEN, _CHOSEN) * nodes.F)[nodes.chosen]
+        z[-1] = np.linalg.eigvalsh(self._matrix(z))[0] - 0.5 * self._scale
+        return z
 
     def _matrix(self, z: Array) -> Array:
-        m = self._m
-        M = (self._U * z[:m][self._tied]) @ self._V.T
+        M = (self._U * z[self._of]) @ self._V.T
         M = 0.5 * (M + M.T)
-        M[self._normal, self._normal] -= 0.5 * z[m:-1]
-        M[self._lower, self._lower] += z[m:-1]
         M[np.diag_indices_from(M)] -= z[-1]
         return np.asarray(M)
 
     def numbers(self) -> Array | None:
-        """tau and omega, or None."""
-        m, parts = self._m, self._k + self._m + 2 * self._b
-        if self._k > _LARGEST or not np.all(np.diag(self._V[: self._k]) > 0):
+        """mu, kappa, nu and theta / F, or None."""
+        if self._k > _LARGEST:
             return None
-        z = np.concatenate([np.ones(m), np.full(self._b, self._size), [0.0]])
-        z[-1] = np.linalg.eigvalsh(self._matrix(z))[0] - 0.5 * self._size
-        weight = parts / self._size
+        z, parts = self._start(), self._k + len(self._C)
+        if not np.all(self._C @ z[:-1] > 0):
+            return None
+        weight, after = parts / self._scale, 0
         for _ in range(_STEPS):
             before = z[-1]
             z, decrement = self._moved(z, weight)
-            centred = decrement < _CENTRED
-            least = z[-1] + np.linalg.eigvalsh(self._matrix(z))[0]
-            # farther from the border where it is not far yet: enclosures are wide near it
-            if least > (_DEFINITE if centred else _CLEARLY):
-                return np.concatenate([z[m:-1], z[:m][self._tied]])
-            if centred or z[-1] - before < _STALLED * abs(before):
+            if z[-1] > _DEFINITE:
+                # farther from the border where it is not far yet: enclosures are wide near it
+                after += 1
+                if after > _AFTER or decrement < _CENTRED or z[-1] > _CLEARLY:
+                    return self._found(z)
+            elif decrement < _CENTRED or z[-1] - before < _STALLED * abs(before):
                 # near a centre no t is larger by more than this
-                if z[-1] + 2.0 * parts / weight < 0:
+                if z[-1] + 2.0 * parts / weight < _WORTH * self._scale:
                     return None
                 weight *= _GROWTH
-        return None
+        return self._found(z) if z[-1] > _DEFINITE else None
+
+    def _found(self, z: Array) -> Array:
+        nodes, tau = self._nodes, np.zeros(len(self._nodes.F))
+        share = np.where(np.isfinite(nodes.share), nodes.share, 0.0)
+        share[nodes.chosen] = np.clip(z[self._rho] / (nodes.F * z[self._kappa])[nodes.chosen], -1.0, 1.0)
+        tau[nodes.wide] = z[self._tau]
+        return np.concatenate([z[self._mu], z[self._kappa], z[self._nu], share, tau])
 
     def _moved(self, z: Array, weight: float) -> tuple[Array, float]:
-        """A Newton step for -weight t - log det(M - t I) - sum log omega - sum log tau, and its decrement."""
+        """A Newton step for -weight t - log det(M - t I) - sum log(C z), as long as serves, and its decrement."""
         gradient, hessian = self._derivatives(z, weight)
-        step = -np.linalg.solve(hessian, gradient)[:-1]
-        decrement, share = float(np.sqrt(max(-float(gradient[:-1] @ step), 0.0))), 1.0
-        while share > _LEAST_STEP:
-            ahead = z + share * step
-            if np.min(ahead[:-1]) > 0 and _is_definite(self._matrix(ahead)):
-                # a step to the border is not made to its end
-                return (ahead if share == 1.0 else z + _INSIDE * share * step), decrement
-            share *= _SHORTER
-        return z, decrement
+        step: Array = -np.linalg.solve(hessian, gradient)[:-1]
+        decrement = float(np.sqrt(max(-float(gradient[:-1] @ step), 0.0)))
+        L: Array = np.linalg.cholesky(self._matrix(z))
+        half = np.linalg.solve(L, self._matrix(step))
+        rates = np.linalg.eigvalsh(np.linalg.solve(L, half.T))
+        rates = np.concatenate([rates, (self._C @ step[:-1]) / (self._C @ z[:-1])])
+        return z + _share(rates, weight * step[-1]) * step, decrement
 
     def _derivatives(self, z: Array, weight: float) -> tuple[Array, Array]:
-        """Gradient and second derivatives, with a row for the sum of omega."""
-        m, n, t = self._m, self._normal, self._lower
+        """Gradient and second derivatives, with a row for the sum of mu and kappa."""
         P = np.linalg.inv(self._matrix(z))
         PU, PV = P @ self._U, P @ self._V
         UU, VV, UV = self._U.T @ PU, self._V.T @ PV, self._U.T @ PV
-        nn, tt, nt, square = P[np.ix_(n, n)], P[np.ix_(t, t)], P[np.ix_(n, t)], np.sum(P * P, axis=1)
-        gather = np.equal.outer(np.arange(m), self._tied).astype(float)
-        hessian = np.zeros((len(z) + 1, len(z) + 1))
-        tau = slice(m, -2)
-        hessian[:m, :m] = gather @ (0.5 * (UU * VV + UV * UV.T)) @ gather.T
-        hessian[:m, tau] = gather @ (PU[t] * PV[t] - 0.5 * PU[n] * PV[n]).T
-        hessian[tau, tau] = 0.25 * nn**2 - 0.5 * nt**2 - 0.5 * nt.T**2 + tt**2
-        hessian[:m, -2] = -gather @ np.sum(PU * PV, axis=0)
-        hessian[tau, -2] = 0.5 * square[n] - square[t]
-        hessian[-2, -2] = np.sum(square)
-        hessian[:m, -1] = np.sum(gather, axis=1)
-        hessian = np.triu(hessian) + np.triu(hessian, 1).T
-        hessian[np.arange(len(z) - 1), np.arange(len(z) - 1)] += 1.0 / z[:-1] ** 2
-        gradient = np.concatenate([-gather @ np.diag(UV), 0.5 * np.diag(nn) - np.diag(tt), [np.trace(P) - weight, 0.0]])
-        gradient[:-2] -= 1.0 / z[:-1]
+        slopes = self._C / (self._C @ z[:-1])[:, None]
+        size, gather = self._size, np.equal.outer(np.arange(self._size), self._of).astype(float)
+        hessian = np.zeros((size + 2, size + 2))
+        hessian[:size, :size] = gather @ (0.5 * (UU * VV + UV * UV.T)) @ gather.T + slopes.T @ slopes
+        hessian[:size, size] = hessian[size, :size] = -gather @ np.sum(PU * PV, axis=0)
+        hessian[size, size] = np.sum(P * P)
+        hessian[: self._nu.start, -1] = hessian[-1, : self._nu.start] = 1.0
+        gradient = np.concatenate([-gather @ np.diag(UV) - np.sum(slopes, axis=0), [np.trace(P) - weight, 0.0]])
         return gradient, hessian
 
 
-def _is_definite(matrix: Array) -> bool:
-    try:
-        np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError:
-        return False
-    return True
+def _share(rates: Array, gain: float) -> float:
+    """s > 0 at which -gain s - sum log(1 + s rates) is least, nearly."""
+    low, high = 0.0, min(-1.0 / min(float(np.min(rates)), -1e-9), 1e3)
+    s = min(1.0, _INSIDE * high)
+    for _ in range(_SHARES):
+        terms = rates / (1.0 + s * rates)
+        slope = -gain - float(np.sum(terms))
+        low, high = (s, high) if slope < 0 else (low, s)
+        ahead = s - slope / float(np.sum(terms * terms))
+        s = ahead if low < ahead < high else 0.5 * (low + high)
+    return low if low > 0 else s

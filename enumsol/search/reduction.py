@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.search.definite import weights_of
+from enumsol.search.definite import Nodes, weights_of
 from enumsol.statuses import BACKWARD, FORWARD, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
@@ -153,21 +153,28 @@ class Reduction:
 
     # -- the test of definiteness ----------------------------------------------------------------------------------
 
-    def weights(self, counted: NDArray[np.bool_], *, factors: bool) -> Array | None:
-        """tau and omega for which Q of theory, (6.9), is definite, as a proof has them; None if none were found.
+    def weights(self, x: Array, v: Array, *, exactly: bool, factors: bool) -> Array | None:
+        """Numbers for which the form of theory, (6.9), is definite at a solution, as a proof has them, or None.
 
-        tau is 0 at nodes that do not count; without omega, which are sought with ``factors``, all of them are 1.
+        Parameters
+        ----------
+        x, v : forces and displacements
+        exactly : for a proof that knows the solution exactly
+        factors : see ``weights_of``
         """
         if not len(self.places):
             return np.zeros(0)
-        used = np.flatnonzero(counted & self.rubbing)
-        # at a node that does not count both terms have the same omega
-        alike, tied = np.flatnonzero(self.rubbing & ~counted), np.arange(len(self.places))
-        tied[self.tangential[alike]] = alike
-        tied = np.unique(tied, return_inverse=True)[1]
-        found = weights_of(self.R, self.system.F[self.nodes[used]], used, self.tangential[used], tied, factors=factors)
-        if found is None:
-            return None
-        tau = np.zeros(len(self.nodes))
-        tau[used] = found[: len(used)]
-        return np.concatenate([tau[~self.slides], found[len(used) :]])
+        normal = np.flatnonzero(self.rubbing)
+        tangential, F = self.tangential[normal], self.system.F[self.nodes[normal]]
+        n, t, gap, slip = x[normal], x[tangential], -v[normal], v[tangential]
+        slip = np.where(np.abs(slip) > NEAR, slip, 0.0)
+        share = np.where(slip != 0, np.sign(slip), np.clip(t / np.where(n > NEAR, F * n, 1.0), -1.0, 1.0))
+        share = np.where((n <= NEAR) & ((gap > NEAR) | (slip == 0)), np.nan, share)
+        wide = self.resting(x, v)[normal] & (not exactly)
+        nodes = Nodes(len(self.nodes), normal, tangential, F, share, wide, np.where(gap > NEAR, gap, 0.0), slip)
+        return weights_of(self.R, nodes, factors=factors)
+
+    def resting(self, x: Array, v: Array) -> NDArray[np.bool_]:
+        """Nodes with friction, and free, that touch without load at a solution and do not slide."""
+        n, t = np.arange(len(self.nodes)), self.tangential
+        return np.asarray(self.rubbing & (x[n] <= NEAR) & (np.abs(v[n]) <= NEAR) & (np.abs(v[t]) <= NEAR))

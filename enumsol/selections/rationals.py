@@ -146,13 +146,14 @@ class ExactSelections:
 
     # -- decisions -------------------------------------------------------------------------------------------------
 
-    def _w(self, point: Point) -> list[Any]:
+    def moved(self, point: Point) -> list[Any]:
+        """w = g - S lambda."""
         product = self.system.S * fmpq_mat([[v] for v in point])
         return [g - v for g, v in zip(self.system.g, product.entries(), strict=True)]
 
     def active(self, point: Point) -> ActiveSets:
         """Per node the codes whose conditions hold at the point, exactly."""
-        p, w = self.p, self._w(point)
+        p, w = self.p, self.moved(point)
         result = []
         for i, (F, friction) in enumerate(zip(self.system.F, self.F_positive, strict=True)):
             n, t, bound, w_t = point[i], point[p + i], F * point[i], w[p + i]
@@ -160,17 +161,9 @@ class ExactSelections:
             result.append(frozenset(code for code in FINAL[friction] if n >= 0 and _holds(CONDITIONS[code], rows)))
         return tuple(result)
 
-    def resting(self, point: Point) -> tuple[bool, ...]:
-        """Nodes that theory, (6.9), need not count: lambda = 0 and w_n + F |w_t| <= 0, or w = 0 and lambda_t = 0."""
-        p, w = self.p, self._w(point)
-        return tuple(
-            point[p + i] == 0 and ((point[i] == 0 and w[i] + F * abs(w[p + i]) <= 0) or (w[i] == 0 and w[p + i] == 0))
-            for i, F in enumerate(self.system.F)
-        )
-
     def statuses_by_test_functions(self, point: Point, r: NDArray[np.float64]) -> tuple[int, ...]:
         """Per node the code that the signs of theory, (1.7), name at any point; ``r`` holds powers of two."""
-        p, w = self.p, self._w(point)
+        p, w = self.p, self.moved(point)
         codes = []
         for i, (F, friction) in enumerate(zip(self.system.F, self.F_positive, strict=True)):
             unit = rational(float(r[i]))
@@ -221,13 +214,13 @@ class ExactSelections:
 
     def displacements(self, point: Point) -> NDArray[np.float64]:
         """w = g - S lambda as floats, rounded once."""
-        return np.array([self.as_float(v) for v in self._w(point)])
+        return np.array([self.as_float(v) for v in self.moved(point)])
 
     def slip_signs(self, point: Point) -> tuple[int, ...]:
         """Signs of w_t, exactly."""
-        return tuple((v > 0) - (v < 0) for v in self._w(point)[self.p :])
+        return tuple((v > 0) - (v < 0) for v in self.moved(point)[self.p :])
 
     def bounds(self, point: Point) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Floats below and above (lambda, w), two arrays of shape (4p,), equal where a value is a float."""
-        pairs = [_outward(v) for v in (*point, *self._w(point))]
+        pairs = [_outward(v) for v in (*point, *self.moved(point))]
         return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])

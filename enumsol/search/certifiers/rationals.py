@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from enumsol.kernel.closing import definite_sign
+from enumsol.kernel.closing import only_solution
 from enumsol.relaxation.rows import imposed_rows
 from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
 from enumsol.search.certifiers.floats import solve_or_open
@@ -61,16 +61,16 @@ class ExactCertifier(WithoutProof):
         proposal = propose(self._scaled, codes, force, w, exactly=True, sides=False)
         if proposal is None or proposal.weights is None:
             return None
-        sign = definite_sign(self._enclosed, proposal.selection, proposal.free, proposal.weights)
-        solver = self._selections
-        solved = solver.solve_equations(proposal.selection, solver.system.g) if sign else None
+        solver, selection = self._selections, proposal.selection
+        solved = solver.solve_equations(selection, solver.system.g)
         if solved is None:
             return None
         point, determinant = solved
-        active, resting = solver.active(point), solver.resting(point)
-        free = zip(proposal.free, proposal.weights[: len(proposal.free)], strict=True)
-        uncounted = [not F or rests for F, rests in zip(solver.F_positive, resting, strict=True)]
-        if not all(proposal.selection[i] in active[i] and (tau > 0 or uncounted[i]) for i, tau in free):
+        active = solver.active(point)
+        if not all(selection[i] in active[i] for i in proposal.free):
+            return None
+        sign = only_solution(self._enclosed, selection, proposal.free, proposal.weights, point, solver.moved(point))
+        if not sign:
             return None
         if not holds_below(codes, active):
             return proposal, []
