@@ -46,14 +46,16 @@ class Closings:
 
     def exact_leaf(self, codes, selection, numbers, count):
         """The selection as a polytope to be counted, if the leaf holds its solution."""
-        free = [i for i, code in enumerate(codes) if code > 4]
-        self.check(selection, free, codes)
+        free, sliding = ([i for i, code in enumerate(codes) if code in some] for some in ((5, 6), (7, 8)))
+        refined = [selection[i] if selection[i] in SIDES.get(code, ()) else code for i, code in enumerate(codes)]
+        self.check(selection, free, refined)
         need(max(selection) < 5, "a selection is not complete")
         equations = self.forms.equations(selection)
         N = fmpq_mat([form[:-1] for form in equations])
         need(N.det() != 0, "a selection is singular")
         point = N.solve(column_of([-form[-1] for form in equations])).entries()
-        reduced = Reduced(self.forms, tuple(6 if i in free else c for i, c in enumerate(selection)), self.friction)
+        core = tuple(6 if i in free else codes[i] if i in sliding else c for i, c in enumerate(selection))
+        reduced = Reduced(self.forms, core, self.friction)
         self.serves(self.numbers(numbers, selection, reduced), reduced, point)
         holds = {i: min(self.conditions(selection[i], i, point)) >= 0 for i in range(self.p)}
         need(all(holds[i] for i in free), "the reduced problem has another solution")

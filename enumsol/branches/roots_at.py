@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
@@ -10,7 +11,7 @@ from enumsol.condensation.affine import exactly_at
 from enumsol.roots.builder import RootBuilder, in_order, root_family
 from enumsol.roots.components import connected_components
 from enumsol.roots.enumerate import roots_of_selections
-from enumsol.roots.local_degree import perturbed_degree
+from enumsol.roots.local_degree import local_degree
 from enumsol.roots.root_set import RootSet, SearchStats
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.selections.floats import FloatSelections
@@ -43,7 +44,7 @@ def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> Root
     components = connected_components(
         [solution for solution in solutions if solution is not None],
         solver,
-        lambda active: perturbed_degree(floats, active),
+        partial(local_degree, floats),
     )
     builder = RootBuilder(problem, alpha, solver, floats, {})
     roots = [builder.root(c) for c in components if c.dimension == 0]

@@ -10,7 +10,7 @@ from flint import fmpq_mat
 from enumsol.arithmetic.balls import SAFE
 from enumsol.arithmetic.rationals import to_fraction
 from enumsol.kernel.closing import closed_solution, final_codes, only_solution, same_solution
-from enumsol.kernel.rows import BACKWARD, CONTACT, FORWARD, FRICTIONLESS, OPEN, STICK, refines
+from enumsol.kernel.rows import BACKWARD, CONTACT, FORWARD, OPEN, STICK, UNDECIDED, refines
 from enumsol.proof.reading import numbers_from
 
 if TYPE_CHECKING:
@@ -61,18 +61,20 @@ def closed_in_rationals(
     """Why a record of kind "M" proves nothing, or None; the selection that it names, and the root in it, if any."""
     friction = system.F > 0
     selection = _selection(record[1], friction)
-    free = tuple(i for i, code in enumerate(codes) if code > FRICTIONLESS)
-    if any(code != selection[i] for i, code in enumerate(codes) if i not in free):
+    free = tuple(i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED))
+    if any(not refines(selection[i], code) for i, code in enumerate(codes) if i not in free):
         return "its selection is none below its assignment", selection, []
-    weights = _weights(record[2], free, selection, friction)
+    slides = {i: code for i, code in enumerate(codes) if code in (FORWARD, BACKWARD)}
+    named = tuple(slides.get(i, code) for i, code in enumerate(selection))
+    weights = _weights(record[2], free, named, friction)
     point = _point(rational, selection)
     if point is None:
         return "its selection is singular", selection, []
     w = _displacements(rational, point)
     least = {i: min(rational.node_conditions(selection[i], i, point)) for i in range(rational.p)}
-    if any(least[i] < 0 for i in free):
+    if any(least[i] < 0 for i in free) or any(w[i] > 0 if selection[i] == OPEN else point[i] < 0 for i in slides):
         return "the point of its selection does not solve the reduced problem", selection, []
-    if not only_solution(system, selection, free, weights, point, w):
+    if not only_solution(system, named, free, weights, point, w):
         return "its solution is not proven to be the only one", selection, []
     touching = all(w[i] == 0 for i, code in enumerate(codes) if code == CONTACT)
     holds = touching and all(least[i] >= 0 for i in range(rational.p) if i not in free)

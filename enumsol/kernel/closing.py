@@ -121,9 +121,9 @@ def only_solution(
 
     Parameters
     ----------
-    system, selection, free, weights : as for ``closed_solution``; no node slides
+    system, selection, free, weights : as for ``closed_solution``
     point, w : 2p rationals each, lambda in units of force and w in units of length
-        At a solution of the reduced problem that has the statuses of the selection.
+        At a solution of the reduced problem that has the statuses of the selection at the nodes that do not slide.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         reduced = Reduced.of(system, selection, free)

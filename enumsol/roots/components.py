@@ -20,7 +20,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
     from typing import Any
 
+    from numpy.typing import NDArray
+
     from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution, SelectionSolver
+
+    Array = NDArray[np.float64]
+    #: Local degree from the active sets, and lambda and w of an isolated root.
+    LocalDegree = Callable[[ActiveSets, tuple[Array, Array] | None], int | None]
 
 #: Selections examined around one degenerate root or family to find all that hold there; beyond, a search on the
 #: perturbed problem gives the index.
@@ -66,7 +72,7 @@ class RootComponent:
 def connected_components(
     solutions: Iterable[SelectionSolution],
     solver: SelectionSolver,
-    degree: Callable[[ActiveSets], int | None] | None = None,
+    degree: LocalDegree | None = None,
 ) -> list[RootComponent]:
     """Roots and families that the given solutions of selections form, every root once.
 
@@ -74,7 +80,8 @@ def connected_components(
     ----------
     solutions : solutions of selections, in any order, duplicates allowed
     solver : the solver that made them
-    degree : called with the active sets of an isolated root when more than MAX_LOCAL_SELECTIONS hold there
+    degree : called where more than MAX_LOCAL_SELECTIONS hold, with the active sets and, of an isolated root, lambda and
+        w
     """
     known: dict[Codes, SelectionSolution] = {}
     singles: list[RootComponent] = []
@@ -180,7 +187,7 @@ def _component(
     group: list[SelectionSolution],
     whole: bool,
     solver: SelectionSolver,
-    degree: Callable[[ActiveSets], int | None] | None,
+    degree: LocalDegree | None,
 ) -> RootComponent:
     group = sorted(group, key=lambda s: (-s.dimension, s.codes))
     dimension = group[0].dimension
@@ -195,7 +202,11 @@ def _component(
     active = tuple(frozenset(s) for s in sets)
     index = next((solution.index for solution in group if solution.index is not None), None)
     if index is None:
-        index = _index(group, solver) if whole else (degree(active) if degree is not None else None)
+        if whole:
+            index = _index(group, solver)
+        elif degree is not None:
+            point = group[0].vertices[0]
+            index = degree(active, None if dimension else (solver.forces(point), solver.displacements(point)))
     if dimension > 0:
         group = _maximal(group, solver)
     return RootComponent(tuple(group), active, dimension, index, whole)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from enumsol.checks import (
@@ -25,7 +26,7 @@ from enumsol.roots.builder import RootBuilder, in_order, named, root_family
 from enumsol.roots.closed import apart, closed_component
 from enumsol.roots.components import RootComponent, connected_components
 from enumsol.roots.enumeration import Enumeration
-from enumsol.roots.local_degree import perturbed_degree
+from enumsol.roots.local_degree import local_degree
 from enumsol.roots.root_set import RootSet
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from enumsol.checks import Alpha, AlphaLike
     from enumsol.problem3d import ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
-    from enumsol.selections.solution import ActiveSets, Codes, PointValues, SelectionSolver
+    from enumsol.selections.solution import Codes, PointValues, SelectionSolver
 
 Method = Literal["tree", "exhaustive"]
 #: The exhaustive method reports progress this often [seconds].
@@ -231,16 +232,14 @@ class _Enumeration(Enumeration[Solvers]):
         """Components of the root set with the solver whose points they hold."""
         solutions, closed, self.doubtful = apart(self.outcome.solutions)
         exact, floats = [s for s in solutions if s.exact], [s for s in solutions if not s.exact]
+        degree = partial(local_degree, self.solvers.floats)
         parts: list[tuple[list[RootComponent], SelectionSolver]] = []
         if floats or closed:
-            components = connected_components(floats, self.solvers.floats, self._degree)
+            components = connected_components(floats, self.solvers.floats, degree)
             parts.append(([*components, *map(closed_component, closed)], self.solvers.floats))
         if exact and self.solvers.exact is not None:
-            parts.append((connected_components(exact, self.solvers.exact, self._degree), self.solvers.exact))
+            parts.append((connected_components(exact, self.solvers.exact, degree), self.solvers.exact))
         return parts
-
-    def _degree(self, active: ActiveSets) -> int | None:
-        return perturbed_degree(self.solvers.floats, active)
 
     def _root(self, component: RootComponent, values: PointValues) -> Root:
         solvers, verified = self.solvers, self.certifier.certified.verified

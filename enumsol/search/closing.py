@@ -194,7 +194,6 @@ def propose(
     w: Array,
     *,
     exactly: bool,
-    sides: bool = True,
     factors: bool = True,
 ) -> Proposal | None:
     """What may close a subtree, or None.
@@ -206,11 +205,10 @@ def propose(
     force, w : (2p,) arrays, lambda and w near its solution
     exactly : for a proof in rationals, in which statuses need not hold strictly; otherwise nodes whose status does not
         hold strictly are freed, or slide
-    sides : nodes that are open or slip in one direction slide; otherwise they are free
     factors : as for ``weights_of``
     """
-    free = tuple(i for i, code in enumerate(codes) if code not in _FINAL and (code not in SLIDING or not sides))
-    sliding = {} if not sides else {i: code for i, code in enumerate(codes) if code in SLIDING}
+    free = tuple(i for i, code in enumerate(codes) if code not in _FINAL and code not in SLIDING)
+    sliding = {i: code for i, code in enumerate(codes) if code in SLIDING}
     for _ in range(2):
         try:
             reduction = Reduction(system, codes, free, sliding)

@@ -98,7 +98,8 @@ def weights_of(R: Array, nodes: Nodes, *, factors: bool = True) -> Array | None:
     try:
         if np.linalg.eigvalsh(0.5 * (form + form.T))[0] > _DEFINITE:
             return np.concatenate([np.ones(nodes.count + b), np.zeros(b), share, tau])
-        return _Barrier(R, nodes).numbers() if factors else None
+        with np.errstate(all="ignore"):
+            return _Barrier(R, nodes).numbers() if factors else None
     except np.linalg.LinAlgError:
         return None
 
@@ -189,9 +190,9 @@ class _Barrier:
     def _moved(self, z: Array, weight: float) -> tuple[Array, float]:
         """A Newton step for -weight t - log det(M - t I) - sum log(C z), as long as serves, and its decrement."""
         gradient, hessian = self._derivatives(z, weight)
-        step: Array = -np.linalg.solve(hessian, gradient)[:-1]
+        step = np.asarray(-np.linalg.solve(hessian, gradient)[:-1], dtype=np.float64)
         decrement = float(np.sqrt(max(-float(gradient[:-1] @ step), 0.0)))
-        L: Array = np.linalg.cholesky(self._matrix(z))
+        L = np.asarray(np.linalg.cholesky(self._matrix(z)), dtype=np.float64)
         half = np.linalg.solve(L, self._matrix(step))
         rates = np.linalg.eigvalsh(np.linalg.solve(L, half.T))
         rates = np.concatenate([rates, (self._C @ step[:-1]) / (self._C @ z[:-1])])

@@ -21,8 +21,8 @@ def cases(kind):
     """Problems with records of proofs that have such leaves."""
     if kind in ("slides", "sides"):
         return cases_with_sides(kind)
-    if kind == "factors":
-        return cases_with_factors()
+    if kind == "any theta":
+        return cases_with_any_theta()
     found = []
     with pytest.MonkeyPatch.context() as patch:
         before = closing.Closer.closed
@@ -50,9 +50,10 @@ def cases_with_sides(kind):
     found = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(closing, "_MANY", 1)
-        rows = [row_of_discs(k, weights=(2.0, 3.0), friction=F) for k, F in product((4, 5), (0.6, 0.9, 1.2))]
-        chains = [beside_a_loaded_node(3, slides=True, grazing=True, friction=F) for F in (2.5, 4.0)]
-        for problem in rows + chains:
+        unequal = (2.0, 3.0), (2.0, 3.0, 2.5), (2.0, 2.0, 3.0)
+        for limit, weights, stiffness in product((0, 250), unequal, (64.0, 256.0)):
+            patch.setattr(solvers, "EXACT_DOF_LIMIT", limit)
+            problem = row_of_discs(5, weights=weights, friction=0.9, stiffness=stiffness)
             records = records_of(enumerate_roots(problem, 0).proof)
             if leaves(records, kind):
                 found.append((problem, records))
@@ -60,32 +61,32 @@ def cases_with_sides(kind):
     return found
 
 
-def cases_with_factors():
-    """Proofs in which the terms of contact nodes are multiplied by numbers of their own."""
+def cases_with_any_theta():
+    """Proofs with nodes that touch without load, at rest, without rationals."""
     found = []
-    for limit, slides, friction in product((0, 250), (False, True), (0.875, 1.25, 1.75, 2.5)):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(solvers, "EXACT_DOF_LIMIT", limit)
-            problem = beside_a_loaded_node(3, slides=slides, grazing=True, friction=friction)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(solvers, "EXACT_DOF_LIMIT", 0)
+        for slides, friction, k in product((False, True), (0.25, 0.5, 0.75), (2, 3)):
+            problem = beside_a_loaded_node(k, slides=slides, grazing=False, friction=friction)
             records = records_of(enumerate_roots(problem, 0).proof)
-        if leaves(records, "factors"):
-            found.append((problem, records))
+            if leaves(records, "any theta"):
+                found.append((problem, records))
     assert len(found) > 5
-    assert {records[k][0] for _, records in found for k in leaves(records, "factors")} == {"m", "M"}
     return found
 
 
-def weights_in(record):
-    """Place of the weights in a record, and how many of them are tau, for leaves at whose root nothing is decided."""
-    return (3, len(record[2])) if record[0] == "m" else (2, len(record[1]))
+def numbers_in(record):
+    """mu, and kappa, nu, theta / F and tau in rows, of a leaf "m" of which all nodes have friction."""
+    sliding, numbers = sum(code > 6 for code in record[1]), record[3]
+    m = len(record[2]) + sliding
+    return numbers[:m], np.reshape(numbers[m:], (4, -1)).tolist()
 
 
 def leaves(records, kind):
-    """Numbers of the records of a kind: "m", "M", "m" with sliding nodes, or with factors; "b" with sides."""
+    """Numbers of the records of a kind: "m", "M", "m" with sliding nodes, or any theta; "b" with sides."""
     chosen = [(k, record) for k, record in enumerate(records) if isinstance(record, list)]
-    if kind == "factors":
-        closed = [(k, record, *weights_in(record)) for k, record in chosen if record[0] in ("m", "M")]
-        return [k for k, record, place, size in closed if len(record[place]) > size]
+    if kind == "any theta":
+        return [k for k, record in chosen if record[0] == "m" and any(numbers_in(record)[1][3])]
     if kind == "slides":
         return [k for k, record in chosen if record[0] == "m" and max(record[1]) > 6]
     if kind == "sides":
@@ -101,7 +102,7 @@ def accepted(problem, records):
     return report.ok
 
 
-KINDS = ["m", "M", "slides", "sides", "factors"]
+KINDS = ["m", "M", "slides", "sides", "any theta"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -157,16 +158,29 @@ def test_forged_roots_are_refused():
                 assert not accepted(problem, [*records[:k], forged, *records[k + 1 :]])
 
 
-def test_forged_factors_are_refused():
-    for problem, records in cases("factors"):
-        for k in leaves(records, "factors"):
-            place, size = weights_in(records[k])
-            weights = records[k][place]
-            forgeries = [weights[:size], weights[:-1], [*weights, 1.0], weights[:size] + [0.0] * (len(weights) - size)]
-            forgeries += [[*weights[:-1], x] for x in (-weights[-1], 0.0, 1e200, 1e-200, True, "1")]
+@pytest.mark.parametrize("kind", ["any theta", "slides"])
+def test_forged_numbers_are_refused(kind):
+    for problem, records in cases(kind):
+        for k in leaves(records, kind):
+            mu, rows = numbers_in(records[k])
+            kappa, nu, share, tau = rows
+            numbers = records[k][3]
+            forgeries = [numbers[:-1], [*numbers, 1.0]]
+            for x in (0.0, -1.0, 1e200, 1e-200, True, "1", None):
+                forgeries += [[*numbers[:n], x, *numbers[n + 1 :]] for n in ((0, len(mu)) if kappa else (0,))]
+            if kappa:
+                most = [2.0 * mu[0] / F for F in problem.friction[0][:1]] * len(nu)
+                forgeries += [mu, [*mu, *kappa], [*mu, *kappa, *most, *share, *tau]]
+                forgeries += [[*mu, *kappa, *nu, *([1.5] * len(nu)), *tau]]
+            # theta does not serve nodes that may have any
+            if any(tau):
+                forgeries += [
+                    [*mu, *kappa, *nu, *share, *([0.0] * len(nu))],
+                    [*mu, *kappa, *nu, *([0.5] * len(nu)), *tau],
+                ]
             for forged in forgeries:
-                record = [*records[k][:place], forged, *records[k][place + 1 :]]
-                assert not verify(problem, proof_of([*records[:k], record, *records[k + 1 :]])).ok
+                record = [*records[k][:3], forged, *records[k][4:]]
+                assert not verify(problem, proof_of([*records[:k], record, *records[k + 1 :]])).ok, (forged, numbers)
 
 
 def test_forged_counts_are_refused():
@@ -189,9 +203,10 @@ def test_a_smaller_core_needs_its_own_proof():
     problem = beside_a_loaded_node(3, slides=True, grazing=True)
     records = records_of(enumerate_roots(problem, 0).proof)
     for k in leaves(records, "m"):
-        for free in ([], records[k][2][1:], records[k][2][:-1]):
-            tau = records[k][3][: len(free)]
-            forged = ["m", records[k][1], free, tau, *records[k][4:]]
+        mu, rows = numbers_in(records[k])
+        for part in (slice(0), slice(1, None), slice(-1)):
+            numbers = mu[part] + [x for row in rows for x in row[part]]
+            forged = ["m", records[k][1], records[k][2][part], numbers, *records[k][4:]]
             assert not accepted(problem, [*records[:k], forged, *records[k + 1 :]])
 
 

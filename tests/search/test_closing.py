@@ -43,9 +43,10 @@ def test_much_friction(slides, arithmetic):
 
 def test_sides_without_rationals(monkeypatch):
     monkeypatch.setattr(solvers, "EXACT_DOF_LIMIT", 0)
-    problem = beside_a_loaded_node(12, slides=True, grazing=True, friction=0.875)
-    roots = enumerate_roots(problem, 0, max_nodes=100)
+    problem = row_of_discs(8, weights=(2.0, 3.0), friction=0.9)
+    roots = enumerate_roots(problem, 0, max_nodes=200)
     assert roots.complete
+    assert any(record[0] == "m" and max(record[1]) > 6 for record in records_of(roots.proof)[1:-1])
     assert len(roots) == roots.index_sum == 1
     assert verify(problem, roots.proof).complete
 
@@ -53,7 +54,25 @@ def test_sides_without_rationals(monkeypatch):
 @pytest.mark.parametrize("weights", [(2.0, 3.0), (1.0, 2.0, 4.0)])
 def test_a_row_of_unequal_discs(weights):
     problem = row_of_discs(12, weights=weights, friction=0.9, stiffness=4.0)
-    roots = enumerate_roots(problem, 0, max_nodes=2000)
+    roots = enumerate_roots(problem, 0, max_nodes=60)
+    assert roots.complete
+    assert roots.index_sum == len(roots) == 1
+    assert verify(problem, roots.proof).complete
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_row_of_stiff_discs_of_any_weights(seed):
+    problem = row_of_discs(20, weights=np.random.default_rng(seed).uniform(1.5, 3.0, 20), friction=0.9)
+    roots = enumerate_roots(problem, 0, max_nodes=600)
+    assert roots.complete
+    assert roots.index_sum == len(roots) == 1
+    assert verify(problem, roots.proof).complete
+
+
+def test_the_index_where_very_many_selections_hold():
+    # some neighbours have equal weights: those touch at rest
+    problem = row_of_discs(20, weights=np.random.default_rng(1).integers(12, 25, 20) / 8, friction=0.9)
+    roots = enumerate_roots(problem, 0, max_nodes=600)
     assert roots.complete
     assert roots.index_sum == len(roots) == 1
     assert verify(problem, roots.proof).complete
@@ -220,7 +239,7 @@ def test_fast_arithmetic():
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_sides_are_told_to_workers(workers, monkeypatch):
-    problem = beside_a_loaded_node(24, slides=True, grazing=True, friction=1.75)
+    problem = row_of_discs(12, weights=(2.0, 3.0), friction=0.9)
     alone = enumerate_roots(problem, 0)
     monkeypatch.setattr("enumsol.search.parallel.FIRST", 8)
     monkeypatch.setattr("enumsol.search.parallel.NODES", 16)
@@ -234,7 +253,7 @@ def test_sides_are_told_to_workers(workers, monkeypatch):
 
 @pytest.mark.parametrize("nodes", [30, 50, 70])
 def test_a_proof_with_sides_is_resumed(nodes, tmp_path):
-    problem = beside_a_loaded_node(24, slides=True, grazing=True, friction=1.75)
+    problem = row_of_discs(12, weights=(2.0, 3.0), friction=0.9)
     stopped = enumerate_roots(problem, 0, max_nodes=nodes, proof_path=tmp_path / "a.proof")
     assert not stopped.complete
     roots = enumerate_roots(problem, 0, max_nodes=3000, proof_path=tmp_path / "a.proof", resume=True)

@@ -11,7 +11,7 @@ from enumsol.search.certifiers.floats import solve_or_open
 from enumsol.search.certifiers.protocol import WithoutProof
 from enumsol.search.closing import holds_below, propose, start
 from enumsol.selections.solution import SelectionSolution
-from enumsol.statuses import RowKind
+from enumsol.statuses import OPEN, SLIDING, RowKind
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,7 +58,7 @@ class ExactCertifier(WithoutProof):
         """What closes a subtree, and the solutions in it, sought near a point (theory, section 6.11)."""
         if self._enclosed is None:
             return None
-        proposal = propose(self._scaled, codes, force, w, exactly=True, sides=False)
+        proposal = propose(self._scaled, codes, force, w, exactly=True)
         if proposal is None or proposal.weights is None:
             return None
         solver, selection = self._selections, proposal.selection
@@ -66,16 +66,19 @@ class ExactCertifier(WithoutProof):
         if solved is None:
             return None
         point, determinant = solved
-        active = solver.active(point)
+        active, moved = solver.active(point), solver.moved(point)
         if not all(selection[i] in active[i] for i in proposal.free):
             return None
-        sign = only_solution(self._enclosed, selection, proposal.free, proposal.weights, point, solver.moved(point))
+        if any(moved[i] > 0 if selection[i] == OPEN else point[i] < 0 for i in proposal.sliding):
+            return None
+        sign = only_solution(self._enclosed, proposal.named, proposal.free, proposal.weights, point, moved)
         if not sign:
             return None
         if not holds_below(codes, active):
             return proposal, []
-        fixed = [active[i] for i in range(solver.p) if i not in proposal.free]
-        index = sign if all(len(held) == 1 for held in fixed) else None
+        fixed = [i for i in range(solver.p) if i not in proposal.free]
+        sides = {i: SLIDING[code] for i, code in proposal.sliding.items()}
+        index = sign if all(active[i] <= set(sides.get(i, (selection[i],))) for i in fixed) else None
         strict = all(len(held) == 1 for held in active)
         solution = SelectionSolution(proposal.selection, (point,), 0, determinant, strict, exact=True, index=index)
         return proposal, [solution]
