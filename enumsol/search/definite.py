@@ -89,7 +89,7 @@ def weights_of(R: Array, nodes: Nodes, *, factors: bool = True) -> Array | None:
     """
     b, F, share, n = len(nodes.F), nodes.F, nodes.first, nodes.normal
     T = F[:, None] * R[nodes.tangential]
-    tau = np.where(nodes.wide, np.sqrt(np.sum(T * T, axis=1)), 0.0)
+    tau = np.where(nodes.wide, np.maximum(np.sqrt(np.sum(T * T, axis=1)), _DEFINITE), 0.0)
     form = R.copy()
     form[n] -= share[:, None] * T
     wide = np.flatnonzero(nodes.wide)
@@ -159,7 +159,7 @@ class _Barrier:
 
     def numbers(self) -> Array | None:
         """mu, kappa, nu and theta / F, or None."""
-        if self._k > _LARGEST:
+        if self._k > _LARGEST or not 0 < self._scale < np.inf:
             return None
         z, parts = self._start(), self._k + len(self._C)
         if not np.all(self._C @ z[:-1] > 0):

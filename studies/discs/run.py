@@ -1,4 +1,4 @@
-"""What do rows of discs of unequal radii or weights cost, and why are some not finished?
+"""What do rows of discs of unequal radii or weights cost?
 
 Discs touch in a row on a floor, one time step with friction 0.9: the first is pulled away, the others rest. Every
 contact has a spring in both directions. With equal radii the normals between neighbours are level, and discs that do
@@ -6,15 +6,15 @@ not move touch their neighbours without load: with equal weights w = 0 there, wi
 other, w_n = lambda_n = 0 and w_t not 0. With unequal radii normals are inclined, and all contacts carry load or are
 open.
 
-Read ``nodes`` and ``seconds``; the search is cut at a number of nodes. ``ones`` are the nodes of a search in which all
-omega of theory, (6.9), are 1. ``grazing`` counts the contacts with w_n = lambda_n = 0 at the root, ``sliding`` those of
-them with w_t not 0. The other contacts being fixed at their statuses,
+Read ``nodes`` and ``seconds``; the search is cut at a number of nodes. ``ones`` are the nodes of a search in which mu =
+kappa = 1 and nu = 0 in theory, (6.9). ``grazing`` counts the contacts with w_n = lambda_n = 0 at the root, ``sliding``
+those of them with w_t not 0. The other contacts being fixed at their statuses,
 
-- ``weights`` says whether there are tau for which the form of theory, (6.9), is definite with omega = 1: then closing
-  needs no status of the grazing ones; ``factors`` whether there are tau and omega. Where it says no, the tree tells
-  sliding contacts one by one from sticking and from slipping to the other side.
-- ``halves`` says whether the form is definite in which every sliding contact is known to be open or to slip in one
-  direction, with lambda_t = F lambda_n or -F lambda_n, with omega = 1; ``scaled`` whether it is so with some omega.
+- ``plain`` says whether the form of theory, (6.9), is definite at the root with mu = kappa = 1 and nu = 0: then closing
+  needs no status of the grazing ones; ``numbers`` whether there are numbers for which it is. Where it says no, the tree
+  tells some sliding contacts from sticking and from slipping to the other side.
+- ``told`` and ``both`` say the same of the form in which every sliding contact is known to be open or to slip in one
+  direction.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SEEDS, SMOKE_SEEDS = range(3), range(1)
 MAX_NODES, SMOKE_NODES = 3000, 500
 FRICTION, PULL = 0.9, 3.0
 #: What is asked of the grazing contacts; see above.
-FORMS = ("weights", "factors", "halves", "scaled")
+FORMS = ("plain", "numbers", "told", "both")
 
 
 def discs(radii, weights, stiffness):
@@ -79,7 +79,7 @@ def problems(run):
 
 
 def with_ones(*form, factors):
-    """What is found if all omega are 1."""
+    """What is found if mu = kappa = 1 and nu = 0."""
     del factors
     return weights_of(*form, factors=False)
 
@@ -101,9 +101,9 @@ def forms(system, root):
     for sliding in ({}, sides):
         undecided = tuple(i for i in free if i not in sliding)
         reduction = Reduction(system, codes, undecided, sliding)
-        for factors in (False, True):
-            weights = reduction.weights(np.ones(len(free), dtype=bool), factors=factors)
-            definite.append(yes(weights is not None))
+        x, v = force[reduction.places], w[reduction.places]
+        found = [reduction.weights(x, v, exactly=True, factors=factors) for factors in (False, True)]
+        definite += [yes(numbers is not None) for numbers in found]
     return len(free), len(sides), *definite
 
 
@@ -143,7 +143,7 @@ def conclusions(rows):
                 f"unequal {kind}, {name}: {len(done)} of {len(own)} complete, up to {largest} discs in "
                 f"{min(line['nodes'] for line in at)} to {max(line['nodes'] for line in at)} nodes"
             )
-    touching = [line for line in rows if line["weights"] != "-"]
+    touching = [line for line in rows if line["plain"] != "-"]
     definite = ", ".join(f"{name} {sum(line[name] == 'yes' for line in touching)}" for name in FORMS)
     yield f"forms that are definite, of {len(touching)} problems with grazing contacts at a root: {definite}"
 

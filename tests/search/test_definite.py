@@ -1,4 +1,4 @@
-"""Numbers with which a form is definite: found where there are any, and solutions are unique then."""
+"""Numbers with which a form is definite: found where there are any, and solutions that theta serves are unique then."""
 
 from itertools import product
 
@@ -6,22 +6,32 @@ import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat
 
-from enumsol.search.definite import weights_of
+from enumsol.search.definite import Nodes, weights_of
 
 
 def exact(values):
     return [fmpq(*float(x).as_integer_ratio()) for x in values]
 
 
-def form_of(R, F, tau, omega):
-    """Q of theory, (6.9), in rationals, with all m nodes counted; R holds integers, normal components first."""
+def form_of(R, F, numbers, x=None):
+    """Q of theory, (6.9), in rationals, of m nodes with friction; R holds integers, normal components first.
+
+    With theta = lambda_t / lambda_n at the loaded nodes of x.
+    """
     m = len(F)
-    rows = [[x * int(r) for r in row] for x, row in zip(omega, R.tolist(), strict=True)]
+    mu, kappa, nu, share, tau = (exact(part) for part in np.reshape(numbers, (5, m)))
+    if x is not None:
+        loaded = [x[i] > 0 and tau[i] == 0 for i in range(m)]
+        share = [x[m + i] / x[i] / F[i] if loaded[i] else share[i] for i in range(m)]
+    R = [[fmpq(int(x)) for x in row] for row in R.tolist()]
+    rows = [[mu[i] * a - kappa[i] * share[i] * F[i] * b for a, b in zip(R[i], R[m + i], strict=True)] for i in range(m)]
+    rows += [[nu[i] * a + kappa[i] * b for a, b in zip(R[i], R[m + i], strict=True)] for i in range(m)]
     Q = [[(rows[a][b] + rows[b][a]) / 2 for b in range(2 * m)] for a in range(2 * m)]
     for i in range(m):
-        Q[i][i] -= tau[i] / 2
-        r, factor = rows[m + i], F[i] ** 2 / tau[i] / 2
-        Q = [[q - factor * r[a] * r[b] for b, q in enumerate(row)] for a, row in enumerate(Q)]
+        if tau[i] > 0:
+            r, factor = R[m + i], (kappa[i] * F[i]) ** 2 / tau[i] / 2
+            Q[i][i] -= tau[i] / 2
+            Q = [[q - factor * r[a] * r[b] for b, q in enumerate(row)] for a, row in enumerate(Q)]
     return Q
 
 
@@ -30,8 +40,8 @@ def is_definite(Q):
 
 
 def solutions(R, h, F):
-    """All x that solve the reduced problem w = h - R x, of the regular selections; None if one is singular."""
-    m, found = len(F), set()
+    """All x that solve the reduced problem w = h - R x, of the regular selections, with w; None if one is singular."""
+    m, found = len(F), {}
     zero, one = fmpq(0), fmpq(1)
     for codes in product(range(4), repeat=m):
         rows, sides = [], []
@@ -48,8 +58,8 @@ def solutions(R, h, F):
         x = matrix.solve(fmpq_mat(sides)).entries()
         w = [a - sum((int(r) * b for r, b in zip(row, x, strict=True)), zero) for a, row in zip(h, R, strict=True)]
         if all(holds(code, x[i], x[m + i], w[i], w[m + i], F[i]) for i, code in enumerate(codes)):
-            found.add(tuple((int(v.p), int(v.q)) for v in x))
-    return found
+            found[tuple((int(v.p), int(v.q)) for v in x)] = x, w
+    return list(found.values())
 
 
 def holds(code, n, t, w_n, w_t, F):
@@ -65,44 +75,97 @@ def random_form(rng, m):
     return R * rng.choice([1, 2, 5, 12], size=(2 * m, 1))
 
 
-def test_solutions_are_unique_where_a_form_is_definite():
-    tried = needed = 0
+def nodes_of(F, share, wide, gap, slip):
+    m = len(F)
+    arrays = (np.asarray(values, dtype=float) for values in (F, share))
+    return Nodes(m, np.arange(m), m + np.arange(m), *arrays, np.asarray(wide), np.asarray(gap), np.asarray(slip))
+
+
+def serves(numbers, F, x, w):
+    """Whether the numbers serve a solution, exactly."""
+    m = len(F)
+    mu, kappa, nu, share, tau = (exact(part) for part in np.reshape(numbers, (5, m)))
+    for i in range(m):
+        theta = share[i] * F[i]
+        assert mu[i] > 0
+        assert kappa[i] > 0
+        assert abs(nu[i]) * F[i] <= mu[i]
+        assert abs(share[i]) <= 1
+        if tau[i] > 0:
+            assert share[i] == 0
+        elif x[i] == 0:
+            forward = (mu[i] + nu[i] * F[i]) * -w[i] - kappa[i] * (F[i] - theta) * w[m + i]
+            backward = (mu[i] - nu[i] * F[i]) * -w[i] + kappa[i] * (F[i] + theta) * w[m + i]
+            if forward < 0 or backward < 0:
+                return False
+    return True
+
+
+def test_a_solution_that_theta_serves_is_the_only_one():
+    tried = needed = several = 0
     rng = np.random.default_rng(0)
-    for _ in range(160):
+    for _ in range(400):
         m = int(rng.integers(1, 4))
-        R, F = random_form(rng, m), rng.integers(1, 7, size=m) / 8
-        weights = weights_of(R * 1.0, F, np.arange(m), m + np.arange(m), np.arange(2 * m))
-        if weights is None:
+        R, F = random_form(rng, m), rng.integers(1, 9, size=m) / 4
+        h = [fmpq(int(x)) for x in rng.integers(-3, 4, size=2 * m)]
+        found = solutions(R, h, exact(F))
+        if not found:
             continue
-        numbers = exact(np.concatenate([weights, np.ones(2 * m)])[: 3 * m])
-        if not is_definite(form_of(R, exact(F), numbers[:m], numbers[m:])):
+        several += len(found) > 1
+        x, w = (np.array([float(v) for v in values]) for values in found[0])
+        loaded, slip = x[:m] > 0, w[m:]
+        share = np.where(loaded, np.clip(x[m:] / np.where(loaded, F * x[:m], 1.0), -1.0, 1.0), np.nan)
+        share = np.where(~loaded & (w[:m] == 0) & (slip != 0), np.sign(slip), share)
+        wide = ~loaded & (w[:m] == 0) & (slip == 0) & bool(rng.integers(2))
+        numbers = weights_of(R * 1.0, nodes_of(F, share, wide, -w[:m], slip))
+        if numbers is None or not serves(numbers, exact(F), *found[0]):
+            continue
+        if not is_definite(form_of(R, exact(F), numbers, found[0][0])):
             continue
         tried += 1
-        needed += len(weights) > m
-        for _ in range(3):
-            h = [fmpq(int(x)) for x in rng.integers(-9, 10, size=2 * m)]
-            found = solutions(R, h, exact(F))
-            assert found is None or len(found) == 1
+        needed += not np.all(numbers[: 2 * m] == 1)
+        assert len(found) == 1
     assert needed > 20
-    assert tried > 50
+    assert tried > 60
+    assert several > 3
 
 
-def test_factors_are_needed_and_found():
-    # without friction a form is a matrix times numbers; with all of them 1 it is indefinite
+def test_a_form_for_any_theta_has_one_solution_for_every_load():
+    tried = 0
+    rng = np.random.default_rng(1)
+    for _ in range(100):
+        m = int(rng.integers(1, 4))
+        R, F = random_form(rng, m), rng.integers(1, 7, size=m) / 8
+        none = np.zeros(m)
+        numbers = weights_of(R * 1.0, nodes_of(F, none + np.nan, none == 0, none, none))
+        if numbers is None or not is_definite(form_of(R, exact(F), numbers)):
+            continue
+        tried += 1
+        for _ in range(3):
+            found = solutions(R, [fmpq(int(x)) for x in rng.integers(-9, 10, size=2 * m)], exact(F))
+            assert found is None or len(found) == 1
+    assert tried > 30
+
+
+def frictionless(R):
     none, still = np.zeros(0), np.zeros(0, dtype=np.intp)
+    return Nodes(len(R), still, still, none, none, none > 0, none, none)
+
+
+def test_numbers_are_needed_and_found():
+    # without friction a form is a matrix times numbers; with all of them 1 it is indefinite
     R = np.array([[1.0, 5.0], [0.0, 1.0]])
-    omega = weights_of(R, none, still, still, np.arange(2))
-    assert np.linalg.eigvalsh(omega[:, None] * R + (omega[:, None] * R).T)[0] > 0
-    assert weights_of(R, none, still, still, np.zeros(2, dtype=np.intp)) is None
-    assert len(weights_of(np.eye(3), none, still, still, np.arange(3))) == 0
+    mu = weights_of(R, frictionless(R))
+    assert np.linalg.eigvalsh(mu[:, None] * R + (mu[:, None] * R).T)[0] > 0
+    assert weights_of(R, frictionless(R), factors=False) is None
+    assert weights_of(np.eye(3), frictionless(np.eye(3))).tolist() == [1.0, 1.0, 1.0]
     # no P-matrix: some problem has several solutions
     for wrong in ([[1.0, 2.0], [2.0, 1.0]], [[1.0, -2.0], [-1.0, 1.0]], [[-1.0]], [[0.0]], [[np.nan]]):
-        size = len(wrong)
-        assert weights_of(np.array(wrong), none, still, still, np.arange(size)) is None
+        assert weights_of(np.array(wrong), frictionless(wrong)) is None
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_wide_ranges_of_factors_are_found(seed):
+def test_wide_ranges_of_numbers_are_found(seed):
     # D R with R + R' definite is made from its rows multiplied by numbers over four decades
     rng = np.random.default_rng(seed)
     k = int(rng.integers(2, 9))
@@ -110,8 +173,6 @@ def test_wide_ranges_of_factors_are_found(seed):
     R = X @ X.T + np.eye(k) + 3.0 * np.triu(rng.normal(size=(k, k)), 1)
     R = R + (0.5 - min(0.0, np.linalg.eigvalsh(R + R.T)[0])) * np.eye(k)
     R *= 10.0 ** rng.uniform(-2, 2, size=(k, 1))
-    none, still = np.zeros(0), np.zeros(0, dtype=np.intp)
-    omega = weights_of(R, none, still, still, np.arange(k))
-    assert omega is not None
-    scaled = (omega if len(omega) else np.ones(k))[:, None] * R
-    assert np.linalg.eigvalsh(scaled + scaled.T)[0] > 0
+    mu = weights_of(R, frictionless(R))
+    assert mu is not None
+    assert np.linalg.eigvalsh(mu[:, None] * R + (mu[:, None] * R).T)[0] > 0
