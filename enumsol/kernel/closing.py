@@ -406,6 +406,8 @@ class Reduced:
         size, change = w.size, np.zeros(len(self.places))
         up, down = np.maximum(w.mid + w.rad, 0.0) * SAFE, np.maximum(w.rad - w.mid, 0.0) * SAFE
         gap = np.maximum(-(w.mid + w.rad), 0.0) / SAFE
+        if not np.all(np.isfinite(size)):
+            return np.inf
         for i, node in enumerate(self.nodes):
             code, t = self.selection[node], self.tangential[i]
             apart = code == OPEN or (code in _SLIDING and point[i] == 0)

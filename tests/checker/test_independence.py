@@ -52,7 +52,7 @@ SHARED = {
     },
     "kernel.precise": None,
     "kernel.selection_rows": None,
-    "kernel.closing": {"ClosedSolution", "closed_solution", "definite_sign", "same_solution"},
+    "kernel.closing": {"ClosedSolution", "closed_solution", "only_solution", "same_solution"},
     "kernel.point": {"VerifiedSelection", "exclusion_margin", "holds_no_root", "solve_selection"},
     "kernel.forms": {"EnclosedForm", "Equations", "form_margin"},
     "kernel.rows": None,
