@@ -41,7 +41,10 @@ def local_degree(solver: FloatSelections, active: ActiveSets, point: tuple[Array
 
 
 def _reduced_degree(solver: FloatSelections, active: ActiveSets, force: Array, w: Array) -> int | None:
-    """The sign of the determinant of the strict nodes' equations, if the others have one solution (theory, section 6.11)."""
+    """The sign of the determinant of the strict nodes' equations, if the others have one solution.
+
+    See theory, section 6.11.
+    """
     system = solver.system
     codes = tuple(min(held) for held in active)
     free = tuple(i for i, held in enumerate(active) if len(held) > 1)
