@@ -45,7 +45,7 @@ import math
 import stat
 import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
@@ -91,16 +91,6 @@ def packed(rows: NDArray[np.intp], values: NDArray[np.float64]) -> tuple[str, st
 def fraction_text(numerator: int, denominator: int) -> str:
     """A fraction in hexadecimal digits, which Python converts without a limit on their number."""
     return f"{numerator:x}/{denominator:x}"
-
-
-class Recorder(Protocol):
-    """Takes the records of a proof in order."""
-
-    def write(self, record: Any) -> None:
-        """Append one record."""
-
-    def add(self, lines: list[str]) -> None:
-        """Append records that were encoded elsewhere (``writer.encoded``)."""
 
 
 class Proof:

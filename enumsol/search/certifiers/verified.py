@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.kernel.forms import EnclosedForm
-    from enumsol.proof.proof_file import Recorder
+    from enumsol.proof.parts import Recorder
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.margins import Margin
     from enumsol.search.certifiers.protocol import Bound
