@@ -72,6 +72,8 @@ RECORD_SHARE = 16
 LONGEST_RECORD = 1 << 26
 #: Characters that the smallest file may hold; its few records may compress far.
 SMALL = 1 << 16
+#: In the bits of a double, half a unit of the upper 32 of them, and these.
+_HALF, _UPPER = np.uint64(1 << 31), np.uint64(0xFFFFFFFF << 32)
 #: Digits of a whole number and its sign; codes, exponents and counts have fewer.
 _WHOLE_DIGITS = 18
 
@@ -86,6 +88,11 @@ def packed(rows: NDArray[np.intp], values: NDArray[np.float64]) -> tuple[str, st
         base64.b64encode(rows.astype("<u4").tobytes()).decode(),
         base64.b64encode(values.astype("<f8").tobytes()).decode(),
     )
+
+
+def shortened(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same to 21 binary digits: the lower half of their bits is zero, which compresses well."""
+    return ((values.view(np.uint64) + _HALF) & _UPPER).view(np.float64)
 
 
 def fraction_text(numerator: int, denominator: int) -> str:

@@ -62,7 +62,7 @@ SHARED = {
     "proof.begun": None,
     "proof.forms": None,
     "proof.parts": None,
-    "proof.proof_file": {"Proof", "fraction_text", "packed"},
+    "proof.proof_file": {"Proof", "fraction_text", "packed", "shortened"},
     "proof.reading": {"fits", "multipliers_from", "rational_text"},
     "proof.reading_space": None,
     "proof.writer": None,
