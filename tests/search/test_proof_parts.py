@@ -8,6 +8,7 @@ import pytest
 from proof_tools import bytes_of
 
 from enumsol import Proof, enumerate_roots, gallery
+from enumsol.proof.begun import BegunProof
 from enumsol.proof.parts import BEGIN, Checksum, Part, encoded
 from enumsol.proof.proof_file import MAGIC
 from enumsol.proof.writer import FLUSH_EVERY, ProofWriter
@@ -58,6 +59,22 @@ def test_records_and_parts_come_in_the_order_in_which_they_are_written(tmp_path,
         proof.check_integrity()
         assert text_of(bytes_of(proof)) == expected
         assert [encoded(record) for record in Proof(bytes_of(proof)).records()] == expected
+
+
+def test_a_file_that_was_cut_short_is_read_up_to_its_last_part_at_least(tmp_path):
+    source = random.Random(7)
+    writer, ends, path = ProofWriter(), [], tmp_path / "cut.proof"
+    writer.write({"format": "enumsol-proof"})
+    groups = [some_lines(source, 40) for _ in range(20)]
+    for lines in groups:
+        writer.add(Part.of(lines))
+        ends.append(len(writer._file.getvalue()))
+    data, expected = bytes_of(writer.close()), [line for lines in groups for line in lines]
+    for cut in (*ends, *(source.randrange(ends[0], len(data)) for _ in range(40))):
+        path.write_bytes(data[:cut])
+        found = [encoded(record) for record in BegunProof(path).records()]
+        assert found == expected[: len(found)]
+        assert len(found) >= sum(len(lines) for lines, end in zip(groups, ends, strict=True) if end <= cut)
 
 
 def test_what_is_not_finite_is_no_record():
