@@ -37,7 +37,8 @@ What checker and search share
       definite matrix, and floats as rationals;
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file; a search that goes on
       with an earlier proof reads its multipliers and forms by ``proof.reading``, ``proof.reading_space`` and
-      ``proof.forms``, too, from what ``proof.begun`` finds, and proves them again before ``proof.writer`` has them;
+      ``proof.forms``, too, from what ``proof.begun`` finds, and proves them again before ``proof.writer`` and
+      ``proof.parts`` have them;
     - ``problem``, ``body2d``, ``contact_body``, ``condensation.data``, ``condensation.condensed``,
       ``condensation.factorization``, ``sealed``, ``checks``, ``array_checks``, ``files``, ``texts`` and ``errors``: the
       data, their checks and their fingerprint, the factorization of A (no bound assumes that it is accurate), S and g

@@ -7,16 +7,15 @@ it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from enumsol.proof.parts import Part, Recorder
 from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, FormEngine
 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.kernel.forms import EnclosedForm
-    from enumsol.proof.proof_file import Recorder
     from enumsol.relaxation.engine import Engine
     from enumsol.search.splitting import ImposedRows
     from enumsol.selections.solution import Codes
@@ -121,11 +120,6 @@ def ascended(
     return found[0]
 
 
-@dataclass(frozen=True, slots=True)
-class _Line:
-    text: str
-
-
 class HeldRecords:
     """Keeps the records of a search that may begin again.
 
@@ -143,15 +137,15 @@ class HeldRecords:
         """Keep a record."""
         self._records.append(record)
 
-    def add(self, lines: list[str]) -> None:
-        """Keep records that are lines already."""
-        self._records += [_Line(line) for line in lines]
+    def add(self, part: Part) -> None:
+        """Keep records that were encoded elsewhere."""
+        self._records.append(part)
 
     def release(self) -> None:
         """Hand the records on."""
         for record in self._records:
-            if isinstance(record, _Line):
-                self.recorder.add([record.text])
+            if isinstance(record, Part):
+                self.recorder.add(record)
             else:
                 self.recorder.write(record)
         self._records.clear()

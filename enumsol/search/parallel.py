@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from enumsol.executors import Crew
-from enumsol.proof.writer import encoded
+from enumsol.proof.parts import Part, encoded
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.search.tree import TreeNode
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from enumsol.executors import Job
     from enumsol.kernel.forms import EnclosedForm
-    from enumsol.proof.proof_file import Recorder
+    from enumsol.proof.parts import Recorder
     from enumsol.search.certifiers.protocol import Certified, Certifier
     from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress
     from enumsol.search.resume import Reader
@@ -115,7 +115,7 @@ class _Answer:
     """What a task came to; ``rest`` are the subtrees that are left, the first one last."""
 
     outcome: SearchOutcome
-    lines: list[str]
+    records: Part | None
     certified: Certified
     covered: float
     rest: list[_Root]
@@ -251,7 +251,8 @@ class Spread:
             return self._parts(part.place, [_Root.of(item) for item in left])
         search.outcome.add(answer.outcome)
         search.certifier.add(answer.certified)
-        search.certifier.recorder.add(answer.lines)
+        if answer.records is not None:
+            search.certifier.recorder.add(answer.records)
         search.covered += answer.covered
         search.report(search.covered)
         return part.further
@@ -271,19 +272,23 @@ class Spread:
         self.cancel()
 
 
-class _Lines:
-    """Records as lines of text."""
+class _Records:
+    """Records of a part of a proof."""
 
     def __init__(self) -> None:
-        self.lines: list[str] = []
+        self._lines: list[str] = []
 
     def write(self, record: Any) -> None:
         """Append one record."""
-        self.lines.append(encoded(record))
+        self._lines.append(encoded(record))
 
-    def add(self, lines: list[str]) -> None:
-        """Append records that are lines already."""
-        self.lines += lines
+    def add(self, part: Part) -> None:
+        """Nothing is searched by others from here."""
+        raise AssertionError("a worker has no workers")
+
+    def part(self) -> Part | None:
+        """All of them; None if there are none."""
+        return Part.of(self._lines) if self._lines else None
 
 
 _local = threading.local()
@@ -299,8 +304,8 @@ def _search_part(
         remake, _local.form, _local.sliding = pickle.loads(data)
         _local.solvers, _local.key = remake(), key
     solvers: Searchable = _local.solvers.fresh()
-    lines = _Lines()
-    certifier = solvers.certifier(lines)
+    records = _Records()
+    certifier = solvers.certifier(records)
     certifier.sliding.update(_local.sliding)
     search = solvers.search(certifier)
     if search.forms is not None:
@@ -308,4 +313,4 @@ def _search_part(
     deadline = None if seconds is None else time.perf_counter() + seconds
     rest = search.examined([root.node for root in roots], nodes, deadline)
     left = [_Root.of(item) for item in rest]
-    return _Answer(search.outcome, lines.lines, certifier.certified, search.covered, left)
+    return _Answer(search.outcome, records.part(), certifier.certified, search.covered, left)

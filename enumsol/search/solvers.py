@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from enumsol.checks import Alpha
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.problem import ContactProblem
-    from enumsol.proof.proof_file import Recorder
+    from enumsol.proof.parts import Recorder
     from enumsol.relaxation.engine import Engine
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rationals import ExactCertifier

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space import EnclosedSpace
     from enumsol.kernel.leaves import SpaceRoot
-    from enumsol.proof.proof_file import Recorder
+    from enumsol.proof.parts import Recorder
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.protocol import Bound
     from enumsol.selections.solution import Codes

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from enumsol.checks import Alpha
     from enumsol.problem3d import ContactProblem3D
-    from enumsol.proof.proof_file import Recorder
+    from enumsol.proof.parts import Recorder
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.outcome import SearchLimits, SearchProgress
 

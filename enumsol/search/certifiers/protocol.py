@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.kernel.forms import EnclosedForm
-    from enumsol.proof.proof_file import Recorder
+    from enumsol.proof.parts import Part, Recorder
     from enumsol.selections.solution import Codes
 
 
@@ -149,7 +149,7 @@ class Unrecorded:
     def write(self, record: Any) -> None:
         """Nothing to write."""
 
-    def add(self, lines: list[str]) -> None:
+    def add(self, part: Part) -> None:
         """Nothing to write."""
 
 
