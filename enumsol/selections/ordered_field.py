@@ -58,7 +58,7 @@ class FiberSelections(ExactSelections):
             self.form(RowKind.NORMAL_FORCE, i) for i, code in enumerate(codes) if code == STICK
         ]
 
-    def _w(self, point: Point) -> list[Any]:
+    def moved(self, point: Point) -> list[Any]:
         return [g - dot(row, point) for g, row in zip(self.system.g, self._S, strict=True)]
 
     # -- the field -------------------------------------------------------------------------------------------------
