@@ -15,20 +15,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-#: Nodes along the outlines of the faces of a cell, by the number of its nodes.
-_FACES: dict[int, tuple[tuple[int, ...], ...]] = {
-    4: ((0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)),
-    8: ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
-    10: ((0, 4, 1, 5, 2, 6), (0, 4, 1, 8, 3, 7), (0, 6, 2, 9, 3, 7), (1, 5, 2, 9, 3, 8)),
-    27: (
-        (0, 8, 1, 9, 2, 10, 3, 11),
-        (4, 12, 5, 13, 6, 14, 7, 15),
-        (0, 8, 1, 17, 5, 12, 4, 16),
-        (1, 9, 2, 18, 6, 13, 5, 17),
-        (2, 10, 3, 19, 7, 14, 6, 18),
-        (3, 11, 0, 16, 4, 15, 7, 19),
-    ),
-}
 #: Displacements are drawn so that the largest takes this part of the body's size, and forces likewise.
 _MOVED, _LONGEST = 0.08, 0.16
 #: Nodal forces below this part of the largest are rounding.
@@ -117,10 +103,3 @@ def round_scale(largest: float, size: float, share: float = _MOVED) -> float:
 def arrow_scale(largest: float, size: float) -> float:
     """Length of an arrow for a unit of force."""
     return _LONGEST * size / largest if largest > 0 else 0.0
-
-
-def boundary_faces(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Outlines (k, m) of the faces of tetrahedra or hexahedra (order of VTK) that belong to one cell only."""
-    faces = np.concatenate([cells[:, list(face)] for face in _FACES[cells.shape[1]]])
-    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    return np.asarray(faces[first[count == 1]])

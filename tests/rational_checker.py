@@ -13,12 +13,12 @@ from flint import fmpq, fmpq_mat
 from rational_arcs import Arcs
 from rational_closings import Closings
 from rational_forms import (
-    Data,
     Forms,
     Refused,
     _value,
     as_point,
     column_of,
+    data_of,
     decimal_fraction,
     dimension_of,
     exact,
@@ -97,7 +97,7 @@ class Proof:
         need(header["format"] == "enumsol-proof" and header["version"] == 1, "another format or version")
         need(header["problem"] == fingerprint(problem) and header["p"] == problem.p, "another problem")
         need(header["data"] == "problem", "S and g as computed are not at hand")
-        self.data, self.p = Data(problem), problem.p
+        self.data, self.p = data_of(problem), problem.p
 
     def units(self, record):
         """[4.4] Factors of multipliers: on rows of forces, and of displacements."""

@@ -9,6 +9,7 @@ import hashlib
 import re
 import struct
 from fractions import Fraction
+from functools import lru_cache
 from itertools import combinations
 from math import comb, isfinite
 
@@ -65,6 +66,7 @@ def multipliers(rows, values):
 # -- [3] the problem ---------------------------------------------------------------------------------------------------
 
 
+@lru_cache(maxsize=16)
 def fingerprint(problem):
     """[3.3]"""
     digest = hashlib.sha256(b"enumsol problem 1")
@@ -124,6 +126,10 @@ class Data:
             return None
         alpha = -self.g0[moving[0]] / self.g1[moving[0]]
         return alpha if all(value == 0 for value in self.load(alpha)) else None
+
+
+#: Of a problem; made once where many proofs of it are checked.
+data_of = lru_cache(maxsize=16)(Data)
 
 
 # -- [4] statuses and rows ---------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ LAYERS = (
     ("condensation",),
     ("contact_body",),
     ("friction", "body2d", "body3d", "shapes"),
-    ("problem", "problem3d"),
+    ("facets", "problem", "problem3d"),
     ("equation", "kernel", "selections"),
     ("relaxation", "proof"),
     ("search", "checker"),

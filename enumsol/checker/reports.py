@@ -112,11 +112,6 @@ class GraphVerificationReport:
         """Every solution for every alpha in the interval lies on one of the arcs, whose ends are joined as proven."""
         return self.ok and self.arcs is not None and not self.open
 
-    @property
-    def whole(self) -> bool:
-        """Same as complete."""
-        return self.complete
-
     def _repr_html_(self) -> str:
         return html_lines(repr(self).splitlines())
 

@@ -64,8 +64,6 @@ def _content(report: VerificationReport | GraphVerificationReport) -> dict[str, 
     content = asdict(report) | {"complete": report.complete}
     if "selections" in content and not isinstance(content["selections"], int):
         content["selections"] = len(content["selections"])
-    if "arcs" in content:
-        content["whole"] = getattr(report, "whole", None)
     return content
 
 

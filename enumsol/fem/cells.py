@@ -1,4 +1,4 @@
-"""Kinds of cells, with nodes in the order of VTK: their facets, and the nodes of facets that can be in contact."""
+"""Kinds of cells, with nodes in the order of VTK, and the nodes of their facets that can be in contact."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.body2d import triangles_apart
-from enumsol.errors import InvalidArgumentError
+from enumsol.facets import CELL_FACETS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,10 +23,7 @@ HEXAHEDRON = np.array(
 _EDGES = np.array(
     [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]], dtype=np.int64
 )
-_SIDES = np.array([[3, 0, 4, 7], [1, 2, 6, 5], [0, 1, 5, 4], [2, 3, 7, 6], [0, 3, 2, 1], [4, 5, 6, 7]])
-_SIDE_EDGES = np.array(
-    [[11, 16, 15, 19], [9, 18, 13, 17], [8, 17, 12, 16], [10, 19, 14, 18], [11, 10, 9, 8], [12, 13, 14, 15]]
-)
+_SIDES, _SIDE_EDGES = CELL_FACETS[3, 27][:, :4], CELL_FACETS[3, 27][:, 4:8]
 
 
 @dataclass(frozen=True)
@@ -70,47 +66,6 @@ KINDS = {
     (3, 10): CellKind("quadratic tetrahedra", "MeshTet2", "ElementTetP2", 4, 4),
     (3, 27): CellKind("quadratic hexahedra", "MeshHex2", "ElementHex2", 8, 5, _TRIQUADRATIC),
 }
-
-
-#: Nodes of each facet of a cell: corners, in 3D counterclockwise as seen from outside a cell of positive volume, then
-#: the nodes between them in the same order, then that inside. By dimension and nodes of a cell.
-CELL_FACETS = {
-    (2, 3): np.array([[0, 1], [1, 2], [2, 0]]),
-    (2, 4): np.array([[0, 1], [1, 2], [2, 3], [3, 0]]),
-    (2, 6): np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]]),
-    (2, 8): np.array([[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]]),
-    (2, 9): np.array([[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]]),
-    (3, 4): np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
-    (3, 8): np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]),
-    (3, 10): np.array([[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6]]),
-    (3, 27): np.concatenate([_SIDES, _SIDE_EDGES, np.arange(20, 26)[:, None]], axis=1),
-}
-
-
-def by_kind(dimension: int, cells: Integers) -> list[tuple[Integers, Integers]]:
-    """The rows of cells that are of one kind, and their nodes, for each kind that there is.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The cells have a number of nodes that no kind has.
-    """
-    count = cells.shape[1]
-    if (dimension, count) not in KINDS:
-        known = ", ".join(str(nodes) for d, nodes in KINDS if d == dimension)
-        raise InvalidArgumentError(f"cells have {count} nodes each; expected one of {known} in {dimension}D")
-    return triangles_apart(cells) if dimension == 2 else [(np.arange(len(cells)), cells)]
-
-
-def boundary_facets(dimension: int, cells: Integers) -> Integers:
-    """Facets (k, m) that belong to one cell only; in 3D counterclockwise as seen from outside the body."""
-    parts = []
-    for _, nodes in by_kind(dimension, cells):
-        local = CELL_FACETS[dimension, nodes.shape[1]]
-        parts.append(nodes[:, local].reshape(-1, local.shape[1]))
-    facets = np.concatenate(parts)
-    _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
-    return np.asarray(facets[np.sort(first[count == 1])])
 
 
 def contact_nodes(dimension: int, facets: Integers) -> Integers:

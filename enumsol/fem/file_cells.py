@@ -8,7 +8,8 @@ import numpy as np
 
 from enumsol.body2d import as_quadrilaterals
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.cells import CELL_FACETS, boundary_facets, completed
+from enumsol.facets import CELL_FACETS, boundary_facets
+from enumsol.fem.cells import completed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

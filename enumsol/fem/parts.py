@@ -12,7 +12,8 @@ import numpy as np
 
 from enumsol.checks import shown
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.cells import KINDS, by_kind
+from enumsol.facets import by_kind
+from enumsol.fem.cells import KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -10,7 +10,8 @@ import numpy as np
 from enumsol.array_checks import short_vector
 from enumsol.checks import one_of, positive_integer, shown
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.cells import KINDS, boundary_facets
+from enumsol.facets import boundary_facets
+from enumsol.fem.cells import KINDS
 from enumsol.fem.mesh_checks import elements, positions
 from enumsol.fem.parts import PartedMesh
 

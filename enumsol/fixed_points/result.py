@@ -49,6 +49,7 @@ class Outcome(enum.Enum):
     """How successive approximations ended."""
 
     CONVERGED = "converged"
+    ROUNDING = "rounding"
     CYCLE = "cycle"
     ITERATION_LIMIT = "iteration limit"
     NOT_SOLVED = "Tresca problem not solved"
@@ -76,7 +77,10 @@ class FixedPoint(ContactState):
         Distance of every iterate from its image under Psi in the norms of (theory, (11.4)): slips
         [length * sqrt(area)], and normal forces [sqrt(work)].
     tolerance : float
-        Increments of at most this fraction of the load's norm count as zero.
+        See `successive_approximations`.
+    rounding : float
+        Largest change of a contact force that was seen to come from rounding, relative to the largest force (theory,
+        section 11.7); nan where none was looked for. Where it is above the tolerance the error may be larger still.
     period : int or None
         Of a cycle.
 
@@ -95,11 +99,12 @@ class FixedPoint(ContactState):
     slip: Vector
     increments: NDArray[np.float64]
     tolerance: float
+    rounding: float = field(default=float("nan"))
     period: int | None = field(default=None)
 
     @property
     def converged(self) -> bool:
-        """Whether the last increment is below the tolerance."""
+        """Whether the estimated distance from the limit is within the tolerance."""
         return self.outcome is Outcome.CONVERGED
 
     @property
@@ -114,9 +119,13 @@ class FixedPoint(ContactState):
 
     @property
     def contraction_factor(self) -> float:
-        """Geometric mean of the last ratios above rounding, at most five; nan where there are none [-]."""
+        """Geometric mean of the last ratios above rounding, at most five; nan where there are none [-].
+
+        What follows an increment within the tolerance comes from a correction for rounding, and does not count.
+        """
         sizes = np.sum(self.increments / self._scales(), axis=1)
-        ratios = self.contraction[(sizes[1:] > 1e-12) & (self.contraction > 0)][-5:]
+        seen = (sizes[:-1] > self.tolerance) & (sizes[1:] > 1e-12) & (self.contraction > 0)
+        ratios = self.contraction[seen][-5:]
         return float(np.exp(np.mean(np.log(ratios)))) if len(ratios) else float("nan")
 
     def _scales(self) -> Vector:
@@ -133,6 +142,11 @@ class FixedPoint(ContactState):
         match self.outcome:
             case Outcome.CONVERGED:
                 return f"converged after {solved} ({last})"
+            case Outcome.ROUNDING:
+                return (
+                    f"not converged to the tolerance: after {solved} rounding still changes contact forces by "
+                    f"{self.rounding:.1e} of the largest ({last}; is the body almost free to move?)"
+                )
             case Outcome.CYCLE:
                 return (
                     f"not converged: from iteration {self.iterations} on it repeats {self.period} iterates ({last}); "
@@ -158,6 +172,7 @@ class FixedPoint(ContactState):
             "outcome": self.outcome.value,
             "iterations": self.iterations,
             "tolerance": self.tolerance,
+            "rounding": repr(self.rounding),
             "period": self.period,
             "node_ids": [str(label) for label in self.problem.node_ids],
             "statuses": [status.value for status in self.statuses],
@@ -184,6 +199,7 @@ class FixedPoint(ContactState):
             report: dict[str, Any] = {
                 "iterations": positive_integer(found["iterations"], f"iterations in {path}", least=0),
                 "tolerance": positive_number(found["tolerance"], f"tolerance in {path}"),
+                "rounding": float(found.get("rounding", "nan")),
                 "period": optional_count(found["period"], f"period in {path}"),
             }
             alpha, outcome, labels = alpha_value(found["alpha"]), Outcome(found["outcome"]), found["node_ids"]

@@ -31,6 +31,15 @@ if TYPE_CHECKING:
 
     Vector = NDArray[np.float64]
 
+#: Corrections of g for the rounding of S (theory, section 11.7) after which it is given up; one or two are enough where
+#: S is not almost singular.
+MOST_CORRECTIONS = 5
+#: A contraction factor nearer to 1 than this part, and one that is not known, counts as 1 minus it.
+_SLOWEST = 1e-3
+#: Ratios of increments that the contraction factor is taken from.
+_RATIOS = 5
+#: Increments no larger than this part are rounding if none of that many following ones is smaller.
+_SMALL, _PATIENCE = 1e-6, 20
 #: Longest cycle that is detected; two iterates are the same if they are this much closer than neighbours.
 LONGEST_CYCLE, _SAME = 12, 1e-9
 #: Most iterates that Anderson's mixing keeps.
@@ -80,9 +89,10 @@ def successive_approximations(
         Slip bounds to begin with [force]; None is 0, a first iterate without friction. A pair gives slip bounds and
         slips [length]; a root, a FixedPoint or a TrescaSolution gives its own.
     tolerance : float
-        Converged when the increment of normal forces in the norm of (theory, (11.4)) is at most this fraction of the
-        load's, and, where coefficients depend on the slips, that of the slips at most this fraction of the largest
-        slips, and the change of the coefficients at most this fraction of the largest one.
+        Converged when the distance from the limit, estimated by the last increment and the contraction seen (theory,
+        section 11.7), is at most this fraction: of normal forces in the norm of (theory, (11.4)) of the load's, and
+        each of the largest; where coefficients depend on the slips, also of slips of the largest, and of coefficients
+        of the largest one. What S loses by rounding is corrected until it changes no force by more.
     max_iterations : int
     anderson : int
         Depth of Anderson's mixing; 0 is plain iteration. With mixing, limits may be fixed points that repel Psi.
@@ -142,37 +152,63 @@ class _Iteration:
         self.slip_weights = np.sqrt(areas) * system.length
         # sqrt(work) of the scaled system: the product of the force and the length factor is the same at every node
         self.work = float(np.sqrt(system.force[0] * system.length[0]))
-        self.mixing = AndersonMixing(depth) if depth else None
+        self.depth, self.mixing = depth, AndersonMixing(depth) if depth else None
         self.recent: deque[Vector] = deque(maxlen=LONGEST_CYCLE + 1)
         self.increments: list[tuple[float, float]] = []
+        self.sizes: list[float] = []
         self.largest_slip = 0.0
+        self.rounding = float("nan")
         self.started = time.perf_counter()
 
     def run(self, start: Any, limit: int) -> FixedPoint:
-        bound, slip = self._start(start)
-        data = TrescaData(self.system, bound, self.system.coefficients(slip))
-        forces = np.zeros(len(self.system.g)) if not hasattr(start, "lambda_t") else scaled_forces(self.system, start)
-        outcome, period = Outcome.ITERATION_LIMIT, None
+        self.bound, self.slip = self._start(start)
+        self.data = TrescaData(self.system, self.bound, self.system.coefficients(self.slip))
+        self.forces = scaled_forces(self.system, start) if hasattr(start, "lambda_t") else np.zeros(len(self.system.g))
+        outcome, period = Outcome.ROUNDING, None
         try:
-            for _ in range(limit):
-                data = TrescaData(self.system, bound, self.system.coefficients(slip))
-                forces, _, _ = solve(data, forces)
-                image, image_slip = self._image(data, forces)
-                increment = self._increment(data, slip, image, image_slip)
-                if increment <= 1.0:
-                    outcome = Outcome.CONVERGED
+            for _ in range(MOST_CORRECTIONS + 1):
+                ended, period = self._iterate(limit)
+                better = self._rounding(ended)
+                settled = ended is Outcome.CONVERGED and self.rounding <= self.tolerance
+                if settled or ended not in (Outcome.CONVERGED, Outcome.ROUNDING):
+                    outcome = ended
                     break
-                period = self._period(np.concatenate([image, image_slip] if self.depends else [image]))
-                if period is not None:
-                    outcome = Outcome.CYCLE
-                    break
-                bound, slip = self._next(bound, slip, image, image_slip)
+                self.system = better
+                self.recent.clear()
+                self.sizes.clear()
+                self.mixing = AndersonMixing(self.depth) if self.depth else None
         except TrescaNotSolved:
             outcome = Outcome.NOT_SOLVED
         except KeyboardInterrupt:
-            partial = self._result(data, forces, Outcome.INTERRUPTED, None)
+            partial = self._result(Outcome.INTERRUPTED, None)
             raise Interrupted(partial.why, partial) from None
-        return self._result(data, forces, outcome, period)
+        return self._result(outcome, period)
+
+    def _iterate(self, limit: int) -> tuple[Outcome, int | None]:
+        """How the iteration with this system ends, and the length of a cycle."""
+        while len(self.increments) < limit:
+            self.data = TrescaData(self.system, self.bound, self.system.coefficients(self.slip))
+            self.forces, _, _ = solve(self.data, self.forces)
+            image, image_slip = self._image(self.data, self.forces)
+            if self._increment(self.data, self.slip, image, image_slip) <= 1.0:
+                return Outcome.CONVERGED, None
+            if self._stalled():
+                return Outcome.ROUNDING, None
+            period = self._period(np.concatenate([image, image_slip] if self.depends else [image]))
+            if period is not None:
+                return Outcome.CYCLE, period
+            self.bound, self.slip = self._next(self.bound, self.slip, image, image_slip)
+        return Outcome.ITERATION_LIMIT, None
+
+    def _rounding(self, ended: Outcome) -> ContactSystem:
+        """The corrected system; ``rounding`` becomes what rounding changes a force by, relative to the largest."""
+        better, change = self.system.corrected(self.forces)
+        unit = np.tile(self.system.force, 1 + self.system.tangents)
+        largest = float(np.max(np.abs(self.forces * unit)))
+        self.rounding = float(np.max(np.abs(change * unit))) / largest if largest > 0 else 0.0
+        if ended is Outcome.ROUNDING:
+            self.rounding = max(self.rounding, *self.sizes[-_PATIENCE:])
+        return better
 
     def _start(self, start: Any) -> tuple[Vector, Vector]:
         """Scaled slip bounds and slips to begin with."""
@@ -199,7 +235,7 @@ class _Iteration:
         return normal, self.system.slip(forces, w)
 
     def _increment(self, data: TrescaData, slip: Vector, image: Vector, image_slip: Vector) -> float:
-        """How far Psi moved the iterate, relative to the tolerance: at most 1 has converged."""
+        """How far the limit may be, relative to the tolerance: at most 1 has converged."""
         system = self.system
         force = system.force_norm(image - data.bound)
         change = float(np.linalg.norm(self.slip_weights * (image_slip - slip)))
@@ -208,15 +244,32 @@ class _Iteration:
         self.increments.append((change, force * self.work))
         self.largest_slip = max(self.largest_slip, float(np.linalg.norm(self.slip_weights * image_slip)))
         relative = [force / system.load_energy] if system.load_energy > 0 else [0.0]
+        moved, largest = np.abs(image - data.bound) * system.force, float(np.max(image * system.force))
+        relative.append(float(np.max(moved)) / (largest or 1.0) if np.any(moved) else 0.0)
         if self.depends:
             relative.append(change / (self.largest_slip or 1.0))
             # where coefficients are steep, slips that hardly change are not enough
             F = system.coefficients(image_slip)
             relative.append(float(np.max(np.abs(F - data.F)) / (np.max(F) or 1.0)))
-        increment = max(relative) / self.tolerance
+        increment = self._reach(max(relative)) / self.tolerance
         if self.progress is not None:
             self.progress(FixedPointProgress(len(self.increments), increment, time.perf_counter() - self.started))
         return increment
+
+    def _reach(self, moved: float) -> float:
+        """Distance from the limit for an increment, by the contraction seen in the last ones (theory, (11.11))."""
+        self.sizes.append(moved)
+        recent = self.sizes[-_RATIOS - 1 :]
+        if self.mixing is not None or not recent[0]:  # mixed iterates do not shrink as those of Psi do
+            return moved
+        ratio = (moved / recent[0]) ** (1.0 / (len(recent) - 1)) if len(recent) > 1 else 1.0
+        q = min(ratio, 1.0 - _SLOWEST)
+        return moved * max(1.0, q / (1.0 - q))
+
+    def _stalled(self) -> bool:
+        """Whether increments are small and shrink no more: rounding."""
+        last, before = self.sizes[-_PATIENCE:], self.sizes[:-_PATIENCE]
+        return bool(before) and min(before) <= min(_SMALL, *last)
 
     def _look_for_jumps(self, slip: Vector) -> None:
         body = self.system.problem
@@ -245,15 +298,16 @@ class _Iteration:
         mixed = self.mixing.next(np.concatenate([bound, slip]), np.concatenate([image, image_slip]))
         return mixed[:p], mixed[p:]
 
-    def _result(self, data: TrescaData, forces: Vector, outcome: Outcome, period: int | None) -> FixedPoint:
-        slip = self.system.slip(forces, data.displacements(forces))
+    def _result(self, outcome: Outcome, period: int | None) -> FixedPoint:
+        slip = self.system.slip(self.forces, self.data.displacements(self.forces))
         return FixedPoint.of(
-            data,
-            forces,
+            self.data,
+            self.forces,
             outcome=outcome,
             iterations=len(self.increments),
             slip=slip * self.system.length,
             increments=np.array(self.increments).reshape(-1, 2),
             tolerance=self.tolerance,
+            rounding=self.rounding,
             period=period,
         )

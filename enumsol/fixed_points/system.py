@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg import cho_solve, solve_triangular
 
 from enumsol.checks import Alpha, alpha_value
 from enumsol.condensation.condensed import cholesky_factor, load_unit, node_units
@@ -143,6 +143,20 @@ class ContactSystem:
         """u in the problem's units, shape (n,), for scaled forces of all rows."""
         scaled = forces * np.tile(self.force, 1 + self.tangents)
         return self.problem.condensed.displacement(self.alpha, scaled)
+
+    def corrected(self, forces: Vector) -> tuple[ContactSystem, Vector]:
+        """The system with w as the body itself has it at scaled forces, and what that changes (theory, section 11.7).
+
+        Returns
+        -------
+        (ContactSystem, ((1 + d) p,) array)
+            The change S^-1 dg of the forces, scaled, in which statuses are not looked at.
+        """
+        problem = self.problem
+        offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
+        w = (problem.contact_rows @ self.displacement(forces) - offset) / np.tile(self.length, 1 + self.tangents)
+        g = w + self.S @ forces
+        return replace(self, g=g), np.asarray(cho_solve((self.cholesky, True), g - self.g, check_finite=False))
 
     def scaled(self, values: Vector, unit: Vector, name: str) -> Vector:
         """Forces or displacements of nodes or rows by the factors ``unit``, which are those of one tangent or of all.

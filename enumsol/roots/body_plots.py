@@ -9,8 +9,9 @@ import numpy as np
 from enumsol.body2d import OUTLINES
 from enumsol.checks import positive_number
 from enumsol.errors import InvalidArgumentError
+from enumsol.facets import boundary_facets, outlines
 from enumsol.figures import axes_or_none, figure_of, new_figure
-from enumsol.shapes import BodyShape, arrow_scale, body_shape, boundary_faces, round_scale
+from enumsol.shapes import BodyShape, arrow_scale, body_shape, round_scale
 from enumsol.statuses import ContactStatus
 
 if TYPE_CHECKING:
@@ -138,7 +139,7 @@ def _plane(ax: Any, shape: BodyShape, points: Floats) -> None:
 def _solid(ax: Any, shape: BodyShape, points: Floats) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    faces = boundary_faces(shape.cells)
+    faces = outlines(boundary_facets(3, shape.cells))
     body = Poly3DCollection(list(points[faces]), facecolors=_BODY, edgecolors=_EDGE, linewidths=0.4, alpha=0.35)
     ax.add_collection3d(body)
     ax.auto_scale_xyz(*points.T)

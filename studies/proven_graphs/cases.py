@@ -85,7 +85,7 @@ def measured(problem, interval, *, exactly):
         "arcs": len(graph.arcs),
         "folds": len(graph.folds),
         "complete": graph.complete,
-        "whole": report.whole,
+        "whole": report.complete,
         "data": graph.certified_data,
         "nodes": graph.stats.nodes,
         "pieces": graph.stats.pieces,

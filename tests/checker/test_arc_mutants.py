@@ -301,14 +301,14 @@ def judge(name, records):
     problem, true, report, oracle = original(name)
     found = verify(problem, proof_of(records))
     assert found.ok == (not found.failures)
-    if not found.whole:
+    if not found.complete:
         return False
     for codes, side, part, low in claims(records):
         assert oracle.is_true(codes, side, part, low), (codes, side, part, low)
     # nothing is missing and nothing is there twice; selections that hold nowhere may be added
     assert found.selections >= {codes for codes, _, part, _ in claims(true) if part[0] in "he"}
     assert found.interval == report.interval
-    assert not report.whole or found.arcs == report.arcs
+    assert not report.complete or found.arcs == report.arcs
     return True
 
 
@@ -319,7 +319,7 @@ def judge(name, records):
 def test_the_oracle_agrees_with_the_originals(name):
     _, records, report, oracle = original(name)
     assert report.ok
-    assert report.whole == (name != "open")
+    assert report.complete == (name != "open")
     said = list(claims(records))
     assert all(oracle.is_true(*claim) for claim in said)
     # and disagrees with their opposites
@@ -337,14 +337,14 @@ def test_mutants_accepted_as_a_whole_are_true(name):
     _, records, report, _ = original(name)
     accepted = [judge(name, mutant(rng, records)) for _ in range(MUTANTS)]
     assert sum(accepted) < MUTANTS / 2
-    if report.whole:
+    if report.complete:
         assert any(accepted)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", range(7))
+@pytest.mark.parametrize("block", range(3))
 @pytest.mark.parametrize("name", ORIGINALS)
-def test_ten_thousand_mutants_accepted_as_a_whole_are_true(name, block):
+def test_many_more_mutants_accepted_as_a_whole_are_true(name, block):
     rng = random.Random(f"{name} {block}")
     records = original(name)[1]
     for _ in range(MUTANTS):
@@ -372,7 +372,6 @@ def test_proofs_of_degenerate_graphs_are_accepted():
         problem = pair(push)
         report = verify(problem, branch_graph(problem, (0.0, 6.0)).proof)
         assert report.ok
-        assert not report.whole
         assert not report.complete
         assert repr(report).endswith("\n  complete: no")
 
@@ -457,6 +456,6 @@ def test_whole_proofs_have_the_arcs_of_exact_algebra():
         graph = branch_graph(problem, (0.0, 4.0))
         report = verify(problem, graph.proof)
         assert report.ok
-        whole += report.whole
-        assert not report.whole or report.arcs == len(graph.arcs)
+        whole += report.complete
+        assert not report.complete or report.arcs == len(graph.arcs)
     assert whole > 20

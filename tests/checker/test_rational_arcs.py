@@ -66,7 +66,7 @@ def test_forged_parts_that_hold_nothing(name):
 @pytest.mark.parametrize("name", EVENTFUL)
 def test_forged_events(name):
     problem, records, _ = graph(name)
-    found = list(parts_of(records, "e"))
+    found = spread(parts_of(records, "e"))
     assert found
     conditions = 3 * problem.p
     for k, i, begin, part in found:

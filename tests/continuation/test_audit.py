@@ -174,7 +174,7 @@ class TestBranchGraph:
         return pytest.importorskip("enumsol.branches.construction").branch_graph
 
     @pytest.mark.parametrize("loading", [False, True])
-    @pytest.mark.parametrize("seed", range(15))
+    @pytest.mark.parametrize("seed", range(10))
     def test_follow_all_visits_every_arc(self, branch_graph, seed, loading, random_problems):
         problem = random_problems(seed, loading)
         interval = (-5.0, 5.0) if loading else (0.0, 20.0)

@@ -3,6 +3,7 @@
 import json
 import re
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -19,7 +20,13 @@ def samples(graph, count=7):
     """Alphas inside the interval: even ones, and every critical one that is a float."""
     a, b = graph.exact_interval
     even = [a + (b - a) * Fraction(k, count) for k in range(count + 1)]
-    return even + [Fraction(v.alpha) for v in graph.vertices if a <= Fraction(v.alpha) <= b]
+    return sorted({*even, *(Fraction(v.alpha) for v in graph.vertices if a <= Fraction(v.alpha) <= b)})
+
+
+@lru_cache(maxsize=256)
+def _all_roots(full, alpha):
+    """Those of a complete graph, which is held against many that were cut short."""
+    return full.roots_at(alpha)
 
 
 def false_claims_of_graph(graph, full):
@@ -122,7 +129,7 @@ def _texts(graph, full):
 
 def false_claims_of_roots(roots, graph_or_roots, alpha=None):
     """What a root set that was cut short prints or returns and the complete one does not confirm."""
-    full = graph_or_roots if alpha is None else graph_or_roots.roots_at(alpha)
+    full = graph_or_roots if alpha is None else _all_roots(graph_or_roots, alpha)
     if not full.whole:
         raise AssertionError("the reference must be whole")
     total = len(full) + len(full.families)

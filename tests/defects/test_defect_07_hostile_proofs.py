@@ -586,6 +586,7 @@ def is_true(name, report, records):
     return all(holding(name, a + (b - a) * Fraction(k, 4)) <= report.selections for k in range(5))
 
 
+@pytest.mark.usefixtures("enclosed_once")
 @pytest.mark.parametrize("name", BEFORE)
 def test_mutants(name, monkeypatch):
     """Every mutant is refused, is named malformed, or claims what is true; nothing else is raised or warned of."""

@@ -5,7 +5,7 @@ import pytest
 
 from enumsol import fem
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.cells import boundary_facets
+from enumsol.facets import boundary_facets
 from enumsol.fem.solid_geometry import facet_vectors, solid_mesh
 
 KINDS = ("hexahedra", "tetrahedra")

@@ -7,7 +7,8 @@ from parted_solids import solid
 
 import enumsol
 from enumsol import InvalidArgumentError, PlaneMesh, fem
-from enumsol.shapes import body_shape, boundary_faces, round_scale
+from enumsol.facets import boundary_facets, outlines
+from enumsol.shapes import body_shape, round_scale
 
 
 @pytest.fixture(scope="module")
@@ -93,9 +94,9 @@ def test_in_space():
 
 
 @pytest.mark.parametrize(("kind", "nodes"), [(4, 3), (8, 4), (10, 6), (27, 8)])
-def test_boundary_faces_enclose_the_body(kind, nodes):
+def test_outlines_of_the_boundary_enclose_the_body(kind, nodes):
     mesh = solid((3, 2, 2), kind)
-    faces = boundary_faces(mesh.cells)
+    faces = outlines(boundary_facets(3, mesh.cells))
     corners = mesh.points[faces]
     # every face lies in one of the six sides of the box
     flat = [np.all(corners[:, :, axis] == side, axis=1) for axis in range(3) for side in (0.0, 1.0)]

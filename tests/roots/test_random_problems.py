@@ -8,7 +8,7 @@ from oracles import brute_force, condense
 
 import enumsol
 
-CHUNK = 250
+CHUNK = 150
 
 
 def check(seed, count, sizes, methods=("tree", "exhaustive")):

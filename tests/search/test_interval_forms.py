@@ -41,7 +41,7 @@ def test_graphs_and_both_checkers_agree(kind):
         records = records_of(graph.proof)
         report = verify(problem, graph.proof)
         assert report.ok
-        assert report.whole
+        assert report.complete
         if problem.p < 3:
             assert check_records(problem, without_arcs(records)) == report.selections
         by_forms += len(of_kind(records, "f"))
@@ -155,4 +155,4 @@ def test_trees_that_are_given_up_change_nothing_but_the_pieces(monkeypatch):
     graph = branch_graph(problem, (0.0, 3.0))
     assert graph.stats.pieces > plain.stats.pieces
     assert shape(graph) == shape(plain)
-    assert verify(problem, graph.proof).whole
+    assert verify(problem, graph.proof).complete

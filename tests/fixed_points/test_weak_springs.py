@@ -1,0 +1,139 @@
+"""Bodies that weak springs hold almost free: what counts as converged is near a proven root, whatever the springs."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import enumsol
+from enumsol import fem
+from enumsol.fixed_points import FixedPoint, Outcome
+
+PLANE = fem.rectangle(4, 2)
+SOLID = fem.box(2, 1, 1)
+
+
+def plane(rng, spring):
+    """A block pressed on the ground and pulled, every node on springs."""
+    forces = np.zeros_like(PLANE.points)
+    top = PLANE.points[:, 1] > np.max(PLANE.points[:, 1]) - 1e-9
+    forces[top] = np.array([0.3, -1.0]) * rng.uniform(0.2, 1.0, (np.count_nonzero(top), 2))
+    return fem.contact_problem(
+        PLANE.points,
+        PLANE.triangles,
+        tuple(rng.uniform(0.5, 2.0, 2)),
+        contact=PLANE.bottom,
+        normals=(0.0, -1.0),
+        springs=(spring, spring),
+        forces=forces,
+        friction=rng.uniform(0.2, 0.7),
+    )
+
+
+def solid(rng, spring):
+    """The same in 3D."""
+    forces = np.zeros_like(SOLID.points)
+    top = SOLID.points[:, 2] > np.max(SOLID.points[:, 2]) - 1e-9
+    forces[top] = np.array([0.2, 0.1, -1.0]) * rng.uniform(0.2, 1.0, (np.count_nonzero(top), 3))
+    return fem.solid_contact_problem(
+        SOLID.points,
+        SOLID.cells,
+        tuple(rng.uniform(0.5, 2.0, 2)),
+        contact=SOLID.facets["bottom"],
+        springs=(spring, spring, spring),
+        forces=forces,
+        friction=rng.uniform(0.2, 0.7),
+    )
+
+
+def distance(found, roots):
+    """From the nearest root, relative to the largest force."""
+    apart = []
+    for root in roots:
+        largest = np.max(np.abs(root.lambda_n))
+        pairs = ((root.lambda_n, found.lambda_n), (root.lambda_t, found.lambda_t))
+        apart.append(max(float(np.max(np.abs(one - other))) for one, other in pairs) / largest)
+    return min(apart)
+
+
+def check(found, roots):
+    """Converged is near a root; what is not says so, and that rounding is the reason."""
+    if found.converged:
+        assert found.rounding <= found.tolerance
+        assert distance(found, roots) < 10 * found.tolerance
+    else:
+        assert found.outcome is Outcome.ROUNDING
+        assert "rounding still changes contact forces by" in found.why
+        assert found.tolerance < found.rounding < 1e-5
+        assert distance(found, roots) < 1e-4
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("spring", [0.1, 1e-3, 1e-6, 1e-8])
+def test_proven_roots_in_2d(spring, seed):
+    problem = plane(np.random.default_rng([seed, 41]), spring)
+    roots = enumsol.enumerate_roots(problem, 0)
+    assert roots.complete
+    found = enumsol.successive_approximations(problem, 0)
+    check(found, roots)
+    assert found.converged or spring < 1e-3
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("spring", [0.1, 1e-3])
+def test_proven_roots_in_3d(spring, seed):
+    problem = solid(np.random.default_rng([seed, 41]), spring)
+    roots = enumsol.enumerate_roots(problem, 0, max_nodes=300)  # with weak springs others may stay undecided
+    assert len(roots) == 1
+    found = enumsol.successive_approximations(problem, 0)
+    assert found.converged
+    check(found, roots)
+
+
+def planted(rng, spring):
+    """A problem in 3D with a solution that is known to rounding, of open, sticking and sliding nodes."""
+    body = solid(rng, spring)
+    u, p = rng.normal(size=body.n), body.p
+    normal = rng.uniform(0.5, 2.0, p) * (np.arange(p) != 0)
+    angle, F = rng.uniform(0.0, 2 * np.pi, p), 0.3
+    along = np.array([np.cos(angle), np.sin(angle)])
+    slides = np.arange(p) % 3 == 1
+    tangential = along * F * normal * np.where(slides, 1.0, 0.5)
+    offsets = np.array([body.Bt1 @ u, body.Bt2 @ u]) - along * np.where(slides | (normal == 0), 0.1, 0.0)
+    load = body.A @ u + body.contact_rows.T @ np.concatenate([normal, *tangential])
+    problem = enumsol.ContactProblem3D(
+        *(body.A, body.Bn, body.Bt1, body.Bt2, load),
+        gap=body.Bn @ u + 0.2 * (normal == 0),
+        friction=F,
+        slip_offset=offsets.T,
+    )
+    return problem, SimpleNamespace(lambda_n=normal, lambda_t=tangential.T)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("spring", [1e-4, 1e-6, 1e-8])
+def test_planted_solutions_in_3d(spring, seed):
+    problem, solution = planted(np.random.default_rng([seed, 43]), spring)
+    found = enumsol.successive_approximations(problem, 0)
+    check(found, [solution])
+    assert found.converged or spring < 1e-4
+
+
+def test_uncertain_forces_are_told_and_kept(tmp_path):
+    problem = plane(np.random.default_rng(3), 1e-8)
+    found = enumsol.successive_approximations(problem, 0)
+    assert found.outcome is Outcome.ROUNDING
+    assert not found.converged
+    found.save(tmp_path / "limit.npz")
+    read = FixedPoint.load(tmp_path / "limit.npz", problem)
+    assert (read.outcome, read.rounding, read.why) == (found.outcome, found.rounding, found.why)
+    # with a tolerance that can be had it is a solution
+    loose = enumsol.successive_approximations(problem, 0, tolerance=1e-6)
+    assert loose.converged
+    assert distance(loose, enumsol.enumerate_roots(problem, 0)) < 1e-5
+
+
+@pytest.mark.parametrize("spring", [1e-4, 1e-6])
+def test_mixing_is_corrected_too(spring):
+    problem = plane(np.random.default_rng([0, 41]), spring)
+    check(enumsol.successive_approximations(problem, 0, anderson=3), enumsol.enumerate_roots(problem, 0))
