@@ -59,6 +59,7 @@ class FiberSelections(ExactSelections):
         ]
 
     def moved(self, point: Point) -> list[Any]:
+        """w = g - S lambda."""
         return [g - dot(row, point) for g, row in zip(self.system.g, self._S, strict=True)]
 
     # -- the field -------------------------------------------------------------------------------------------------
