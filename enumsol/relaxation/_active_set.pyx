@@ -10,7 +10,7 @@ N the normals of the active rows, all rows scaled to unit length in the norm of 
 """
 
 cimport cython
-from libc.math cimport HUGE_VAL, fabs, fmax, fmin, hypot, isfinite, sqrt
+from libc.math cimport HUGE_VAL, fabs, fmax, fmin, isfinite, sqrt
 from libc.stdlib cimport free, malloc
 from libc.string cimport memcpy, memmove, memset
 
@@ -37,6 +37,8 @@ cdef extern from "_dense.h" nogil:
     void add_outer "enumsol_add_outer"(
         double t, const double *c, const double *z, Py_ssize_t rows, Py_ssize_t n, double *M)
     void rotate "enumsol_rotate"(double c, double s, double *a, double *b, Py_ssize_t n)
+    void solve_upper "enumsol_solve_upper"(
+        const double *R, Py_ssize_t n, Py_ssize_t q, const double *b, double *out)
 
 
 cdef class QPData:
@@ -342,16 +344,20 @@ cdef class QPState:
 
     def multipliers(self):
         """Rows and multipliers, in the scaling of the rows as given: min e >= bound is proven by them."""
-        cdef Py_ssize_t j, count = self.q + (self.pending >= 0 and self.pending_u != 0.0)
+        cdef Py_ssize_t j, count = 0
+        cdef double u
         cdef int row
-        rows, values = np.empty(count, dtype=np.intp), np.empty(count)
+        rows, values = np.empty(self.q + 1, dtype=np.intp), np.empty(self.q + 1)
         cdef Py_ssize_t[::1] row_of = rows
         cdef double[::1] value_of = values
-        for j in range(count):
+        for j in range(self.q + (self.pending >= 0)):
             row = self.active[j] if j < self.q else self.pending
-            row_of[j] = row
-            value_of[j] = (self.u[j] if j < self.q else self.pending_u) * self.sign[row] / self.data.norm[row]
-        return rows, values
+            u = self.u[j] if j < self.q else self.pending_u
+            if u != 0.0:
+                row_of[count] = row
+                value_of[count] = u * self.sign[row] / self.data.norm[row]
+                count += 1
+        return rows[:count], values[:count]
 
     def at(self, Py_ssize_t i):
         """x and w number i."""
@@ -383,8 +389,8 @@ cdef class QPState:
         matvec(&self.data.J0[0, 0], n, n, self.normal, self.z)
         return total - 0.5 * dot(self.z, self.z, n)
 
-    cdef void _project(self, int row, double sgn) noexcept nogil:
-        """d = J'n for the row's normal n, turned by sgn."""
+    cdef void _project(self, int row, double sgn, Py_ssize_t first) noexcept nogil:
+        """d = J'n for the row's normal n, turned by sgn; its components from the first on."""
         cdef Py_ssize_t i, j, at, n = self.data.n
         cdef double t
         cdef bint sparse = True
@@ -393,12 +399,12 @@ cdef class QPState:
         if not sparse:
             memset(self.normal, 0, n * sizeof(double))
             self.data.add_normal(row, sgn, self.normal)
-            matvec(self.J, n, n, self.normal, self.d)
+            matvec(self.J + first * n, n - first, n, self.normal, self.d + first)
             return
-        memset(self.d, 0, n * sizeof(double))
+        memset(self.d + first, 0, (n - first) * sizeof(double))
         for j in range(self.data.start[row], self.data.start[row + 1]):
             at, t = self.data.index[j], sgn * self.data.value[j]
-            for i in range(n):
+            for i in range(first, n):
                 self.d[i] += t * self.J[i * n + at]
 
     cdef Py_ssize_t _ratios(self, double *step) noexcept nogil:
@@ -406,8 +412,7 @@ cdef class QPState:
         cdef Py_ssize_t i, l = -1, n = self.data.n, q = self.q
         cdef double t
         step[0] = -1.0
-        for i in range(q - 1, -1, -1):
-            self.r[i] = (self.d[i] - dot(self.R + i * n + i + 1, self.r + i + 1, q - i - 1)) / self.R[i * n + i]
+        solve_upper(self.R, n, q, self.d, self.r)
         for i in range(q):
             if self.mode[self.active[i]] == 1 and self.r[i] > 0.0:
                 t = self.u[i] / self.r[i]
@@ -430,7 +435,7 @@ cdef class QPState:
         s = -sgn * s
         if s <= SATISFIED or (self.mode[row] != 0 and self.position[row] >= 0):
             return 0.0
-        self._project(row, sgn)
+        self._project(row, sgn, self.q if quick else 0)
         d2 = dot(self.d + self.q, self.d + self.q, n - self.q)
         if quick:
             return 0.5 * s * s / d2 if d2 > DEPENDENT * DEPENDENT else HUGE_VAL
@@ -544,7 +549,7 @@ cdef class QPState:
         return best
 
     cdef void _append(self, int row, double u) noexcept nogil:
-        """Make a row active, d being J'n of its normal: a Householder reflection of the columns from q on."""
+        """Make a row active, d being J'n of its normal and z = J2 d2: a reflection of the columns from q on."""
         cdef Py_ssize_t i, n = self.data.n, q = self.q
         cdef double norm = 0.0, beta, v0
         cdef double *v = self.d
@@ -560,8 +565,8 @@ cdef class QPState:
         if v0 != 0.0 and q + 1 < n:
             beta = -1.0 / (norm * v0)
             v[q] = v0
-            memset(self.z, 0, n * sizeof(double))
-            add_rows(self.J + q * n, n - q, n, v + q, self.z)
+            for i in range(n):
+                self.z[i] -= norm * self.J[q * n + i]
             add_outer(-beta, v + q, self.z, n - q, n, self.J + q * n)
         elif v0 != 0.0:
             for i in range(n):
@@ -572,7 +577,7 @@ cdef class QPState:
         self.q = q + 1
 
     cdef void _drop(self, Py_ssize_t l) noexcept nogil:
-        """Take the active row at place l out; Givens rotations restore the triangle."""
+        """Take the active row at place l out; Givens rotations restore the triangle, and d = J'n of a normal."""
         cdef Py_ssize_t i, j, n = self.data.n, q = self.q
         cdef double a, b, h, c, s
         self.position[self.active[l]] = -1
@@ -589,7 +594,7 @@ cdef class QPState:
         for j in range(l, q - 1):
             a = self.R[j * n + j]
             b = self.R[(j + 1) * n + j]
-            h = hypot(a, b)
+            h = sqrt(a * a + b * b)
             if h == 0.0:
                 continue
             c = a / h
@@ -598,6 +603,9 @@ cdef class QPState:
             self.R[(j + 1) * n + j] = 0.0
             rotate(c, s, self.R + j * n + j + 1, self.R + (j + 1) * n + j + 1, q - 2 - j)
             rotate(c, s, self.J + j * n, self.J + (j + 1) * n, n)
+            a = self.d[j]
+            self.d[j] = c * a + s * self.d[j + 1]
+            self.d[j + 1] = c * self.d[j + 1] - s * a
 
     cdef bint _polish(self, double most) noexcept nogil:
         """Project x back on the active rows (rounding drift) where a residual is above ``most``; whether one was."""
@@ -679,11 +687,11 @@ cdef class QPState:
             self.pending = row
             self.pending_u = 0.0
             full = False
+            self._project(row, sgn, 0)
             while not full:
                 self.iterations += 1
                 if self.iterations > limit:
                     return STALLED_
-                self._project(row, sgn)
                 d2 = dot(self.d + self.q, self.d + self.q, n - self.q)
                 l = self._ratios(&t1)
                 if d2 > DEPENDENT * DEPENDENT:
@@ -693,11 +701,12 @@ cdef class QPState:
                     else:
                         t = t2
                         full = True
-                    # x += t J2 d2
-                    for i in range(self.q, n):
-                        self.r[i] = t * self.d[i]
-                    add_rows(self.J + self.q * n, n - self.q, n, self.r + self.q, self.x)
+                    # x += t z, z = J2 d2
+                    memset(self.z, 0, n * sizeof(double))
+                    add_rows(self.J + self.q * n, n - self.q, n, self.d + self.q, self.z)
+                    add_rows(self.z, 1, n, &t, self.x)
                     self.f += t * d2 * (0.5 * t + self.pending_u)
+                    s += t * d2
                 elif l < 0:
                     # infeasible: along the ray the bound grows at the rate -s
                     t = 2.0 * (fabs(target) + fabs(self.data.f0)) / -s
@@ -713,23 +722,23 @@ cdef class QPState:
                     if self.mode[self.active[i]] == 1 and self.u[i] < 0.0:
                         self.u[i] = 0.0
                 self.pending_u += t
+                if not full:
+                    self.u[l] = 0.0
                 if not isfinite(self.f):
                     return STALLED_
-                if full:
-                    self._append(row, self.pending_u)
-                    self.pending = -1
-                    self._update_w()
-                else:
-                    self._drop(l)
-                    self._update_w()
-                    s = sgn * self.data.row_at(row, self.x, self.w)
-                    if s >= 0.0:
-                        # satisfied by rounding on a partial step: take it in as it stands
-                        s = -0.0
-                if self.f - (0.0 if full else self.pending_u * s) > target:
+                if s >= 0.0 or full:
+                    # on a partial step satisfied by rounding: take it in as it stands
+                    s = -0.0
+                if self.f - self.pending_u * s > target:
                     self.bound = self._dual_bound()
                     if self.bound > target:
                         return EXCEEDED_
+                if full:
+                    self._append(row, self.pending_u)
+                    self.pending = -1
+                else:
+                    self._drop(l)
+            self._update_w()
 
 
 cdef int OPTIMAL_ = 0
