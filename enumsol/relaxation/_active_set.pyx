@@ -295,7 +295,7 @@ cdef class QPState:
         for i in range(self.data.k):
             self.w[i] += self.data.w0[i]
 
-    def copy(self):
+    cpdef QPState copy(self):
         """An independent state with the same rows and iterate."""
         cdef Py_ssize_t i, n = self.data.n
         cdef int row
@@ -314,7 +314,13 @@ cdef class QPState:
         other.iterations, other.bound = 0, self.bound
         return other
 
-    def switch(self, rows, modes):
+    def child(self, list rows, list modes, bint last, double target, double tolerance, long limit):
+        """The state with further rows on, and how `solve` ended there; ``last``: this one is not used again."""
+        cdef QPState child = self if last else self.copy()
+        child.switch(rows, modes)
+        return child, child.solve(target, tolerance, limit)
+
+    cpdef switch(self, list rows, list modes):
         """Switch rows on: mode 1 inequality, 2 equality."""
         cdef Py_ssize_t j
         cdef int row
@@ -347,7 +353,11 @@ cdef class QPState:
         cdef Py_ssize_t j, count = 0
         cdef double u
         cdef int row
-        rows, values = np.empty(self.q + 1, dtype=np.intp), np.empty(self.q + 1)
+        for j in range(self.q):
+            count += self.u[j] != 0.0
+        count += self.pending >= 0 and self.pending_u != 0.0
+        rows, values = np.empty(count, dtype=np.intp), np.empty(count)
+        count = 0
         cdef Py_ssize_t[::1] row_of = rows
         cdef double[::1] value_of = values
         for j in range(self.q + (self.pending >= 0)):
@@ -357,7 +367,7 @@ cdef class QPState:
                 row_of[count] = row
                 value_of[count] = u * self.sign[row] / self.data.norm[row]
                 count += 1
-        return rows[:count], values[:count]
+        return rows, values
 
     def at(self, Py_ssize_t i):
         """x and w number i."""
@@ -626,7 +636,7 @@ cdef class QPState:
         self._update_w()
         return True
 
-    def solve(self, double target, double tolerance, long limit):
+    cpdef int solve(self, double target, double tolerance, long limit):
         """Run the dual method.
 
         Parameters
