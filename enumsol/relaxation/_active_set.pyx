@@ -27,6 +27,8 @@ cdef enum:
     POOL = 64  # blocks of memory kept for new states: fresh pages from the system cost more than the copy into them
 
 cdef double LEAST = 1e-3      # part of the gap below which a child's gain makes no difference
+cdef double BEYOND = 0.1      # how far to trust what the first dual step of a child leaves to further ones
+cdef double LATER = 0.05      # promise of a node in contact, its slip undecided, beside that of an undecided one
 cdef double DEPENDENT = 1e-10  # part of a unit normal outside the span of the active ones, below which it lies in it
 
 
@@ -167,8 +169,9 @@ cdef class BranchingRule:
     """Which contact node a partial assignment is branched on.
 
     Candidates are the nodes with the largest violation of complementarity at the minimiser. For each child of each of
-    them one step of the dual method, without carrying it out, bounds the child's energy from below. The candidate
-    whose children close most of the gap is taken, the first one at once of which all children but one are excluded.
+    them one step of the dual method, without carrying it out, bounds the child's energy from below, and tells what
+    further steps may add. The candidate whose children close most of the gap is taken, those rather that are undecided
+    altogether, and the first one at once of which all children but one are excluded.
 
     Parameters
     ----------
@@ -435,20 +438,28 @@ cdef class QPState:
 
     def gain(self, int row, int mode):
         """By how much one dual step on a row, imposed in that mode, raises the bound; inf: nothing is feasible."""
-        return self._gain(row, mode, False)
+        cdef double most
+        return self._gain(row, mode, False, &most)
 
-    cdef double _gain(self, int row, int mode, bint quick) noexcept nogil:
-        """The gain; or, quick, an upper bound of it that leaves other multipliers out of account."""
+    cdef double _share(self, int row, int mode, double gap, bint quick) noexcept nogil:
+        """The share of the gap that a row is expected to close; 1 where it is proven to; or, quick, the most."""
+        cdef double most = 0.0, proven = fmin(self._gain(row, mode, quick, &most) / gap, 1.0)
+        return proven + BEYOND * (fmin(most / gap, 1.0) - proven)
+
+    cdef double _gain(self, int row, int mode, bint quick, double *most) noexcept nogil:
+        """The gain; or, quick, the ``most`` that it can be with further steps: other multipliers left out of account."""
         cdef Py_ssize_t n = self.data.n
         cdef double t, t1, d2, s = self.data.row_at(row, self.x, self.w)
         cdef double sgn = -1.0 if (mode == 2 and s > 0.0) else 1.0
         s = -sgn * s
         if s <= SATISFIED or (self.mode[row] != 0 and self.position[row] >= 0):
+            most[0] = 0.0
             return 0.0
         self._project(row, sgn, self.q if quick else 0)
         d2 = dot(self.d + self.q, self.d + self.q, n - self.q)
+        most[0] = 0.5 * s * s / d2 if d2 > DEPENDENT * DEPENDENT else HUGE_VAL
         if quick:
-            return 0.5 * s * s / d2 if d2 > DEPENDENT * DEPENDENT else HUGE_VAL
+            return most[0]
         self._ratios(&t1)
         if d2 <= DEPENDENT * DEPENDENT:
             return t1 * s if t1 >= 0.0 else HUGE_VAL
@@ -464,29 +475,27 @@ cdef class QPState:
         A finite promise is less than 1.01.
         """
         cdef Py_ssize_t p = rule.p
-        cdef double a, b, c, slip
+        cdef double a, b, slip
         if code == UNDECIDED_:
             # open: no force; in contact: no gap
-            a = fmax(self._gain(<int> i, 2, quick), self._gain(<int> (p + i), 2, quick) if rule.F[i] > 0.0 else 0.0)
-            b = self._gain(<int> (4 * p + i), 2, quick)
-            a = fmin(a / gap, 1.0)
-            b = fmin(b / gap, 1.0)
+            a = self._share(<int> i, 2, gap, quick)
+            if rule.F[i] > 0.0:
+                a = fmax(a, self._share(<int> (p + i), 2, gap, quick))
+            b = self._share(<int> (4 * p + i), 2, gap, quick)
             if a >= 1.0 or b >= 1.0:
                 return HUGE_VAL
             return (a + LEAST) * (b + LEAST)
         # stick: no slip; slip: the slip bound is reached, and the slip has its sign
-        slip = fmin(self._gain(<int> (5 * p + i), 2, quick) / gap, 1.0)
-        a = fmin(self._gain(<int> rule.slip_row[0, i], rule.slip_mode[0, i], quick) / gap, 1.0)
-        b = fmin(self._gain(<int> rule.slip_row[1, i], rule.slip_mode[1, i], quick) / gap, 1.0)
+        slip = self._share(<int> (5 * p + i), 2, gap, quick)
+        a = self._share(<int> rule.slip_row[0, i], rule.slip_mode[0, i], gap, quick)
+        b = self._share(<int> rule.slip_row[1, i], rule.slip_mode[1, i], gap, quick)
         if self.w[p + i] < 0.0:
             a = fmax(a, slip)
         else:
             b = fmax(b, slip)
         if (slip >= 1.0) + (a >= 1.0) + (b >= 1.0) >= 2:
             return HUGE_VAL
-        c = fmax(slip, fmax(a, b))
-        slip, a = fmin(slip, fmin(a, b)), slip + a + b - c
-        return (slip + LEAST) * (a - slip + LEAST) * sqrt(c + LEAST)
+        return LATER * (slip + LEAST) * (a + LEAST) * (b + LEAST)
 
     def forced(self, given, BranchingRule rule, double target):
         """Undecided contact nodes of which one dual step excludes all children but one (see choose)."""
