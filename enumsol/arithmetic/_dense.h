@@ -142,4 +142,38 @@ ENUMSOL_CLONES static void enumsol_rotate(double c, double s, double *a, double 
     }
 }
 
+/* out = R^-1 b for the upper triangle of order q in the first q rows and columns of R, whose rows are n doubles */
+ENUMSOL_CLONES static void enumsol_solve_upper(const double *R, ptrdiff_t n, ptrdiff_t q, const double *b, double *out)
+{
+    ptrdiff_t i = q, j;
+#if ENUMSOL_FOUR
+    for (; i >= 4; i -= 4) {
+        const double *d = R + (i - 1) * n, *c = d - n, *e = c - n, *a = e - n;
+        enumsol_four s = {0.0, 0.0, 0.0, 0.0}, t = s, u = s, w = s;
+        double s1 = b[i - 4], t1 = b[i - 3], u1 = b[i - 2], w1 = b[i - 1];
+        for (j = i; j + 4 <= q; j += 4) {
+            const enumsol_four x = ENUMSOL_LOAD(out + j);
+            s += ENUMSOL_LOAD(a + j) * x;
+            t += ENUMSOL_LOAD(e + j) * x;
+            u += ENUMSOL_LOAD(c + j) * x;
+            w += ENUMSOL_LOAD(d + j) * x;
+        }
+        w1 = (w1 - ((w[0] + w[1]) + (w[2] + w[3]))) / d[i - 1];
+        u1 = (u1 - ((u[0] + u[1]) + (u[2] + u[3])) - c[i - 1] * w1) / c[i - 2];
+        t1 = (t1 - ((t[0] + t[1]) + (t[2] + t[3])) - (e[i - 1] * w1 + e[i - 2] * u1)) / e[i - 3];
+        s1 = (s1 - ((s[0] + s[1]) + (s[2] + s[3])) - ((a[i - 1] * w1 + a[i - 2] * u1) + a[i - 3] * t1)) / a[i - 4];
+        out[i - 1] = w1;
+        out[i - 2] = u1;
+        out[i - 3] = t1;
+        out[i - 4] = s1;
+    }
+#endif
+    while (i-- > 0) {
+        double sum = b[i];
+        for (j = i + 1; j < q; j++)
+            sum -= R[i * n + j] * out[j];
+        out[i] = sum / R[i * n + i];
+    }
+}
+
 #endif

@@ -10,7 +10,7 @@ N the normals of the active rows, all rows scaled to unit length in the norm of 
 """
 
 cimport cython
-from libc.math cimport HUGE_VAL, fabs, fmax, fmin, hypot, isfinite, sqrt
+from libc.math cimport HUGE_VAL, fabs, fmax, fmin, isfinite, sqrt
 from libc.stdlib cimport free, malloc
 from libc.string cimport memcpy, memmove, memset
 
@@ -27,6 +27,8 @@ cdef enum:
     POOL = 64  # blocks of memory kept for new states: fresh pages from the system cost more than the copy into them
 
 cdef double LEAST = 1e-3      # part of the gap below which a child's gain makes no difference
+cdef double BEYOND = 0.1      # how far to trust what the first dual step of a child leaves to further ones
+cdef double LATER = 0.05      # promise of a node in contact, its slip undecided, beside that of an undecided one
 cdef double DEPENDENT = 1e-10  # part of a unit normal outside the span of the active ones, below which it lies in it
 
 
@@ -37,6 +39,8 @@ cdef extern from "_dense.h" nogil:
     void add_outer "enumsol_add_outer"(
         double t, const double *c, const double *z, Py_ssize_t rows, Py_ssize_t n, double *M)
     void rotate "enumsol_rotate"(double c, double s, double *a, double *b, Py_ssize_t n)
+    void solve_upper "enumsol_solve_upper"(
+        const double *R, Py_ssize_t n, Py_ssize_t q, const double *b, double *out)
 
 
 cdef class QPData:
@@ -165,8 +169,9 @@ cdef class BranchingRule:
     """Which contact node a partial assignment is branched on.
 
     Candidates are the nodes with the largest violation of complementarity at the minimiser. For each child of each of
-    them one step of the dual method, without carrying it out, bounds the child's energy from below. The candidate
-    whose children close most of the gap is taken, the first one at once of which all children but one are excluded.
+    them one step of the dual method, without carrying it out, bounds the child's energy from below, and tells what
+    further steps may add. The candidate whose children close most of the gap is taken, those rather that are undecided
+    altogether, and the first one at once of which all children but one are excluded.
 
     Parameters
     ----------
@@ -293,7 +298,7 @@ cdef class QPState:
         for i in range(self.data.k):
             self.w[i] += self.data.w0[i]
 
-    def copy(self):
+    cpdef QPState copy(self):
         """An independent state with the same rows and iterate."""
         cdef Py_ssize_t i, n = self.data.n
         cdef int row
@@ -312,7 +317,13 @@ cdef class QPState:
         other.iterations, other.bound = 0, self.bound
         return other
 
-    def switch(self, rows, modes):
+    def child(self, list rows, list modes, bint last, double target, double tolerance, long limit):
+        """The state with further rows on, and how `solve` ended there; ``last``: this one is not used again."""
+        cdef QPState child = self if last else self.copy()
+        child.switch(rows, modes)
+        return child, child.solve(target, tolerance, limit)
+
+    cpdef switch(self, list rows, list modes):
         """Switch rows on: mode 1 inequality, 2 equality."""
         cdef Py_ssize_t j
         cdef int row
@@ -342,15 +353,23 @@ cdef class QPState:
 
     def multipliers(self):
         """Rows and multipliers, in the scaling of the rows as given: min e >= bound is proven by them."""
-        cdef Py_ssize_t j, count = self.q + (self.pending >= 0 and self.pending_u != 0.0)
+        cdef Py_ssize_t j, count = 0
+        cdef double u
         cdef int row
+        for j in range(self.q):
+            count += self.u[j] != 0.0
+        count += self.pending >= 0 and self.pending_u != 0.0
         rows, values = np.empty(count, dtype=np.intp), np.empty(count)
+        count = 0
         cdef Py_ssize_t[::1] row_of = rows
         cdef double[::1] value_of = values
-        for j in range(count):
+        for j in range(self.q + (self.pending >= 0)):
             row = self.active[j] if j < self.q else self.pending
-            row_of[j] = row
-            value_of[j] = (self.u[j] if j < self.q else self.pending_u) * self.sign[row] / self.data.norm[row]
+            u = self.u[j] if j < self.q else self.pending_u
+            if u != 0.0:
+                row_of[count] = row
+                value_of[count] = u * self.sign[row] / self.data.norm[row]
+                count += 1
         return rows, values
 
     def at(self, Py_ssize_t i):
@@ -383,8 +402,8 @@ cdef class QPState:
         matvec(&self.data.J0[0, 0], n, n, self.normal, self.z)
         return total - 0.5 * dot(self.z, self.z, n)
 
-    cdef void _project(self, int row, double sgn) noexcept nogil:
-        """d = J'n for the row's normal n, turned by sgn."""
+    cdef void _project(self, int row, double sgn, Py_ssize_t first) noexcept nogil:
+        """d = J'n for the row's normal n, turned by sgn; its components from the first on."""
         cdef Py_ssize_t i, j, at, n = self.data.n
         cdef double t
         cdef bint sparse = True
@@ -393,12 +412,12 @@ cdef class QPState:
         if not sparse:
             memset(self.normal, 0, n * sizeof(double))
             self.data.add_normal(row, sgn, self.normal)
-            matvec(self.J, n, n, self.normal, self.d)
+            matvec(self.J + first * n, n - first, n, self.normal, self.d + first)
             return
-        memset(self.d, 0, n * sizeof(double))
+        memset(self.d + first, 0, (n - first) * sizeof(double))
         for j in range(self.data.start[row], self.data.start[row + 1]):
             at, t = self.data.index[j], sgn * self.data.value[j]
-            for i in range(n):
+            for i in range(first, n):
                 self.d[i] += t * self.J[i * n + at]
 
     cdef Py_ssize_t _ratios(self, double *step) noexcept nogil:
@@ -406,8 +425,7 @@ cdef class QPState:
         cdef Py_ssize_t i, l = -1, n = self.data.n, q = self.q
         cdef double t
         step[0] = -1.0
-        for i in range(q - 1, -1, -1):
-            self.r[i] = (self.d[i] - dot(self.R + i * n + i + 1, self.r + i + 1, q - i - 1)) / self.R[i * n + i]
+        solve_upper(self.R, n, q, self.d, self.r)
         for i in range(q):
             if self.mode[self.active[i]] == 1 and self.r[i] > 0.0:
                 t = self.u[i] / self.r[i]
@@ -420,20 +438,28 @@ cdef class QPState:
 
     def gain(self, int row, int mode):
         """By how much one dual step on a row, imposed in that mode, raises the bound; inf: nothing is feasible."""
-        return self._gain(row, mode, False)
+        cdef double most
+        return self._gain(row, mode, False, &most)
 
-    cdef double _gain(self, int row, int mode, bint quick) noexcept nogil:
-        """The gain; or, quick, an upper bound of it that leaves other multipliers out of account."""
+    cdef double _share(self, int row, int mode, double gap, bint quick) noexcept nogil:
+        """The share of the gap that a row is expected to close; 1 where it is proven to; or, quick, the most."""
+        cdef double most = 0.0, proven = fmin(self._gain(row, mode, quick, &most) / gap, 1.0)
+        return proven + BEYOND * (fmin(most / gap, 1.0) - proven)
+
+    cdef double _gain(self, int row, int mode, bint quick, double *most) noexcept nogil:
+        """The gain; or, quick, the ``most`` that it can be with further steps: other multipliers left out of account."""
         cdef Py_ssize_t n = self.data.n
         cdef double t, t1, d2, s = self.data.row_at(row, self.x, self.w)
         cdef double sgn = -1.0 if (mode == 2 and s > 0.0) else 1.0
         s = -sgn * s
         if s <= SATISFIED or (self.mode[row] != 0 and self.position[row] >= 0):
+            most[0] = 0.0
             return 0.0
-        self._project(row, sgn)
+        self._project(row, sgn, self.q if quick else 0)
         d2 = dot(self.d + self.q, self.d + self.q, n - self.q)
+        most[0] = 0.5 * s * s / d2 if d2 > DEPENDENT * DEPENDENT else HUGE_VAL
         if quick:
-            return 0.5 * s * s / d2 if d2 > DEPENDENT * DEPENDENT else HUGE_VAL
+            return most[0]
         self._ratios(&t1)
         if d2 <= DEPENDENT * DEPENDENT:
             return t1 * s if t1 >= 0.0 else HUGE_VAL
@@ -449,29 +475,27 @@ cdef class QPState:
         A finite promise is less than 1.01.
         """
         cdef Py_ssize_t p = rule.p
-        cdef double a, b, c, slip
+        cdef double a, b, slip
         if code == UNDECIDED_:
             # open: no force; in contact: no gap
-            a = fmax(self._gain(<int> i, 2, quick), self._gain(<int> (p + i), 2, quick) if rule.F[i] > 0.0 else 0.0)
-            b = self._gain(<int> (4 * p + i), 2, quick)
-            a = fmin(a / gap, 1.0)
-            b = fmin(b / gap, 1.0)
+            a = self._share(<int> i, 2, gap, quick)
+            if rule.F[i] > 0.0:
+                a = fmax(a, self._share(<int> (p + i), 2, gap, quick))
+            b = self._share(<int> (4 * p + i), 2, gap, quick)
             if a >= 1.0 or b >= 1.0:
                 return HUGE_VAL
             return (a + LEAST) * (b + LEAST)
         # stick: no slip; slip: the slip bound is reached, and the slip has its sign
-        slip = fmin(self._gain(<int> (5 * p + i), 2, quick) / gap, 1.0)
-        a = fmin(self._gain(<int> rule.slip_row[0, i], rule.slip_mode[0, i], quick) / gap, 1.0)
-        b = fmin(self._gain(<int> rule.slip_row[1, i], rule.slip_mode[1, i], quick) / gap, 1.0)
+        slip = self._share(<int> (5 * p + i), 2, gap, quick)
+        a = self._share(<int> rule.slip_row[0, i], rule.slip_mode[0, i], gap, quick)
+        b = self._share(<int> rule.slip_row[1, i], rule.slip_mode[1, i], gap, quick)
         if self.w[p + i] < 0.0:
             a = fmax(a, slip)
         else:
             b = fmax(b, slip)
         if (slip >= 1.0) + (a >= 1.0) + (b >= 1.0) >= 2:
             return HUGE_VAL
-        c = fmax(slip, fmax(a, b))
-        slip, a = fmin(slip, fmin(a, b)), slip + a + b - c
-        return (slip + LEAST) * (a - slip + LEAST) * sqrt(c + LEAST)
+        return LATER * (slip + LEAST) * (a + LEAST) * (b + LEAST)
 
     def forced(self, given, BranchingRule rule, double target):
         """Undecided contact nodes of which one dual step excludes all children but one (see choose)."""
@@ -544,7 +568,7 @@ cdef class QPState:
         return best
 
     cdef void _append(self, int row, double u) noexcept nogil:
-        """Make a row active, d being J'n of its normal: a Householder reflection of the columns from q on."""
+        """Make a row active, d being J'n of its normal and z = J2 d2: a reflection of the columns from q on."""
         cdef Py_ssize_t i, n = self.data.n, q = self.q
         cdef double norm = 0.0, beta, v0
         cdef double *v = self.d
@@ -560,8 +584,8 @@ cdef class QPState:
         if v0 != 0.0 and q + 1 < n:
             beta = -1.0 / (norm * v0)
             v[q] = v0
-            memset(self.z, 0, n * sizeof(double))
-            add_rows(self.J + q * n, n - q, n, v + q, self.z)
+            for i in range(n):
+                self.z[i] -= norm * self.J[q * n + i]
             add_outer(-beta, v + q, self.z, n - q, n, self.J + q * n)
         elif v0 != 0.0:
             for i in range(n):
@@ -572,7 +596,7 @@ cdef class QPState:
         self.q = q + 1
 
     cdef void _drop(self, Py_ssize_t l) noexcept nogil:
-        """Take the active row at place l out; Givens rotations restore the triangle."""
+        """Take the active row at place l out; Givens rotations restore the triangle, and d = J'n of a normal."""
         cdef Py_ssize_t i, j, n = self.data.n, q = self.q
         cdef double a, b, h, c, s
         self.position[self.active[l]] = -1
@@ -589,7 +613,7 @@ cdef class QPState:
         for j in range(l, q - 1):
             a = self.R[j * n + j]
             b = self.R[(j + 1) * n + j]
-            h = hypot(a, b)
+            h = sqrt(a * a + b * b)
             if h == 0.0:
                 continue
             c = a / h
@@ -598,6 +622,9 @@ cdef class QPState:
             self.R[(j + 1) * n + j] = 0.0
             rotate(c, s, self.R + j * n + j + 1, self.R + (j + 1) * n + j + 1, q - 2 - j)
             rotate(c, s, self.J + j * n, self.J + (j + 1) * n, n)
+            a = self.d[j]
+            self.d[j] = c * a + s * self.d[j + 1]
+            self.d[j + 1] = c * self.d[j + 1] - s * a
 
     cdef bint _polish(self, double most) noexcept nogil:
         """Project x back on the active rows (rounding drift) where a residual is above ``most``; whether one was."""
@@ -618,7 +645,7 @@ cdef class QPState:
         self._update_w()
         return True
 
-    def solve(self, double target, double tolerance, long limit):
+    cpdef int solve(self, double target, double tolerance, long limit):
         """Run the dual method.
 
         Parameters
@@ -679,11 +706,11 @@ cdef class QPState:
             self.pending = row
             self.pending_u = 0.0
             full = False
+            self._project(row, sgn, 0)
             while not full:
                 self.iterations += 1
                 if self.iterations > limit:
                     return STALLED_
-                self._project(row, sgn)
                 d2 = dot(self.d + self.q, self.d + self.q, n - self.q)
                 l = self._ratios(&t1)
                 if d2 > DEPENDENT * DEPENDENT:
@@ -693,11 +720,12 @@ cdef class QPState:
                     else:
                         t = t2
                         full = True
-                    # x += t J2 d2
-                    for i in range(self.q, n):
-                        self.r[i] = t * self.d[i]
-                    add_rows(self.J + self.q * n, n - self.q, n, self.r + self.q, self.x)
+                    # x += t z, z = J2 d2
+                    memset(self.z, 0, n * sizeof(double))
+                    add_rows(self.J + self.q * n, n - self.q, n, self.d + self.q, self.z)
+                    add_rows(self.z, 1, n, &t, self.x)
                     self.f += t * d2 * (0.5 * t + self.pending_u)
+                    s += t * d2
                 elif l < 0:
                     # infeasible: along the ray the bound grows at the rate -s
                     t = 2.0 * (fabs(target) + fabs(self.data.f0)) / -s
@@ -713,23 +741,23 @@ cdef class QPState:
                     if self.mode[self.active[i]] == 1 and self.u[i] < 0.0:
                         self.u[i] = 0.0
                 self.pending_u += t
+                if not full:
+                    self.u[l] = 0.0
                 if not isfinite(self.f):
                     return STALLED_
-                if full:
-                    self._append(row, self.pending_u)
-                    self.pending = -1
-                    self._update_w()
-                else:
-                    self._drop(l)
-                    self._update_w()
-                    s = sgn * self.data.row_at(row, self.x, self.w)
-                    if s >= 0.0:
-                        # satisfied by rounding on a partial step: take it in as it stands
-                        s = -0.0
-                if self.f - (0.0 if full else self.pending_u * s) > target:
+                if s >= 0.0 or full:
+                    # on a partial step satisfied by rounding: take it in as it stands
+                    s = -0.0
+                if self.f - self.pending_u * s > target:
                     self.bound = self._dual_bound()
                     if self.bound > target:
                         return EXCEEDED_
+                if full:
+                    self._append(row, self.pending_u)
+                    self.pending = -1
+                else:
+                    self._drop(l)
+            self._update_w()
 
 
 cdef int OPTIMAL_ = 0

@@ -55,7 +55,7 @@ class CompiledEngine:
         from enumsol.relaxation._active_set import QPState  # compiled: whoever made the data has it
 
         return ActiveSetRelaxation(
-            self, QPState(self.data), [*rows, *self.always], modes + [INEQUALITY] * len(self.always)
+            self, QPState(self.data), [*rows, *self.always], modes + [INEQUALITY] * len(self.always), last=True
         )
 
 
@@ -118,15 +118,16 @@ class FormEngine(CompiledEngine):
 
 
 class ActiveSetRelaxation:
-    """A solved relaxation; the state that it holds is handed on to its last child."""
+    """A solved relaxation: that of a state with further rows on, which the last child takes over from its parent."""
 
     __slots__ = ("_engine", "_state", "bound", "pruned", "stalled")
 
-    def __init__(self, engine: CompiledEngine, state: QPState, rows: list[int], modes: list[int]) -> None:
-        self._engine, self._state = engine, state
-        state.switch(rows, modes)
-        status = state.solve(PRUNE_MARGIN + engine.offset, FEASIBILITY_TOLERANCE, engine.limit)
-        self.bound: float = state.bound - engine.offset
+    def __init__(
+        self, engine: CompiledEngine, state: QPState, rows: list[int], modes: list[int], *, last: bool
+    ) -> None:
+        self._engine, offset = engine, engine.offset
+        self._state, status = state.child(rows, modes, last, PRUNE_MARGIN + offset, FEASIBILITY_TOLERANCE, engine.limit)
+        self.bound: float = self._state.bound - offset
         self.pruned = status == 1
         self.stalled = status == 2
 
@@ -179,4 +180,4 @@ class ActiveSetRelaxation:
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""
-        return ActiveSetRelaxation(self._engine, self._state if last else self._state.copy(), rows, modes)
+        return ActiveSetRelaxation(self._engine, self._state, rows, modes, last=last)

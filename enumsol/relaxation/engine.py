@@ -21,7 +21,7 @@ FEASIBILITY_TOLERANCE = 1e-11
 #: A leaf is pruned when its energy bound exceeds this; g' S^{-1} g lies in [1, 4), so it is relative to the data.
 PRUNE_MARGIN = 1e-9
 #: Nodes whose children are bounded before one of them is branched on (measured in studies/branching_rule).
-BRANCHING_CANDIDATES = 16
+BRANCHING_CANDIDATES = 24
 
 
 class Relaxation(Protocol):

@@ -120,7 +120,7 @@ class Closer:
         if not self._looked and nodes >= system.p:
             self._looked = True
             self._look(system)
-        if max(len(self._certifier.sliding), self._touching) < _MANY:
+        if self._touching < _MANY and len(self._certifier.sliding) < _MANY:
             return False
         self._began_again = True
         self._wait = self._pause = 0

@@ -96,6 +96,10 @@ def _sliding_node(codes: Codes) -> int:
     return next((i for i, code in enumerate(codes) if code in SLIDING), -1)
 
 
+#: What a node in contact with friction may be.
+_CONTACT = STICK, SLIP_PLUS, SLIP_MINUS
+
+
 class PlaneSplitting:
     """Two dimensions at one alpha: open or in contact; then stick, slip+ or slip-.
 
@@ -119,6 +123,9 @@ class PlaneSplitting:
         self.friction = [bool(f > 0) for f in F]
         every = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS))
         self._allowed = list(allowed) if allowed is not None else [every] * len(F)
+        #: Per node the codes of its friction in contact, and those of the two parts of an undecided one.
+        self._contact = [tuple(c for c in _CONTACT if c in some) for some in self._allowed]
+        self._parts = [self._touching_or_not(i) for i in range(len(F))]
 
     def coverings(self, node: int, code: int) -> Sequence[Sequence[int]]:
         """All ways to cover a partial status of a node by codes, in any order; none for a final one."""
@@ -134,27 +141,36 @@ class PlaneSplitting:
 
     def children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
         """Codes of the children, the one nearest to the minimiser first."""
-        allowed = self._allowed[node]
-        contact = [c for c in (STICK, SLIP_PLUS, SLIP_MINUS) if c in allowed]
-        if relaxation is not None:
-            normal, w_n = relaxation.at(node)
-        if codes[node] in SLIDING:
-            return list(SLIDING[codes[node]])
-        if codes[node] == UNDECIDED and self.friction[node] and node in self._sliding:
-            side = self._sliding[node]
-            return [side, STICK, SLIP_MINUS if SLIP_PLUS in SLIDING[side] else SLIP_PLUS]
-        if codes[node] == UNDECIDED:
-            touching = FRICTIONLESS if not self.friction[node] else (contact[0] if len(contact) == 1 else CONTACT)
-            children = [OPEN] if OPEN in allowed else []
-            if (FRICTIONLESS in allowed) if touching == FRICTIONLESS else contact:
-                children.append(touching)
-            if relaxation is not None and normal > -w_n:
-                children.reverse()
+        code = codes[node]
+        if code in SLIDING:
+            return list(SLIDING[code])
+        if code == UNDECIDED:
+            if self.friction[node] and node in self._sliding:
+                side = self._sliding[node]
+                return [side, STICK, SLIP_MINUS if SLIP_PLUS in SLIDING[side] else SLIP_PLUS]
+            children = list(self._parts[node])
+            if relaxation is not None:
+                normal, w_n = relaxation.at(node)
+                if normal > -w_n:
+                    children.reverse()
             return children
-        if relaxation is not None:
-            tangential, w_t = relaxation.at(len(codes) + node)
-            sign = (w_t > 0) - (w_t < 0)
-            sticks = self._F[node] * normal - abs(tangential) > abs(w_t)
-            order = {STICK: 0 if sticks else 2, SLIP_PLUS: 1 - sign, SLIP_MINUS: 1 + sign}
-            contact.sort(key=lambda c: order[c])
-        return contact
+        contact = self._contact[node]
+        if relaxation is None:
+            return list(contact)
+        normal, _ = relaxation.at(node)
+        tangential, w_t = relaxation.at(len(codes) + node)
+        forward, backward = _CONTACT[1:] if w_t >= 0.0 else _CONTACT[:0:-1]
+        if self._F[node] * normal - abs(tangential) > abs(w_t):
+            order = STICK, forward, backward
+        elif w_t != 0.0:
+            order = forward, STICK, backward
+        else:
+            order = forward, backward, STICK
+        return [c for c in order if c in contact]
+
+    def _touching_or_not(self, node: int) -> tuple[int, ...]:
+        """The children of an undecided node: open, and in contact."""
+        allowed, contact = self._allowed[node], self._contact[node]
+        touching = FRICTIONLESS if not self.friction[node] else (contact[0] if len(contact) == 1 else CONTACT)
+        children = (OPEN,) if OPEN in allowed else ()
+        return (*children, touching) if (contact if self.friction[node] else FRICTIONLESS in allowed) else children

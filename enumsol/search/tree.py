@@ -30,7 +30,7 @@ from enumsol.selections.solution import Codes
 from enumsol.statuses import UNDECIDED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     from enumsol.condensation.space import SpaceSystem
     from enumsol.kernel.forms import EnclosedForm
@@ -155,15 +155,14 @@ class TreeSearch:
         def due() -> bool:
             return forms.due(self.outcome.nodes, self.covered)
 
-        def known() -> bool:
-            closer, system = self.closer, self.system
-            return due() or (
-                closer is not None
-                and isinstance(system, ScaledSystem)
-                and closer.begins_again(system, self.outcome.nodes)
-            )
+        closer, system = self.closer, self.system
 
-        stack = self.loop(start, known)
+        def known() -> bool:
+            assert closer is not None
+            assert isinstance(system, ScaledSystem)
+            return due() or closer.begins_again(system, self.outcome.nodes)
+
+        stack = self.loop(start, known if closer is not None and isinstance(system, ScaledSystem) else due)
         if stack and not due():
             self._forget(held)
             stack = self.loop(start, due)
@@ -198,7 +197,7 @@ class TreeSearch:
         """Examine so many nodes of subtrees, the last first; what still waits then, or at the deadline."""
         stack, last = self._planted(items), self.outcome.nodes + nodes
         while stack and self.outcome.nodes < last and (deadline is None or time.perf_counter() <= deadline):
-            stack.extend(reversed(list(self.examine(stack.pop()))))
+            stack += self.examine(stack.pop())
         return stack
 
     def _planted(self, items: Sequence[TreeNode]) -> list[TreeNode]:
@@ -231,7 +230,7 @@ class TreeSearch:
             if self.must_stop(len(stack)):
                 self._leave(stack)
                 return []
-            stack.extend(reversed(list(self.examine(stack.pop()))))
+            stack += self.examine(stack.pop())
         return stack
 
     def _leave(self, items: Sequence[TreeNode]) -> None:
@@ -244,8 +243,8 @@ class TreeSearch:
         part = UndecidedPart(codes, "the search was stopped before it got here", "raise the limit")
         self.outcome.undecided.append(part)
 
-    def examine(self, item: TreeNode) -> Iterator[TreeNode]:
-        """Settle one node of the tree, or give its children in the order in which they are examined."""
+    def examine(self, item: TreeNode) -> list[TreeNode]:
+        """Settle one node of the tree, or give its children, the one that is examined first last."""
         outcome = self.outcome
         outcome.nodes += 1
         codes = item.codes
@@ -254,25 +253,26 @@ class TreeSearch:
         if solved.stalled:
             # the fallback costs more than a try
             if self.closed(item, None):
-                return
+                return []
             relaxation = self._fall_back(codes)
         if relaxation is not None and relaxation.pruned and self.excluded(item, relaxation):
-            return
+            return []
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
         if self.closed(item, usable):
-            return
+            return []
         node, forced = branching_node(codes, item.forced, usable, () if self.closer is None else self.closer.sliding)
         if node < 0:
             node = self._settle(item)
         if node < 0:
-            return
+            return []
         children = self.splitting.children(codes, node, relaxation)
         outcome.presolved += forced is not None
         self.certifier.branching(node, children)
-        for k, code in enumerate(children):
-            child = (*codes[:node], code, *codes[node + 1 :])
-            last = k + 1 == len(children)
-            yield TreeNode(usable, child, node, last, item.weight / len(children), forced)
+        weight, before, after = item.weight / len(children), codes[:node], codes[node + 1 :]
+        waiting = list[TreeNode]()
+        for code in reversed(children):
+            waiting.append(TreeNode(usable, (*before, code, *after), node, not waiting, weight, forced))
+        return waiting
 
     def excluded(self, item: TreeNode, bound: Bound) -> bool:
         """Whether the subtree is proven to hold no solution."""

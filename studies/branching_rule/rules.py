@@ -22,8 +22,9 @@ from enumsol.relaxation.engine import BRANCHING_CANDIDATES, PRUNE_MARGIN
 from enumsol.relaxation.rows import status_rows
 from enumsol.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
-#: Part of the gap below which a child's gain makes no difference, as in the package's rule.
-LEAST = 1e-3
+#: Part of the gap below which a child's gain makes no difference, and the weight of nodes with three children: those of
+#: the package's rule.
+LEAST, LATER = 1e-3, 0.05
 
 
 class Lookahead(ActiveSetEngine):
@@ -119,9 +120,8 @@ def closed(relaxation, before):
 
 
 def measure(shares):
-    """The measure of the package's rule: the product of the two least shares, and of the root of a third."""
-    ordered = sorted(share + LEAST for share in shares)
-    return math.prod(ordered[:2]) * math.prod(math.sqrt(share) for share in ordered[2:])
+    """The measure of the package's rule: the product of the shares, less for three of them."""
+    return (LATER if len(shares) > 2 else 1.0) * math.prod(share + LEAST for share in shares)
 
 
 BASE = "largest violation"

@@ -174,10 +174,9 @@ class Search(TreeSearch):
     def examine(self, item):
         """Settle one node of the tree, or give its children."""
         self.engine.examined += 1
-        undecided = sum(code in PARTIAL for code in item.codes)
-        for child in super().examine(item):
-            self.engine.branched.append(undecided)
-            yield child
+        children = super().examine(item)
+        self.engine.branched += len(children) * [sum(code in PARTIAL for code in item.codes)]
+        return children
 
 
 class Solvers(SpaceSolvers):

@@ -47,6 +47,14 @@ def test_wedges(p):
         assert all(root.regular for root in roots)
 
 
+def test_contact_is_decided_before_slip():
+    # 10,647 nodes where both weigh the same and only what one dual step proves counts
+    roots = enumsol.enumerate_roots(gallery.wedge(4, 13, (4e-4, 1e-3)), 2.2)
+    assert roots.complete
+    assert (len(roots), roots.index_sum) == (5, 1)
+    assert roots.stats.nodes < 9_000
+
+
 def test_the_cost_of_exhaustion_is_refused_with_an_estimate():
     with pytest.raises(enumsol.TooLargeError, match=r"1\.8.*e\+19 selections .*hours.*method=\"tree\""):
         enumsol.enumerate_roots(gallery.clamped_block(32, 8), 1.0, "fast", "exhaustive")
