@@ -234,6 +234,4 @@ def workers(jobs: int) -> Iterator[Executor | None]:
             ) from error
         yield pool
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for worker in set(multiprocessing.active_children()) - before:
-            worker.terminate()
+        pool.end(set(multiprocessing.active_children()) - before)

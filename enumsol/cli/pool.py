@@ -13,8 +13,9 @@ from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from concurrent.futures import Future, ProcessPoolExecutor
+    from multiprocessing.process import BaseProcess
 
 
 class RenewedPool(Executor):
@@ -67,6 +68,23 @@ class RenewedPool(Executor):
         if self._pool is not None:
             self._pool.shutdown(wait=wait, cancel_futures=cancel_futures)
             self._pool = None
+
+    def end(self, processes: Iterable[BaseProcess]) -> None:
+        """End the processes at once, whatever they do.
+
+        One that is ended while it sends a result leaves a part of it in the pipe, and one that is sent a task takes no
+        more of it. The pool's threads would wait for the rest as long as the pipes have another end: in this process.
+        """
+        results, calls = (getattr(self._pool, name, None) for name in ("_result_queue", "_call_queue"))
+        self.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.terminate()
+        for process in processes:
+            process.join()
+        for end in (getattr(results, "_writer", None), getattr(calls, "_reader", None)):
+            if end is not None:
+                with suppress(OSError):  # the pool closed it
+                    end.close()
 
 
 def _end_with_parent() -> None:

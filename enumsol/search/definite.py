@@ -69,8 +69,8 @@ class Nodes:
     def first(self) -> Array:
         """A share for every node with friction; where it may be chosen, the least in size that is clearly allowed."""
         size = self.F * np.abs(self.slip)
-        least = 1.0 - _SHARED * self.gap / np.where(size > 0, size, np.inf)
-        chosen = np.sign(self.slip) * np.where(size > 0, np.clip(least, 0.0, 1.0), 0.0)
+        least = 1.0 - np.minimum(_SHARED * self.gap, size) / np.where(size > 0, size, np.inf)
+        chosen = np.sign(self.slip) * np.where(size > 0, least, 0.0)
         return np.where(np.isfinite(self.share), self.share, chosen)
 
 

@@ -25,13 +25,13 @@ def test_a_search_in_two_parts(capsys, tmp_path):
     second = json.loads(report.read_text())
     taken = second["stats"]["resumed"]
     assert taken == 150
-    assert second["stats"]["nodes"] == 239 - 150
-    assert f"resumed: {taken} nodes of the tree from the file, 89 more searched" in out
+    assert second["stats"]["nodes"] == 249 - 150
+    assert f"resumed: {taken} nodes of the tree from the file, 99 more searched" in out
     assert len(second["roots"]) == 5
     assert verify(gallery.get("wedge-8-5").build(), Proof.load(proof)).complete
     status, out, _ = run(capsys, *search)
     assert status == 0
-    assert "resumed: 239 nodes of the tree from the file, nothing was left to search" in out
+    assert "resumed: 249 nodes of the tree from the file, nothing was left to search" in out
     status, out, _ = run(capsys, "verify", "gallery:wedge-8-5", proof)
     assert status == 0
 
