@@ -44,7 +44,9 @@ class VertexKind(enum.StrEnum):
     #: Selections hold here that were not examined, because the search was cut short or a limit was reached. Unknown
     #: arcs may end here, so the kind is not known.
     UNSETTLED = "unsettled"
-    #: An arc ends for no reason: something is missing, and the graph is not complete.
+    #: One arc of degree 0 begins or ends alone.
+    TERMINAL = "terminal"
+    #: The degrees of the arcs on both sides do not balance: something is missing, and the graph is not complete.
     BROKEN = "broken"
     #: On the interval's border.
     END = "end"
@@ -68,7 +70,8 @@ class Vertex(ContactState):
     alpha : float
         Rounded from ``exact``.
     kind : VertexKind
-        "transition", "fold", "bifurcation", "family", "sheet", "touch", "point", "unsettled", "broken" or "end".
+        "transition", "fold", "bifurcation", "family", "sheet", "touch", "point", "terminal", "unsettled", "broken" or
+        "end".
     border : bool
         It lies at the first or last alpha.
     statuses, active, lambda_n, lambda_t, u_n, u_t

@@ -147,6 +147,9 @@ def vertex_kind(left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dime
         return VertexKind.FAMILY
     if border:
         return VertexKind.END
+    degrees = degree_of(left), degree_of(right)
+    if None not in degrees and degrees[0] != degrees[1]:
+        return VertexKind.BROKEN
     match len(left), len(right):
         case 1, 1:
             same = left[0].selections == right[0].selections
@@ -154,7 +157,7 @@ def vertex_kind(left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dime
         case 0, 0:
             return VertexKind.POINT
         case (1, 0) | (0, 1):
-            return VertexKind.BROKEN
+            return VertexKind.TERMINAL
         case (2, 0) | (0, 2):
             return VertexKind.FOLD
     return VertexKind.BIFURCATION

@@ -28,7 +28,8 @@ MARKERS = {
     VertexKind.BIFURCATION: ("D", "white", "bifurcation"),
     VertexKind.TOUCH: ("v", "white", "status met and left again"),
     VertexKind.POINT: ("x", GREY, "single point"),
-    VertexKind.BROKEN: ("X", GREY, "arc ends, something is missing"),
+    VertexKind.TERMINAL: ("P", "white", "begins or ends alone"),
+    VertexKind.BROKEN: ("X", GREY, "degrees differ, something is missing"),
     VertexKind.UNSETTLED: ("4", GREY, "not followed further"),
 }
 

@@ -36,9 +36,10 @@ if TYPE_CHECKING:
     from enumsol.branches.arc_values import ArcValues
     from enumsol.selections.solution import Codes
 
-FORMAT, VERSION = "enumsol-branch-graph", 2
-#: Version 1 gave kinds to the vertices of graphs that were not complete; only its complete graphs are read.
-_READ = (1, 2)
+FORMAT, VERSION = "enumsol-branch-graph", 3
+#: Version 1 gave kinds to the vertices of graphs that were not complete; only its complete graphs are read. Before
+#: version 3 every vertex with a single arc was "broken".
+_READ = (1, 2, 3)
 #: Arrays of a vertex.
 _VALUES = ("lambda_n", "lambda_t", "u_n", "u_t")
 _FRACTION = re.compile(r"-?\d+(/\d+)?", re.ASCII)
@@ -210,6 +211,12 @@ def _fraction(text: str) -> Fraction:
     return Fraction(text)
 
 
+def _kind(item: dict[str, Any]) -> VertexKind:
+    """The kind of a vertex, by its name of today."""
+    kind, degrees = VertexKind(item["kind"]), (item["index_left"], item["index_right"])
+    return VertexKind.TERMINAL if kind is VertexKind.BROKEN and degrees[0] == degrees[1] else kind
+
+
 def _vertex(number: int, item: dict[str, Any], *, balls: bool) -> Vertex:
     lo, hi = (fmpq(*_fraction(item[end]).as_integer_ratio()) for end in ("lo", "hi"))
     coefficients = item["polynomial"]
@@ -224,7 +231,7 @@ def _vertex(number: int, item: dict[str, Any], *, balls: bool) -> Vertex:
     return Vertex(
         number=number,
         alpha=item["alpha"],
-        kind=VertexKind(item["kind"]),
+        kind=_kind(item),
         border=item["border"],
         statuses=_statuses(item["statuses"]),
         active=tuple(frozenset(_statuses(names)) for names in item["active"]),

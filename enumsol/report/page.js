@@ -9,8 +9,8 @@ const STATUS_DASH = { open: "solid", stick: "dash", "slip+": "dashdot", "slip-":
 const SYMBOLS = {
   transition: ["circle-open", "transition"], fold: ["square-open", "fold"], bifurcation: ["diamond-open", "bifurcation"],
   touch: ["triangle-down-open", "status met and left again"], point: ["x-thin-open", "single point"],
-  family: ["line-ns-open", "continuum"], broken: ["x", "arc ends, something is missing"],
-  unsettled: ["y-right-open", "not followed further"],
+  family: ["line-ns-open", "continuum"], terminal: ["cross-open", "begins or ends alone"],
+  broken: ["x", "degrees differ, something is missing"], unsettled: ["y-right-open", "not followed further"],
 };
 const CARDS = 12;
 const arcs = new Map(data.arcs.map((arc) => [arc.number, arc]));
