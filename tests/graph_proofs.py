@@ -2,6 +2,7 @@
 
 import functools
 from contextlib import contextmanager
+from fractions import Fraction
 from unittest import mock
 
 import numpy as np
@@ -70,6 +71,18 @@ def without_arcs(records):
     *_, footer = records
     first = next(k for k, record in enumerate(records) if "traces" in record)
     return [*records[:first], {key: footer[key] for key in footer if key not in ("traces", "arcs")}]
+
+
+def cut_in_two(records):
+    """The proof of one piece as one that leaves its selections to both halves."""
+    arcs = next(k for k, record in enumerate(records) if "traces" in record)
+    header, piece, *leaves = records[:arcs]
+    (a, b), selections = (Fraction(end) for end in piece["piece"]), [leaf for leaf in leaves if leaf[0] == "s"]
+    middle = str((a + b) / 2)
+    changed = [header, piece, *(["c", leaf[1]] if leaf[0] == "s" else leaf for leaf in leaves)]
+    for ends in ([piece["piece"][0], middle], [middle, piece["piece"][1]]):
+        changed += [{**piece, "piece": ends, "roots": [leaf[1] for leaf in selections]}, *selections]
+    return [*changed, *records[arcs:-1], {**records[-1], "pieces": 3}]
 
 
 def of_kind(records, *kinds):

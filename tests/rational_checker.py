@@ -8,6 +8,7 @@ import json
 import re
 import zlib
 from itertools import pairwise, product
+from math import isfinite
 
 from flint import fmpq, fmpq_mat
 from rational_arcs import Arcs
@@ -78,13 +79,33 @@ def records_of(file):
         text = stream.decompress(file[len(MAGIC) : -DIGEST], LARGEST_TEXT)
         need(stream.eof and not stream.unused_data, "the stream does not end where the digest begins")
         need(text.endswith(b"\n"), "the last line has no end")
-        return [json.loads(line, parse_constant=_no_number) for line in text.decode().split("\n")[:-1]]
+        return [record_of(line) for line in text.decode("ascii").split("\n")[:-1]]
     except (zlib.error, ValueError) as error:
         raise Refused(f"the stream cannot be read: {error}") from error
 
 
+def record_of(line):
+    need(line == line.strip() and "\r" not in line, "a line holds more than its record")
+    return json.loads(line, parse_constant=_no_number, parse_float=_finite, object_pairs_hook=_each_once)
+
+
 def _no_number(name):
     raise ValueError(name)
+
+
+def _finite(text):
+    need(isfinite(float(text)), "a number is not finite")
+    return float(text)
+
+
+def _each_once(pairs):
+    need(len(dict(pairs)) == len(pairs), "an object gives a name twice")
+    return dict(pairs)
+
+
+def are(found, expected):
+    """Whether the records are these, integers as integers."""
+    return json.dumps(found, sort_keys=True) == json.dumps(expected, sort_keys=True)
 
 
 # -- [5] and [6]: what both kinds share --------------------------------------------------------------------------------
@@ -94,8 +115,8 @@ class Proof:
     """Header, units and rules of multipliers."""
 
     def __init__(self, problem, header):
-        need(header["format"] == "enumsol-proof" and header["version"] == 1, "another format or version")
-        need(header["problem"] == fingerprint(problem) and header["p"] == problem.p, "another problem")
+        need(header["format"] == "enumsol-proof" and integer(header["version"]) == 1, "another format or version")
+        need(header["problem"] == fingerprint(problem) and integer(header["p"]) == problem.p, "another problem")
         need(header["data"] == "problem", "S and g as computed are not at hand")
         self.data, self.p = data_of(problem), problem.p
 
@@ -139,6 +160,7 @@ class Point(Proof):
 
     def __init__(self, problem, header):
         super().__init__(problem, header)
+        need("kind" not in header, "an unknown kind of proof")
         alpha = decimal_fraction(header["alpha"])
         F = self.data.friction(alpha)
         need(min(F) >= 0, "friction is negative")
@@ -167,7 +189,7 @@ class Point(Proof):
         isolated += self.closings.apart(self.roots + [codes for codes, _ in self.polytopes])
         counts = {"roots": self.regular + isolated, "families": families}
         counts |= {"undecided": self.undecided, "leaves": self.leaves}
-        need(records[position:] == [counts], f"the footer is not {counts}")
+        need(are(records[position:], [counts]), f"the footer is not {counts}")
         return counts
 
     def split(self, codes, record):
@@ -186,9 +208,10 @@ class Point(Proof):
         elif kind == "f":
             self.excluded_by(codes, *rest)
         elif kind == "u":
+            need(len(rest) == 1 and isinstance(rest[0], str), "no reason")
             self.undecided += 1
         elif kind == "z":
-            need(set(codes) == {6} and not any(self.forms.g), "the body is loaded")
+            need(set(codes) == {6} and not rest and not any(self.forms.g), "the body is loaded")
             self.polytopes.append(((0,) * self.p, 0))
         else:
             need(kind in ("n", "N", "r", "D", "m", "M"), "an unknown leaf")
@@ -280,6 +303,7 @@ class Graph(Proof):
         while due:
             x, y, roots = due.pop(0)
             piece = records[position]
+            need(set(piece) == {"piece", "roots", "force", "length"}, "a piece has other names")
             need([decimal_fraction(end) for end in piece["piece"]] == [x, y], "another piece is due")
             need(sorted(piece["roots"]) == sorted(roots), "other roots are due")
             start = position = position + 1
@@ -291,11 +315,12 @@ class Graph(Proof):
                 due[:0] = [(x, middle, cut), (middle, y, cut)]
         counts = {"pieces": self.pieces, "leaves": self.leaves, "selections": len(self.handed_on)}
         if "pieces" not in records[position]:
+            need(set(records[position]) == {"traces", "force", "length"}, "arcs begin with other names")
             self.units(records[position])
             arcs = Arcs(self.data, (self.a, self.b), self.origin, self.handed_on)
             counts |= arcs.run(records[position], records[position + 1 : -1])
             position = len(records) - 1
-        need(records[position:] == [counts], f"the footer is not {counts}")
+        need(are(records[position:], [counts]), f"the footer is not {counts}")
         return set(self.handed_on)
 
     def piece(self, x, y, roots, units, leaves):

@@ -11,7 +11,7 @@ import struct
 from fractions import Fraction
 from functools import lru_cache
 from itertools import combinations
-from math import comb, isfinite
+from math import comb, gcd, isfinite
 
 import numpy as np
 from flint import fmpq, fmpq_mat
@@ -51,12 +51,20 @@ def decimal_fraction(text):
 
 def hexadecimal_fraction(text):
     need(len(text) <= LARGEST_FRACTION, "a fraction has too many digits")
-    need(re.fullmatch(r"-?[0-9a-f]+/[0-9a-f]*[1-9a-f][0-9a-f]*", text, re.ASCII), "no hexadecimal fraction")
-    return fmpq(*(int(part, 16) for part in text.split("/")))
+    need(re.fullmatch(r"(0|-?[1-9a-f][0-9a-f]*)/[1-9a-f][0-9a-f]*", text, re.ASCII), "no hexadecimal fraction")
+    above, below = (int(part, 16) for part in text.split("/"))
+    need(gcd(above, below) == 1, "a hexadecimal fraction is not in lowest terms")
+    return fmpq(above, below)
+
+
+def octets(text):
+    found = base64.b64decode(text, validate=True)
+    need(base64.b64encode(found).decode() == text, "a text in base64 has bits that stand for nothing")
+    return found
 
 
 def multipliers(rows, values):
-    rows, values = (base64.b64decode(text, validate=True) for text in (rows, values))
+    rows, values = (octets(text) for text in (rows, values))
     need(2 * len(rows) == len(values), "not as many multipliers as rows")
     count = len(rows) // 4
     numbers = struct.unpack(f"<{count}d", values)

@@ -30,7 +30,7 @@ from enumsol.kernel.selection_rows import (
     SLIP_BACKWARD,
     SLIP_FORWARD,
 )
-from enumsol.proof.reading import RefusedError, codes_from, shown, units_from
+from enumsol.proof.reading import RefusedError, codes_from, names_only, same, shown, units_from
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -124,6 +124,7 @@ class ArcChecker:
     def run(self, head: dict[str, Any], records: Iterator[Any]) -> tuple[ArcCount, Any]:
         """Check all traces; what they show, and the record after them."""
         try:
+            names_only(head, ("traces", "force", "length"))
             units = units_from(head, self._problem.p)
         except ValueError as error:
             raise RefusedError(f"the arcs cannot be read: {error}") from None
@@ -137,8 +138,8 @@ class ArcChecker:
             except (ValueError, OverflowError) as error:
                 raise RefusedError(f"trace {self.traces} cannot be read: {error}") from None
         self._boxes.check()
-        if self.traces != head.get("traces"):
-            self._fail(f"there are {self.traces} traces; the arcs begin with {shown(head.get('traces'))}")
+        if not same(head["traces"], self.traces):
+            self._fail(f"there are {self.traces} traces; the arcs begin with {shown(head['traces'])}")
         if self._due:
             self._fail(f"{len(self._due)} of the selections handed on are not traced")
         self._pair()
@@ -166,10 +167,10 @@ class ArcChecker:
 
     def _trace(self, record: list[Any], records: Iterator[Any]) -> Any:
         """Check a trace and follow its arcs; gives the record after it."""
-        if len(record) != 5 or record[0] != "t" or record[4] not in (-1, 0, 1):
+        if len(record) != 5 or record[0] != "t" or type(record[4]) is not int or record[4] not in (-1, 0, 1):
             raise ValueError(f"{shown(record)} begins no trace")
         codes = tuple(codes_from([record[1]], self._problem.p)[0].tolist())
-        low, high, side = number(record[2]), number(record[3]), int(record[4])
+        low, high, side = number(record[2]), number(record[3]), record[4]
         spans = (d for d in self._due if d[0] == codes and d[3] == side)
         due = next((d for d in spans if _is_next(-low, -d[1]) and _is_next(high, d[2])), None)
         if due is None:
@@ -192,7 +193,7 @@ class ArcChecker:
 
     def _box(self, record: list[Any], selection: BoxSelection, follower: _Follower, start: Fraction) -> Fraction:
         """Follow the arcs through the parts of a box, and keep what they say; the end of the last one."""
-        if len(record) != 5 or record[3] not in (0, 1) or not isinstance(record[4], list):
+        if len(record) != 5 or type(record[3]) is not int or record[3] not in (0, 1) or not isinstance(record[4], list):
             raise ValueError(f"{shown(record)} is no box")
         low, high = number(record[1]), number(record[2])
         if not low == start < high or not 0 < len(record[4]) <= _MOST_PARTS:

@@ -11,7 +11,7 @@ from enumsol.arithmetic.balls import SAFE
 from enumsol.arithmetic.rationals import to_fraction
 from enumsol.kernel.closing import closed_solution, final_codes, only_solution, same_solution
 from enumsol.kernel.rows import BACKWARD, CONTACT, FORWARD, OPEN, STICK, UNDECIDED, refines
-from enumsol.proof.reading import numbers_from
+from enumsol.proof.reading import numbers_from, same
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -78,7 +78,7 @@ def closed_in_rationals(
         return "its solution is not proven to be the only one", selection, []
     touching = all(w[i] == 0 for i, code in enumerate(codes) if code == CONTACT)
     holds = touching and all(least[i] >= 0 for i in range(rational.p) if i not in free)
-    if record[3] is not holds and (type(record[3]) is not int or record[3] != int(holds)):
+    if not same(record[3], int(holds)):
         return "it holds another number of roots than it claims", selection, []
     return None, selection, [tuple(to_fraction(x) for x in point)] if holds else []
 

@@ -44,8 +44,10 @@ from enumsol.proof.reading import (
     data_of,
     friction_at,
     multipliers_from,
+    names_only,
     numbers_from,
     rational_from,
+    same,
     shown,
     units_from,
 )
@@ -174,7 +176,7 @@ class GraphChecker:
             checker = ArcChecker(self.problem, self.enclosure, (a, b), origin, self._handed, self._fail)
             self.arcs, record = checker.run(record, records)
             claim |= {"traces": checker.traces, "arcs": self.arcs.arcs}
-        if record != claim:
+        if not same(record, claim):
             found = shown(record) if isinstance(record, (dict, list)) else "missing"
             self._fail(f"the counts at the end are {found}; the pieces give {claim!r}")
         if next(records, _END) is not _END:
@@ -241,9 +243,10 @@ class GraphChecker:
     def _begin(self, record: Any) -> _Piece:
         if not isinstance(record, dict):
             raise ValueError("no piece begins here")  # noqa: TRY004 (as in reading)
-        a, b = _interval_from(record.get("piece"))
+        names_only(record, ("piece", "force", "length", "roots"))
+        a, b = _interval_from(record["piece"])
         units = units_from(record, self.problem.p)
-        return _Piece(a, b, *units, codes_from(record.get("roots"), self.problem.p))
+        return _Piece(a, b, *units, codes_from(record["roots"], self.problem.p))
 
     def _read_leaves(self, piece: _Piece, batch: list[list[Any]]) -> None:
         """Record some leaves, the first perhaps a form, and check the inequalities of those claimed to be empty."""

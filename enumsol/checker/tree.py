@@ -9,7 +9,7 @@ from enumsol.checker.reports import MAX_FAILURES, VerificationReport
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.kernel.rows import UNDECIDED
-from enumsol.proof.reading import RefusedError, shown
+from enumsol.proof.reading import RefusedError, same, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -56,7 +56,7 @@ class TreeChecker:
             self._walk(records)
             isolated, families = self._count()
             claim = self._claim(isolated, families)
-            if footer != claim:
+            if not same(footer, claim):
                 self.fail(f"the counts at the end are {shown(footer)}; the leaves give {claim}")
         except RefusedError as refusal:
             self.failures.append(str(refusal))

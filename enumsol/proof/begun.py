@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.proof.proof_file import EXPANSION, MAGIC, SMALL, ProofFormatError, decoded, lines_of
-from enumsol.proof.reading import shown
+from enumsol.proof.reading import same, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -104,12 +104,12 @@ def begun_proof(place: Path, header: dict[str, Any]) -> BegunProof | None:
         return None
     if not isinstance(found, dict) or found.get("format") != header["format"]:
         raise _refusal(place, "is no proof")
-    if found.get("kind") != header.get("kind"):
+    if not same(found.get("kind", ()), header.get("kind", ())):
         raise _refusal(place, f"is a proof of another kind, {shown(found.get('kind', 'point'))}")
     for name, words in _NAMES.items():
-        if found.get(name) != header[name]:
+        if not same(found.get(name), header[name]):
             raise _refusal(place, f"belongs to another {words} ({shown(found.get(name))}; here {shown(header[name])})")
-    if found != header:
+    if not same(found, header):
         raise _refusal(place, "was written with other units of force and length")
     return begun
 

@@ -280,7 +280,9 @@ def lines_of(parts: Iterable[bytes], size: int) -> Iterator[bytes]:
 
 
 def decoded(line: bytes) -> Any:
-    """The record in a line; ProofFormatError if there is none."""
+    """The record in a line; ProofFormatError if there is none, or something beside it."""
+    if b"\r" in line or line != line.strip():
+        raise ProofFormatError("the proof has a line with white space around its record, or a carriage return in it")
     try:
         return _DECODER.decode(line.decode("ascii"))
     except (ValueError, RecursionError) as error:

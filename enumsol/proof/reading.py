@@ -19,6 +19,8 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.kernel.rows import UNDECIDED
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from enumsol.condensation.data import Data
@@ -51,15 +53,30 @@ def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
     RefusedError
         It does not.
     """
-    if not isinstance(header, dict) or header.get("format") != "enumsol-proof" or header.get("version") != 1:
+    if not isinstance(header, dict) or header.get("format") != "enumsol-proof" or not same(header.get("version"), 1):
         raise RefusedError("the first record is no header of an enumsol-proof of version 1")
     if header.get("problem") != problem.fingerprint:
         raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
-    if header.get("p") != problem.p or header.get("data") not in ("problem", "condensed"):
+    if not same(header.get("p"), problem.p) or header.get("data") not in ("problem", "condensed"):
         raise RefusedError("the header does not fit the problem")
-    if header.get("kind") != kind:
+    if ("kind" in header) != (kind is not None) or header.get("kind") != kind:
         raise RefusedError(f"the header names an unknown kind of proof, {shown(header.get('kind'))}")
     return "problem" if header["data"] == "problem" else "condensed"
+
+
+def same(found: Any, expected: Any) -> bool:
+    """Whether a value of a proof is the one expected, of the same type throughout: neither ``true`` nor 1.0 is 1."""
+    if isinstance(expected, dict) and isinstance(found, dict):
+        return found.keys() == expected.keys() and all(same(found[key], value) for key, value in expected.items())
+    if isinstance(expected, list) and isinstance(found, list):
+        return len(found) == len(expected) and all(map(same, found, expected))
+    return type(found) is type(expected) and bool(found == expected)
+
+
+def names_only(record: dict[str, Any], names: Collection[str]) -> None:
+    """Raise ValueError unless an object has exactly these names."""
+    if record.keys() != set(names):
+        raise ValueError(f"the names {shown(sorted(record))} are not {', '.join(names)}")
 
 
 def rational_text(value: Fraction, name: str) -> str:
@@ -118,13 +135,21 @@ def exponents_from(value: Any, size: int) -> list[int]:
     return value
 
 
+def bytes_from(text: str) -> bytes:
+    """What a text in base64 stands for, if it is the one text that stands for it."""
+    data = base64.b64decode(text, validate=True)
+    if base64.b64encode(data).decode() != text:
+        raise ValueError("a text in base64 has bits to spare that are not zero")
+    return data
+
+
 def multipliers_from(texts: list[Any], most: int) -> tuple[NDArray[np.intp], Array]:
     """Rows, whole numbers below ``most``, and their multipliers, as many and at most ``most`` of them, from base64."""
     if len(texts) != 2 or not all(isinstance(text, str) for text in texts):
         raise ValueError("its multipliers are no two texts")
     rows, values = texts
-    row = np.frombuffer(base64.b64decode(rows, validate=True), dtype="<u4").astype(np.intp)
-    value = np.frombuffer(base64.b64decode(values, validate=True), dtype="<f8").astype(np.float64)
+    row = np.frombuffer(bytes_from(rows), dtype="<u4").astype(np.intp)
+    value = np.frombuffer(bytes_from(values), dtype="<f8").astype(np.float64)
     if len(row) != len(value):
         raise ValueError(f"{len(row)} rows and {len(value)} multipliers")
     if len(row) > most:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import base64
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.kernel.space import FORCE, GAP, RIGHT
-from enumsol.proof.reading import shown
+from enumsol.proof.reading import bytes_from, shown
 from enumsol.sectors import DEEPEST
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ def multipliers_in_space(rows: Any, text: Any, p: int) -> tuple[list[Row], NDArr
     """Rows and as many multipliers."""
     if not all((isinstance(rows, list), isinstance(text, str))):
         raise ValueError("its multipliers are no list of rows and a text")
-    values = np.frombuffer(base64.b64decode(text, validate=True), dtype="<f8").astype(np.float64)
+    values = np.frombuffer(bytes_from(text), dtype="<f8").astype(np.float64)
     if len(rows) != len(values):
         raise ValueError(f"{len(rows)} rows and {len(values)} multipliers")
     return [_row(row, p) for row in rows], values

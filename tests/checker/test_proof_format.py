@@ -18,6 +18,7 @@ from generators import integer_problem, random_problem, singular_problem
 from graph_proofs import (
     GRAPHS,
     accepted,
+    cut_in_two,
     graph,
     of_kind,
     refused,
@@ -137,18 +138,6 @@ def test_graph_proofs_in_halves_are_accepted(name):
     halves = cut_in_two(records)
     assert accepted(problem, halves)
     assert verify(problem, proof_of(halves)).ok
-
-
-def cut_in_two(records):
-    """The proof of one piece as one that leaves its selections to both halves."""
-    arcs = next(k for k, record in enumerate(records) if "traces" in record)
-    header, piece, *leaves = records[:arcs]
-    (a, b), selections = (Fraction(end) for end in piece["piece"]), [leaf for leaf in leaves if leaf[0] == "s"]
-    middle = str((a + b) / 2)
-    changed = [header, piece, *(["c", leaf[1]] if leaf[0] == "s" else leaf for leaf in leaves)]
-    for ends in ([piece["piece"][0], middle], [middle, piece["piece"][1]]):
-        changed += [{**piece, "piece": ends, "roots": [leaf[1] for leaf in selections]}, *selections]
-    return [*changed, *records[arcs:-1], {**records[-1], "pieces": 3}]
 
 
 def test_fingerprints():
