@@ -14,7 +14,7 @@ import enumsol
 
 #: Rooms from the ground up ("." is the package's own ``__init__``). A room imports rooms of lower layers only.
 LAYERS = (
-    ("errors", "sealed", "compiled", "executors", "texts", "_version", "arithmetic"),
+    ("errors", "sealed", "compiled", "executors", "deadlines", "texts", "_version", "arithmetic"),
     ("checks", "figures", "files"),
     ("array_checks", "statuses", "sectors"),
     ("condensation",),

@@ -33,6 +33,7 @@ from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed
 from enumsol.condensation.unloaded import vanishing_alpha
+from enumsol.deadlines import Deadline, over, within
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.branches.following import Followed
     from enumsol.checks import AlphaLike
+    from enumsol.deadlines import Limited
     from enumsol.proof.proof_file import Proof
     from enumsol.search.interval import IntervalCertifier, SearchedPiece
     from enumsol.selections.solution import Codes
@@ -57,6 +59,9 @@ Arithmetic = Literal["fast", "verified", "exact"]
 
 #: Exact algebra is not begun where it would take more than this by ``_exact_work``: some five minutes.
 LARGEST_EXACT_WORK = 2**22
+#: Of the time that is left when arcs are begun: for working them out, and for joining them too, where there is a limit.
+#: To join them takes a fifth as long as to work them out by exact algebra, to make a graph of them another tenth.
+_WORKED_OUT, _JOINED = 0.55, 0.75
 #: Boxes in which arcs are followed when the search was interrupted.
 _BOXES_AFTER_INTERRUPT = 500
 #: Selections whose arcs are then worked out without rounding: 8 at least, or so many by p^2.
@@ -100,7 +105,8 @@ def branch_graph(
     max_nodes : int, optional
         Stop the search after this many nodes; the graph is then reported as incomplete.
     time_limit : float, optional
-        Stop the search after this many seconds.
+        Stop after this many seconds; the graph is then made of what was found, which takes a fifth of them and two
+        seconds at most.
     executor : concurrent.futures.Executor, optional
         Searches the pieces of the interval, and parts of large ones, in its workers. The graph and its proof are those
         found without it.
@@ -143,19 +149,21 @@ def branch_graph(
     exact = _condensed(problem, arithmetic) if traced is None else None
     zero = traced.origin if exact is None and traced is not None else None if exact is None else exact.zero
     certifier = _certifier(problem, exact, arithmetic, zero)
+    limits = Deadline.after(started, time_limit)
     search = IntervalSearch(
         problem.condensed,
         (a, b),
         zero,
         certifier,
         max_nodes=max_nodes,
-        deadline=None if time_limit is None else started + time_limit,
+        deadline=limits.deadline,
         progress=_stage(progress, "search"),
     )
     candidates = _candidates(search, exact, executor)
     searched = time.perf_counter()
-    tick = _stage(progress, "arcs")
-    made = _make(problem, search, candidates, traced, exact, tick)
+    limits = limits.extended(started)
+    with within(limits.part(_JOINED)):
+        made = _make(problem, search, candidates, traced, exact, _stage(progress, "arcs"), limits.part(_WORKED_OUT))
     stats = GraphStats(
         pieces=len(search.pieces),
         nodes=search.nodes,
@@ -173,7 +181,7 @@ def branch_graph(
         reasons=(*map(str, made.stops), *made.reasons),
         stats=stats,
         pieces=tuple(search.pieces),
-        make_proof=_proof(search, problem, made.exact, made.followed),
+        make_proof=_proof(search, problem, made),
     )
     graph = BranchGraph(data)
     if any(stop.interrupted for stop in made.stops):
@@ -200,16 +208,21 @@ def _make(
     traced: TracedProblem | None,
     exact: ExactCondensed | None,
     tick: Callable[[float], object] | None,
+    limits: Limited,
 ) -> _Made:
-    """Arcs in ball arithmetic; without rounding where there is no such way, or it leaves something open."""
+    """Arcs in ball arithmetic; without rounding where there is no such way, or it leaves something open.
+
+    Arcs that are not worked out by the deadline of ``limits`` are left out; what is not put together by the one that
+    holds here stays open.
+    """
     made = _Made(exact, None, [] if search.stopped is None else [search.stopped])
     if traced is not None:
         # after Ctrl-C only as much as takes a moment
         most = _BOXES_AFTER_INTERRUPT if any(stop.interrupted for stop in made.stops) else None
-        made.followed = follow(traced, search.pieces, tick, cut_short=bool(made.stops), most=most)
-        joined, interrupted = made.followed.joined, made.followed.interrupted
-        made.stops += [] if interrupted is None else [interrupted]
-        large = problem.n > EXACT_DOF_LIMIT or _exact_work(problem, candidates) > LARGEST_EXACT_WORK
+        made.followed = follow(traced, search.pieces, tick, cut_short=bool(made.stops), most=most, limits=limits)
+        joined, stopped = made.followed.joined, made.followed.stopped
+        made.stops += [] if stopped is None else [stopped]
+        large = over() or problem.n > EXACT_DOF_LIMIT or _exact_work(problem, candidates) > LARGEST_EXACT_WORK
         if (joined.ordered and not joined.open) or made.stops or large:
             made.vertices, made.arcs = make_traced(traced, joined)
             made.reasons = made.followed.reasons
@@ -220,8 +233,8 @@ def _make(
     a, b = (rational(end) for end in search.interval)
     # after Ctrl-C only as much as takes a moment
     most = max(8, _SELECTIONS_AFTER_INTERRUPT // problem.p**2) if any(s.interrupted for s in made.stops) else None
-    gluing = glue(made.exact, candidates, a, b, tick, cut_short=bool(made.stops), most=most)
-    made.stops += [] if gluing.interrupted is None else [gluing.interrupted]
+    gluing = glue(made.exact, candidates, a, b, tick, cut_short=bool(made.stops), most=most, limits=limits)
+    made.stops += [] if gluing.stopped is None else [gluing.stopped]
     made.arcs = make_arcs(gluing)
     made.vertices, made.reasons = make_vertices(gluing, made.arcs), gluing.reasons
     return made
@@ -278,14 +291,15 @@ def _candidates(search: IntervalSearch, exact: ExactCondensed | None, executor: 
     return search.selections
 
 
-def _proof(
-    search: IntervalSearch, problem: ContactProblem, exact: ExactCondensed | None, followed: Followed | None
-) -> Callable[[], Proof | None] | None:
-    """What makes the proof, once it is asked for; None when there is none."""
-    if not search.checkable or not search.pieces or search.stopped is not None:
+def _proof(search: IntervalSearch, problem: ContactProblem, made: _Made) -> Callable[[], Proof | None] | None:
+    """What makes the proof, once it is asked for; None when there is none, or the time was over."""
+    exact = made.exact
+    if not search.checkable or not search.pieces or any(not stop.interrupted for stop in made.stops):
+        return None
+    if search.stopped is not None:
         return None
     if exact is None or exact.condensed_exactly:
-        return partial(_proof_of_problem, problem, search.interval, search.pieces, followed)
+        return partial(_proof_of_problem, problem, search.interval, search.pieces, made.followed)
     return partial(write_graph_proof, problem, search.interval, "condensed", search.pieces, None)
 
 
@@ -298,7 +312,7 @@ def _proof_of_problem(
     """The proof for the problem's own data, with the arcs where they can be followed in balls."""
     if followed is None and (traced := _traced(problem, interval)) is not None:
         followed = follow(traced, pieces)
-    whole = followed is None or followed.interrupted is None
+    whole = followed is None or followed.stopped is None
     return write_graph_proof(problem, interval, "problem", pieces, followed if whole else None)
 
 

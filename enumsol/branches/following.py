@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from enumsol.branches.joining import Joined, join
+from enumsol.deadlines import Deadline, TimeOverError, within
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.texts import counted
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     from enumsol.branches.parts import Trace
     from enumsol.branches.traced import TracedProblem
+    from enumsol.deadlines import Limited
     from enumsol.search.interval import SearchedPiece
     from enumsol.selections.solution import Codes
 
@@ -38,15 +40,15 @@ class Followed:
     joined : Joined
     force, length : (2p,) arrays
         Units in which they were followed.
-    interrupted : Stop or None
-        How far it got, if Ctrl-C was pressed.
+    stopped : Stop or None
+        How far it got, if Ctrl-C was pressed or the time was over.
     """
 
     force: NDArray[np.float64]
     length: NDArray[np.float64]
     traces: list[Trace] = field(default_factory=list)
     joined: Joined = field(default_factory=Joined)
-    interrupted: Stop | None = None
+    stopped: Stop | None = None
 
     @property
     def reasons(self) -> list[str]:
@@ -67,6 +69,7 @@ def follow(
     *,
     cut_short: bool = False,
     most: int | None = None,
+    limits: Limited | None = None,
 ) -> Followed:
     """Trace all selections handed on, where they were; after a search that was cut short, over the whole interval.
 
@@ -78,6 +81,8 @@ def follow(
     cut_short : the search was stopped before it had looked everywhere
     most : int, optional
         No further selections are followed after so many boxes, as if Ctrl-C had been pressed.
+    limits : Limited, optional
+        Selections that are not finished by this deadline are left out.
     """
     where: dict[Codes, list[Bounds]] = {}
     for found in pieces:
@@ -89,18 +94,21 @@ def follow(
     together = min(max(_LEAST, _TOGETHER // traced.problem.p**2), _MOST) if most is None else _FEW
     for first in range(0, len(waiting), together):
         group = waiting[first : first + together]
+        enough = most is not None and sum(len(trace.boxes) for trace in followed.traces) >= most
+        reason = StopReason.INTERRUPTED if enough else None
+        places = {codes: [traced.interval] if cut_short else where[codes] for codes in group}
         try:
-            enough = most is not None and sum(len(trace.boxes) for trace in followed.traces) >= most
-            if not enough:
-                places = {codes: [traced.interval] if cut_short else where[codes] for codes in group}
-                traced.trace(places, followed.traces)
-                if tick is not None:
-                    tick(min(first + together, len(waiting)) / len(waiting))
+            with within(limits or Deadline()):
+                traced.trace({} if enough else places, followed.traces)
+            if tick is not None and not enough:
+                tick(min(first + together, len(waiting)) / len(waiting))
         except KeyboardInterrupt:
-            enough = True
-        if enough:
+            reason = StopReason.INTERRUPTED
+        except TimeOverError:
+            reason = StopReason.TIME_LIMIT
+        if reason is not None:
             done = len({trace.selection.rows.codes for trace in followed.traces})
-            followed.interrupted = Stop(StopReason.INTERRUPTED, done, arcs_of=len(waiting))
+            followed.stopped = Stop(reason, done, arcs_of=len(waiting))
             break
     followed.joined = join(followed.traces, traced.interval, traced.origin, traced.sharpen)
     return followed

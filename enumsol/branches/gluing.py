@@ -15,6 +15,7 @@ from networkx.utils import UnionFind
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge
 from enumsol.branches.known_selections import KnownSelections
+from enumsol.deadlines import Deadline, TimeOverError, look, within
 from enumsol.roots.components import connected_components
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.selections.ordered_field import FiberSelections
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
     from enumsol.branches.selection_arcs import Event, SelectionArcs
     from enumsol.condensation.exact import ExactCondensed
+    from enumsol.deadlines import Limited
     from enumsol.roots.components import RootComponent
     from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
 
@@ -90,8 +92,8 @@ class Gluing:
     arcs : dict of SelectionArcs by codes, those that hold somewhere
     vertices : list of GluedVertex in the order of alpha
     edges : list of GluedArc
-    interrupted : Stop or None
-        How far it got, if Ctrl-C was pressed while arcs were computed.
+    stopped : Stop or None
+        How far it got, if Ctrl-C was pressed while arcs were computed, or the time was over.
     reasons : list of str
         What stayed undecided or contradicts completeness; empty when nothing does.
     """
@@ -102,7 +104,7 @@ class Gluing:
     arcs: dict[Codes, SelectionArcs]
     vertices: list[GluedVertex]
     edges: list[GluedArc]
-    interrupted: Stop | None
+    stopped: Stop | None
     reasons: list[str]
 
 
@@ -115,6 +117,7 @@ def glue(
     *,
     cut_short: bool = False,
     most: int | None = None,
+    limits: Limited | None = None,
 ) -> Gluing:
     """Vertices and arcs of the graph, from the selections that the search found.
 
@@ -127,22 +130,23 @@ def glue(
     cut_short : the search was stopped: selections it did not find are left out, and arcs may end without neighbours
     most : int, optional
         No further candidates are worked out after so many, as if Ctrl-C had been pressed.
+    limits : Limited, optional
+        Candidates that are not worked out by this deadline are left out. What is not joined by the one that holds where
+        this is called is unsettled.
     """
     known = KnownSelections(exact, a, b, cut_short=cut_short)
-    interrupted = _work_out(known, sorted(set(candidates)), tick, most)
+    stopped = _work_out(known, sorted(set(candidates)), tick, most, limits or Deadline())
     for codes in list(known.arcs):
-        known.close(codes)
+        try:
+            known.close(codes)
+        except TimeOverError:
+            del known.arcs[codes]
+            known.late = known.cut_short = True
     vertices = _vertices(_joined(known))
-    return Gluing(
-        exact=exact,
-        a=a,
-        b=b,
-        arcs=known.arcs,
-        vertices=vertices,
-        edges=_edges(known, vertices),  # may unsettle vertices and add reasons
-        interrupted=interrupted,
-        reasons=known.reasons,
-    )
+    edges = _edges(known, vertices)  # may unsettle vertices and add reasons
+    if known.late and stopped is None:
+        stopped = Stop(StopReason.TIME_LIMIT)
+    return Gluing(exact, a, b, known.arcs, vertices, edges, stopped, known.reasons)
 
 
 def _work_out(
@@ -150,20 +154,25 @@ def _work_out(
     candidates: Sequence[Codes],
     tick: Callable[[float], object] | None,
     most: int | None,
+    limits: Limited,
 ) -> Stop | None:
-    """Where the candidates hold; after Ctrl-C the rest is left out, as if the search had been cut short."""
+    """Where the candidates hold; after Ctrl-C or the deadline the rest is left out, as if it had not been found."""
     for k, codes in enumerate(candidates):
-        enough = k == most
+        reason = StopReason.INTERRUPTED if k == most else None
         try:
-            if not enough:
-                known.add(codes)
+            if reason is None:
+                with within(limits):
+                    look()
+                    known.add(codes)
                 if tick is not None:
                     tick((k + 1) / len(candidates))
         except KeyboardInterrupt:
-            enough = True
-        if enough:
+            reason = StopReason.INTERRUPTED
+        except TimeOverError:
+            reason = StopReason.TIME_LIMIT
+        if reason is not None:
             known.cut_short = True
-            return Stop(StopReason.INTERRUPTED, k, arcs_of=len(candidates))
+            return Stop(reason, k, arcs_of=len(candidates))
     return None
 
 
@@ -189,9 +198,14 @@ def _joined(known: KnownSelections) -> list[list[Event]]:
             event.active = everything
             event.settled = event.settled and not known.gaps
             continue
-        for active in known.active_at(event):
-            _join_members(known, event, active, union)
-    _join_polytopes(seen, union)
+        event.active = tuple(frozenset((code,)) for code in event.codes)
+        try:
+            look()
+            for active in known.active_at(event):
+                _join_members(known, event, active, union)
+        except TimeOverError:
+            event.settled, known.late = False, True
+    _join_polytopes(known, seen, union)
     groups: dict[Event, list[Event]] = {}
     for event in seen:
         groups.setdefault(union[event], []).append(event)
@@ -226,16 +240,22 @@ def _join_members(known: KnownSelections, event: Event, active: ActiveSets, unio
         union.union(event, other)
 
 
-def _join_polytopes(events: Iterable[Event], union: UnionFind) -> None:
+def _join_polytopes(known: KnownSelections, events: Iterable[Event], union: UnionFind) -> None:
     """Join polytopes at one alpha that meet away from the vertices of both."""
     by_solver: dict[FiberSelections, list[tuple[Event, SelectionSolution]]] = {}
     for event in events:
         if event.polytope is not None and event.polytope[1].dimension > 0:
             by_solver.setdefault(event.polytope[0], []).append((event, event.polytope[1]))
     for solver, found in by_solver.items():
-        for (first, a), (second, b) in combinations(found, 2):
-            if union[first] != union[second] and solver.meet(a, b):
-                union.union(first, second)
+        try:
+            for (first, a), (second, b) in combinations(found, 2):
+                look()
+                if union[first] != union[second] and solver.meet(a, b):
+                    union.union(first, second)
+        except TimeOverError:
+            known.late = True
+            for event, _ in found:
+                event.settled = False
 
 
 # -- the graph ---------------------------------------------------------------------------------------------------------
@@ -276,7 +296,10 @@ def _edges(known: KnownSelections, vertices: list[GluedVertex]) -> list[GluedArc
             if arcs.grazing and known.exact.unloaded:
                 index = 1
             elif arcs.grazing:
-                component = _component(known, codes, cell.sample)
+                try:
+                    component = _component(known, codes, cell.sample)
+                except TimeOverError:
+                    component, known.late = None, True
                 # unknown selections that coincide here may have critical points that cut the arc further
                 if component is None or (known.cut_short and not _all_known(known, component)):
                     vertices[tail].settled = vertices[head].settled = False
@@ -297,6 +320,7 @@ def _all_known(known: KnownSelections, component: RootComponent) -> bool:
 
 def _component(known: KnownSelections, codes: Codes, sample: Any) -> RootComponent | None:
     """The connected set of solutions that a degenerate selection belongs to at a point of its cell."""
+    look()
     solver = FiberSelections(known.exact, sample)
     solution = solver.solve(codes)
     if solution is None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from enumsol.arithmetic.number_field import exact_value
 from enumsol.branches.selection_arcs import Event, SelectionArcs, active_sets, selection_arcs
 from enumsol.branches.sheets import sheet_arcs
+from enumsol.deadlines import look
 from enumsol.selections.ordered_field import FiberSelections
 from enumsol.selections.solution import VertexLimitError
 
@@ -31,6 +32,8 @@ class KnownSelections:
     arcs : dict of SelectionArcs by codes
     cut_short : bool
         The search was stopped: selections it did not find are left out, and arcs may end without neighbours.
+    late : bool
+        The time was over before all of them were joined.
     waiting : list of Event
         Events at which other selections have not been looked for yet.
     reasons : list of str
@@ -39,6 +42,7 @@ class KnownSelections:
 
     def __init__(self, exact: ExactCondensed, a: Any, b: Any, *, cut_short: bool) -> None:
         self.exact, self.a, self.b, self.cut_short = exact, a, b, cut_short
+        self.late = False
         self.arcs: dict[Codes, SelectionArcs] = {}
         self.waiting: list[Event] = []
         self.reasons: list[str] = []
@@ -85,6 +89,7 @@ class KnownSelections:
 
     def solve(self, event: Event) -> bool:
         """Find the polytope of a selection at a singular event; False when it has no solution there."""
+        look()
         solver = self._fiber(event.alpha)
         try:
             solution = solver.solve(event.codes)

@@ -11,6 +11,7 @@ from flint import fmpq, fmpq_mat, fmpq_poly
 from enumsol.arithmetic.algebraic import CriticalAlpha, integer_polynomial, merge, rational_between, real_roots
 from enumsol.arithmetic.number_field import exact_value
 from enumsol.branches.selection_arcs import Cell, Event, SelectionArcs
+from enumsol.deadlines import look
 from enumsol.selections.functions import SelectionFunctions
 from enumsol.selections.ordered_field import FiberSelections, row_reduce
 from enumsol.selections.solution import MAX_BASES, VertexLimitError
@@ -90,6 +91,7 @@ def _critical_polynomials(exact: ExactCondensed, codes: Codes) -> list[Any]:
     inverse = fmpq_mat([[node**k for k in range(len(nodes))] for node in nodes]).inv()
     found = []
     for basis in combinations(range(count), dimension):
+        look()
         table = [_bordered(equations, inequalities, independent, basis, size) for equations, inequalities in samples]
         for column in (inverse * fmpq_mat(table)).transpose().tolist():
             poly = integer_polynomial(fmpq_poly(column))

@@ -11,6 +11,7 @@ import numpy as np
 
 from enumsol.branches.tracing import trace
 from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.deadlines import over
 from enumsol.kernel.arc_selections import ArcSelection, ArcSystem
 from enumsol.kernel.precise import PreciseSelection, PreciseSystem
 
@@ -77,8 +78,8 @@ class TracedProblem:
         return self._selections[codes, side]
 
     def precise(self, codes: Codes, side: float) -> PreciseSelection | None:
-        """A selection in many digits; None when the problem has more than EXACT_DOF_LIMIT degrees of freedom."""
-        if self._precise_system is None:
+        """A selection in many digits; None beyond EXACT_DOF_LIMIT degrees of freedom, and once the time is over."""
+        if over() or self._precise_system is None:
             return None
         if (codes, side) not in self._precise:
             system = self._precise_system.constant_load(side) if side else self._precise_system

@@ -14,6 +14,7 @@ import numpy as np
 
 from enumsol.branches.cutting import Cutting, between
 from enumsol.branches.parts import Box, Part, PartKind, Trace
+from enumsol.deadlines import TimeOverError, look
 from enumsol.kernel.arcs import Expansion, expansions, over_parts
 
 if TYPE_CHECKING:
@@ -58,14 +59,14 @@ def trace(
         ``precise`` gives the same selection in balls of many digits, for short boxes, or None where there is none;
         ``side`` is that of the selection's system.
     found : list of Trace
-        Takes the traces; on Ctrl-C those of the selections that are finished.
+        Takes the traces; on Ctrl-C, or once the time is over, those of the selections that are finished.
     sharpened : bounds of events will be made narrower
     """
     traces = [Trace(selection, low, high, side) for selection, low, high, _, side in asked]
     tracings = [_Tracing(one, part[3], sharpened=sharpened) for one, part in zip(traces, asked, strict=True)]
     try:
         _answer([tracing.run() for tracing in tracings])
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, TimeOverError):
         pairs = list(zip(traces, tracings, strict=True))
         waiting = {one.selection.rows.codes for one, tracing in pairs if not tracing.finished}
         found += [one for one in traces if one.selection.rows.codes not in waiting]
@@ -113,6 +114,7 @@ class _Tracing:
         """Box by box, from left to right."""
         waiting: list[Interval] = [(self._found.low, self._found.high)]
         while waiting:
+            look()
             first, last = waiting.pop()
             self._count += 1
             rest = yield from self._box(_as_float(first), _as_float(last))

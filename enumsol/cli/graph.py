@@ -49,7 +49,7 @@ def graph(
     last: LastAlpha,
     arithmetic: HowExact = "verified",
     max_nodes: MaxNodes = None,
-    time_limit: Annotated[float | None, seconds("Stop the search after so long.")] = None,
+    time_limit: Annotated[float | None, seconds("Stop after so long.")] = None,
     jobs: Annotated[int, count("Processes to search with.")] = 1,
     save_file: Annotated[str | None, file("--save", "Write the graph, for enumsol audit and follow.")] = None,
     json_file: JsonFile = None,

@@ -38,7 +38,7 @@ def report(
     ] = "report.html",
     arithmetic: HowExact = "verified",
     max_nodes: MaxNodes = None,
-    time_limit: Annotated[float | None, seconds("Stop the search after so long.")] = None,
+    time_limit: Annotated[float | None, seconds("Stop after so long.")] = None,
     jobs: Annotated[int, count("Processes to search with.")] = 1,
     title: Annotated[
         str | None, typer.Option(metavar="TEXT", help="Heading of the page; default PROBLEM.", rich_help_panel=OUTPUT)

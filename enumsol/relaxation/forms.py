@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
 
+from enumsol.deadlines import look
 from enumsol.kernel.forms import EnclosedForm, Equations
 from enumsol.kernel.rows import CONTACT, UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetRelaxation, FormEngine
@@ -124,6 +125,7 @@ class FormAscent:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             found = self._candidate(codes, space, start, rows)
             for _ in range(steps):
+                look()
                 if found is None or found.relaxation.pruned:
                     break
                 better = self._step(codes, space, found, rows)
@@ -207,6 +209,7 @@ class FormAscent:
                 return None
         length *= _INSIDE
         for _ in range(_TRIALS):
+            look()
             trial = self._candidate(codes, space, moved(length), rows)
             if trial is not None and (trial.relaxation.pruned or merit(trial) > merit(found)):
                 return trial, promised < _ENOUGH

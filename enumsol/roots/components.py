@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.deadlines import look
 from enumsol.selections.solution import VertexLimitError
 
 if TYPE_CHECKING:
@@ -110,6 +111,7 @@ def _grow(
 
     def solve(codes: Codes) -> SelectionSolution | None:
         if codes not in solved:
+            look()
             try:
                 solved[codes] = solver.solve(codes)
             except VertexLimitError:  # the search lists this selection as open
@@ -140,6 +142,7 @@ def _holding_at_vertices(solution: SelectionSolution, solver: SelectionSolver) -
     found: set[Codes] = set()
     whole = True
     for vertex in solution.vertices:
+        look()
         active = _with_own(solver.active(vertex), solution.codes if solution.dimension == 0 else None)
         if prod(len(a) for a in active) > MAX_LOCAL_SELECTIONS:
             whole = False
@@ -171,6 +174,7 @@ def _with_own(active: ActiveSets, codes: Codes | None) -> ActiveSets:
 
 def _touch(a: SelectionSolution, b: SelectionSolution, solver: SelectionSolver) -> bool:
     """Whether two solutions share a point; points must agree, and each lie in the other's selection."""
+    look()
     if a.dimension == 0 and b.dimension == 0:
         return solver.equal(a.vertices[0], b.vertices[0])
     return any(_holds(b.codes, v, solver) for v in a.vertices) or (
@@ -180,6 +184,7 @@ def _touch(a: SelectionSolution, b: SelectionSolution, solver: SelectionSolver) 
 
 
 def _holds(codes: Codes, point: Any, solver: SelectionSolver) -> bool:
+    look()
     return all(code in active for code, active in zip(codes, solver.active(point), strict=True))
 
 

@@ -19,6 +19,7 @@ from enumsol.checks import (
     share,
 )
 from enumsol.contact_body import ContactBody
+from enumsol.deadlines import TimeOverError, within
 from enumsol.errors import InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.roots.at_rest import AtRest
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     from enumsol.checks import Alpha, AlphaLike
     from enumsol.problem3d import ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
-    from enumsol.selections.solution import Codes, PointValues, SelectionSolver
+    from enumsol.selections.solution import Codes, PointValues, SelectionSolution, SelectionSolver
 
 Method = Literal["tree", "exhaustive"]
 #: The exhaustive method reports progress this often [seconds].
@@ -94,7 +95,8 @@ def enumerate_roots(
     max_nodes : int, optional
         Stop after this many nodes of the tree (selections, for the exhaustive method).
     time_limit : float, optional
-        Stop after this many seconds.
+        Stop after this many seconds; the result is then made of what was found, which takes a fifth of them and two
+        seconds at most, but for very large bodies.
     proof_path : path, optional
         Stream the proof to this file (arithmetic "verified"); by default it is kept, compressed, in memory.
     resume : bool
@@ -135,7 +137,7 @@ def enumerate_roots(
     """
     if not _is_in_space(problem):
         instance_of(problem, ContactProblem, "problem")
-    value = alpha_value(alpha)
+    started, value = time.perf_counter(), alpha_value(alpha)
     one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     one_of(method, "method", ("tree", "exhaustive"))
     one_of(engine, "engine", (None, "active-set", "clarabel"))
@@ -151,10 +153,12 @@ def enumerate_roots(
         check_supported(arithmetic, method, engine)
         _check_proof(arithmetic, method, proof_path, resume)
         in_space = SpaceSolvers(problem, value, arithmetic)
-        return SpaceEnumeration(in_space, progress, proof_path, resumed=resume).run(executor, *counts, seconds)
+        search: Enumeration[Any] = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
+        return search.run(executor, *counts, seconds)
     _check_proof(arithmetic, method, proof_path, resume)
     solvers = Solvers(problem, value, arithmetic, tolerance, engine)
-    return _Enumeration(solvers, method, progress, proof_path, resumed=resume).run(executor, *counts, seconds)
+    search = _Enumeration(solvers, method, progress, proof_path, resumed=resume, started=started)
+    return search.run(executor, *counts, seconds)
 
 
 def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
@@ -165,6 +169,16 @@ def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
 def _in_doubt(core: Codes) -> UndecidedPart:
     hint = "perturb the load, or condense the body to its contact nodes"
     return UndecidedPart(core, "a root in it may be the same as another one", hint, examined=True)
+
+
+def _not_joined(codes: Codes) -> UndecidedPart:
+    reason = "the time was over before it was known with which others its solution is connected"
+    return UndecidedPart(codes, reason, "raise the limit", examined=True)
+
+
+def _alone(solution: SelectionSolution) -> bool:
+    """Whether no other selection's solution is connected with it, or it is told from these otherwise."""
+    return solution.possible is not None or (solution.strict and solution.det_sign != 0)
 
 
 class _Enumeration(Enumeration[Solvers]):
@@ -178,8 +192,9 @@ class _Enumeration(Enumeration[Solvers]):
         proof_path: str | Path | None,
         *,
         resumed: bool = False,
+        started: float | None = None,
     ) -> None:
-        super().__init__(solvers, progress, proof_path, resumed=resumed)
+        super().__init__(solvers, progress, proof_path, resumed=resumed, started=started)
         self.method = method
         #: Closed roots that may be the same as others.
         self.doubtful: list[Codes] = []
@@ -200,7 +215,11 @@ class _Enumeration(Enumeration[Solvers]):
 
     def _search(self, limits: SearchLimits, executor: Executor | None) -> None:
         if self.method == "exhaustive":
-            self._exhaustive(limits)
+            try:
+                with within(limits):
+                    self._exhaustive(limits)
+            except TimeOverError:
+                self.outcome.stopped = Stop(StopReason.TIME_LIMIT)
         else:
             super()._search(limits, executor)
 
@@ -223,10 +242,21 @@ class _Enumeration(Enumeration[Solvers]):
                 outcome.stopped = Stop(StopReason.ENOUGH_ROOTS)
             elif limits.max_nodes is not None and limits.max_nodes <= outcome.selections < total:
                 outcome.stopped = Stop(StopReason.NODE_LIMIT, limits.max_nodes, "selection")
-            elif limits.deadline is not None and now > limits.deadline and outcome.selections < total:
+            elif limits.over and outcome.selections < total:
                 outcome.stopped = Stop(StopReason.TIME_LIMIT)
             if outcome.stopped is not None:
                 return
+
+    def _joined(self) -> list[tuple[list[RootComponent], SelectionSolver]]:
+        """Components of what was found, before the time is over; then of what belongs to no others in any case."""
+        try:
+            return self._components()
+        except TimeOverError:
+            outcome, self.late = self.outcome, True
+            outcome.undecided += [_not_joined(s.codes) for s in outcome.solutions if not _alone(s)]
+            outcome.solutions[:] = filter(_alone, outcome.solutions)
+            outcome.stopped = outcome.stopped or Stop(StopReason.TIME_LIMIT)
+            return self._components()
 
     def _components(self) -> list[tuple[list[RootComponent], SelectionSolver]]:
         """Components of the root set with the solver whose points they hold."""
@@ -253,7 +283,7 @@ class _Enumeration(Enumeration[Solvers]):
         if self.unloaded:
             at_rest = AtRest(solvers.floats.F_positive, proven=solvers.arithmetic != "fast")
             roots, separate = [self._root(at_rest.component, at_rest)], 1
-        for components, solver in self._components():
+        for components, solver in self._joined():
             # what joins a component that was not examined whole is not known
             separate += sum(c.whole for c in components)
             joinable = joinable or not all(c.whole for c in components)

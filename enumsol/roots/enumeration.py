@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from enumsol.deadlines import Deadline, within
 from enumsol.errors import Interrupted, OutputError
 from enumsol.proof.begun import begun_proof
 from enumsol.proof.writer import ProofWriter
@@ -41,6 +42,8 @@ class Enumeration(ABC, Generic[_Solvers]):
         Where to write the proof (arithmetic "verified"); None keeps it in memory.
     resumed : bool
         Go on with the proof in that file, if there is one.
+    started : time.perf_counter() value, optional
+        When the call began; by default now.
 
     Raises
     ------
@@ -55,9 +58,12 @@ class Enumeration(ABC, Generic[_Solvers]):
         proof_path: str | Path | None,
         *,
         resumed: bool = False,
+        started: float | None = None,
     ) -> None:
         self.solvers, self.progress = solvers, progress
-        self.started = time.perf_counter()
+        self.started = time.perf_counter() if started is None else started
+        #: The time was over before it was known which roots the solutions form.
+        self.late = False
         self.outcome = SearchOutcome()
         self.unloaded = False
         self.writer: ProofWriter | None = None
@@ -74,8 +80,8 @@ class Enumeration(ABC, Generic[_Solvers]):
         self, executor: Executor | None, stop_after: int | None, max_nodes: int | None, time_limit: float | None
     ) -> RootSet:
         """Search, then build the result; an interruption keeps what was found."""
-        deadline = None if time_limit is None else self.started + time_limit
-        limits = SearchLimits(None if stop_after is None else self._enough(stop_after), max_nodes, deadline)
+        until = Deadline.after(self.started, time_limit)
+        limits = SearchLimits(None if stop_after is None else self._enough(stop_after), max_nodes, until.deadline)
         try:
             self._search(limits, executor)
         except KeyboardInterrupt as interruption:
@@ -85,7 +91,9 @@ class Enumeration(ABC, Generic[_Solvers]):
             raise Interrupted(message, partial) from interruption
         if self.writer is not None:
             self.writer.replace()
-        result = self._result()
+        # a search that goes on with an earlier one has moved its deadline
+        with within(Deadline(limits.deadline).extended(self.started)):
+            result = self._result()
         if self.writer is not None and self.writer.failure is not None:
             raise OutputError(self.writer.failure, result)
         return result
@@ -146,11 +154,11 @@ class Enumeration(ABC, Generic[_Solvers]):
         )
 
     def _proof(self, **counts: int) -> Proof | None:
-        """The proof, closed; None when the search was interrupted or there was no room to write its end."""
+        """The proof, closed; None when the search was interrupted, or there was no room or time to write its end."""
         if self.writer is None:
             return None
         outcome = self.outcome
-        whole = outcome.stopped is None or not outcome.stopped.interrupted
+        whole = not self.late and (outcome.stopped is None or not outcome.stopped.interrupted)
         if whole:
             leaves = self.certifier.certified.leaves
             self.writer.write({**counts, "undecided": len(outcome.undecided), "leaves": leaves})

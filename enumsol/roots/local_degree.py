@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.deadlines import current
 from enumsol.search.certifiers.floats import FastCertifier
 from enumsol.search.outcome import SearchLimits
 from enumsol.search.reduction import Reduction
@@ -77,7 +78,7 @@ def _perturbed(solver: FloatSelections, active: ActiveSets, push: Array) -> dict
     """Selections of the roots of a perturbed problem, with sign det; None where it is not found."""
     loaded = bool(np.any(solver.system.g))
     system = replace(solver.system, g=solver.system.g + push if loaded else push / _STEPS[-1])
-    splitting, limits = PlaneSplitting(system.F, active), SearchLimits(max_nodes=_MAX_NODES)
+    splitting, limits = PlaneSplitting(system.F, active), SearchLimits(max_nodes=_MAX_NODES, deadline=current())
     certifier = FastCertifier(FloatSelections(system, solver.tolerance))
     outcome = TreeSearch(system, certifier, splitting=splitting, limits=limits).run()
     if outcome.stopped is not None or any(not s.strict or s.det_sign == 0 for s in outcome.solutions):

@@ -44,8 +44,9 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         proof_path: str | Path | None,
         *,
         resumed: bool = False,
+        started: float | None = None,
     ) -> None:
-        super().__init__(solvers, progress, proof_path, resumed=resumed)
+        super().__init__(solvers, progress, proof_path, resumed=resumed, started=started)
         self.problem, self.alpha, self.arithmetic = solvers.problem, solvers.alpha, solvers.arithmetic
         self.system, self.enclosed = solvers.system, solvers.enclosed
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.deadlines import look
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -166,6 +168,7 @@ class _Barrier:
             return None
         weight, after = parts / self._scale, 0
         for _ in range(_STEPS):
+            look()
             before = z[-1]
             z, decrement = self._moved(z, weight)
             if z[-1] > _DEFINITE:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.deadlines import look
 from enumsol.errors import TooLargeError
 from enumsol.selections.floats import selection_systems
 from enumsol.statuses import FINAL, INEQUALITIES
@@ -66,6 +67,7 @@ def exhaustive_float(system: ScaledSystem, solver: SelectionSolver) -> Iterator[
     while done < total:
         block = np.array([next(codes) for _ in range(min(BLOCK, total - done))], dtype=np.int8)
         for row in block[_candidates(system, block)]:
+            look()
             solution = solver.solve(tuple(int(c) for c in row))
             if solution is not None:
                 yield done, solution

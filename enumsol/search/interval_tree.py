@@ -15,6 +15,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from enumsol.deadlines import Deadline, TimeOverError, within
 from enumsol.relaxation.interval import IntervalEngine, IntervalSystem, PieceForm, interval_rows
 from enumsol.search.interval_forms import PairedTerms, better_form
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, branching_node
@@ -209,7 +210,7 @@ class PieceTree:
         while stack:
             if not tried and result.nodes >= FORM_AFTER:
                 tried = True
-                if self._use(better_form(self._system)):
+                if self._use(self._better_form(deadline)):
                     self._result = result = TreeResult(nodes=result.nodes)
                     stack = [_first(roots)]
             if result.nodes >= max_nodes or (deadline is not None and time.perf_counter() > deadline):
@@ -230,6 +231,14 @@ class PieceTree:
             stack += children[::-1]
         self._try_again(max_nodes)
         return result
+
+    def _better_form(self, deadline: float | None) -> PairedTerms | None:
+        """A form that is tighter than the energy; None: there is none, or no time to find it."""
+        try:
+            with within(Deadline(deadline)):
+                return better_form(self._system)
+        except TimeOverError:
+            return None
 
     def _with_form(self, roots: Sequence[Subtree]) -> list[Subtree]:
         return [Subtree(root.codes, root.left, self._form) for root in roots]

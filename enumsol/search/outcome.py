@@ -60,6 +60,11 @@ class SearchLimits:
         """The clock's value this many seconds from now."""
         return None if seconds is None else time.perf_counter() + seconds
 
+    @property
+    def over(self) -> bool:
+        """Whether the deadline has passed."""
+        return self.deadline is not None and time.perf_counter() > self.deadline
+
     def remaining(self) -> float | None:
         """Seconds until the deadline."""
         return None if self.deadline is None else self.deadline - time.perf_counter()

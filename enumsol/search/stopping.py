@@ -30,7 +30,7 @@ class Stop:
     unit : str
         What ``count`` counts: "node" or "selection".
     arcs_of : int or None
-        Number of selections whose arcs were wanted, if that stage was interrupted and not the search.
+        Number of selections whose arcs were wanted, if that stage was ended and not the search.
     unexamined : int or None
         Subtrees that are listed as not examined; None where the search keeps no such list.
     """
@@ -53,7 +53,7 @@ class Stop:
         text = {
             StopReason.NODE_LIMIT: f"stopped after max_nodes = {done}",
             StopReason.ENOUGH_ROOTS: "stopped after enough roots",
-            StopReason.TIME_LIMIT: "stopped by the time limit",
+            StopReason.TIME_LIMIT: "stopped by the time limit" + (f" after {done}" if done else ""),
             StopReason.INTERRUPTED: f"interrupted after {done}",
             StopReason.GRAPH_INCOMPLETE: "the branch graph is not complete",
         }[self.reason]

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from enumsol.condensation.condensed import ScaledSystem
+from enumsol.deadlines import Deadline, TimeOverError, over, within
 from enumsol.errors import MissingDependencyError
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
@@ -166,10 +167,18 @@ class TreeSearch:
         if stack and not due():
             self._forget(held)
             stack = self.loop(start, due)
-        if stack and forms.pay(self.engine, start[0].codes, self._rows):
+        if stack and self._pays(forms):
             self._forget(held)
             return list(start)
         return stack
+
+    def _pays(self, forms: Forms) -> bool:
+        """Whether a form is found that is better than the energy, before the time is over."""
+        try:
+            with within(self.limits):
+                return forms.pay(self.engine, self.first().codes, self._rows)
+        except TimeOverError:
+            return False
 
     def _forget(self, held: HeldRecords) -> None:
         held.drop()
@@ -188,7 +197,7 @@ class TreeSearch:
         stack: list[Any] = self._planted(items)
         if forms is not None and trial and form is None:
             stack = self.loop(stack, lambda: forms.due(self.outcome.nodes, self.covered))
-            if stack and forms.pay(self.engine, self.first().codes, self._rows):
+            if stack and self._pays(forms):
                 # from here on without the parents' relaxations, which are the energy's
                 stack = [replace(item, parent=None) if isinstance(item, TreeNode) else item for item in stack]
         self.loop(stack, None)
@@ -196,9 +205,20 @@ class TreeSearch:
     def examined(self, items: Sequence[TreeNode], nodes: int, deadline: float | None = None) -> list[TreeNode]:
         """Examine so many nodes of subtrees, the last first; what still waits then, or at the deadline."""
         stack, last = self._planted(items), self.outcome.nodes + nodes
-        while stack and self.outcome.nodes < last and (deadline is None or time.perf_counter() <= deadline):
-            stack += self.examine(stack.pop())
+        with within(Deadline(deadline)):
+            while stack and self.outcome.nodes < last and not over() and self._go_on(stack):
+                pass
         return stack
+
+    def _go_on(self, stack: list[TreeNode]) -> bool:
+        """Examine what waits last; whether there was time for it, and otherwise it waits as before."""
+        item = stack.pop()
+        try:
+            stack += self.examine(item)
+        except TimeOverError:
+            stack.append(item)
+            return False
+        return True
 
     def _planted(self, items: Sequence[TreeNode]) -> list[TreeNode]:
         """Subtrees of one search, the first one last, with the relaxations from which each of them begins."""
@@ -224,14 +244,23 @@ class TreeSearch:
     def _run(self, stack: Sequence[TreeNode], until: Callable[[], bool] | None) -> list[TreeNode]:
         """Examine what waits, depth first; what still waits when it is time to stop."""
         stack = list(stack)
-        while stack:
-            if until is not None and until():
-                break
-            if self.must_stop(len(stack)):
-                self._leave(stack)
-                return []
-            stack += self.examine(stack.pop())
+        with within(self.limits):
+            while stack:
+                if until is not None and self._time_to(until):
+                    break
+                if self.must_stop(len(stack)):
+                    self._leave(stack)
+                    return []
+                self._go_on(stack)
         return stack
+
+    @staticmethod
+    def _time_to(until: Callable[[], bool]) -> bool:
+        """Whether it is time to stop, as far as there is time to find out."""
+        try:
+            return until()
+        except TimeOverError:
+            return False
 
     def _leave(self, items: Sequence[TreeNode]) -> None:
         for item in reversed(items):
@@ -321,7 +350,7 @@ class TreeSearch:
             outcome.stopped = Stop(StopReason.NODE_LIMIT, limits.max_nodes, unexamined=waiting)
         elif limits.enough is not None and limits.enough(outcome.solutions):
             outcome.stopped = Stop(StopReason.ENOUGH_ROOTS, unexamined=waiting)
-        elif limits.deadline is not None and time.perf_counter() > limits.deadline:
+        elif limits.over:
             outcome.stopped = Stop(StopReason.TIME_LIMIT, unexamined=waiting)
         elif outcome.nodes % _REPORT_EVERY == 0:
             self.report(self.covered)

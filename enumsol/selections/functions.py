@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq, fmpq_mat, fmpz_mat, fmpz_poly
 
 from enumsol.arithmetic.algebraic import integer_polynomial
+from enumsol.deadlines import look
 from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
 
 if TYPE_CHECKING:
@@ -82,6 +83,7 @@ class SelectionFunctions:
         values: list[list[Any]] = []
         zeros = trial = 0
         while len(nodes) < needed:
+            look()
             matrix, rhs = self._matrix(trial)
             M = fmpz_mat(matrix)
             det = M.det()

@@ -8,6 +8,7 @@ from flint import fmpq
 
 from enumsol.arithmetic.rationals import to_fraction
 from enumsol.condensation.exact import ExactSystem
+from enumsol.deadlines import look
 from enumsol.selections.polytopes import dot
 from enumsol.selections.rationals import ExactSelections
 from enumsol.statuses import STICK, RowKind
@@ -91,6 +92,7 @@ def row_reduce(table: list[list[Any]]) -> tuple[Any, list[int]]:
     pivots: list[int] = []
     columns = len(table[0]) if table else 0
     for column in range(columns):
+        look()
         rank = len(pivots)
         pivot = next((r for r in range(rank, len(table)) if table[r][column] != 0), None)
         if pivot is None:

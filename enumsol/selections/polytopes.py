@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq
 
+from enumsol.deadlines import look
 from enumsol.selections.solution import MAX_BASES, VertexLimitError
 
 if TYPE_CHECKING:
@@ -98,6 +99,7 @@ def _corners(origin: Point, kernel: list[Point], rows: list[Form], reduce: Reduc
         )
     found: list[Point] = []
     for basis in combinations(rows, size):
+        look()
         table, pivots = reduce([[*row, -constant] for row, constant in basis])
         if pivots != list(range(size)):
             continue

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from enumsol.deadlines import look
 from enumsol.kernel.closing import only_solution
 from enumsol.relaxation.rows import imposed_rows
 from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
@@ -88,6 +89,7 @@ class ExactCertifier(WithoutProof):
         solver, free, codes = self._selections, {*proposal.free, *proposal.sliding}, proposal.selection
         units = self._scaled.force / self._scaled.length
         for _ in range(_NEWTON_STEPS):
+            look()
             solved = solver.solve_equations(codes, solver.system.g)
             if solved is None:
                 return None

@@ -1,0 +1,89 @@
+"""The time that a call may take: long loops ask here whether it is over, whoever set the limit.
+
+A limit belongs to a call in its thread, and may move while it holds. Nothing has to be handed through what is between
+the call and the loop, and code that is called without a limit never stops.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+#: Of the time limit, and seconds besides: what may be used after it to put together what was found. A fifth and two
+#: seconds are promised; what does not look at the clock needs the rest.
+_SHARE, _SECONDS = 0.15, 1.2
+
+
+class TimeOverError(Exception):
+    """The time is over; whoever set the limit catches this and keeps what was found."""
+
+
+class Limited(Protocol):
+    """Has a deadline, a value of time.perf_counter(), or None."""
+
+    deadline: float | None
+
+
+@dataclass
+class Deadline:
+    """A deadline of its own.
+
+    Attributes
+    ----------
+    deadline : time.perf_counter() value or None
+    """
+
+    deadline: float | None = None
+
+    @classmethod
+    def after(cls, started: float, limit: float | None) -> Deadline:
+        """When a call has to end that began then and may take so many seconds."""
+        return cls(None if limit is None else started + limit)
+
+    def extended(self, started: float) -> Deadline:
+        """Until when what was found may be put together: somewhat more time than the limit."""
+        if self.deadline is None:
+            return self
+        return Deadline(self.deadline + _SHARE * (self.deadline - started) + _SECONDS)
+
+    def part(self, share: float) -> Deadline:
+        """The end of a share of the time that is left."""
+        now = time.perf_counter()
+        return self if self.deadline is None else Deadline(now + share * (self.deadline - now))
+
+
+_current: ContextVar[Limited | None] = ContextVar("deadline", default=None)
+
+
+@contextmanager
+def within(limits: Limited) -> Iterator[None]:
+    """Inside, `look` raises once the deadline of these limits has passed; other limits do not count there."""
+    token = _current.set(limits)
+    try:
+        yield
+    finally:
+        _current.reset(token)
+
+
+def current() -> float | None:
+    """The deadline that holds here."""
+    limits = _current.get()
+    return None if limits is None else limits.deadline
+
+
+def over() -> bool:
+    """Whether the time is over."""
+    deadline = current()
+    return deadline is not None and time.perf_counter() > deadline
+
+
+def look() -> None:
+    """Raise TimeOverError if the time is over."""
+    if over():
+        raise TimeOverError

@@ -1,0 +1,218 @@
+"""Time limits are kept in every phase, by a clock that counts pieces of work instead of seconds."""
+
+import inspect
+import threading
+
+import numpy as np
+import pytest
+from graph_proofs import triangle
+
+from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
+from enumsol.branches import gluing
+from enumsol.branches.known_selections import KnownSelections
+from enumsol.branches.tracing import _Tracing
+from enumsol.deadlines import Deadline, TimeOverError, current, look, over, within
+from enumsol.relaxation.forms import FormAscent
+from enumsol.search import forms
+from enumsol.search.interval import IntervalSearch
+from enumsol.search.solvers import Solvers
+from enumsol.selections.rationals import ExactSelections
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """The time, which passes only where a test says so."""
+    now = [0.0]
+    monkeypatch.setattr("time.perf_counter", lambda: now[0])
+    return now
+
+
+@pytest.fixture
+def takes(clock, monkeypatch):
+    """Has every call of a function take so many seconds."""
+
+    def slow(owner, name, seconds=1.0):
+        before = getattr(owner, name)
+
+        def call(*args, **options):
+            clock[0] += seconds
+            return before(*args, **options)
+
+        static = isinstance(inspect.getattr_static(owner, name), staticmethod)
+        monkeypatch.setattr(owner, name, staticmethod(call) if static else call)
+
+    return slow
+
+
+def kept(limit):
+    """What a limit promises."""
+    return 1.2 * limit + 2.0
+
+
+def uncoupled(p, load=(1.0, -2.0)):
+    """Nodes that do not feel each other, each with a continuum of solutions at alpha = 2."""
+    A = np.kron(np.eye(p), [[2.0, -1.0], [-1.0, 2.0]])
+    rows = np.eye(2 * p)
+    return ContactProblem(A, rows[0::2], rows[1::2], np.tile(load, p))
+
+
+# -- the clock ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_deadline_holds_where_it_was_set_and_nowhere_else(clock):
+    look()
+    with within(Deadline(5.0)):
+        look()
+        assert current() == 5.0
+        clock[0] = 6.0
+        assert over()
+        with pytest.raises(TimeOverError):
+            look()
+        with within(Deadline()):
+            look()
+        seen = []
+        thread = threading.Thread(target=lambda: seen.append(current()))
+        thread.start()
+        thread.join()
+        assert seen == [None]
+    look()
+    assert current() is None
+
+
+def test_a_deadline_may_move_while_it_holds(clock):
+    limits = Deadline(5.0)
+    with within(limits):
+        clock[0] = 6.0
+        limits.deadline = 7.0
+        look()
+
+
+@pytest.mark.parametrize("limit", [0.5, 1.0, 60.0, 3600.0])
+def test_what_is_added_to_a_limit_is_less_than_what_is_promised(clock, limit):
+    assert Deadline.after(3.0, None).extended(3.0).deadline is None
+    last = Deadline.after(3.0, limit).extended(3.0)
+    assert 3.0 + limit < last.deadline < 3.0 + kept(limit)
+    clock[0] = 3.0
+    assert last.part(0.5).deadline == pytest.approx((3.0 + last.deadline) / 2)
+
+
+# -- roots -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("arithmetic", ["verified", "exact"])
+@pytest.mark.parametrize("limit", [10, 30, 100, 300])
+def test_many_solutions_at_one_alpha(clock, takes, arithmetic, limit):
+    """Every elimination takes a second: in the leaves of the tree, and where their solutions are joined."""
+    takes(ExactSelections, "row_reduced")
+    takes(ExactSelections, "solve_equations")
+    roots = enumerate_roots(uncoupled(4), 2, arithmetic, time_limit=limit)
+    assert clock[0] <= kept(limit)
+    assert not roots.complete
+    assert "time limit" in str(roots)
+    assert roots.at_least <= 1  # it is one continuum
+    if roots.proof is not None:
+        assert verify(uncoupled(4), roots.proof).ok
+
+
+def test_what_was_not_joined_in_time_is_listed(clock, takes):
+    """The search ends in time, and then it takes too long to find which solutions are connected."""
+    problem = uncoupled(3)
+    whole = enumerate_roots(problem, 2, "exact")
+    assert whole.complete
+    assert len(whole.families) == 1
+    takes(ExactSelections, "active", 40.0)
+    roots = enumerate_roots(problem, 2, "exact", time_limit=100.0)
+    assert roots.undecided
+    assert not roots.complete
+    assert "time limit" in roots.stopped
+    assert roots.at_least <= 1
+
+
+def test_a_form_is_not_sought_beyond_the_limit(clock, takes, monkeypatch):
+    monkeypatch.setattr(forms, "NODES", 0)
+    takes(FormAscent, "_candidate")
+    problem = gallery.clamped_block(12, 6)
+    roots = enumerate_roots(problem, 0.3, time_limit=4.0)
+    assert clock[0] <= kept(4.0)
+    assert not roots.complete
+    assert verify(problem, roots.proof).ok
+
+
+def test_the_time_runs_from_the_beginning_of_the_call(clock, takes):
+    takes(Solvers, "__init__", 7.0)
+    roots = enumerate_roots(triangle(), 5.0, time_limit=5.0)
+    assert roots.stats.nodes == 0
+    assert roots.stats.seconds >= 7.0
+    assert "time limit" in roots.stopped
+
+
+@pytest.mark.parametrize("arithmetic", ["fast", "exact"])
+def test_the_exhaustive_method(clock, takes, arithmetic):
+    solver = Solvers(uncoupled(4), 2.0, arithmetic, 1e-9)
+    takes(type(solver.exact if arithmetic == "exact" else solver.floats), "solve")
+    takes(ExactSelections, "row_reduced")
+    roots = enumerate_roots(uncoupled(4), 2, arithmetic, "exhaustive", time_limit=20)
+    assert clock[0] <= kept(20)
+    assert not roots.complete
+    assert "time limit" in roots.stopped
+
+
+# -- graphs ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("limit", [5, 20, 60])
+def test_arcs_by_exact_algebra(clock, takes, limit):
+    takes(KnownSelections, "add")
+    graph = branch_graph(gallery.chain(4), (0, 10), time_limit=limit)
+    assert clock[0] <= kept(limit)
+    assert not graph.complete
+    assert graph.arcs
+    (reason,) = graph.reasons
+    assert reason.startswith("stopped by the time limit after the arcs of ")
+    assert graph.proof is None
+
+
+@pytest.mark.parametrize("name", ["active_at", "members"])
+def test_arcs_that_are_joined(clock, takes, name):
+    """Joining takes longer than anything before: what is left is open, and what is said is true."""
+    takes(KnownSelections, name)
+    problem, whole = gallery.chain(3), branch_graph(gallery.chain(3), (0, 10))
+    clock[0] = 0.0
+    graph = branch_graph(problem, (0, 10), time_limit=20.0)
+    assert clock[0] <= kept(20.0)
+    assert not graph.complete
+    for alpha in (1.0, 2.0, 3.0, 4.5, 7.0, 10.0):
+        assert graph.at_least(alpha) <= whole.multiplicity_at(alpha)
+    settled = {(v.alpha, v.kind) for v in graph.vertices if v.kind != "unsettled"}
+    assert settled <= {(v.alpha, v.kind) for v in whole.vertices}
+
+
+@pytest.mark.parametrize("name", ["solve", "active"])
+def test_continua_and_grazing_arcs(clock, takes, name):
+    takes(ExactSelections, name)
+    graph = branch_graph(uncoupled(3), (0, 4), time_limit=30.0)
+    assert clock[0] <= kept(30.0)
+    assert not graph.complete
+    assert all(v.kind == "unsettled" for v in graph.vertices if v.alpha == 2.0)
+
+
+@pytest.mark.parametrize("limit", [10, 40])
+def test_arcs_in_balls(clock, takes, limit):
+    problem = gallery.get("wedge-8-5").build()
+    whole = branch_graph(problem, (0, 3))
+    assert whole.data.arcs_by == "balls"
+    takes(_Tracing, "_box")
+    graph = branch_graph(problem, (0, 3), time_limit=limit)
+    assert clock[0] <= kept(limit) < 60
+    assert not graph.complete
+    assert graph.reasons[0].startswith("stopped by the time limit after the arcs of ")
+    assert all(graph.at_least(alpha) <= whole.multiplicity_at(alpha) for alpha in (0.5, 1.5, 2.2, 3.0))
+
+
+def test_no_exact_algebra_is_begun_after_the_limit(clock, takes, monkeypatch):
+    """The search takes the whole time."""
+    problem = gallery.get("wedge-8-5").build()
+    takes(IntervalSearch, "run", 100.0)
+    monkeypatch.setattr(gluing, "glue", None)
+    graph = branch_graph(problem, (0, 3), time_limit=10.0)
+    assert "time limit" in graph.reasons[0]
