@@ -121,7 +121,7 @@ def glue(
     Parameters
     ----------
     exact : ExactCondensed
-    candidates : codes of the selections that may hold somewhere in [a, b]
+    candidates : codes of the selections that may hold somewhere in [a, b]; all do if g vanishes at every alpha
     a, b : fmpq
     tick : called with the share of the candidates done
     cut_short : the search was stopped: selections it did not find are left out, and arcs may end without neighbours
@@ -129,7 +129,9 @@ def glue(
         No further candidates are worked out after so many, as if Ctrl-C had been pressed.
     """
     known = KnownSelections(exact, a, b, cut_short=cut_short)
-    interrupted = _work_out(known, sorted(set(candidates)), tick, most)
+    # where all selections hold, with lambda = 0, one arc stands for them
+    waiting = [(OPEN,) * exact.p] if exact.unloaded else sorted(set(candidates))
+    interrupted = _work_out(known, waiting, tick, most)
     for codes in list(known.arcs):
         known.close(codes)
     vertices = _vertices(_joined(known))
