@@ -1,8 +1,8 @@
 """How many solutions there are at least, as a graph with gaps proves it: the one place that counts them.
 
 Counted are arcs of regular roots, settled vertices, pieces of settled vertices and arcs that lead past an alpha, and
-one more solution where another is known to exist, if only because the indices of all solutions add up to +1. Theory,
-section 7.13, says why no solution is counted twice, and none that does not exist.
+one more solution where another is known to exist, if only because the indices of all solutions add up to +1. Why no
+solution is counted twice, and none that does not exist: theory, section 7.13.
 """
 
 from __future__ import annotations
