@@ -43,7 +43,7 @@ class IncompleteGraphError(EnumsolError, ValueError):
         ...
     enumsol.errors.IncompleteGraphError: ...
     >>> graph.at_least(5)
-    0
+    1
     """
 
 

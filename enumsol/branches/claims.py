@@ -1,8 +1,9 @@
 """What a branch graph may claim: the one place that knows how far its statements reach (theory, section 7.13).
 
 Arcs and settled vertices of any graph are solutions, whatever cut the search short: each arc is one of regular roots,
-and no two of them meet between their ends. So a graph that is not complete gives lower bounds. The number
-of solutions, uniqueness and a critical alpha need a graph without gaps. Texts, JSON, plots and Python all ask here.
+and no two of them meet between their ends. So a graph that is not complete gives lower bounds, which
+``branches.lower_bounds`` counts. The number of solutions, uniqueness and a critical alpha need a graph without gaps.
+Texts, JSON, plots and Python all ask here.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.branches.elements import VertexKind
+from enumsol.arithmetic.algebraic import CriticalAlpha
+from enumsol.arithmetic.rationals import rational
+from enumsol.branches.lower_bounds import least_at, least_steps
 from enumsol.texts import counted
 
 if TYPE_CHECKING:
@@ -57,9 +60,10 @@ class MultiplicitySteps:
     Attributes
     ----------
     alphas : tuple of Fraction
-        Critical alphas, rounded to floats, in order.
+        Critical alphas, rounded to floats, in order. Where these are lower bounds: the floats at which they change, on
+        the safe side of a critical alpha that is no float or not known exactly, and the first and last float.
     at : tuple of int
-        Values at the critical alphas.
+        Values at these alphas (at the critical ones themselves, unless these are lower bounds).
     between : tuple of int
         Values on the open intervals between them (one fewer).
     exact : bool
@@ -103,18 +107,18 @@ class Claims:
     ----------
     vertices : sequence of Vertex, in the order of alpha
     arcs : sequence of Arc
-    interval : (float, float)
+    interval : (Fraction, Fraction)
     standing : Standing
     """
 
     def __init__(
-        self, vertices: Sequence[Vertex], arcs: Sequence[Arc], interval: tuple[float, float], standing: Standing
+        self, vertices: Sequence[Vertex], arcs: Sequence[Arc], interval: tuple[Fraction, Fraction], standing: Standing
     ) -> None:
         self._vertices, self._arcs, self._interval = vertices, arcs, interval
         self.standing = standing
 
     def __repr__(self) -> str:
-        low, high = self._interval
+        low, high = map(float, self._interval)
         arcs, vertices = counted(len(self._arcs), "arc"), counted(len(self._vertices), "vertex", "vertices")
         return f"Claims of {arcs} and {vertices} for alpha in [{low:g}, {high:g}]: {self.standing.value}"
 
@@ -123,19 +127,23 @@ class Claims:
         """Whether nothing is known to be missing: counts are then exact and not lower bounds."""
         return self.standing is not Standing.INCOMPLETE
 
-    def multiplicity(self, arcs: Sequence[Arc], vertices: Sequence[Vertex]) -> Multiplicity:
-        """Number of solutions at one alpha, given the arcs over it and the vertices at it.
+    def multiplicity(self, alpha: Fraction) -> Multiplicity:
+        """Number of solutions at an alpha of the interval, or its lower bound.
 
-        In a graph with gaps, solutions that an undiscovered continuum may connect are counted as one.
+        It is a bound, too, where bounds of a vertex do not tell on which side of the alpha it lies.
         """
-        if self.whole:
-            return Multiplicity(len(arcs) + len(vertices), exact=True)
-        apart = sum(not arc.grazing for arc in arcs) + sum(v.kind is not VertexKind.UNSETTLED for v in vertices)
-        joinable = any(arc.grazing for arc in arcs) or any(v.kind is VertexKind.UNSETTLED for v in vertices)
-        return Multiplicity(apart + int(joinable), exact=False)
+        point = CriticalAlpha.rational(rational(alpha))
+        at = [v.exact for v in self._vertices if v.exact.compare(point) == 0]
+        if not self.whole or not all(place.is_rational for place in at):
+            return Multiplicity(least_at(alpha, self._vertices, self._arcs), exact=False)
+        over = sum(arc.passes_over(point) for arc in self._arcs)
+        return Multiplicity(over + len(at), exact=True)
 
     def steps(self) -> MultiplicitySteps:
         """The number of solutions over the whole interval, or its lower bound."""
+        if not self.whole:
+            alphas, least, between = least_steps(self._interval, self._vertices, self._arcs)
+            return MultiplicitySteps(tuple(map(Fraction, alphas)), tuple(least), tuple(between), exact=False)
         groups: list[list[Vertex]] = []
         for v in self._vertices:
             if groups and groups[-1][0].exact.compare(v.exact) == 0:
@@ -143,28 +151,24 @@ class Claims:
             else:
                 groups.append([v])
         place = {v.number: k for k, group in enumerate(groups) for v in group}
-        apart, joinable = _Cover(len(groups)), _Cover(len(groups))
+        cover = _Cover(len(groups))
         for arc in self._arcs:
-            cover = apart if self.whole or not arc.grazing else joinable
             cover.add(place[arc.tail], place[arc.head])
-        at = []
-        for group, over, joined in zip(groups, apart.at(), joinable.at(), strict=True):
-            settled = sum(self.whole or v.kind is not VertexKind.UNSETTLED for v in group)
-            at.append(over + settled + int(joined > 0 or settled < len(group)))
-        between = [n + int(m > 0) for n, m in zip(apart.between(), joinable.between(), strict=True)]
-        alphas = tuple(Fraction(group[0].alpha) for group in groups)
-        return MultiplicitySteps(alphas, tuple(at), tuple(between), self.whole)
+        at = (over + len(group) for group, over in zip(groups, cover.at(), strict=True))
+        return MultiplicitySteps(
+            tuple(Fraction(group[0].alpha) for group in groups), tuple(at), tuple(cover.between()), exact=True
+        )
 
     def uniqueness(self) -> Uniqueness:
         """Up to which alpha the solution is unique, or what is known about it."""
         steps = self.steps()
-        continua = {v.alpha for v in self._vertices if v.family is not None}
-        several = None
-        for k, (alpha, number) in enumerate(zip(steps.alphas, steps.at, strict=True)):
-            behind = steps.between[k] if k < len(steps.between) else 1
-            if max(number, behind) > 1 or float(alpha) in continua:
-                several = float(alpha)
-                break
+        behind = (*steps.between, 1)
+        found = [float(x) for x, n, m in zip(steps.alphas, steps.at, behind, strict=False) if max(n, m) > 1]
+        # a continuum is one solution to be counted, and many to be told apart
+        found += [v.alpha for v in self._vertices if v.family is not None] + [
+            arc.lo for arc in self._arcs if arc.dimension
+        ]
+        several = min(found, default=None)
         if not self.whole:
             return Uniqueness(known=False, throughout=None, limit=None, several_by=several)
         return Uniqueness(known=True, throughout=several is None, limit=several, several_by=several)

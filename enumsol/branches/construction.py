@@ -32,7 +32,7 @@ from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed
-from enumsol.condensation.unloaded import vanishing_alpha
+from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
 from enumsol.deadlines import Deadline, over, within
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
@@ -145,8 +145,10 @@ def branch_graph(
     max_nodes, time_limit = optional_count(max_nodes, "max_nodes"), optional_seconds(time_limit)
     _check_friction(problem, a, b)
     started = time.perf_counter()
-    traced = _traced(problem, (a, b)) if arithmetic == "verified" and problem.n > FAST_EXACT_DOF else None
-    exact = _condensed(problem, arithmetic) if traced is None else None
+    large = arithmetic == "verified" and problem.n > FAST_EXACT_DOF
+    at_rest = large and never_loaded(problem)
+    traced = _traced(problem, (a, b)) if large and not at_rest else None
+    exact = _condensed(problem, arithmetic, at_rest=at_rest) if traced is None else None
     zero = traced.origin if exact is None and traced is not None else None if exact is None else exact.zero
     certifier = _certifier(problem, exact, arithmetic, zero)
     limits = Deadline.after(started, time_limit)
@@ -253,18 +255,15 @@ def _exact_work(problem: ContactProblem, candidates: set[Codes]) -> int:
 
 
 def _traced(problem: ContactProblem, interval: tuple[Fraction, Fraction]) -> TracedProblem | None:
-    """The problem in balls; None where its data cannot be enclosed, or are no load at all."""
-    loads = (problem.f, problem.gap, problem.slip_offset, problem.load_slope)
-    if not any(part is not None and np.any(part) for part in loads):
-        return None
+    """The problem in balls; None where its data cannot be enclosed."""
     try:
         return TracedProblem(problem, interval, vanishing_alpha(problem, "problem"))
     except NotEnclosedError:
         return None
 
 
-def _condensed(problem: ContactProblem, arithmetic: Arithmetic) -> ExactCondensed:
-    exactly = arithmetic == "exact" or problem.n <= FAST_EXACT_DOF
+def _condensed(problem: ContactProblem, arithmetic: Arithmetic, *, at_rest: bool) -> ExactCondensed:
+    exactly = arithmetic == "exact" or problem.n <= (EXACT_DOF_LIMIT if at_rest else FAST_EXACT_DOF)
     return ExactCondensed.from_problem(problem) if exactly else ExactCondensed.from_condensed(problem)
 
 

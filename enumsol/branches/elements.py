@@ -116,7 +116,7 @@ class Arc:
         Those of the first selection where several coincide (grazing). At a node in contact with F = 0 throughout the
         sign of u_t at the middle of the arc names the slip.
     lo, hi : float
-        Its ends.
+        ``begin`` and ``end``, rounded.
     tail, head : int
         Numbers of the vertices at its lower and upper end.
     index : int or None
@@ -126,6 +126,9 @@ class Arc:
     grazing : bool
         Several selections coincide on it, or it is a sheet: no root on it is regular.
     selections : tuple of status codes
+    begin, end : CriticalAlpha
+        It was found to hold between them: up to its vertices, or beside a place that ball arithmetic left open (an
+        unsettled vertex of which only bounds are known) up to the last alpha where that was shown.
     """
 
     number: int
@@ -138,6 +141,8 @@ class Arc:
     dimension: int
     grazing: bool
     selections: tuple[Codes, ...] = field(repr=False)
+    begin: CriticalAlpha = field(repr=False)
+    end: CriticalAlpha = field(repr=False)
     sample: Fraction = field(repr=False)
     _values: ArcValues = field(repr=False)
 
@@ -150,6 +155,10 @@ class Arc:
     def length(self) -> float:
         """hi - lo."""
         return self.hi - self.lo
+
+    def passes_over(self, alpha: CriticalAlpha) -> bool:
+        """Whether it is known to begin below an alpha and to end above it."""
+        return self.begin.compare(alpha) < 0 < self.end.compare(alpha)
 
     def state(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Forces and displacements at an alpha of the arc, both (2p,), normal ones first; errors as ``values``."""

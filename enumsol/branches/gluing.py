@@ -124,7 +124,7 @@ def glue(
     Parameters
     ----------
     exact : ExactCondensed
-    candidates : codes of the selections that may hold somewhere in [a, b]
+    candidates : codes of the selections that may hold somewhere in [a, b]; all do if g vanishes at every alpha
     a, b : fmpq
     tick : called with the share of the candidates done
     cut_short : the search was stopped: selections it did not find are left out, and arcs may end without neighbours
@@ -135,7 +135,9 @@ def glue(
         this is called is unsettled.
     """
     known = KnownSelections(exact, a, b, cut_short=cut_short)
-    stopped = _work_out(known, sorted(set(candidates)), tick, most, limits or Deadline())
+    # where all selections hold, with lambda = 0, one arc stands for them
+    waiting = [(OPEN,) * exact.p] if exact.unloaded else sorted(set(candidates))
+    stopped = _work_out(known, waiting, tick, most, limits or Deadline())
     for codes in list(known.arcs):
         try:
             known.close(codes)

@@ -9,7 +9,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
+from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps, uniqueness_bound
 from enumsol.branches.elements import VertexKind
@@ -179,20 +179,22 @@ class BranchGraph(Immutable):
 
     # -- solutions at one alpha ------------------------------------------------------------------------------------
 
+    def _inside(self, alpha: AlphaLike) -> Fraction:
+        """An alpha of the interval."""
+        value, (low, high) = Fraction(alpha_value(alpha)), self.exact_interval
+        if low <= value <= high:
+            return value
+        raise InvalidArgumentError(
+            f"alpha is {float(value):.17g}; expected a value in the graph's interval [{float(low):g}, {float(high):g}]"
+        )
+
     def _located(self, alpha: AlphaLike) -> tuple[list[Arc], list[Vertex], list[Vertex]]:
         """Arcs over an alpha, vertices at it, and vertices whose bounds are too wide to tell on which side it lies."""
-        value = Fraction(alpha_value(alpha))
-        if not self.exact_interval[0] <= value <= self.exact_interval[1]:
-            raise InvalidArgumentError(
-                f"alpha is {float(value):.17g}; expected a value in the graph's interval "
-                f"[{self.interval[0]:g}, {self.interval[1]:g}]"
-            )
-        point = CriticalAlpha.rational(rational(value))
-        order = [v.exact.compare(point) for v in self.vertices]
-        arcs = [arc for arc in self.arcs if order[arc.tail] < 0 < order[arc.head]]
-        equal = [v for v, o in zip(self.vertices, order, strict=True) if o == 0]
-        near = [v for v in equal if isinstance(v.exact, EnclosedAlpha) and not v.exact.is_rational]
-        return arcs, [v for v in equal if v not in near], near
+        point = CriticalAlpha.rational(rational(self._inside(alpha)))
+        arcs = [arc for arc in self.arcs if arc.passes_over(point)]
+        equal = [v for v in self.vertices if v.exact.compare(point) == 0]
+        known = [v for v in equal if v.exact.is_rational]
+        return arcs, known, [v for v in equal if v not in known]
 
     def arcs_at(self, alpha: AlphaLike) -> tuple[Arc, ...]:
         """Arcs and sheets that pass over an alpha inside the interval (vertices at it do not count).
@@ -203,13 +205,13 @@ class BranchGraph(Immutable):
             alpha is outside the interval, or cannot be told from a vertex of which only bounds are known.
         """
         arcs, _, near = self._located(alpha)
-        if near:
-            low, high = (float(bound) for bound in near[0].enclosure)
-            raise InvalidArgumentError(
-                f"alpha is {float(alpha_value(alpha))!r}, which cannot be told from vertex {near[0].number}, between "
-                f"{low!r} and {high!r}; expected another alpha, or roots_at, which solves there"
-            )
-        return tuple(arcs)
+        if not near:
+            return tuple(arcs)
+        low, high = map(float, near[0].enclosure)
+        raise InvalidArgumentError(
+            f"alpha is {float(alpha_value(alpha))!r}, which cannot be told from vertex {near[0].number}, between "
+            f"{low!r} and {high!r}; expected another alpha, or roots_at, which solves there"
+        )
 
     def roots_at(self, alpha: AlphaLike) -> RootSet:
         """All solutions at one alpha, as enumerate_roots returns them; of a graph with gaps, those that were found.
@@ -253,11 +255,12 @@ class BranchGraph(Immutable):
         return self._multiplicity(alpha).count
 
     def _multiplicity(self, alpha: AlphaLike) -> Multiplicity:
-        arcs, vertices, near = self._located(alpha)
-        if near and self.claims.whole:
+        found = self.claims.multiplicity(self._inside(alpha))
+        if self.claims.whole and not found.exact:
+            # only the side on which a vertex lies is not known
             roots = self.roots_at(alpha)
-            return Multiplicity(roots.at_least, exact=roots.whole)
-        return self.claims.multiplicity(arcs, vertices + near)
+            return Multiplicity(max(roots.at_least, found.count), exact=roots.whole)
+        return found
 
     @cached_property
     def _steps(self) -> MultiplicitySteps:

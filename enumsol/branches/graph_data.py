@@ -106,8 +106,7 @@ class GraphData:
     def claims(self) -> Claims:
         """What is known about the number of solutions: exact counts, or lower bounds for a graph with gaps."""
         whole = Standing.PROVEN if self.complete else Standing.NOT_PROVEN
-        ends = (float(self.interval[0]), float(self.interval[1]))
-        return Claims(self.vertices, self.arcs, ends, Standing.INCOMPLETE if self.all_reasons else whole)
+        return Claims(self.vertices, self.arcs, self.interval, Standing.INCOMPLETE if self.all_reasons else whole)
 
     @cached_property
     def gaps(self) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from networkx.utils import UnionFind
 
-from enumsol.branches.parts import PartKind
+from enumsol.branches.parts import PartKind, inside
 from enumsol.kernel.selection_rows import (
     CONE_MINUS,
     CONE_PLUS,
@@ -73,6 +73,8 @@ class Place:
         Selections that hold there, or at an open place may.
     node : int
         At an event the node whose status changes.
+    whole : bool
+        Every selection that holds there was examined (which open places leave undecided).
     """
 
     kind: PlaceKind
@@ -80,6 +82,7 @@ class Place:
     high: Fraction
     members: list[Codes]
     node: int = -1
+    whole: bool = True
 
 
 @dataclass
@@ -173,6 +176,8 @@ def join(
     interval: Bounds,
     origin: Fraction | None,
     sharpen: Callable[[Trace, Part], Bounds | None],
+    *,
+    cut_short: bool = False,
 ) -> Joined:
     """Arcs and the places at which they end.
 
@@ -183,8 +188,9 @@ def join(
     origin : Fraction or None
         The alpha at which g vanishes, if it lies in the interval; no trace crosses it.
     sharpen : gives narrower bounds of an event's zero, or None
+    cut_short : selections that hold somewhere may be missing, as all do at the origin
     """
-    return _Joining(traces, interval, origin, sharpen).run()
+    return _Joining(traces, interval, origin, sharpen, whole=not cut_short).run()
 
 
 class _Joining:
@@ -196,14 +202,22 @@ class _Joining:
         interval: Bounds,
         origin: Fraction | None,
         sharpen: Callable[[Trace, Part], Bounds | None],
+        *,
+        whole: bool,
     ) -> None:
         self._traces, self._interval, self._sharpen = traces, interval, sharpen
         self._joined = Joined()
-        self._origin = None if origin is None else Place(PlaceKind.ORIGIN, origin, origin, [])
+        self._origin = None if origin is None else Place(PlaceKind.ORIGIN, origin, origin, [], whole=whole)
+        self._parts = []
+        for trace in traces:
+            low, high = interval
+            if origin is not None:
+                low, high = (origin, high) if trace.side > 0 else (low, origin)
+            self._parts.append(list(inside(trace, low, high, sharpen)))
         self._found = {
             part: _Found(trace, part)
-            for trace in traces
-            for part in trace.parts
+            for trace, parts in zip(traces, self._parts, strict=True)
+            for part in parts
             if part.kind in (PartKind.EVENT, PartKind.OPEN)
         }
 
@@ -211,8 +225,8 @@ class _Joining:
         """Places first, then the arcs between them."""
         self._match()
         self._gather()
-        for trace in self._traces:
-            self._follow(trace)
+        for trace, parts in zip(self._traces, self._parts, strict=True):
+            self._follow(trace, parts)
         places = self._joined.places
         if self._origin is not None:
             self._origin.members = sorted({trace.selection.rows.codes for trace in self._traces})
@@ -314,12 +328,12 @@ class _Joining:
 
     # -- arcs ------------------------------------------------------------------------------------------------------
 
-    def _follow(self, trace: Trace) -> None:
+    def _follow(self, trace: Trace, parts: Sequence[Part]) -> None:
         """The arcs of one trace."""
         arc: JoinedArc | None = None
         before: Place | None = None  # what was left open directly before
         first = True
-        for part in trace.parts:
+        for part in parts:
             if part.kind is PartKind.OPEN:
                 place = self._found[part].place
                 if arc is not None and place is not None:

@@ -52,6 +52,8 @@ def make_arcs(gluing: Gluing) -> list[Arc]:
             dimension=edge.dimension,
             grazing=gluing.arcs[edge.codes].grazing,
             selections=(edge.codes, *(c for c in edge.selections if c != edge.codes)),
+            begin=gluing.vertices[edge.tail].alpha,
+            end=gluing.vertices[edge.head].alpha,
             sample=to_fraction(fmpq(edge.sample)),
             _values=ExactArcValues(exact, edge.codes, to_fraction(fmpq(edge.sample))),
         )

@@ -42,21 +42,25 @@ def _arc(
 ) -> Arc:
     sample = (arc.low + arc.high) / 2
     # beside what was left open only inner bounds are known
-    lo = float(arc.low if arc.tail.kind is PlaceKind.OPEN else exact[ends[0]])
-    hi = float(arc.high if arc.head.kind is PlaceKind.OPEN else exact[ends[1]])
+    begin, end = (
+        EnclosedAlpha(rational(known), rational(known)) if place.kind is PlaceKind.OPEN else exact[vertex]
+        for place, known, vertex in zip((arc.tail, arc.head), (arc.low, arc.high), ends, strict=True)
+    )
     still = [i for i, code in enumerate(arc.codes) if code == FRICTIONLESS]
     signs = traced.slip_signs(arc.codes, sample, still) if still else {}
     return Arc(
         number=number,
         statuses=tuple(shown_status(code, signs.get(i, 0)) for i, code in enumerate(arc.codes)),
-        lo=lo,
-        hi=hi,
+        lo=float(begin),
+        hi=float(end),
         tail=ends[0],
         head=ends[1],
         index=arc.index or None,
         dimension=0,
         grazing=False,
         selections=(arc.codes,),
+        begin=begin,
+        end=end,
         sample=sample,
         _values=TracedArcValues(traced, arc.codes, sample),
     )
@@ -71,7 +75,7 @@ def _vertex(
     right: Sequence[Arc],
 ) -> Vertex:
     p, border = traced.problem.p, place.low == place.high and place.low in traced.interval
-    settled = place.kind is not PlaceKind.OPEN
+    settled = place.kind is not PlaceKind.OPEN and place.whole
     degrees = (degree_of(left), degree_of(right)) if settled else (None, None)
     active = _active(traced, place)
     middle = (place.low + place.high) / 2

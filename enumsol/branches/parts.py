@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from enumsol.kernel.arc_selections import ArcSelection
 
@@ -101,3 +101,42 @@ class Trace:
     def parts(self) -> Iterator[Part]:
         """All parts, from left to right."""
         return (part for box in self.boxes for part in box.parts)
+
+
+def inside(
+    trace: Trace, low: Fraction, high: Fraction, sharpen: Callable[[Trace, Part], tuple[Fraction, Fraction] | None]
+) -> Iterator[Part]:
+    """The parts of a trace between two alphas, beyond which it was rounded outward; no event lies beyond them.
+
+    ``sharpen`` gives narrower bounds of an event's zero, or None.
+    """
+    for part in trace.parts:
+        if low <= trace.low and trace.high <= high:
+            yield part
+        elif part.high < low or part.low > high:
+            continue
+        elif part.kind is PartKind.EVENT:
+            yield from _event_inside(trace, part, (low, high), sharpen(trace, part) or part.zero)
+        else:
+            yield part
+
+
+def _event_inside(trace: Trace, part: Part, ends: tuple[Fraction, Fraction], zero: Interval) -> Iterator[Part]:
+    """An event, or what the selection does inside where its zero lies outside, or cannot be told from an end."""
+    (low, high), (first, last) = ends, zero
+    below, above = (PartKind.NONE, PartKind.HOLDS) if part.rising else (PartKind.HOLDS, PartKind.NONE)
+    if not (trace.low < low and first <= low) and not (trace.high > high and last >= high):
+        yield part
+    elif last < low:
+        yield replace(part, kind=above)
+    elif first > high:
+        yield replace(part, kind=below)
+    else:
+        doubtful = frozenset((trace.selection.rows.conditions[part.condition][0],))
+        if first > low:
+            yield replace(part, kind=below, high=first)
+            yield Part(PartKind.OPEN, first, part.high, doubtful=doubtful)
+        else:
+            yield Part(PartKind.OPEN, part.low, last, doubtful=doubtful)
+            if last < min(part.high, high):
+                yield replace(part, kind=above, low=last)

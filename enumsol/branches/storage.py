@@ -58,7 +58,7 @@ def save_graph(data: GraphData, file: str | Path) -> None:
         "reasons": list(data.reasons),
         "stats": asdict(data.stats),
         "vertices": [_vertex_record(v) for v in data.vertices],
-        "arcs": [_arc_record(arc) for arc in data.arcs],
+        "arcs": [_arc_record(arc, data.vertices) for arc in data.arcs],
     }
     place = file_path(file, "file")
     with writing(place, "file"):
@@ -244,7 +244,7 @@ def _vertex(number: int, item: dict[str, Any], *, balls: bool) -> Vertex:
     )
 
 
-def _arc_record(arc: Arc) -> dict[str, Any]:
+def _arc_record(arc: Arc, vertices: Sequence[Vertex]) -> dict[str, Any]:
     return {
         "statuses": _names(arc.statuses),
         "tail": arc.tail,
@@ -254,6 +254,12 @@ def _arc_record(arc: Arc) -> dict[str, Any]:
         "grazing": arc.grazing,
         "selections": [list(codes) for codes in arc.selections],
         "sample": str(arc.sample),
+        # beside a place that was left open; elsewhere an arc reaches up to its vertices
+        **{
+            name: str(end.enclosure()[0])
+            for name, end, number in (("from", arc.begin, arc.tail), ("to", arc.end, arc.head))
+            if end is not vertices[number].exact
+        },
     }
 
 
@@ -262,16 +268,28 @@ def _arc(
 ) -> Arc:
     selections = tuple(tuple(codes) for codes in item["selections"])
     sample = _fraction(item["sample"])
+    lo, begin = _arc_end(item.get("from"), vertices[item["tail"]])
+    hi, end = _arc_end(item.get("to"), vertices[item["head"]])
     return Arc(
         number=number,
         statuses=_statuses(item["statuses"]),
-        lo=vertices[item["tail"]].alpha,
-        hi=vertices[item["head"]].alpha,
+        lo=lo,
+        hi=hi,
         **{name: item[name] for name in ("tail", "head", "index", "dimension", "grazing")},
         selections=selections,
+        begin=begin,
+        end=end,
         sample=sample,
         _values=values(selections[0], sample),
     )
+
+
+def _arc_end(known: str | None, vertex: Vertex) -> tuple[float, CriticalAlpha]:
+    """Where an arc ends: at its vertex, or beside it as far as it is known to hold."""
+    if known is None:
+        return vertex.alpha, vertex.exact
+    value = fmpq(*_fraction(known).as_integer_ratio())
+    return float(Fraction(known)), EnclosedAlpha(value, value)
 
 
 # -- other programs ----------------------------------------------------------------------------------------------------

@@ -32,7 +32,8 @@ What checker and search share
       exclusion inequality; ``kernel.leaves``, what a complete assignment holds and which leaves share a root;
       ``sectors``, the ends of sectors; ``condensation.space``, balls for S and g in the variables in which friction is
       isotropic; ``problem3d``, ``body3d`` and ``friction``, the data and their checks;
-    - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes;
+    - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
+      search whether it does at all (then there is no proof);
       ``condensation.affine``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
       definite matrix, and floats as rationals;
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file; a search that goes on

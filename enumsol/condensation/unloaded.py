@@ -1,4 +1,4 @@
-"""The alpha at which g(alpha) = g0 + alpha g1 vanishes, found in one place for the search and for the checker.
+"""Where g(alpha) = g0 + alpha g1 vanishes, at one alpha or at all, found in one place for the search and the checker.
 
 There lambda = 0 is the only solution and every selection holds. On either side of it the solutions are alpha's distance
 from it times those of the constant load +-g1, so that the search cuts the interval there, and the checker expects
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from enumsol.condensation.data import EXACT_DOF_LIMIT, ProblemData
+from enumsol.condensation.enclosure import NotEnclosedError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.condensation.data import Data
+    from enumsol.condensation.enclosure import CondensedEnclosure
 
 
 class CondensedData(ProblemData, Protocol):
@@ -30,6 +32,14 @@ class CondensedData(ProblemData, Protocol):
     @property
     def condensed(self) -> CondensedProblem:
         """S, g0 and g1 as computed."""
+
+
+class EnclosedData(ProblemData, Protocol):
+    """A problem's data, as given and condensed in balls."""
+
+    @property
+    def enclosure(self) -> CondensedEnclosure:
+        """S, g0 and g1 in balls."""
 
 
 def vanishing_alpha(problem: CondensedData, data: Data) -> Fraction | None:
@@ -62,6 +72,27 @@ def vanishing_alpha(problem: CondensedData, data: Data) -> Fraction | None:
 
     zero = _common_zero(*free_displacements(problem))
     return None if zero is None else Fraction(int(zero.p), int(zero.q))
+
+
+def never_loaded(problem: EnclosedData) -> bool:
+    """Whether g is known to vanish at every alpha, for A, Bn, Bt, f, load_slope, gap and slip_offset as given.
+
+    With more than EXACT_DOF_LIMIT degrees of freedom only where all loads, gap and slip offset are zero.
+    """
+    parts = (problem.f, problem.load_slope, problem.gap, problem.slip_offset)
+    if not any(part is not None and np.any(part) for part in parts):
+        return True
+    if problem.n > EXACT_DOF_LIMIT:
+        return False
+    try:
+        g = problem.enclosure
+    except NotEnclosedError:
+        return False
+    if np.any(np.abs(g.g0) > g.g0_rad) or np.any(np.abs(g.g1) > g.g1_rad):
+        return False
+    from enumsol.condensation.free_displacements import free_displacements  # python-flint, not needed by all problems
+
+    return not any(x != 0 for part in free_displacements(problem) for x in part)
 
 
 def _of_floats(constant: NDArray[np.float64], slope: NDArray[np.float64]) -> Fraction | None:

@@ -44,7 +44,7 @@ SHARED = {
     "condensation.affine": {"exactly_at"},
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
     "condensation.space": {"EnclosedSpace", "SpaceSystem"},
-    "condensation.unloaded": {"CondensedData", "vanishing_alpha"},
+    "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
     "kernel.arc_selections": None,
     "kernel.arcs": None,
     "kernel.interval": {
