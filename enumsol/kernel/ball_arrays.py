@@ -109,10 +109,10 @@ class Inverse:
     def solve(self, B: Ball) -> Ball:
         """All X with M X = B, columns of unknowns."""
         R = Ball.exact(self.approximate)
-        X = self.approximate @ B.mid
-        # one step of refinement, as in verified_solve: without it M X misses B by the rounding of the inverse, and what
-        # M moves much for little load is wrong in X by more than X is as an array
-        X = Ball.exact(X + self.approximate @ (B.mid - self._M.mid @ X))
+        first = self.approximate @ B.mid
+        # One step of refinement, as in verified_solve: without it M X misses B by as much as the inverse is rounded,
+        # and forces X leave a resultant that weak springs turn into a large displacement.
+        X = Ball.exact(first + self.approximate @ (B.mid - self._M.mid @ first))
         step = (R @ (B - self._M @ X)).size
         # |error| <= step + defect |error|; with step <= t u in every column |error| <= t u / (1 - contraction)
         u = self._weights

@@ -129,7 +129,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
     def _enclosure(self, y: Ball, w: Ball) -> Enclosure:
         """Bounds in the problem's units, for scaled forces and displacements in balls."""
-        problem, system, exact, p = self.problem, self.system, self.enclosed, self.problem.p
+        system, exact, p = self.system, self.enclosed, self.problem.p
         S, g = self._in_balls
         forces, known = (Ball(np.zeros(3 * p), np.full(3 * p, radius)) for radius in (0.0, np.inf))
         for k in range(3):
