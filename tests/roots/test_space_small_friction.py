@@ -1,4 +1,4 @@
-"""Friction of any size in 3D is decided: tau has units of its own, so that S keeps its condition (theory, 12.1)."""
+"""Friction of any size in 3D is decided: tau has units of its own, and S keeps its condition (theory, section 12.1)."""
 
 import re
 from fractions import Fraction
