@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
+import inspect
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -33,6 +35,9 @@ ROW_RANK_TOLERANCE = 1e-12
 class ContactBody(Immutable):
     """A linear elastic body with p contact nodes: A, Bn and one or two tangents, f(alpha), gap and slip offset.
 
+    ``dataclasses.replace(problem, f=...)`` makes a problem of the same data but for those named: every argument of a
+    subclass is the name of an attribute that it takes back.
+
     Parameters
     ----------
     A : (n, n) array_like or sparse
@@ -44,8 +49,17 @@ class ContactBody(Immutable):
     coordinates : (p, dimension) array_like or None
     """
 
-    _instead = "build a new problem"
+    _instead = "build a new problem, or one with other data by dataclasses.replace"
     slip_offset: NDArray[np.float64]
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        arguments = list(inspect.signature(cls).parameters)
+        # neither a constructor nor comparison or text of a dataclass, only what dataclasses.replace asks for
+        like = dataclasses.make_dataclass(cls.__name__, arguments, init=False, repr=False, eq=False)
+        for name in ("__dataclass_fields__", "__dataclass_params__"):
+            setattr(cls, name, getattr(like, name))
 
     def __init__(
         self,

@@ -38,6 +38,14 @@ def with_one_tangent():
     return from_compliance(X @ X.T + 0.5 * np.eye(6), np.array([1.0, 1.0, 0.5, -2.0, 1.0, 1.0]), friction)
 
 
+def with_small_friction():
+    """Two nodes with coefficients far below one along one or both axes."""
+    rng = np.random.default_rng(5)
+    X = rng.standard_normal((6, 6))
+    friction = (np.array([2.0, 1e-9]), np.array([1e-12, 1e-9]))
+    return from_compliance(X @ X.T + 0.5 * np.eye(6), np.array([1.0, 1.0, 0.5, -2.0, 1.0, 1.0]), friction)
+
+
 @functools.cache
 def case(name):
     """Problem, alpha, records and bytes of the proof of a set of roots."""
@@ -46,6 +54,8 @@ def case(name):
         problem = on_the_end_of_a_sector()
     elif name == "one tangent":
         problem = with_one_tangent()
+    elif name == "small friction":
+        problem = with_small_friction()
     elif name[0] == "block":
         problem, alpha = gallery.block3d(*name[1]), name[2]
     else:

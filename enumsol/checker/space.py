@@ -103,7 +103,8 @@ class SpaceChecker(TreeChecker):
         _, mid, rad, index = record
         centre, radius = (numbers_from(values, len(found.y.mid)) for values in (mid, rad))
         with np.errstate(over="ignore", invalid="ignore"):
-            inside = (np.abs(centre - found.y.mid) + found.y.rad) * SAFE <= radius
+            unit = self.system.unit
+            inside = (np.abs(centre - found.y.mid * unit) + found.y.rad * unit) * SAFE <= radius
         if not np.all(inside):
             return "its enclosure does not hold the root"
         return None if type(index) is int and index == found.index else "its index is wrong"

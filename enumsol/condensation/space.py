@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT
 from enumsol.condensation.affine import exactly_at
-from enumsol.condensation.condensed import cholesky_factor, load_unit, node_units
+from enumsol.condensation.condensed import LARGEST_FRICTION, cholesky_factor, load_unit, node_units
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
+from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,21 +23,80 @@ if TYPE_CHECKING:
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]
 
+#: Coefficients between 2^-9 and 2^8 keep tau as it is: S loses no more than twice so many binary digits by them.
+_NEAR_ONE = 8
+#: Smaller coefficients than this, but for 0, would make tau overflow float64.
+LEAST_FRICTION = 2.0**-900
+
+
+class FrictionUnits:
+    """What systems in 3D share: units of tau, by which S keeps its condition whatever F is (theory, section 12.1).
+
+    Attributes
+    ----------
+    tau : (p, 2) array of int
+        Where in y the components of tau are; -1 where they do not occur.
+    unit : (m,) array
+        A tau is ``unit`` times its entry in y and a v its entry in w over ``unit``; powers of two, 1 for normals.
+    """
+
+    tau: NDArray[np.intp]
+    unit: Vector
+
+    @cached_property
+    def row_unit(self) -> Vector:
+        """Factors that take rows on (lambda_n, tau) and (w_n, v) to rows on y and w, shape (2 m,)."""
+        return np.concatenate([self.unit, 1.0 / self.unit])
+
+    def tangential(self, values: Vector) -> Matrix:
+        """The parts of y or w that belong to tau, shape (p, 2), 0 where it does not occur."""
+        return np.where(self.tau >= 0, values[self.tau], 0.0)
+
+    @cached_property
+    def _units(self) -> Matrix:
+        """Units of tau, shape (p, 2), 1 where it does not occur."""
+        return np.where(self.tau >= 0, self.unit[self.tau], 1.0)
+
+    @cached_property
+    def disc_scale(self) -> Vector:
+        """By what |tau| <= lambda_n is multiplied so that nothing in it is large, shape (p,)."""
+        return np.asarray(1.0 / np.maximum(np.max(self._units, axis=1), 1.0))
+
+    @cached_property
+    def slip_scale(self) -> Vector:
+        """By what v is multiplied so that its larger component has the size of w_t, shape (p,)."""
+        return np.asarray(np.min(self._units, axis=1))
+
+    def taus(self, y: Vector) -> Matrix:
+        """tau times ``disc_scale``, shape (p, 2)."""
+        return self.tangential(y) * (self._units * self.disc_scale[:, None])
+
+    def slips(self, w: Vector) -> Matrix:
+        """v times ``slip_scale``, shape (p, 2)."""
+        return self.tangential(w) * (self.slip_scale[:, None] / self._units)
+
+
+def friction_units(F: Matrix) -> Matrix:
+    """Powers of two that take coefficients to a size near one; 1 where they have it or are 0."""
+    exponent = np.frexp(F)[1]
+    return np.ldexp(1.0, np.where(np.abs(exponent) > _NEAR_ONE, -exponent, 0))
+
 
 @dataclass(frozen=True)
-class SpaceSystem:
+class SpaceSystem(FrictionUnits):
     """w = g - S y without units, y = (lambda_n, tau) with lambda_t = F tau, w = (w_n, v) with v = F w_t.
 
-    Components of tau whose coefficient is 0 do not occur. All normals come first, then the tau node by node.
+    Components of tau whose coefficient is 0 do not occur. All normals come first, then the tau node by node, in the
+    units of FrictionUnits.
 
     Attributes
     ----------
     S : (m, m) symmetric positive definite array
     g : (m,) array
     F : (p, 2) array
-        Friction coefficients.
-    tau : (p, 2) array of int
-        Where in y the components of tau are; -1 where they do not occur.
+        Friction coefficients in the units of tau: lambda_t is F times the entry in y.
+    tau, unit : arrays
+        See FrictionUnits.
     force, length : (p,) arrays
         Forces of a node are ``force`` times the scaled ones, displacements ``length`` times; powers of two.
     """
@@ -44,29 +105,48 @@ class SpaceSystem:
     g: Vector
     F: Matrix
     tau: NDArray[np.intp]
+    unit: Vector
     force: Vector
     length: Vector
 
     @classmethod
     def scaled(cls, S: Matrix, g: Vector, F: Matrix) -> SpaceSystem:
-        """From S (3p, 3p) and g (3p,), all normals first, then both tangents, and coefficients F (p, 2)."""
+        """From S (3p, 3p) and g (3p,), all normals first, then both tangents, and coefficients F (p, 2).
+
+        Raises
+        ------
+        InvalidProblemError
+            S is not positive definite to working precision, or a coefficient is too small or too large for float64.
+        """
         p = len(F)
+        if (why := _out_of_range(F)) is not None:
+            raise InvalidProblemError(why)
         factor = node_units(S, p)
         tau, rows, node, axis = places(F > 0)
+        units = friction_units(F)
+        F = F * units
+        unit = np.concatenate([np.ones(p), units[node, axis]])
         weight = np.concatenate([factor, factor[node] * F[node, axis]])
         S = weight[:, None] * S[np.ix_(rows, rows)] * weight
         g = weight * g[rows]
         size = load_unit(g, cholesky_factor(S))
-        return cls(S, g / size, F, tau, factor * size, size / factor)
+        return cls(S, g / size, F, tau, unit, factor * size, size / factor)
 
     @property
     def p(self) -> int:
         """Number of contact nodes."""
         return len(self.F)
 
-    def tangential(self, values: Vector) -> Matrix:
-        """The parts of y or w that belong to tau, shape (p, 2), 0 where it does not occur."""
-        return np.where(self.tau >= 0, values[self.tau], 0.0)
+
+def _out_of_range(F: Matrix) -> str | None:
+    """Why coefficients are too small or too large for float64, or None."""
+    for wrong, limit in (
+        (F[F > LARGEST_FRICTION], f"where float64 overflows; expected at most {LARGEST_FRICTION:g}"),
+        (F[(F > 0) & (F < LEAST_FRICTION)], f"where float64 underflows; expected 0, or at least {LEAST_FRICTION:.1e}"),
+    ):
+        if len(wrong):
+            return f"a friction coefficient is {wrong[0]:g}, {limit}"
+    return None
 
 
 def places(occurs: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
@@ -82,22 +162,23 @@ _OVERFLOW = "the condensed problem over- or underflows float64; expected data in
 
 
 @dataclass(frozen=True)
-class EnclosedSpace(EnclosedSystem):
+class EnclosedSpace(EnclosedSystem, FrictionUnits):
     """A SpaceSystem as balls: S, g and F for the data as given.
 
     Attributes
     ----------
-    tau : (p, 2) array of int
+    tau, unit : arrays
         As in SpaceSystem.
     """
 
     tau: NDArray[np.intp]
+    unit: Vector
 
     @classmethod
     def of_floats(cls, system: SpaceSystem) -> EnclosedSpace:
         """S and g as they were computed."""
-        zero = np.zeros_like
-        return cls(system.S, zero(system.S), system.g, zero(system.g), system.F, zero(system.F), system.tau)
+        S, g, F = system.S, system.g, system.F
+        return cls(S, np.zeros_like(S), g, np.zeros_like(g), F, np.zeros_like(F), system.tau, system.unit)
 
     @classmethod
     def of_problem(cls, enclosure: CondensedEnclosure, alpha: Fraction, force: Vector, length: Vector) -> EnclosedSpace:
@@ -120,9 +201,14 @@ class EnclosedSpace(EnclosedSystem):
         )
         if np.any(inexact.T & (F == 0)):
             raise NotEnclosedError("a friction coefficient underflows float64")
-        F_rad = np.where(inexact.T, 2 * UNIT * F + TINY, 0.0)
+        if (why := _out_of_range(F)) is not None:
+            raise NotEnclosedError(why)
+        units = friction_units(F)
+        F = F * units
+        F_rad = np.where(inexact.T, 2 * UNIT * F, 0.0)
         S, S_rad, g, g_rad = enclosure.in_units(alpha, np.tile(force, 3), np.tile(length, 3))
         tau, rows, node, axis = places(F > 0)
+        unit = np.concatenate([np.ones(p), units[node, axis]])
         weight = np.concatenate([np.ones(p), F[node, axis]])
         rad = np.concatenate([np.zeros(p), F_rad[node, axis]])
         with np.errstate(over="ignore", invalid="ignore"):
@@ -136,4 +222,4 @@ class EnclosedSpace(EnclosedSystem):
             load_rad = load_rad * SAFE + TINY
         if not all(np.all(np.isfinite(array)) for array in (scaled, scaled_rad, load, load_rad)):
             raise NotEnclosedError(_OVERFLOW)
-        return cls(scaled, scaled_rad, load, load_rad, F, F_rad, tau)
+        return cls(scaled, scaled_rad, load, load_rad, F, F_rad, tau, unit)

@@ -9,10 +9,11 @@ import numpy as np
 from enumsol.array_checks import plain_array, real_array
 from enumsol.checks import alpha_value, positive_integer, positive_number, shown
 from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.fixed_points.newton import TrescaData
 from enumsol.fixed_points.state import scaled_forces, slips_of
 from enumsol.fixed_points.successive import successive_approximations
 from enumsol.fixed_points.system import ContactSystem, contact_problem
-from enumsol.fixed_points.tresca import solve_tresca
+from enumsol.fixed_points.tresca import node_values, solve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,7 +34,8 @@ def fixed_point_residual(problem: Problem, root: Any) -> float:
     """How far Psi moves a root, relative to the load [-].
 
     The largest change of a contact force when the Tresca problem with the root's normal forces as slip bounds, and
-    the coefficients at its slips, is solved.
+    the coefficients at its slips, is solved, with displacements at the root as the body itself has them: what S has
+    lost by rounding does not count (theory, (11.12)).
 
     Parameters
     ----------
@@ -53,9 +55,11 @@ def fixed_point_residual(problem: Problem, root: Any) -> float:
         )
     system = ContactSystem.at(body, root.alpha)
     forces = scaled_forces(system, root, "root")
-    slip = slips_of(root, body.p, "root")
-    image = solve_tresca(body, np.maximum(root.lambda_n, 0.0), root.alpha, slip=slip, start=root)
-    return float(np.max(np.abs(scaled_forces(system, image) - forces)))
+    slip = system.scaled(node_values(slips_of(root, body.p, "root"), "slip", body.p), system.length, "slip")
+    corrected, _ = system.corrected(forces)
+    data = TrescaData(corrected, np.maximum(system.split(forces)[0], 0.0), system.coefficients(slip))
+    image, _, _ = solve(data, forces)
+    return float(np.max(np.abs(image - forces)))
 
 
 def is_fixed_point(problem: Problem, root: Any, tolerance: float = 1e-8) -> bool:

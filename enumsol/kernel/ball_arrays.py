@@ -109,7 +109,10 @@ class Inverse:
     def solve(self, B: Ball) -> Ball:
         """All X with M X = B, columns of unknowns."""
         R = Ball.exact(self.approximate)
-        X = Ball.exact(self.approximate @ B.mid)
+        first = self.approximate @ B.mid
+        # One step of refinement, as in verified_solve: without it M X misses B by as much as the inverse is rounded,
+        # and forces X leave a resultant that weak springs turn into a large displacement.
+        X = Ball.exact(first + self.approximate @ (B.mid - self._M.mid @ first))
         step = (R @ (B - self._M @ X)).size
         # |error| <= step + defect |error|; with step <= t u in every column |error| <= t u / (1 - contraction)
         u = self._weights

@@ -128,10 +128,14 @@ class _Leaf:
         self.rows = [*self.closed, *(int(t) for i in self.stick for t in tau[i] if t >= 0)]
         self.column = [self.closed.index(i) for i in self.turning]
         self.t = tau[self.turning].reshape(-1, 2)
+        # tau = unit y and v = w / unit; slips as ``slips`` of FrictionUnits has them, which have the same directions
+        self.unit = system.unit[self.t]
+        self.slip_scale = system.slip_scale[self.turning][:, None] / self.unit
         E = np.zeros((len(system.g), len(self.rows)))
         E[self.rows, np.arange(len(self.rows))] = 1.0
         for i, sign in self.sliding:
-            E[int(np.max(tau[i])), self.closed.index(i)] = sign
+            along = int(np.max(tau[i]))
+            E[along, self.closed.index(i)] = sign / system.unit[along]
         self.E0 = E
         self.centre, self.half = self._boxes()
 
@@ -196,19 +200,18 @@ class _Leaf:
 
     def _refined(self, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open | None:
         """The one zero of a box, enclosed as closely as floats can."""
-        state = None
         for _ in range(_REFINEMENTS):
             if np.any(self._outside(angle, radius)):
                 return None
             state = self._state(angle, radius)
             move = None if state is None else self._move(angle, radius, state[3])
             if move is None:
-                return self._left_open(angle, radius, state)
+                break
             new_angle, new_radius = _cut(angle, radius, reach, move)
-            if not np.all(new_radius <= radius + 8 * UNIT * reach):
-                return self._left_open(angle, radius, state)
-            done = np.all(new_radius > 0.9 * radius)
-            angle, radius = new_angle, new_radius
+            # the zero lies in both boxes, angle by angle: an angle that rounding keeps from becoming narrower stays
+            narrower = new_radius < radius
+            done = not np.any(new_radius <= 0.9 * radius)
+            angle, radius = np.where(narrower, new_angle, angle), np.where(narrower, new_radius, radius)
             if done:
                 break
         state = self._state(angle, radius)
@@ -240,7 +243,8 @@ class _Leaf:
         E, d, _ = self._directions(angle, radius)
         left, sizes, right = np.linalg.svd(self.S.mid[self.rows] @ E.mid)
         inverse = np.abs(right.T / np.maximum(sizes, UNIT * sizes[0]) @ left.T)
-        changes = [np.abs(self.S.mid[self.rows][:, t]) @ rad for t, rad in zip(self.t, d.rad, strict=True)]
+        widths = zip(self.t, d.rad / self.unit, strict=True)
+        changes = [np.abs(self.S.mid[self.rows][:, t]) @ rad for t, rad in widths]
         worth = np.array([np.max(inverse @ change) for change in changes])
         return worth if np.max(changes[int(np.argmax(worth))]) > _SINGULAR else np.zeros_like(worth)
 
@@ -272,7 +276,7 @@ class _Leaf:
         turned = Ball(mid_turned, np.minimum(np.abs(mid_d) * r + bent, r) * SAFE + 64 * UNIT)
         mid, rad = self.E0.copy(), np.zeros_like(self.E0)
         for k, column in enumerate(self.column):
-            mid[self.t[k], column], rad[self.t[k], column] = d.mid[k], d.rad[k]
+            mid[self.t[k], column], rad[self.t[k], column] = d.mid[k] / self.unit[k], d.rad[k] / self.unit[k]
         return Ball(mid, rad), d, turned
 
     def _state(self, angle: Array, radius: Array) -> _State | None:
@@ -311,56 +315,76 @@ class _Leaf:
         if point is not None:
             y = smaller(smaller(y, (E @ x)[:, 0]), point[0] + (dy @ span)[:, 0])
             w = smaller(w, point[1] + (dv @ span)[:, 0])
-        t1, t2 = self.t[:, 0], self.t[:, 1]
+        (v1, v2), (dv1, dv2) = self._slips(w), self._slips(dv)
         d1, d2 = d[:, 0], d[:, 1]
-        G = w[t1] * d2 - w[t2] * d1
-        J = dv[t1] * d2[:, None] - dv[t2] * d1[:, None]
-        along = w[t1] * turned[:, 1] - w[t2] * turned[:, 0]
+        G = v1 * d2 - v2 * d1
+        J = dv1 * d2[:, None] - dv2 * d1[:, None]
+        along = v1 * turned[:, 1] - v2 * turned[:, 0]
         diagonal = np.arange(q)
         corrected = J[diagonal, diagonal] + along
         J.mid[diagonal, diagonal], J.rad[diagonal, diagonal] = corrected.mid, corrected.rad
         return y, w, G, J
+
+    def _slips(self, w: Ball) -> tuple[Ball, Ball]:
+        """Both components of v at the nodes in sectors, times ``slip_scale`` of FrictionUnits; ``w`` by rows."""
+        first, second = (w[self.t[:, k]] for k in (0, 1))
+        scales = (self.slip_scale[:, k].reshape(-1, *[1] * (w.mid.ndim - 1)) for k in (0, 1))
+        pairs = zip((first, second), scales, strict=True)
+        one, other = (Ball(part.mid * scale, part.rad * scale) for part, scale in pairs)
+        return one, other
 
     def _pushed(self, push: Ball, size: int) -> Ball:
         """dE/dpsi x: what turning the directions alone does to y."""
         q = len(self.turning)
         pushed = Ball(np.zeros((size, q)), np.zeros((size, q)))
         for k in range(q):
-            pushed.mid[self.t[k], k], pushed.rad[self.t[k], k] = push.mid[k], push.rad[k]
+            pushed.mid[self.t[k], k], pushed.rad[self.t[k], k] = push.mid[k] / self.unit[k], push.rad[k] / self.unit[k]
         return pushed
 
-    def _conditions(self, y: Ball, w: Ball, angle: Array, radius: Array) -> tuple[Array, Array]:
-        """Conditions that a root has to satisfy, as midpoints and radii; stick by |tau| in both."""
-        tau = self.system.tau
+    def _conditions(self, y: Ball, w: Ball) -> tuple[Array, Array]:
+        """Conditions that a root has to satisfy but for directions, as midpoints and radii; stick by |tau| in both.
+
+        Those of slips and of sticking are in the units of ``slips`` and ``taus`` of FrictionUnits.
+        """
+        tau, unit, scale = self.system.tau, self.system.unit, self.system.disc_scale
         mid = [-w.mid[i] for i in self.open] + [y.mid[i] for i in self.closed]
         rad = [w.rad[i] for i in self.open] + [y.rad[i] for i in self.closed]
         for i in self.stick:
             t = [int(k) for k in tau[i] if k >= 0]
             if t:
-                length = float(np.linalg.norm(y.mid[t]))
-                mid.append(y.mid[i] - length)
-                rad.append(
-                    (y.rad[i] + float(upper_norm(y.rad[t])) + 16 * UNIT * (abs(y.mid[i]) + length)) * SAFE + TINY
-                )
+                units, most, uncertain = unit[t] * scale[i], y.mid[i] * scale[i], y.rad[i] * scale[i]
+                length = float(np.linalg.norm(y.mid[t] * units))
+                mid.append(most - length)
+                uncertain += float(upper_norm(y.rad[t] * units)) + 16 * UNIT * (abs(most) + length)
+                rad.append(uncertain * SAFE + TINY)
         for i, sign in self.sliding:
             along = int(np.max(tau[i]))
             mid.append(sign * w.mid[along])
             rad.append(w.rad[along])
-        if self.turning:
-            _, d, _ = self._directions(angle, radius)
-            forward = w[self.t[:, 0]] * d[:, 0] + w[self.t[:, 1]] * d[:, 1]
-            mid, rad = [*mid, *forward.mid], [*rad, *forward.rad]
         return np.array(mid), np.array(rad)
 
+    def _forward(self, w: Ball, angle: Array, radius: Array) -> tuple[Array, Array]:
+        """v . d of the nodes in sectors, and v_1 d_1 and v_2 d_2 alone, as midpoints and radii, (3, q) each.
+
+        Where G vanishes v = t d: none of the three is negative if t >= 0, and t > 0 if one is positive. A component
+        alone tells where the rounding of the other would hide it, as its coefficient is much larger.
+        """
+        _, d, _ = self._directions(angle, radius)
+        v1, v2 = self._slips(w)
+        products = (v1 * d[:, 0] + v2 * d[:, 1], w[self.t[:, 0]] * d[:, 0], w[self.t[:, 1]] * d[:, 1])
+        return np.array([product.mid for product in products]), np.array([product.rad for product in products])
+
     def _broken(self, y: Ball, w: Ball, angle: Array, radius: Array) -> bool:
-        """Whether some condition is broken in the whole box."""
-        mid, rad = self._conditions(y, w, angle, radius)
-        return bool(np.any(mid < -rad))
+        """Whether some condition is broken at every zero of G in the box."""
+        mid, rad = self._conditions(y, w)
+        forward, uncertain = self._forward(w, angle, radius)
+        return bool(np.any(mid < -rad) or np.any(forward < -uncertain))
 
     def _slacks(self, y: Ball, w: Ball, angle: Array, radius: Array) -> Array:
-        """Lower bounds of the conditions."""
-        mid, rad = self._conditions(y, w, angle, radius)
-        return mid - rad * SAFE
+        """Lower bounds of the conditions at zeros of G in the box; of directions, numbers of the same signs."""
+        mid, rad = self._conditions(y, w)
+        forward, uncertain = self._forward(w, angle, radius)
+        return np.concatenate([mid - rad * SAFE, np.max(forward - uncertain * SAFE, axis=0)])
 
 
 def same_root(one: SpaceRoot, other: SpaceRoot) -> bool | None:

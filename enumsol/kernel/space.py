@@ -104,14 +104,15 @@ def exclusion_margin(
 
     ``errors`` as in ``energy_bounds``; -inf where a multiplier has the wrong sign.
     """
-    size = len(system.g)
+    size, units = len(system.g), system.row_unit.tolist()
     y, y_size, c, c_size = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
     for row, value in zip(rows, values.tolist(), strict=True):
         sign = row_sign(codes[row[1]], row)
         if sign == FORBIDDEN or (sign == NONNEGATIVE and value < 0) or not np.isfinite(value):
             return -np.inf
         for i, coefficient in zip(*row_terms(row, system.tau, size), strict=True):
-            term = value * coefficient
+            # a power of two: nothing is rounded but what underflows, which is less than TINY
+            term = value * (coefficient * units[i])
             if i < size:
                 c[i] += term
                 c_size[i] += abs(term)

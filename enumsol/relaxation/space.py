@@ -85,8 +85,9 @@ class SpaceEngine:
         self._known: list[dict[tuple[int, int], int]] = [{} for _ in range(p)]
         self._imposed: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
         self.tangents = np.sum(system.tau >= 0, axis=1).tolist()
-        #: Row by number, for multipliers.
+        #: Row by number, for multipliers, and what the program's row is of it.
         self.rows: dict[int, Row] = {}
+        self.scale = np.ones(rows)
         self.limit = 400 + 20 * len(system.g)
         self.full = False
 
@@ -100,8 +101,15 @@ class SpaceEngine:
                 return None
             slot = known[kind, number] = len(known)
             self.rows[slot * self.system.p + node] = row
-            self.data.put_row(slot * self.system.p + node, *row_terms(row, self.system.tau, len(self.system.g)))
+            self._put(slot * self.system.p + node, row)
         return known[kind, number]
+
+    def _put(self, place: int, row: Row) -> None:
+        """Store a row in the units of y and w, scaled so that its largest coefficient stays of size one."""
+        indices, coefficients = row_terms(row, self.system.tau, len(self.system.g))
+        units = self.system.row_unit[indices]
+        self.scale[place] = 1.0 / np.max(units)
+        self.data.put_row(place, indices, (coefficients * (units * self.scale[place])).tolist())
 
     def imposed(self, node: int, code: int) -> tuple[list[int], list[int]]:
         """Numbers and modes of the rows that a node imposes in a (partial) status."""
@@ -185,9 +193,9 @@ class SpaceRelaxation:
         """Rows of tangents at nodes whose tau is outside the disc of radius lambda_n."""
         system = self._engine.system
         y = self.forces
-        tau, p = system.tangential(y), system.p
-        size = np.linalg.norm(tau, axis=1)
-        outside = np.flatnonzero(np.all(system.tau >= 0, axis=1) & (size > y[:p] * (1.0 + _OUTSIDE) + 1e-9))
+        tau, p = system.taus(y), system.p
+        size, radius = np.linalg.norm(tau, axis=1), y[:p] * system.disc_scale
+        outside = np.flatnonzero(np.all(system.tau >= 0, axis=1) & (size > radius * (1.0 + _OUTSIDE) + 1e-9))
         rows = []
         for node in outside:
             slot = self._engine.slot((TANGENT, int(node), nearest(float(tau[node, 0]), float(tau[node, 1]), _FINE)))
@@ -211,7 +219,10 @@ class SpaceRelaxation:
 
     def multipliers(self) -> tuple[NDArray[np.intp], Array]:
         """Rows and their multipliers, which prove ``bound``."""
-        return self._state.multipliers() if self._kept is None else self._kept[2]
+        if self._kept is not None:
+            return self._kept[2]
+        numbers, values = self._state.multipliers()
+        return numbers, values * self._engine.scale[numbers]
 
     def _released(self) -> SpaceRelaxation:
         """Give away the state that children would start from; what was found is kept."""
@@ -276,8 +287,10 @@ class SpaceRelaxation:
     def _dissipation(self) -> Array:
         """By how much maximum dissipation is violated at every node: lambda_n |v| - tau . v."""
         system, y = self._engine.system, self.forces
-        tau, v = system.tangential(y), system.tangential(self.displacements)
-        return np.asarray(y[: system.p] * np.linalg.norm(v, axis=1) - np.sum(tau * v, axis=1))
+        w = self.displacements
+        size = np.linalg.norm(system.slips(w), axis=1) / system.slip_scale
+        # the units of tau and v cancel
+        return np.asarray(y[: system.p] * size - np.sum(system.tangential(y) * system.tangential(w), axis=1))
 
     def forced(self, codes: Codes) -> tuple[int, ...]:
         """No node is forced here."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -106,11 +107,21 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             _condensed=self.problem.condensed,
         )
 
+    @cached_property
+    def _in_balls(self) -> tuple[Ball, Ball]:
+        """S and g in the problem's units, those of all 3p rows: as enclosed, or in fast arithmetic as computed."""
+        problem, size = self.problem, 3 * self.problem.p
+        if self.arithmetic != "verified":
+            return Ball.exact(problem.condensed.S), Ball.exact(problem.condensed.free_displacements(self.alpha))
+        ones = np.ones(size)
+        S, S_rad, g, g_rad = problem.enclosure.in_units(Fraction(self.alpha), ones, ones)
+        return Ball(S, S_rad), Ball(g, g_rad)
+
     def _displacements(self, lambda_n: Array, lambda_t: Array) -> tuple[Array, Array]:
-        condensed, p = self.problem.condensed, self.problem.p
-        w = condensed.free_displacements(self.alpha)
-        w = w - condensed.S @ np.concatenate([lambda_n, lambda_t.ravel(order="F")])
-        return w[:p], w[p:].reshape(2, p).T
+        """u_n and u_t; floats may have S and g off by more than the root's enclosure is wide."""
+        S, g = self._in_balls
+        w = g.mid - S.mid @ np.concatenate([lambda_n, lambda_t.ravel(order="F")])
+        return w[: self.problem.p], w[self.problem.p :].reshape(2, -1).T
 
     def _angles(self, codes: Codes, found: SpaceRoot) -> Array:
         """Bounds of the directions of v."""
@@ -119,8 +130,8 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
     def _enclosure(self, y: Ball, w: Ball) -> Enclosure:
         """Bounds in the problem's units, for scaled forces and displacements in balls."""
-        problem, system, exact, p = self.problem, self.system, self.enclosed, self.problem.p
-        S, S_rad, g, g_rad = problem.enclosure.in_units(Fraction(self.alpha), np.ones(3 * p), np.ones(3 * p))
+        system, exact, p = self.system, self.enclosed, self.problem.p
+        S, g = self._in_balls
         forces, known = (Ball(np.zeros(3 * p), np.full(3 * p, radius)) for radius in (0.0, np.inf))
         for k in range(3):
             occurs = np.arange(p) if k == 0 else np.flatnonzero(system.tau[:, k - 1] >= 0)
@@ -132,7 +143,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
                 zero = (scaled.mid[part] == 0) & (scaled.rad[part] == 0)
                 ball.mid[k * p + occurs] = product.mid * unit[occurs]
                 ball.rad[k * p + occurs] = np.where(zero, 0.0, product.rad * unit[occurs])
-        computed = Ball(g, g_rad) - (Ball(S, S_rad) @ Ball(forces.mid[:, None], forces.rad[:, None]))[:, 0]
+        computed = g - (S @ forces[:, None])[:, 0]
         bounds = [(b.mid - b.rad * SAFE, b.mid + b.rad * SAFE) for b in (forces, known, computed)]
         low, high = np.maximum(bounds[1][0], bounds[2][0]), np.minimum(bounds[1][1], bounds[2][1])
         bounds[0][0][:p], high[:p] = np.maximum(bounds[0][0][:p], 0.0), np.minimum(high[:p], 0.0)

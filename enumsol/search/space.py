@@ -51,7 +51,7 @@ class SpaceSplitting:
             return children[:: -1 if force > -w else 1]
         if codes[node] == CONTACT and self._engine.tangents[node] == 1:
             return children
-        tau, v = (self._system.tangential(x)[node] for x in (relaxation.forces, relaxation.displacements))
+        tau, v = self._system.taus(relaxation.forces)[node], self._system.slips(relaxation.displacements)[node]
         towards = tau / (np.linalg.norm(tau) + 1e-300) + v / (np.linalg.norm(v) + 1e-300)
         return sorted(children, key=lambda code: -_towards(code, towards) if code > SECTORS else -10.0)
 
@@ -163,7 +163,8 @@ class SpaceCertifier:
             return UndecidedPart(codes, _DEGENERATE, "perturb the load or the friction coefficients", examined=True)
         else:
             self._roots[codes] = answer
-            self._leaf("r", answer.y.mid.tolist(), (4.0 * answer.y.rad).tolist(), answer.index)
+            unit = self.enclosed.unit
+            self._leaf("r", (answer.y.mid * unit).tolist(), (4.0 * answer.y.rad * unit).tolist(), answer.index)
         return answer
 
     def unloaded(self) -> None:

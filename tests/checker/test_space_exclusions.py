@@ -144,7 +144,7 @@ def excluded(problem, records, alpha=0):
     return True
 
 
-@pytest.mark.parametrize("name", [(1, 22), (1, 0), (2, 0), "end", "one tangent"], ids=str)
+@pytest.mark.parametrize("name", [(1, 22), (1, 0), (2, 0), "end", "one tangent", "small friction"], ids=str)
 def test_exclusions_hold_in_rationals(name):
     problem, _, records, _ = case(name)
     assert of_kind(records, "x")

@@ -7,27 +7,32 @@ import pytest
 
 import enumsol
 from enumsol import fem
-from enumsol.fixed_points import FixedPoint, Outcome
+from enumsol.fixed_points import FixedPoint, Outcome, fixed_point_residual
 
-PLANE = fem.rectangle(4, 2)
+PLANE, SQUARE = fem.rectangle(4, 2), fem.rectangle(4, 4)
 SOLID = fem.box(2, 1, 1)
 
 
-def plane(rng, spring):
+def plane(rng, spring, mesh=PLANE):
     """A block pressed on the ground and pulled, every node on springs."""
-    forces = np.zeros_like(PLANE.points)
-    top = PLANE.points[:, 1] > np.max(PLANE.points[:, 1]) - 1e-9
+    forces = np.zeros_like(mesh.points)
+    top = mesh.points[:, 1] > np.max(mesh.points[:, 1]) - 1e-9
     forces[top] = np.array([0.3, -1.0]) * rng.uniform(0.2, 1.0, (np.count_nonzero(top), 2))
     return fem.contact_problem(
-        PLANE.points,
-        PLANE.triangles,
+        mesh.points,
+        mesh.triangles,
         tuple(rng.uniform(0.5, 2.0, 2)),
-        contact=PLANE.bottom,
+        contact=mesh.bottom,
         normals=(0.0, -1.0),
         springs=(spring, spring),
         forces=forces,
         friction=rng.uniform(0.2, 0.7),
     )
+
+
+def square(rng, spring):
+    """The same with more contact nodes."""
+    return plane(rng, spring, SQUARE)
 
 
 def solid(rng, spring):
@@ -137,3 +142,35 @@ def test_uncertain_forces_are_told_and_kept(tmp_path):
 def test_mixing_is_corrected_too(spring):
     problem = plane(np.random.default_rng([0, 41]), spring)
     check(enumsol.successive_approximations(problem, 0, anderson=3), enumsol.enumerate_roots(problem, 0))
+
+
+def moved(rng, problem, found, size):
+    """The state with its forces off by ``size`` of the largest, in directions that S resists least but one."""
+    held = np.tile(found.lambda_n > 0, found.forces.size // problem.p)
+    directions = np.linalg.eigh(problem.condensed.S[np.ix_(held, held)])[1][:, : np.count_nonzero(held) // 2]
+    change = np.zeros(held.size)
+    change[held] = directions @ rng.normal(size=directions.shape[1])
+    forces = found.forces + change * size * np.max(np.abs(found.forces)) / np.max(np.abs(change))
+    normal, tangential = np.split(forces, [problem.p])
+    lambda_t = tangential.reshape(-1, problem.p).T.reshape(found.lambda_t.shape)
+    return SimpleNamespace(alpha=0, lambda_n=normal, lambda_t=lambda_t, u_t=found.u_t)
+
+
+@pytest.mark.parametrize("spring", [1e-1, 1e-4, 1e-5, 1e-6, 1e-7])
+@pytest.mark.parametrize("body", [square, solid])
+def test_roots_and_limits_are_fixed_points_and_nothing_beside_them(body, spring):
+    for seed in range(2):
+        rng = np.random.default_rng([seed, 41])
+        problem = body(rng, spring)
+        roots = enumsol.enumerate_roots(problem, 0, max_nodes=100)
+        found = enumsol.successive_approximations(problem, 0)
+        assert len(roots) or (body is solid and spring < 0.1)  # with weak springs some stay undecided
+        for root in roots:
+            assert enumsol.is_fixed_point(problem, root)
+        # where rounding kept the iteration from its tolerance it is as near as it says
+        assert fixed_point_residual(problem, found) < (1e-9 if found.converged else 10 * found.rounding)
+        for size in (1e-3, 1e-5, 1e-6):
+            assert not enumsol.is_fixed_point(problem, moved(rng, problem, found, size))
+        for bound in (0.0, 1.001 * found.lambda_n, 0.5 * found.lambda_n):
+            other = enumsol.solve_tresca(problem, bound, 0)
+            assert distance(other, [found]) < 1e-9 or not enumsol.is_fixed_point(problem, other)

@@ -1,6 +1,7 @@
 """The kernel in 3D against exact points of the circle, sampled solutions and sampled data."""
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -177,7 +178,9 @@ def test_margins_are_below_the_energy():
         # the energy at a sampled point of the status: g is what makes w = g - S y
         y, w = sampled(rng, code)
         g = w + S @ y
-        system = EnclosedSpace.of_floats(SpaceSystem(S, g, np.ones((1, 2)), TAU_ONE, np.ones(1), np.ones(1)))
+        system = EnclosedSpace.of_floats(
+            SpaceSystem(S, g, np.ones((1, 2)), TAU_ONE, np.ones(3), np.ones(1), np.ones(1))
+        )
         rows = [row for row in ROWS if row_sign(code, row) != FORBIDDEN]
         values = np.array([rng.normal() if row_sign(code, row) == FREE else rng.random() for row in rows])
         values *= 10.0 ** rng.integers(-4, 1)
@@ -255,9 +258,7 @@ def test_a_root_of_a_ball_of_data_holds_that_of_every_data(p, seed):
     checked = 0
     for codes in leaves:
         exact, size = EnclosedSpace.of_floats(system), 1e-7
-        wide = EnclosedSpace(
-            exact.S, size * np.abs(exact.S), exact.g, size * np.abs(exact.g), exact.F, exact.F_rad, exact.tau
-        )
+        wide = replace(exact, S_rad=size * np.abs(exact.S), g_rad=size * np.abs(exact.g))
         root = settle(wide, codes)
         if not isinstance(root, SpaceRoot):
             continue
@@ -265,7 +266,7 @@ def test_a_root_of_a_ball_of_data_holds_that_of_every_data(p, seed):
             E = rng.choice((-1.0, 1.0), size=exact.S.shape)
             S = system.S * (1 + size * np.triu(E) + size * np.triu(E, 1).T)
             g = system.g * (1 + size * rng.choice((-1.0, 1.0), size=len(system.g)))
-            other = settle(EnclosedSpace(S, 0 * S, g, 0 * g, exact.F, exact.F_rad, exact.tau), codes)
+            other = settle(replace(exact, S=S, g=g), codes)
             assert isinstance(other, SpaceRoot)
             assert np.all(np.abs(other.y.mid - root.y.mid) <= root.y.rad + other.y.rad)
             checked += 1

@@ -96,7 +96,7 @@ def test_fast_arithmetic(executors, many):
 def test_an_unloaded_body_and_one_that_cannot_be_enclosed(executors):
     free = from_compliance(np.eye(6), np.zeros(6), 0.5)
     assert len(enumerate_roots(free, 0, executor=executors[0])) == 1
-    thin = enumsol.ContactProblem3D(np.eye(3) + 0.1, *np.eye(3)[:, None], [1, 1, 1], friction=1e-8)
+    thin = enumsol.ContactProblem3D(np.eye(3), [[1, 0, 0]], [[1, 1e-7, 0]], [[0, 0, 1]], [1, 1, 1], friction=0.5)
     for executor in (None, executors[0]):
         roots = enumerate_roots(thin, 0, executor=executor)
         (part,) = roots.undecided

@@ -1,0 +1,71 @@
+"""Bodies in 3D that weak springs hold: displacements of roots are as good as their forces, and in their enclosures."""
+
+import numpy as np
+import pytest
+from flint import fmpq, fmpq_mat
+
+import enumsol
+from enumsol import ContactStatus, fem
+
+SOLID = fem.box(2, 1, 1)
+UNIT = float(np.finfo(float).eps)
+
+
+def body(spring, shear):
+    """A block with Young's modulus 2.5 on springs at every node, pressed on the ground and pulled sideways."""
+    forces = np.zeros_like(SOLID.points)
+    top = SOLID.points[:, 2] > np.max(SOLID.points[:, 2]) - 1e-9
+    forces[top] = 0.02 * np.array([shear, 0.5 * shear, -1.0])
+    forces[top, 0] *= np.linspace(0.5, 1.5, np.count_nonzero(top))
+    return fem.solid_contact_problem(
+        SOLID.points,
+        SOLID.cells,
+        (1.0, 1.0),
+        contact=SOLID.facets["bottom"],
+        springs=(spring, spring, spring),
+        forces=forces,
+        friction=0.5,
+    )
+
+
+def sticking(problem):
+    """u with all contact nodes sticking, in rationals, rounded: every row B u is gap or slip offset."""
+    n, rows = problem.n, problem.contact_rows.toarray()
+    size = n + len(rows)
+    matrix, rhs = np.zeros((size, size)), np.zeros(size)
+    matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = problem.A.toarray(), rows.T, rows
+    rhs[:n], rhs[n:] = problem.f, np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
+    exact = fmpq_mat([[_rational(x) for x in row] for row in matrix.tolist()]).solve(
+        fmpq_mat([[_rational(x)] for x in rhs.tolist()])
+    )
+    return np.array([int(exact[i, 0].p) / int(exact[i, 0].q) for i in range(n)])
+
+
+def _rational(x):
+    return fmpq(*x.as_integer_ratio())
+
+
+@pytest.mark.parametrize("spring", [1e-2, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
+def test_displacements_at_loaded_nodes(spring):
+    problem = body(spring, 0.1)
+    (root,) = enumsol.enumerate_roots(problem, 0, max_nodes=60)
+    assert set(root.statuses) == {ContactStatus.STICK}
+    # forces that are rounded once push the whole body by their rounding over the springs, and no more
+    room = 16 * UNIT * np.sum(root.lambda_n) / spring
+    assert np.all(root.lambda_n > 0)
+    assert np.max(np.abs(problem.Bn @ root.u - problem.gap - root.u_n)) <= room
+    for rows, slip in zip((problem.Bt1, problem.Bt2), root.u_t.T, strict=True):
+        assert np.max(np.abs(rows @ root.u - slip)) <= room
+    assert np.max(np.abs(root.u - sticking(problem))) <= room
+
+
+@pytest.mark.parametrize("spring", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
+def test_displacements_lie_in_their_enclosures(spring):
+    problem = body(spring, 1.0)
+    (root,) = enumsol.enumerate_roots(problem, 0, max_nodes=60)
+    assert ContactStatus.SLIP in root.statuses
+    assert ContactStatus.OPEN in root.statuses
+    bounds = root.enclosure
+    for value, within in ((root.u_n, bounds.u_n), (root.u_t, bounds.u_t)):
+        assert np.all(within[..., 0] <= value)
+        assert np.all(value <= within[..., 1])
