@@ -196,19 +196,18 @@ class _Leaf:
 
     def _refined(self, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open | None:
         """The one zero of a box, enclosed as closely as floats can."""
-        state = None
         for _ in range(_REFINEMENTS):
             if np.any(self._outside(angle, radius)):
                 return None
             state = self._state(angle, radius)
             move = None if state is None else self._move(angle, radius, state[3])
             if move is None:
-                return self._left_open(angle, radius, state)
+                break
             new_angle, new_radius = _cut(angle, radius, reach, move)
-            if not np.all(new_radius <= radius + 8 * UNIT * reach):
-                return self._left_open(angle, radius, state)
-            done = np.all(new_radius > 0.9 * radius)
-            angle, radius = new_angle, new_radius
+            # the zero lies in both boxes, angle by angle: an angle that rounding keeps from becoming narrower stays
+            narrower = new_radius < radius
+            done = not np.any(new_radius <= 0.9 * radius)
+            angle, radius = np.where(narrower, new_angle, angle), np.where(narrower, new_radius, radius)
             if done:
                 break
         state = self._state(angle, radius)
