@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from enumsol import ContactProblem3D
+from enumsol import ContactProblem3D, fem
 
 
 def from_compliance(S, g, friction, **more):
@@ -77,3 +77,20 @@ def unmatched(roots, wanted, rtol=1e-6):
     inside = np.array([[np.all((lam >= low - near) & (lam <= up + near)) for low, up in boxes] for lam in wanted])
     inside = inside.reshape(len(wanted), len(boxes))
     return np.flatnonzero(~inside.any(axis=1)).tolist(), np.flatnonzero(~inside.any(axis=0)).tolist()
+
+
+def block_on_springs(rng, spring):
+    """A block pressed on the ground and pulled, every node on springs."""
+    block = fem.box(2, 1, 1)
+    forces = np.zeros_like(block.points)
+    top = block.points[:, 2] > np.max(block.points[:, 2]) - 1e-9
+    forces[top] = np.array([0.2, 0.1, -1.0]) * rng.uniform(0.2, 1.0, (np.count_nonzero(top), 3))
+    return fem.solid_contact_problem(
+        block.points,
+        block.cells,
+        tuple(rng.uniform(0.5, 2.0, 2)),
+        contact=block.facets["bottom"],
+        springs=(spring, spring, spring),
+        forces=forces,
+        friction=rng.uniform(0.2, 0.7),
+    )

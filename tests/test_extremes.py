@@ -120,14 +120,19 @@ def test_a_node_next_to_another(distance):
     assert found.complete
 
 
-def test_rows_that_are_almost_dependent():
-    rng = np.random.default_rng(2)
-    for exponent in (4, 6, 8):
-        rows = rng.normal(size=(4, 6))
-        rows[1] = rows[0] + 10.0**-exponent * rows[1]
-        rows[3] = rows[2] + 10.0**-exponent * rows[3]
-        X = rng.normal(size=(6, 8))
-        check(ContactProblem(X @ X.T, rows[:2], rows[2:], rng.normal(size=6), friction=1.0), 0.0)
+def almost_dependent(seed, exponent, **more):
+    """Two contact nodes whose rows differ by 10^-exponent; from 8 on S is definite only far within rounding."""
+    rng = np.random.default_rng([seed, 2])
+    rows, X = rng.normal(size=(4, 6)), rng.normal(size=(6, 8))
+    rows[[1, 3]] = rows[[0, 2]] + 10.0**-exponent * rows[[1, 3]]
+    return ContactProblem(X @ X.T, rows[:2], rows[2:], rng.normal(size=6), friction=1.0, **more)
+
+
+@pytest.mark.parametrize("exponent", [4, 6, 8, 9])
+def test_rows_that_are_almost_dependent(exponent):
+    for seed in range(6):
+        # floats only propose: whether they can factorize S depends on the processor, and the answer must not
+        assert check(almost_dependent(seed, exponent), 0.0).complete
 
 
 def test_no_load():
@@ -261,15 +266,17 @@ def test_huge_friction(arithmetic):
         )
 
 
-def test_a_compliance_that_is_definite_by_accident_is_refused():
-    # its Cholesky factorization succeeds, that of twice the same matrix does not
-    rng = np.random.default_rng(3)
-    for exponent in (4, 6, 8):
-        rows, X, f = rng.normal(size=(4, 6)), rng.normal(size=(6, 8)), rng.normal(size=6)
-        rows[1] = rows[0] + 10.0**-exponent * rows[1]
-        rows[3] = rows[2] + 10.0**-exponent * rows[3]
-    with pytest.raises(enumsol.InvalidProblemError, match="independent beyond rounding"):
-        enumerate_roots(ContactProblem(X @ X.T, rows[:2], rows[2:], f, friction=1.0), 0.0, "fast")
+@pytest.mark.parametrize("exponent", [8, 9])
+def test_a_compliance_that_is_definite_by_accident_is_refused(exponent):
+    # of some the Cholesky factorization succeeds, which ones depends on the processor
+    for seed in range(20):
+        problem = almost_dependent(seed, exponent)
+        for call in (
+            lambda problem=problem: enumerate_roots(problem, 0.0, "fast"),
+            lambda problem=problem: enumsol.successive_approximations(problem, 0.0),
+        ):
+            with pytest.raises(enumsol.InvalidProblemError, match="independent beyond rounding"):
+                call()
 
 
 def test_the_checker_finds_better_bounds_than_the_search():
@@ -381,23 +388,17 @@ def test_audit_on_arcs_of_a_few_floats():
 
 
 def test_graphs_of_contact_rows_that_are_almost_dependent():
-    # proven and accepted by the checker, or refused with a sentence: not a LinAlgError, nor a proof that fails
-    outcomes = set()
+    # proven, in rationals where balls and floats tell nothing: not refused, nor a proof that fails
     for seed in range(6):
         for exponent in (6, 8, 9):
-            rng = np.random.default_rng(seed)
-            rows, X = rng.normal(size=(4, 6)), rng.normal(size=(6, 8))
-            rows[[1, 3]] = rows[[0, 2]] + 10.0**-exponent * rows[[1, 3]]
-            f, slope = rng.normal(size=(2, 6))
-            problem = ContactProblem(X @ X.T, rows[:2], rows[2:], f, friction=1.0, load_slope=slope)
-            try:
-                graph = branch_graph(problem, (0.0, 3.0))
-            except enumsol.InvalidProblemError as error:
-                outcomes.add("refused" if "independent beyond rounding" in str(error) else str(error))
-                continue
-            outcomes.add(graph.complete)
-            assert graph.uniqueness_bound is None or graph.uniqueness_bound >= 0.0
+            problem = almost_dependent(seed, exponent, load_slope=np.random.default_rng(seed).normal(size=6))
+            graph = branch_graph(problem, (0.0, 3.0))
+            assert graph.complete
+            assert graph.uniqueness_bound is None or (exponent == 6 and graph.uniqueness_bound >= 0.0)
             assert graph.proof is None or verify(problem, graph.proof).ok
             exact = enumerate_roots(problem, Fraction(3, 2), "exact", method="exhaustive")
-            assert not graph.complete or graph.multiplicity_at(1.5) == len(exact) + len(exact.families)
-    assert outcomes == {"refused", True}
+            assert graph.multiplicity_at(1.5) == len(exact) + len(exact.families)
+            assert len(graph.roots_at(1.5)) == len(exact)
+            if exponent > 6:
+                with pytest.raises(enumsol.InvalidProblemError, match="independent beyond rounding"):
+                    branch_graph(problem, (0.0, 3.0), arithmetic="fast")

@@ -204,10 +204,9 @@ def uniqueness_bound(condensed: CondensedProblem, interval: tuple[float, float])
     """An alpha up to which uniqueness follows without any search (theory, section 5.6), if there is one."""
     a, b = interval
     p = len(condensed.F0)
-    try:
-        inverse = np.linalg.inv(condensed.S)
-    except np.linalg.LinAlgError:  # S is singular within rounding, and the bound nearly zero
+    if not condensed.definite:  # within rounding, and the bound nearly zero
         return None
+    inverse = np.linalg.inv(condensed.S)
     product = np.linalg.eigvalsh(inverse[:p, :p])[-1] * np.linalg.eigvalsh(condensed.S[p:, p:])[-1]
     largest = 1.0 / float(np.sqrt(product))
     if np.any(condensed.F0 + a * condensed.F1 >= largest):

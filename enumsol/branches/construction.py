@@ -31,7 +31,7 @@ from enumsol.checks import (
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed
+from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite
 from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
 from enumsol.deadlines import Deadline, over, within
 from enumsol.errors import Interrupted, InvalidArgumentError
@@ -264,7 +264,12 @@ def _traced(problem: ContactProblem, interval: tuple[Fraction, Fraction]) -> Tra
 
 def _condensed(problem: ContactProblem, arithmetic: Arithmetic, *, at_rest: bool) -> ExactCondensed:
     exactly = arithmetic == "exact" or problem.n <= (EXACT_DOF_LIMIT if at_rest else FAST_EXACT_DOF)
-    return ExactCondensed.from_problem(problem) if exactly else ExactCondensed.from_condensed(problem)
+    if not exactly:
+        return ExactCondensed.from_condensed(problem)
+    exact = ExactCondensed.from_problem(problem)
+    if not problem.condensed.definite:
+        check_definite(exact.S)
+    return exact
 
 
 def _certifier(

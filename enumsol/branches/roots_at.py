@@ -31,7 +31,7 @@ def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> Root
     problem = data.problem
     if data.exact is None:
         return _in_balls(data, alpha, selections)
-    floats = FloatSelections(problem.condensed.at(alpha).scaled)
+    floats = FloatSelections(problem.condensed.at(alpha).proposals)
     solver: Any = floats
     exact = data.arithmetic != "fast"
     solutions: list[SelectionSolution | None] = []

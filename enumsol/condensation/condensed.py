@@ -24,6 +24,8 @@ UNIT_EXPONENT = 900
 LARGEST_FRICTION = 1e100
 #: Right-hand sides solved at once; bounds the dense memory of a condensation to this many vectors of length n.
 RHS_BLOCK = 16
+#: How many roundings for every row of S, with a unit diagonal, its eigenvalues may be off by.
+_ROUNDINGS = 4
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,11 @@ class CondensedSystem:
         """The same problem without units (see ScaledSystem)."""
         return ScaledSystem.from_system(self)
 
+    @cached_property
+    def proposals(self) -> ScaledSystem:
+        """The same for floats that only propose, where rationals decide (see ScaledSystem.from_system)."""
+        return ScaledSystem.from_system(self, proposals=True)
+
 
 @dataclass(frozen=True)
 class ScaledSystem:
@@ -77,13 +84,21 @@ class ScaledSystem:
     cholesky: NDArray[np.float64] = field(repr=False)
 
     @classmethod
-    def from_system(cls, system: CondensedSystem) -> ScaledSystem:
-        """Scale a condensed system."""
+    def from_system(cls, system: CondensedSystem, *, proposals: bool = False) -> ScaledSystem:
+        """Scale a condensed system; ``proposals``: one that need not be right, for rationals decide.
+
+        Raises
+        ------
+        InvalidProblemError
+            S is not positive definite beyond rounding: floats tell nothing. For proposals it is moved until it is
+            (theory, (4.9)). Or the problem over- or underflows float64.
+        """
         node = node_units(system.S, system.p)
         factor = np.concatenate([node, node])
         S = system.S * factor[:, None] * factor[None, :]
+        S = lifted(S) if proposals else S
         g = system.g * factor
-        cholesky = cholesky_factor(S)
+        cholesky = np.asarray(np.linalg.cholesky(S)) if proposals else cholesky_factor(S)
         size = load_unit(g, cholesky)
         with np.errstate(over="ignore", divide="ignore"):
             units = np.concatenate([factor * size, size / factor])
@@ -122,22 +137,42 @@ def load_unit(g: NDArray[np.float64], cholesky: NDArray[np.float64]) -> float:
 
 
 def cholesky_factor(S: NDArray[np.float64]) -> NDArray[np.float64]:
-    """L with S = L L'.
+    """L with S = L L', for an S that is positive definite beyond rounding (theory, (4.9)).
 
     Raises
     ------
     InvalidProblemError
-        S is not positive definite to working precision.
+        S is not. A factorization of S itself may succeed all the same, by accident and on some processors only.
     """
-    try:
-        # a pivot of the size of rounding may be positive by accident: the relaxations factorize 2 S, and would fail
-        np.linalg.cholesky(2.0 * S)
-        return np.asarray(np.linalg.cholesky(S))
-    except np.linalg.LinAlgError as error:
+    if not _definite(S):
         raise InvalidProblemError(
             "the condensed compliance S = B A^-1 B' is not positive definite to working precision; expected contact "
             "rows [Bn; Bt] that are independent beyond rounding (are two contact nodes almost the same point?)"
-        ) from error
+        )
+    return np.asarray(np.linalg.cholesky(S))
+
+
+def lifted(S: NDArray[np.float64]) -> NDArray[np.float64]:
+    """S, or where it is not positive definite beyond rounding the least S + t diag(S) that surely is."""
+    if _definite(S):
+        return S
+    root = np.sqrt(np.diagonal(S))
+    least = 2.0 * _rounding(S) - float(np.linalg.eigvalsh(S / root[:, None] / root)[0])
+    return np.asarray(S + least * np.diag(np.diagonal(S)))
+
+
+def _definite(S: NDArray[np.float64]) -> bool:
+    """Whether S less its rounding is positive definite."""
+    try:
+        np.linalg.cholesky(S - _rounding(S) * np.diag(np.diagonal(S)))
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def _rounding(S: NDArray[np.float64]) -> float:
+    """Eigenvalues of S with a unit diagonal that may be rounding are smaller."""
+    return _ROUNDINGS * len(S) * float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True)
@@ -176,6 +211,13 @@ class Condensation(Sealed):
         if not (np.all(np.isfinite(S)) and np.all(np.isfinite(g0)) and np.all(np.isfinite(g1))):
             raise InvalidProblemError("A, f: the condensed problem overflows float64; expected data in smaller units")
         return cls(S, g0, g1, problem)
+
+    @cached_property
+    def definite(self) -> bool:
+        """Whether S is positive definite beyond rounding."""
+        units = node_units(self.S, len(self.problem.gap))
+        factor = np.tile(units, len(self.S) // len(units))
+        return _definite(self.S * factor[:, None] * factor)
 
     def free_displacements(self, alpha: AlphaLike) -> NDArray[np.float64]:
         """g(alpha), shape (m,) [length].

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import fmpq, fmpq_mat
 
-from enumsol.arithmetic.rationals import rational, rational_matrix
+from enumsol.arithmetic.rationals import is_positive_definite, rational, rational_matrix
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.unloaded import vanishing_alpha
-from enumsol.errors import TooLargeError
+from enumsol.errors import InvalidProblemError, TooLargeError
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -24,6 +24,21 @@ if TYPE_CHECKING:
 
 #: Most degrees of freedom for which "fast" condenses without rounding; beyond, S and g as computed in floats are used.
 FAST_EXACT_DOF = 24
+
+
+def check_definite(S: Any) -> None:
+    """Nothing; refuses an S, an fmpq_mat, that is not positive definite: no bound on the energy holds.
+
+    Raises
+    ------
+    InvalidProblemError
+        It is not.
+    """
+    if not is_positive_definite(S):
+        raise InvalidProblemError(
+            "the condensed compliance S = B A^-1 B' is not positive definite, in rational arithmetic; expected A "
+            "positive definite and contact rows [Bn; Bt] that are independent (is a contact node listed twice?)"
+        )
 
 
 @dataclass(frozen=True)

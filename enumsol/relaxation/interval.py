@@ -86,8 +86,12 @@ class IntervalSystem:
     scaled: ScaledSystem = field(repr=False)
 
     @classmethod
-    def from_problem(cls, condensed: CondensedProblem, a: Alpha, b: Alpha, origin: Alpha | None) -> IntervalSystem:
+    def from_problem(
+        cls, condensed: CondensedProblem, a: Alpha, b: Alpha, origin: Alpha | None, *, proposals: bool = False
+    ) -> IntervalSystem:
         """The interval [a, b]; ``origin`` is the alpha at which g vanishes, if it does in [a, b] (then a or b).
+
+        ``proposals``: as in ScaledSystem.from_system.
 
         With such an origin the solutions are alpha's distance from it times those of the load +-g1, so that this load,
         which does not vary, is searched in place of g(alpha).
@@ -98,11 +102,12 @@ class IntervalSystem:
             ends = np.stack([condensed.g1 if b > origin else -condensed.g1] * 2)
         else:
             ends = np.stack([condensed.g0 + float(alpha) * condensed.g1 for alpha in (a, b)])
-        first = ScaledSystem.from_system(CondensedSystem(condensed.S, ends[0], F_hi))
+        systems = [CondensedSystem(condensed.S, g, F_hi) for g in ends]
+        first = ScaledSystem.from_system(systems[0], proposals=proposals)
         with np.errstate(over="ignore", invalid="ignore"):
             energies = [np.linalg.norm(np.linalg.solve(first.cholesky, g / first.length)) for g in ends]
         larger = int(not energies[1] <= energies[0])
-        scaled = first if larger == 0 else ScaledSystem.from_system(CondensedSystem(condensed.S, ends[1], F_hi))
+        scaled = first if larger == 0 else ScaledSystem.from_system(systems[1], proposals=proposals)
         ends = ends / scaled.length
         return cls(scaled.S, 0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]), F_lo, F_hi, scaled)
 

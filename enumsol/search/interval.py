@@ -84,6 +84,10 @@ class IntervalCertifier(Protocol):
     forms: bool
 
     @property
+    def rational(self) -> bool:
+        """Whether rationals decide what is left open, so that floats only propose."""
+
+    @property
     def checkable(self) -> bool:
         """Whether a checker can repeat what was accepted so far, so that it makes a proof."""
 
@@ -97,7 +101,7 @@ class IntervalCertifier(Protocol):
 class FastIntervalCertifier:
     """Floats: the result of the engine is trusted."""
 
-    checkable = forms = False
+    checkable = forms = rational = False
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Accept the pruning."""
@@ -183,7 +187,8 @@ class Worker:
 
     def _make(self, piece: Piece) -> IntervalSystem:
         origin = self._origin if self._origin in (piece.a, piece.b) else None
-        return IntervalSystem.from_problem(self._condensed, piece.a, piece.b, origin)
+        ends = piece.a, piece.b
+        return IntervalSystem.from_problem(self._condensed, *ends, origin, proposals=self.leaves.rational)
 
 
 class IntervalSearch:

@@ -11,7 +11,7 @@ import numpy as np
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.errors import InvalidArgumentError
 from enumsol.search.certifiers.floats import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.closing import Closer
@@ -56,6 +56,8 @@ class Solvers:
     ------
     InvalidArgumentError
         A friction coefficient is positive and underflows to zero: its node would count as one without friction.
+    InvalidProblemError
+        S is not positive definite: exactly where rationals decide what balls leave open, otherwise beyond rounding.
     """
 
     def __init__(
@@ -67,8 +69,12 @@ class Solvers:
         engine: str | None = None,
     ) -> None:
         self.problem, self.alpha, self.arithmetic, self.engine = problem, alpha, arithmetic, engine
-        self.scaled = problem.condensed.at(alpha).scaled
+        system = problem.condensed.at(alpha)
+        exactly = arithmetic != "fast" and problem.n <= EXACT_DOF_LIMIT
+        self.scaled = system.proposals if exactly else system.scaled
         self.floats = FloatSelections(self.scaled, tolerance)
+        if exactly and not problem.condensed.definite:
+            _ = self.exact  # definite, or refused
         exact = exactly_at(Fraction(alpha), *problem.friction)
         lost = [not F and x != 0 for F, x in zip(self.scaled.F, exact, strict=True)]
         if any(lost):
@@ -85,10 +91,9 @@ class Solvers:
         Raises
         ------
         InvalidProblemError
-            S is not positive definite, exactly: no bound on the energy would hold.
+            S is not positive definite, exactly.
         """
-        from enumsol.arithmetic.rationals import is_positive_definite
-        from enumsol.condensation.exact import ExactSystem  # python-flint
+        from enumsol.condensation.exact import ExactSystem, check_definite  # python-flint
         from enumsol.selections.rationals import ExactSelections  # python-flint
 
         if self.arithmetic != "exact" and self.problem.n > EXACT_DOF_LIMIT:
@@ -96,8 +101,8 @@ class Solvers:
         system = ExactSystem.from_problem(self.problem, self.alpha)
         enclosed, data = self._enclosed
         proven = enclosed is not None and data == "problem"
-        if not proven and not is_positive_definite(system.S):
-            raise InvalidProblemError("A is not positive definite (S = B A^-1 B' is not, in rational arithmetic)")
+        if not proven:
+            check_definite(system.S)
         return ExactSelections(system)
 
     @cached_property

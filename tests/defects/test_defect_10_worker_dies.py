@@ -149,7 +149,10 @@ def results(pool, function, *arguments):
     return [crew.next().result for _ in arguments], crew.redone
 
 
-_ALONE = pytest.mark.skipif("PYTEST_XDIST_WORKER" in os.environ, reason="run by the test below")
+#: Processes that are not forked import this module by its path from the root: only `python -m pytest` has that.
+_ALONE = pytest.mark.skipif(
+    "PYTEST_XDIST_WORKER" in os.environ or str(ROOT) not in sys.path, reason="run by the test below"
+)
 
 
 @_ALONE

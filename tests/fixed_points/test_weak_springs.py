@@ -4,13 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from problems3d import block_on_springs
 
 import enumsol
 from enumsol import fem
 from enumsol.fixed_points import FixedPoint, Outcome, fixed_point_residual
 
 PLANE, SQUARE = fem.rectangle(4, 2), fem.rectangle(4, 4)
-SOLID = fem.box(2, 1, 1)
 
 
 def plane(rng, spring, mesh=PLANE):
@@ -33,22 +33,6 @@ def plane(rng, spring, mesh=PLANE):
 def square(rng, spring):
     """The same with more contact nodes."""
     return plane(rng, spring, SQUARE)
-
-
-def solid(rng, spring):
-    """The same in 3D."""
-    forces = np.zeros_like(SOLID.points)
-    top = SOLID.points[:, 2] > np.max(SOLID.points[:, 2]) - 1e-9
-    forces[top] = np.array([0.2, 0.1, -1.0]) * rng.uniform(0.2, 1.0, (np.count_nonzero(top), 3))
-    return fem.solid_contact_problem(
-        SOLID.points,
-        SOLID.cells,
-        tuple(rng.uniform(0.5, 2.0, 2)),
-        contact=SOLID.facets["bottom"],
-        springs=(spring, spring, spring),
-        forces=forces,
-        friction=rng.uniform(0.2, 0.7),
-    )
 
 
 def distance(found, roots):
@@ -87,7 +71,7 @@ def test_proven_roots_in_2d(spring, seed):
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("spring", [0.1, 1e-3])
 def test_proven_roots_in_3d(spring, seed):
-    problem = solid(np.random.default_rng([seed, 41]), spring)
+    problem = block_on_springs(np.random.default_rng([seed, 41]), spring)
     roots = enumsol.enumerate_roots(problem, 0, max_nodes=300)  # with weak springs others may stay undecided
     assert len(roots) == 1
     found = enumsol.successive_approximations(problem, 0)
@@ -97,7 +81,7 @@ def test_proven_roots_in_3d(spring, seed):
 
 def planted(rng, spring):
     """A problem in 3D with a solution that is known to rounding, of open, sticking and sliding nodes."""
-    body = solid(rng, spring)
+    body = block_on_springs(rng, spring)
     u, p = rng.normal(size=body.n), body.p
     normal = rng.uniform(0.5, 2.0, p) * (np.arange(p) != 0)
     angle, F = rng.uniform(0.0, 2 * np.pi, p), 0.3
@@ -157,14 +141,14 @@ def moved(rng, problem, found, size):
 
 
 @pytest.mark.parametrize("spring", [1e-1, 1e-4, 1e-5, 1e-6, 1e-7])
-@pytest.mark.parametrize("body", [square, solid])
+@pytest.mark.parametrize("body", [square, block_on_springs])
 def test_roots_and_limits_are_fixed_points_and_nothing_beside_them(body, spring):
     for seed in range(2):
         rng = np.random.default_rng([seed, 41])
         problem = body(rng, spring)
         roots = enumsol.enumerate_roots(problem, 0, max_nodes=100)
         found = enumsol.successive_approximations(problem, 0)
-        assert len(roots) or (body is solid and spring < 0.1)  # with weak springs some stay undecided
+        assert len(roots) or (body is block_on_springs and spring < 0.1)  # with weak springs some stay undecided
         for root in roots:
             assert enumsol.is_fixed_point(problem, root)
         # where rounding kept the iteration from its tolerance it is as near as it says

@@ -71,6 +71,11 @@ class VerifiedIntervalCertifier:
         """Whether balls accepted every leaf so far."""
         return not self._used_rationals
 
+    @property
+    def rational(self) -> bool:
+        """Whether rationals decide where there are no balls."""
+        return self._rationals is not None
+
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
         enclosed, margin = self._on(piece, system)

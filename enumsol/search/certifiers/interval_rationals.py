@@ -40,6 +40,7 @@ class ExactIntervalCertifier:
     """
 
     checkable = forms = False
+    rational = True
 
     def __init__(self, exact: ExactCondensed) -> None:
         self._exact = exact
