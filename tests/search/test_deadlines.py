@@ -2,9 +2,11 @@
 
 import inspect
 import threading
+from itertools import count
 
 import numpy as np
 import pytest
+from defects.cut_short import false_claims_of_graph
 from graph_proofs import triangle
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
@@ -216,3 +218,23 @@ def test_no_exact_algebra_is_begun_after_the_limit(clock, takes, monkeypatch):
     monkeypatch.setattr(gluing, "glue", None)
     graph = branch_graph(problem, (0, 3), time_limit=10.0)
     assert "time limit" in graph.reasons[0]
+
+
+@pytest.mark.parametrize("name", ["chain", "continua", "corners", "balls"])
+def test_wherever_the_time_is_over_nothing_false_is_claimed(name, monkeypatch):
+    """Every look at the clock takes a second."""
+    problem, interval = {
+        "chain": lambda: (gallery.chain(2, 0.1), (0, 10)),
+        "continua": lambda: (uncoupled(2), (0, 4)),
+        "corners": lambda: (uncoupled(2, (1.5, -4.0)), (0, 5)),
+        "balls": lambda: (gallery.wedge(2, 3, (0, 5e-4), half_angle=5.0), (0, 1)),
+    }[name]()
+    whole, ticks, ended = branch_graph(problem, interval), count(), set()
+    assert whole.complete
+    for limit in np.unique(np.geomspace(1, 2000, 14).astype(int)).tolist():
+        with monkeypatch.context() as patch:
+            patch.setattr("time.perf_counter", lambda: float(next(ticks)))
+            graph = branch_graph(problem, interval, time_limit=limit)
+        ended.add(graph.complete)
+        assert list(false_claims_of_graph(graph, whole)) == [], limit
+    assert ended == {True, False}
