@@ -110,6 +110,6 @@ def follow(
             done = len({trace.selection.rows.codes for trace in followed.traces})
             followed.stopped = Stop(reason, done, arcs_of=len(waiting))
             break
-    missing = cut_short or followed.interrupted is not None
+    missing = cut_short or followed.stopped is not None
     followed.joined = join(followed.traces, traced.interval, traced.origin, traced.sharpen, cut_short=missing)
     return followed
