@@ -331,7 +331,9 @@ def test_the_oracle_agrees_with_the_originals(name):
             assert not oracle.is_true(codes, side, ["h", part[1], 1], low)
 
 
-@pytest.mark.parametrize("name", ORIGINALS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "open" else []) for name in ORIGINALS]
+)
 def test_mutants_accepted_as_a_whole_are_true(name):
     rng = random.Random(name)
     _, records, report, _ = original(name)

@@ -158,7 +158,7 @@ def test_forged_roots_are_refused():
                 assert not accepted(problem, [*records[:k], forged, *records[k + 1 :]])
 
 
-@pytest.mark.parametrize("kind", ["any theta", "slides"])
+@pytest.mark.parametrize("kind", ["any theta", pytest.param("slides", marks=pytest.mark.slow)])
 def test_forged_numbers_are_refused(kind):
     for problem, records in cases(kind):
         for k in leaves(records, kind):

@@ -318,7 +318,14 @@ def test_multipliers_have_to_be_finite():
 # -- mutants -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [(1, 22), SEVERAL, (2, 5), "end", "one tangent", "small friction"], ids=str)
+@pytest.mark.parametrize(
+    "name",
+    [
+        *((1, 22), SEVERAL, "one tangent", "small friction"),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ((2, 5), "end")),
+    ],
+    ids=str,
+)
 def test_no_mutant_is_accepted_with_another_claim(name):
     problem, _, records, data = case(name)
     truth, accepted = Truth(problem), 0

@@ -41,12 +41,12 @@ def test_the_example_of_the_report():
 
 @pytest.mark.parametrize("zero", ZEROS, ids=str)
 @pytest.mark.parametrize("friction", [0.0, 1.0, (0.0, 1.0)], ids=str)
-def test_g_vanishes_by_load_and_offsets_together(zero, friction):
-    rng = np.random.default_rng([4, zero.numerator + 3, zero.denominator])
-    for p in (1, 2, 3):
-        for inner in (0, 2):
-            graph, _ = assert_proven(vanishing_problem(rng, p, zero, inner=inner, friction=friction))
-            assert (zero in ends_of_pieces(graph)) == (0 <= zero <= 10)
+@pytest.mark.parametrize("p", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
+def test_g_vanishes_by_load_and_offsets_together(p, zero, friction):
+    rng = np.random.default_rng([4, p, zero.numerator + 3, zero.denominator])
+    for inner in (0, 2):
+        graph, _ = assert_proven(vanishing_problem(rng, p, zero, inner=inner, friction=friction))
+        assert (zero in ends_of_pieces(graph)) == (0 <= zero <= 10)
 
 
 @pytest.mark.parametrize("zero", ZEROS, ids=str)

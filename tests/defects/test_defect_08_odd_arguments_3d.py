@@ -15,7 +15,7 @@ ROOTS = enumsol.enumerate_roots(PLANE, 5.0)
 LIMIT = enumsol.successive_approximations(SOLID, 0)
 TABLE = enumsol.basin_table(PLANE, ROOTS, 3)
 BLOCK = gallery.block3d(2, 2, 1, multipliers="elements", ratio=2)
-BOX = fem.box(2, 2, 1)
+BOX = fem.box(2, 2, 1, cells="tetrahedra")  # assembled four times as fast as hexahedra
 
 
 def by_function(value):

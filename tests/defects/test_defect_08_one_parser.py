@@ -191,8 +191,9 @@ def _forces(problem, alpha):
 
 @pytest.mark.parametrize("name", TAKE)
 def test_every_function_takes_every_kind_of_number(problem, graph, name):
+    known = {exact: TAKE[name](problem, graph, exact, exact) for exact in {exact for _, exact in NUMBERS.values()}}
     for given, exact in NUMBERS.values():
-        assert TAKE[name](problem, graph, given, exact) == TAKE[name](problem, graph, exact, exact)
+        assert TAKE[name](problem, graph, given, exact) == known[exact]
 
 
 @pytest.mark.parametrize("name", TAKE)

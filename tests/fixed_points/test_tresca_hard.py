@@ -64,6 +64,7 @@ def test_hard_problems_are_solved(rng, solver):
         assert violation(S, g, bound, F, found) < 1e-3
 
 
+@pytest.mark.slow
 def test_extreme_coefficients_are_solved_or_refused(rng):
     unsolved = 0
     for _ in range(150):

@@ -1,6 +1,5 @@
 """The compiled dual active-set method against an interior-point solver, and the bounds its multipliers prove."""
 
-import cvxpy as cp
 import numpy as np
 import pytest
 from generators import dense_compliance, fe_compliance, friction, planted_load, random_load
@@ -43,6 +42,8 @@ def dense_rows(system):
 
 def reference(system, codes):
     """Optimal value by clarabel through cvxpy, inf when infeasible."""
+    import cvxpy as cp  # takes a second, of every process that only collects tests
+
     normals, offsets = dense_rows(system)
     x = cp.Variable(2 * system.p)
     constraints = []

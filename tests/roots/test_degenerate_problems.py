@@ -44,7 +44,8 @@ def test_integer_data(seed, sizes, count):
 
 
 @pytest.mark.parametrize(
-    ("seed", "sizes", "count"), [(2, (1, 2), 120), pytest.param(3, (3,), 15, marks=pytest.mark.slow)]
+    ("seed", "sizes", "count"),
+    [(2, (1, 2), 40), *(pytest.param(*more, marks=pytest.mark.slow) for more in ((12, (1, 2), 80), (3, (3,), 15)))],
 )
 def test_singular_selections(seed, sizes, count):
     rng = np.random.default_rng(seed)

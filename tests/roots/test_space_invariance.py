@@ -1,5 +1,7 @@
 """In 3D, too, axes, units and numbering do not change which roots there are; problems in 2D keep theirs."""
 
+import functools
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -90,8 +92,15 @@ def some(count, least=1):
     raise AssertionError
 
 
-CASES = [*some(3), *some(3, least=3)]
-each = pytest.mark.parametrize(("S", "g", "F", "before"), CASES, ids=[f"{len(case[3])} roots" for case in CASES])
+@functools.cache
+def cases():
+    return [*some(3), *some(3, least=3)]
+
+
+@pytest.fixture(params=range(6))
+def case(request):
+    """S, g, F and their roots."""
+    return cases()[request.param]
 
 
 def check(before, S, g, F, image, nodes=(0, 1)):
@@ -107,8 +116,8 @@ def check(before, S, g, F, image, nodes=(0, 1)):
         assert [twin.statuses for twin in twins] == [tuple(root.statuses[i] for i in nodes)]
 
 
-@each
-def test_axes_turned_at_every_node(S, g, F, before):
+def test_axes_turned_at_every_node(case):
+    S, g, F, _ = case
     isotropic = np.repeat(F[:, :1], 2, axis=1)
     start = enumerate_roots(from_compliance(S, g, tuple(isotropic.T)), 0)
     assert start.complete
@@ -118,8 +127,8 @@ def test_axes_turned_at_every_node(S, g, F, before):
         check(start, Q @ S @ Q.T, Q @ g, isotropic, lambda lam, Q=Q: Q @ lam)
 
 
-@each
-def test_a_quarter_turn_with_the_coefficients_exchanged(S, g, F, before):
+def test_a_quarter_turn_with_the_coefficients_exchanged(case):
+    S, g, F, before = case
     turn = [0, 1, 4, 5, 2, 3]
     sign = np.repeat([1.0, 1.0, -1.0], 2)
     check(
@@ -127,13 +136,13 @@ def test_a_quarter_turn_with_the_coefficients_exchanged(S, g, F, before):
     )
 
 
-@each
 @pytest.mark.parametrize(("force", "length"), [(1e6, 1.0), (1e-9, 1e3), (3.7, 1e-9)])
-def test_units(S, g, F, before, force, length):
+def test_units(case, force, length):
+    S, g, F, before = case
     check(before, S * (length / force), g * length, F, lambda lam: force * lam)
 
 
-@each
-def test_numbering(S, g, F, before):
+def test_numbering(case):
+    S, g, F, before = case
     other = [1, 0, 3, 2, 5, 4]
     check(before, S[np.ix_(other, other)], g[other], F[::-1], lambda lam: lam[other], nodes=(1, 0))

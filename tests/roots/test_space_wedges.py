@@ -26,7 +26,9 @@ KINDS = {
 REACHED = {"wedge3d-2-3": {0, 2}, "wedge3d-4-3": {0, 2}, "wedge3d-4-9": {0, 8}, "wedge3d-8-5": {4}}
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "wedge3d-8-5" else []) for name in KINDS]
+)
 def test_all_roots_of_a_wedge_that_jams(name):
     entry = enumsol.gallery.get(name)
     problem, alpha = entry.build(), entry.alpha
