@@ -5,6 +5,10 @@ check; one process, one problem after the other. A search is cut at a number of 
 
 Read ``nodes`` against ``slip``, the slipping nodes of the solution: every one of them has a direction to be found. The
 column ``leaves`` counts the leaves that were tested by Krawczyk's operator, ``check s`` is the checker's time.
+
+``degenerate`` are problems with three nodes whose search is long all the same: with small integers conditions hold with
+equality, and one region (``largest region``) may take hundreds of leaves; with much friction many selections come near
+to holding. They are kept to see what a change does to them.
 """
 
 from __future__ import annotations
@@ -13,6 +17,9 @@ from time import process_time
 from typing import TYPE_CHECKING
 
 import enumsol
+from search_in_3d.degenerate import CASES, SMOKE_NODES
+from search_in_3d.degenerate import MAX_NODES as MOST_DEGENERATE
+from search_in_3d.degenerate import row as degenerate_row
 
 if TYPE_CHECKING:
     from shared.results import Run
@@ -62,3 +69,12 @@ def main(run: Run) -> None:
         f"{hardest['search s']:.1f} s, its proof checked in {hardest['check s']:.1f} s",
         f"every proof accepted: {all(r['accepted'] for r in rows)}",
     )
+    degenerate(run)
+
+
+def degenerate(run: Run) -> None:
+    """The table of degenerate problems."""
+    most = SMOKE_NODES if run.smoke else MOST_DEGENERATE
+    rows = [degenerate_row(*case, most) for case in CASES]
+    cut = [r["case"] for r in rows if not r["ended"]]
+    run.table("degenerate", rows, f"cut at {most} nodes: {', '.join(cut) or 'none'}")
