@@ -176,7 +176,7 @@ class _Positions:
 
     def __init__(self, interval: tuple[Fraction, Fraction], numbers: Iterable[CriticalAlpha]) -> None:
         # the vertices' numbers are those of the arcs as well
-        self._brackets = {id(number): _bracket(number) for number in numbers}
+        self._brackets = {number: _bracket(number) for number in numbers}
         first, last = (_outward(end, up=up) for end, up in zip(interval, (True, False), strict=True))
         inside = {x for pair in self._brackets.values() for x in pair if first <= x <= last}
         self.floats = sorted(inside | {x for x in (first, last) if first <= last})
@@ -184,7 +184,7 @@ class _Positions:
 
     def of(self, number: CriticalAlpha) -> tuple[int, int]:
         """First and last position at which a number may lie, -1 and ``count`` for all below and above."""
-        low, high = self._brackets[id(number)]
+        low, high = self._brackets[number]
         k, j = self._index(low), self._index(high)
         return (2 * k, 2 * k) if low == high else (2 * k + 1, 2 * j - 1)
 

@@ -35,6 +35,7 @@ most: those below assignments in which at most k nodes are undecided.
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import cached_property
 from time import process_time
 from typing import TYPE_CHECKING
@@ -262,7 +263,7 @@ def turned(system, place):
         c, s = np.cos(angle[i]), np.sin(angle[i])
         turn[np.ix_([t1, t2], [t1, t2])] = [[c, -s], [s, c]]
     S = turn @ system.S @ turn.T
-    return type(system)(0.5 * (S + S.T), turn @ system.g, system.F, system.tau, system.force, system.length)
+    return replace(system, S=0.5 * (S + S.T), g=turn @ system.g)
 
 
 CHOICES = {
