@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from concurrent.futures import Future, ProcessPoolExecutor
+    from multiprocessing.connection import Connection
     from multiprocessing.process import BaseProcess
 
 
@@ -75,16 +76,23 @@ class RenewedPool(Executor):
         One that is ended while it sends a result leaves a part of it in the pipe, and one that is sent a task takes no
         more of it. The pool's threads would wait for the rest as long as the pipes have another end: in this process.
         """
-        results, calls = (getattr(self._pool, name, None) for name in ("_result_queue", "_call_queue"))
+        names = ("_result_queue", "_call_queue", "_executor_manager_thread")
+        results, calls, manager = (getattr(self._pool, name, None) for name in names)
         self.shutdown(wait=False, cancel_futures=True)
         for process in processes:
             process.terminate()
         for process in processes:
             process.join()
-        for end in (getattr(results, "_writer", None), getattr(calls, "_reader", None)):
-            if end is not None:
-                with suppress(OSError):  # the pool closed it
-                    end.close()
+        _close(getattr(results, "_writer", None))
+        if manager is not None:
+            manager.join(timeout=1.0)  # newer Pythons close the other pipe in this thread: two that close it collide
+        _close(getattr(calls, "_reader", None))
+
+
+def _close(end: Connection | None) -> None:
+    if end is not None:
+        with suppress(OSError):  # the pool closed it
+            end.close()
 
 
 def _end_with_parent() -> None:
