@@ -99,6 +99,7 @@ _HOMES = {
         "newton",
     ),
     "enumsol.roots.enumerate": ("enumerate_roots",),
+    "enumsol.roots.unique": ("is_unique",),
     "enumsol.search.outcome": ("SearchProgress",),
     "enumsol.errors": (
         "EnumsolError",
@@ -202,6 +203,7 @@ __all__ = [
     "follow_all",
     "gallery",
     "is_fixed_point",
+    "is_unique",
     "link_samples",
     "lipschitz_estimate",
     "local_branch_test",

@@ -4,6 +4,7 @@ import signal
 
 import numpy as np
 import pytest
+from trees import by_the_tree
 
 from enumsol.condensation.enclosure import CondensedEnclosure
 
@@ -14,6 +15,13 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 @pytest.fixture
 def rng():
     return np.random.default_rng(20121)
+
+
+@pytest.fixture
+def tree_only():
+    """Searches go through their tree, also where one certificate would do."""
+    with by_the_tree():
+        yield
 
 
 @pytest.fixture

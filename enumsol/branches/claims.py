@@ -196,7 +196,7 @@ class Claims:
             line += ", not proven"
         lines = [line]
         if bound is not None:
-            lines.append(f"without any search, a bound evaluated in floats gives one solution up to {bound:.8g}")
+            lines.append(f"a bound known before any search: one solution for alpha up to {bound:.8g} (in floats)")
         return lines
 
 

@@ -10,6 +10,7 @@ from flint import fmpq_mat
 from enumsol.arithmetic.balls import SAFE
 from enumsol.arithmetic.rationals import to_fraction
 from enumsol.kernel.closing import closed_solution, final_codes, only_solution, same_solution
+from enumsol.kernel.point import solve_selection
 from enumsol.kernel.rows import BACKWARD, CONTACT, FORWARD, OPEN, STICK, UNDECIDED, refines
 from enumsol.proof.reading import numbers_from, same
 
@@ -34,12 +35,9 @@ def closed_by_balls(
     """Why a record of kind "m" proves nothing, or None; and the root that it proves, if it claims one."""
     if len(record) not in (5, 7):
         return f"its record has {len(record)} entries; expected 5 or 7", None
-    free = _nodes(record[2], system.p)
-    selection = _selection(record[1], system.F > 0, sliding=set(range(system.p)) - set(free))
+    free, selection, weights, mid = _read(system, record)
     if any(not refines(code, selection[i]) for i, code in enumerate(codes) if i not in free):
         return "a node that has a status in its proof has another one in its assignment", None
-    weights = _weights(record[3], free, selection, system.F > 0)
-    mid = numbers_from(record[4], 2 * system.p)
     ball = closed_solution(system, selection, free, weights, mid / force)
     if ball is None:
         return "its reduced problem is not proven to have one solution", None
@@ -53,6 +51,15 @@ def closed_by_balls(
     if not np.all(inside | ((ball.force_rad == 0) & (mid == 0) & (radius >= 0))):
         return "its enclosure does not hold the root", None
     return (None if type(record[6]) is int and record[6] == ball.sign else "its index is wrong"), ball
+
+
+def one_regular_root(system: EnclosedSystem, record: list[Any], force: Array) -> bool:
+    """Whether a record of kind "m" proves that all data in the balls have one root, regular and in its selection."""
+    free, selection, weights, mid = _read(system, record)
+    root = solve_selection(system, selection) if len(free) == system.p else None
+    if root is None or not root.is_root:
+        return False
+    return closed_solution(system, selection, free, weights, mid / force) is not None
 
 
 def closed_in_rationals(
@@ -95,6 +102,14 @@ def count_apart(closed: dict[Codes, ClosedSolution], others: list[Codes]) -> tup
         kept += 1
         known.append((core, ball.possible))
     return kept, doubtful
+
+
+def _read(system: EnclosedSystem, record: list[Any]) -> tuple[tuple[int, ...], Codes, Array, Array]:
+    """Free nodes, selection, numbers and forces of a record of kind "m"."""
+    free = _nodes(record[2], system.p)
+    selection = _selection(record[1], system.F > 0, sliding=set(range(system.p)) - set(free))
+    weights = _weights(record[3], free, selection, system.F > 0)
+    return free, selection, weights, numbers_from(record[4], 2 * system.p)
 
 
 def _selection(value: Any, friction: NDArray[np.bool_], sliding: Collection[int] = ()) -> Codes:

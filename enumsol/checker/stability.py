@@ -173,8 +173,12 @@ class _WidenedChecker(Checker):
         return "it was proven for the given data alone"
 
     def _closed(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        self.radius = 0.0
-        return "it was proven for the given data alone"
+        from enumsol.checker.closing import one_regular_root
+
+        reason = super()._closed(codes, record)
+        if reason is None and not self._passes(lambda system: one_regular_root(system, record, self.force)):
+            self.radius, reason = 0.0, "it was proven for the given data alone"
+        return reason
 
     def _closed_in_rationals(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         self.radius = 0.0

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 #: The table over contact nodes is printed when it has at most so many rows.
 _ROWS = 24
-_STATS = ("nodes", "pruned", "selections", "qps", "fallback_qps", "seconds", "resumed")
+_STATS = ("nodes", "pruned", "selections", "qps", "fallback_qps", "closed", "seconds", "resumed")
 _FIELDS = ("lambda_n", "lambda_t", "u_n", "u_t")
 
 
@@ -49,6 +49,17 @@ def _family_rows(k: int, family: RootFamily, node_ids: tuple[Any, ...], width: i
             yield f"{j if i == 0 else '':>8} {label!s:>{width}} {'':<7} {normal + 0.0:>12.6g} {tangential + 0.0:>12.6g}"
 
 
+def uniqueness(found: RootSet) -> str:
+    """Whether there is one solution, in a line."""
+    if found.unique is None:
+        why = "fast arithmetic proves nothing" if found.arithmetic == "fast" else found.completeness()
+        return f"unique: not known ({why})"
+    if found.unique:
+        return f"unique: yes ({'proven by one certificate' if found.by_one_certificate else 'proven by a search'})"
+    what = "a continuum of solutions" if found.families else "two solutions"
+    return f"unique: no ({what}, proven; --unique looks for no more)"
+
+
 def as_json(found: RootSet, problem: str) -> str:
     """The whole result; numbers read back as the same float64, what is not finite is null."""
     stats = found.stats
@@ -61,6 +72,8 @@ def as_json(found: RootSet, problem: str) -> str:
         "complete": found.complete,
         "certified_data": found.certified_data if found.complete else None,
         "completeness": found.completeness(),
+        "unique": found.unique,
+        "by_one_certificate": found.by_one_certificate,
         "stopped": found.stopped,
         "index_sum": found.index_sum,
         "node_ids": list(found.node_ids),

@@ -48,6 +48,9 @@ HowSearched = Annotated[Method, typer.Option(help="Pruned search; or all 4^p sel
 
 
 StopAfter = Annotated[int | None, count("Stop at N roots; 2 answers: is it unique?")]
+Unique = Annotated[
+    bool, typer.Option("--unique", help="Only tell whether there is one solution; stops at the second one.")
+]
 TimeLimit = Annotated[float | None, seconds("Stop after so long.")]
 Jobs = Annotated[int, count("Processes to search with (tree).")]
 ProofFile = Annotated[str | None, file("--proof", "Write the proof (verified).")]
@@ -63,6 +66,7 @@ def roots(
     alpha: AtAlpha,
     arithmetic: HowExact = "verified",
     method: HowSearched = "tree",
+    unique: Unique = False,
     stop_after: StopAfter = None,
     max_nodes: MaxNodes = None,
     time_limit: TimeLimit = None,
@@ -78,17 +82,23 @@ def roots(
     Prints a table of the roots and whether it is complete; lambda_n and lambda_t are nodal forces, not pressures.
 
     Exit status: 0 when complete (in fast arithmetic, which proves nothing: when the search ran to its end with nothing
-    undecided); 3 when something stayed undecided, a limit cut the search short, or the indices do not add up to +1;
-    2 on bad input; 130 on Ctrl-C, after printing what was found so far; 74 when a result could not be written, 141 when
-    nobody read it any more.
+    undecided), with --unique when yes or no is proven; 3 when something stayed undecided, a limit cut the search short,
+    or the indices do not add up to +1; 2 on bad input; 130 on Ctrl-C, after printing what was found so far; 74 when a
+    result could not be written, 141 when nobody read it any more.
     """
     if jobs > 1 and method != "tree":
         raise InvalidArgumentError(f"--jobs is {jobs} with the exhaustive method; expected 1 job, or the method tree")
     check_files(proof_file, json_file, csv_file, resume=resume)
-    limits: dict[str, Any] = {"stop_after": stop_after, "max_nodes": max_nodes, "time_limit": time_limit}
+    if unique and stop_after is not None:
+        raise InvalidArgumentError(f"--stop-after is {stop_after} with --unique, which stops at the second root")
+    limits: dict[str, Any] = {
+        "stop_after": 2 if unique else stop_after,
+        "max_nodes": max_nodes,
+        "time_limit": time_limit,
+    }
     options = {"arithmetic": arithmetic, "method": method, "proof_path": proof_file, "resume": resume, **limits}
     value = parse_alpha(alpha)
-    answer(problem, load_any_problem(problem), value, jobs, options, json_file, csv_file)
+    answer(problem, load_any_problem(problem), value, jobs, options, json_file, csv_file, unique=unique)
 
 
 def check_files(proof_file: str | None, json_file: str | None, csv_file: str | None, *, resume: bool) -> None:
@@ -115,20 +125,25 @@ def answer(
     options: dict[str, Any],
     json_file: str | None,
     csv_file: str | None,
+    *,
+    unique: bool = False,
 ) -> NoReturn:
-    """Search with the options of `enumerate_roots`, write what was found, and end the command."""
+    """Search with the options of `enumerate_roots`, write what was found, and end the command.
+
+    With ``unique`` the question is only whether there is one solution.
+    """
     found, ended = so_far(lambda: _search(problem, alpha, jobs, **options))
     deliver(
         json_file=json_file,
         csv_file=csv_file,
-        text=lambda: root_report.as_text(found),
+        text=lambda: root_report.uniqueness(found) if unique else root_report.as_text(found),
         content=lambda: root_report.as_json(found, name),
         frame=found.to_frame,
     )
     if csv_file is not None and found.families:
         families = counted(len(found.families), "family", "families")
         note(f"the CSV holds the isolated roots only, --json the {families} too")
-    finish(ended, _status(found))
+    finish(ended, ExitStatus.DONE if unique and found.unique is not None else _status(found))
 
 
 def _search(problem: ContactProblem | ContactProblem3D, alpha: Alpha, jobs: int, **options: Any) -> RootSet:

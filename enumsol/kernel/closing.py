@@ -14,7 +14,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, upper_norm
 from enumsol.kernel.ball_arrays import Ball, determinant_sign, solution
-from enumsol.kernel.point import row_balls
+from enumsol.kernel.point import row_balls, solve_selection
 from enumsol.kernel.rows import (
     BACKWARD,
     CONDITIONS,
@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
 
     Codes = tuple[int, ...]
+
+#: Radii of forces by the largest force, beyond which a solution is hardly placed.
+_WIDE = 1e-3
 
 
 def core_of(selection: Sequence[int], free: Sequence[int]) -> Codes:
@@ -80,6 +83,11 @@ class ClosedSolution:
     def is_excluded(self) -> bool:
         """A condition is broken strictly: no root has this core."""
         return bool(np.any(self.slack < -self.slack_rad))
+
+    @property
+    def is_wide(self) -> bool:
+        """The balls hardly tell where it lies."""
+        return bool(np.max(self.force_rad, initial=0.0) > _WIDE * np.max(np.abs(self.force), initial=0.0))
 
 
 def final_codes(friction: bool) -> tuple[int, ...]:
@@ -374,9 +382,22 @@ class Reduced:
             return None
         x = self._point(force, numbers)
         reach = self._distance(x.mid, self._displacements(x), numbers) / least * SAFE
-        if not np.isfinite(reach):
+        found = self._alone(Ball(x.mid, (x.rad + reach) * SAFE), numbers, least) if np.isfinite(reach) else None
+        if found is None:
+            found = self._regular(numbers, least)
+        return found
+
+    def _regular(self, numbers: Weights, least: float) -> ClosedSolution | None:
+        """The same where the solution is regular and its selection encloses it: closer, where Q is hardly definite."""
+        if any(code in _SLIDING for code in self.selection):
             return None
-        x = Ball(x.mid, (x.rad + reach) * SAFE)
+        root = solve_selection(self.system, self.selection)
+        if root is None or not root.is_root:
+            return None
+        return self._alone(Ball(root.force[self.places], root.force_rad[self.places]), numbers, least)
+
+    def _alone(self, x: Ball, numbers: Weights, least: float) -> ClosedSolution | None:
+        """The solution that is known to lie in a ball, if Q is definite for every theta that it may have there."""
         w = self._displacements(x)
         for i, node in enumerate(self.nodes):
             # open at every solution

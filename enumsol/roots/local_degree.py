@@ -54,7 +54,7 @@ def _reduced_degree(solver: FloatSelections, active: ActiveSets, force: Array, w
     except np.linalg.LinAlgError:
         return None
     x, v = ((values / unit)[reduction.places] for values, unit in ((force, system.force), (w, system.length)))
-    found = reduction.weights(x, v, exactly=True, factors=True)
+    found = reduction.weights(x, v, exactly=True)
     return None if found is None else reduction.sign
 
 

@@ -194,6 +194,21 @@ class RootSet(Sequence[Root], Immutable):
         return self.stopped is None and not self.undecided
 
     @property
+    def unique(self) -> bool | None:
+        """Whether there is one solution, proven either way; None when that stayed open, and in fast arithmetic."""
+        if self.arithmetic == "fast":
+            return None
+        if self.families or self.at_least > 1:
+            return False
+        return True if self.complete and len(self) == 1 else None
+
+    @property
+    def by_one_certificate(self) -> bool:
+        """Whether a form that is definite proved, without a tree, that there is one solution (theory, section 6.11)."""
+        stats = self.stats
+        return self.whole and len(self) == 1 and stats.closed == 1 == stats.nodes + stats.resumed
+
+    @property
     def index_sum(self) -> int | None:
         """Sum of the indices of all roots and families: +1 when nothing is missing; None if one is unknown.
 
@@ -263,8 +278,9 @@ class RootSet(Sequence[Root], Immutable):
             return f"complete: no ({count} undecided)"
         if not self.complete:
             return f"complete: not proven ({count} undecided)"
-        about = "" if self.certified_data == "problem" else " for S and g as computed"
-        return f"complete: yes (proven{about})"
+        about = "proven" if self.certified_data == "problem" else "proven for S and g as computed"
+        how = ": one solution, by one certificate" if self.by_one_certificate else ""
+        return f"complete: yes ({about}{how})"
 
     def _heading(self) -> str:
         heading = f"RootSet at alpha = {float(self.alpha):g}: {counted(len(self), 'root')}"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from enumsol.search.definite import Numbers
 from enumsol.search.reduction import NEAR, Reduction
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import (
@@ -33,9 +34,13 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import ActiveSets, Codes
 
     Array = NDArray[np.float64]
+    #: lambda and w, (2p,) arrays each.
+    Point = tuple[Array, Array]
 
 #: So many nodes that slide without load make a search begin again.
 _MANY = 3
+#: With fewer contact nodes a long tree is waited for: of so many nodes for each of these.
+_FEW, _LONG = 24, 8
 
 
 @dataclass(frozen=True)
@@ -85,57 +90,95 @@ class Closing(Protocol):
         A complete selection was met that is degenerate, or nearly so.
     sliding : dict
         FORWARD or BACKWARD for nodes that touch without load and slide at a solution met.
+    exactly : bool
+        It knows a solution exactly, so that statuses need not hold strictly.
+    plain : bool
+        It takes mu = kappa = 1 and nu = 0 only.
     """
 
     hard: bool
     sliding: dict[int, int]
+    exactly: bool
+    plain: bool
 
-    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
-        """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
+    def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
+        """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven.
+
+        Parameters
+        ----------
+        codes : of the assignment
+        proposal : what may close it, if anything was found
+        near : lambda and w from which its solution was sought
+        """
 
 
 class Closer:
     """Which nodes of the tree are worth a try: all where tries succeed, fewer and fewer where they fail.
 
+    The whole problem comes first, before there is a tree. Where plain numbers fail and nodes are few, numbers are
+    sought only when the tree has turned out to be long: that costs as much as many of its nodes.
+
     Parameters
     ----------
+    system : ScaledSystem
     certifier : Closing
     """
 
-    def __init__(self, certifier: Closing) -> None:
-        self._certifier = certifier
-        self._alert = self._began_again = self._looked = False
+    def __init__(self, system: ScaledSystem, certifier: Closing) -> None:
+        self._system, self._certifier = system, certifier
+        self._alert = self._began_again = False
         self._touching = 0
         self._wait = self._pause = 0
+        #: Tries of the whole problem that are left, by the number of nodes after which they are due.
+        self._tries = [(0, Numbers.DESCENT)]
+        if certifier.plain or system.p < _FEW:
+            self._tries = [(0, Numbers.PLAIN), (_LONG * system.p, Numbers.DESCENT)][: 1 if certifier.plain else 2]
+        self._whole: Proposal | None = None
 
     @property
     def sliding(self) -> dict[int, int]:
         """Those of the certifier."""
         return self._certifier.sliding
 
-    def begins_again(self, system: ScaledSystem, nodes: int) -> bool:
-        """Whether so much has become known after some nodes that a search had better begin again; once at most."""
-        if self._began_again:
-            return False
-        if not self._looked and nodes >= system.p:
-            self._looked = True
-            self._look(system)
-        if self._touching < _MANY and len(self._certifier.sliding) < _MANY:
+    def whole(self) -> list[SelectionSolution] | None:
+        """All solutions of the problem, if one certificate proves that there is one only."""
+        proposal, self._whole = self._whole, None
+        if proposal is None and self._due(0):
+            proposal = self._proposed(self._tries.pop(0)[1])
+        if proposal is None or proposal.weights is None:
+            return None
+        return self._certifier.closed((UNDECIDED,) * self._system.p, proposal, self._near(proposal))
+
+    def begins_again(self, nodes: int) -> bool:
+        """Whether so much has become known after some nodes that a search had better begin again."""
+        if self._due(nodes):
+            self._whole = self._proposed(self._tries.pop(0)[1])
+            if self._whole is not None and self._whole.weights is not None:
+                return True
+        if self._began_again or (self._touching < _MANY and len(self._certifier.sliding) < _MANY):
             return False
         self._began_again = True
         self._wait = self._pause = 0
         return True
 
-    def _look(self, system: ScaledSystem) -> None:
-        """Take note of a degenerate solution, if Newton's method finds one."""
-        whole = Reduction(system, (UNDECIDED,) * system.p, tuple(range(system.p)), {})
-        found = whole.solution(*start(system, None))
-        if found is not None:
-            force, p = whole.forces(found[0]), system.p
-            w = system.g - system.S @ force
-            self._touching = int(np.count_nonzero((np.abs(force[:p]) <= NEAR) & (np.abs(w[:p]) <= NEAR)))
-            self._alert = self._alert or self._touching > 0
-            self._certifier.sliding |= without_load(system, force, w)
+    def _due(self, nodes: int) -> bool:
+        return bool(self._tries) and nodes >= self._tries[0][0]
+
+    def _proposed(self, sought: Numbers) -> Proposal | None:
+        """What may be the only solution of the whole problem; takes note of where it is degenerate."""
+        system, p = self._system, self._system.p
+        proposal = propose(system, (UNDECIDED,) * p, None, exactly=self._certifier.exactly, sought=sought)
+        if proposal is None:
+            self._tries.clear()
+            return None
+        force, w = self._near(proposal)
+        self._touching = int(np.count_nonzero((np.abs(force[:p]) <= NEAR) & (np.abs(w[:p]) <= NEAR)))
+        self._alert = self._alert or self._touching > 0
+        self._certifier.sliding |= without_load(system, force, w)
+        return proposal
+
+    def _near(self, proposal: Proposal) -> Point:
+        return proposal.force, self._system.g - self._system.S @ proposal.force
 
     def met(self, answer: object) -> None:
         """Take note of what a complete selection holds: a degenerate solution makes every node worth a try."""
@@ -144,7 +187,19 @@ class Closer:
 
     def again(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions of a subtree that was closed in an earlier search."""
-        return self._certifier.closed(codes, relaxation)
+        if all(code == UNDECIDED for code in codes):
+            self._whole = self._proposed(Numbers.PLAIN if self._certifier.plain else Numbers.DESCENT)
+            return self.whole()
+        return self._tried(codes, relaxation)
+
+    def _tried(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        system, certifier = self._system, self._certifier
+        near = (np.zeros(2 * system.p), system.g)
+        if relaxation is not None:
+            near = relaxation.forces, relaxation.displacements
+        sought = Numbers.PLAIN if certifier.plain else Numbers.CENTRES
+        proposal = propose(system, codes, near, exactly=certifier.exactly, sought=sought)
+        return certifier.closed(codes, proposal, near)
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions of a subtree that can be closed, None where it has to be searched."""
@@ -157,7 +212,7 @@ class Closer:
         if self._wait > 0 and (CONTACT in codes or UNDECIDED in codes):
             self._wait -= 1
             return None
-        found = self._certifier.closed(codes, relaxation)
+        found = self._tried(codes, relaxation)
         self._pause = 2 * self._pause + 1 if found is None else 0
         self._wait = self._pause
         return found
@@ -180,21 +235,13 @@ def holds_below(codes: Codes, active: ActiveSets) -> bool:
     )
 
 
-def start(system: ScaledSystem, relaxation: Relaxation | None) -> tuple[Array, Array]:
-    """lambda and w from which the solution of a reduced problem is sought."""
-    if relaxation is None:
-        return np.zeros(2 * system.p), system.g
-    return relaxation.forces, relaxation.displacements
-
-
 def propose(
     system: ScaledSystem,
     codes: Codes,
-    force: Array,
-    w: Array,
+    near: Point | None,
     *,
     exactly: bool,
-    factors: bool = True,
+    sought: Numbers = Numbers.CENTRES,
 ) -> Proposal | None:
     """What may close a subtree, or None.
 
@@ -202,10 +249,10 @@ def propose(
     ----------
     system : ScaledSystem
     codes : of the subtree
-    force, w : (2p,) arrays, lambda and w near its solution
+    near : (2p,) arrays, lambda and w near its solution; None where nothing is known of it
     exactly : for a proof in rationals, in which statuses need not hold strictly; otherwise nodes whose status does not
         hold strictly are freed, or slide
-    factors : as for ``weights_of``
+    sought : as for ``weights_of``
     """
     free = tuple(i for i, code in enumerate(codes) if code not in _FINAL and code not in SLIDING)
     sliding = {i: code for i, code in enumerate(codes) if code in SLIDING}
@@ -214,12 +261,13 @@ def propose(
             reduction = Reduction(system, codes, free, sliding)
         except np.linalg.LinAlgError:
             return None
-        found = reduction.solution(force, w)
+        found = reduction.sought() if near is None else reduction.solution(*near)
         if found is None:
             return None
         x, named = found
         force = reduction.forces(x)
         w = system.g - system.S @ force
+        near = force, w
         selection = list(codes)
         for i, code in zip(reduction.free, named, strict=True):
             selection[i] = code
@@ -234,7 +282,7 @@ def propose(
         sliding |= {i: resting[i] for i in loose if codes[i] in SLIDING.get(resting.get(i, 0), ())}
         free = tuple(sorted({*free, *loose} - sliding.keys()))
     v = reduction.h - reduction.R @ x
-    weights = reduction.weights(x, v, exactly=exactly, factors=factors)
+    weights = reduction.weights(x, v, exactly=exactly, sought=sought)
     least = float(np.min(slack[fixed], initial=np.inf))
     strict = bool(np.all(np.abs(slack) > NEAR))
     hopeless = weights is None and len(reduction.nodes) == sum(code not in _FINAL for code in codes)

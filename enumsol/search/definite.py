@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.deadlines import look
+from enumsol.search.descent import Descent
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -76,14 +78,22 @@ class Nodes:
         return np.where(np.isfinite(self.share), self.share, chosen)
 
 
-def weights_of(R: Array, nodes: Nodes, *, factors: bool = True) -> Array | None:
+class Numbers(enum.Enum):
+    """Where numbers are sought: mu = kappa = 1 and nu = 0 only; near analytic centres besides; or by descent."""
+
+    PLAIN = enum.auto()
+    CENTRES = enum.auto()
+    DESCENT = enum.auto()
+
+
+def weights_of(R: Array, nodes: Nodes, sought: Numbers = Numbers.CENTRES) -> Array | None:
     """mu, kappa, nu, theta / F and tau for which (6.9) is definite, as a proof has them; None where none were found.
 
     Parameters
     ----------
     R : (k, k) array
     nodes : Nodes
-    factors : whether they are sought where mu = kappa = 1 and nu = 0 will not do
+    sought : where; analytic centres serve where the form has to serve any theta, and the others hardly or not at all
 
     Returns
     -------
@@ -100,8 +110,11 @@ def weights_of(R: Array, nodes: Nodes, *, factors: bool = True) -> Array | None:
     try:
         if np.linalg.eigvalsh(0.5 * (form + form.T))[0] > _DEFINITE:
             return np.concatenate([np.ones(nodes.count + b), np.zeros(b), share, tau])
+        if sought is Numbers.PLAIN:
+            return None
         with np.errstate(all="ignore"):
-            return _Barrier(R, nodes).numbers() if factors else None
+            search = Descent if sought is Numbers.DESCENT and not len(wide) else _Barrier
+            return search(R, nodes).numbers()
     except np.linalg.LinAlgError:
         return None
 

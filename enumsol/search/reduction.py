@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.search.definite import Nodes, weights_of
+from enumsol.deadlines import look
+from enumsol.search.definite import Nodes, Numbers, weights_of
 from enumsol.statuses import BACKWARD, FORWARD, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
@@ -21,7 +22,11 @@ if TYPE_CHECKING:
 #: A condition of a scaled problem within this of zero may hold as an equation; only the choice of what to try rests on
 #: it.
 NEAR = 1e-9
-_NEWTON_STEPS = 16
+_NEWTON_STEPS = 40
+#: The least part of a step of Newton's method.
+_LEAST_PART = 1e-4
+#: Shares of the friction: the first one, and the least step.
+_FIRST_SHARE, _LEAST_SHARE = 0.25, 1 / 64
 
 
 class Reduction:
@@ -48,6 +53,7 @@ class Reduction:
         self.tangential = np.where(self.rubbing, len(self.free) + np.cumsum(self.rubbing) - 1, -1)
         self.turn = np.array([(sliding.get(i, 0) == FORWARD) - (sliding.get(i, 0) == BACKWARD) for i in self.free])
         self.turn = self.turn * F[self.nodes]
+        self._friction, self._F = F[self.nodes], F[self.nodes[self.rubbing]]
         rows = np.array(fixed + [p + i for i in stuck], dtype=np.intp)
         self.E = np.zeros((2 * p, len(rows)))
         for k, i in enumerate(fixed):
@@ -80,87 +86,114 @@ class Reduction:
 
     def solution(self, force: Array, w: Array) -> tuple[Array, list[int]] | None:
         """Forces and statuses that solve the reduced problem up to NEAR, by Newton's method; None if there are none."""
-        x, v = force[self.places], w[self.places]
+        x = self._newton(force[self.places], w[self.places], 1.0)
+        return None if x is None else (x, self._named(x))
+
+    def sought(self) -> tuple[Array, list[int]] | None:
+        """The same from far away: Newton's method without forces, else along F from frictionless contact."""
+        x = self._newton(np.zeros(len(self.places)), self.h, 1.0)
+        if x is None:
+            x = self._along_friction()
+        return None if x is None else (x, self._named(x))
+
+    def _along_friction(self) -> Array | None:
+        """A solution with share F of the friction, the share going from 0 to 1."""
+        x, share, step = np.zeros(len(self.places)), 0.0, 0.0
+        while True:
+            ahead = min(share + step, 1.0)
+            found = self._newton(x, self.h - self.R @ x, ahead)
+            if found is not None and ahead == 1.0:
+                return found
+            if found is not None:
+                x, share, step = found, ahead, 1.5 * step if step else _FIRST_SHARE
+            else:
+                step *= 0.5
+                if step < _LEAST_SHARE:
+                    return None
+
+    def _newton(self, x: Array, v: Array, share: float) -> Array | None:
+        """A solution with this share of the friction; steps are shortened once a set of statuses comes again."""
+        seen, damped, residual = set[bytes](), False, np.inf
         for _ in range(_NEWTON_STEPS):
-            codes = [self._status(i, x, v) for i in range(len(self.free))]
-            x = self._selected(codes)
-            if x is None:
+            look()
+            codes = self._statuses(x, v, share)
+            damped = damped or codes.tobytes() in seen
+            seen.add(codes.tobytes())
+            ahead = self._selected(codes, share)
+            if ahead is None:
                 return None
-            v = self.h - self.R @ x
-            if self._solves(x, v):
-                return x, [self._named(i, x, v) for i in range(len(self.free))]
+            if damped:
+                ahead = self._shortened(x, ahead, residual, share)
+                if ahead is None:
+                    return None
+            x, v = ahead, self.h - self.R @ ahead
+            residual = self._residual(x, v, share)
+            if residual <= NEAR:
+                return x
         return None
 
-    def _status(self, i: int, x: Array, v: Array) -> int:
-        """The status whose test functions are active at a point (theory, (1.7))."""
-        if x[i] + v[i] <= 0:
-            return OPEN
-        t = self.tangential[i]
-        if t < 0:
-            return FRICTIONLESS
-        bound = self.system.F[self.free[i]] * x[i]
-        if x[t] + v[t] > bound:
-            return SLIP_PLUS
-        return SLIP_MINUS if x[t] + v[t] < -bound else STICK
+    def _shortened(self, x: Array, ahead: Array, residual: float, share: float) -> Array | None:
+        """A point on the way at which the residual is less."""
+        part = 1.0
+        while part > _LEAST_PART:
+            point = x + part * (ahead - x)
+            if self._residual(point, self.h - self.R @ point, share) < (1.0 - _LEAST_PART * part) * residual:
+                return point
+            part *= 0.5
+        return None
 
-    def _selected(self, codes: list[int]) -> Array | None:
+    def _statuses(self, x: Array, v: Array, share: float) -> NDArray[np.intp]:
+        """The statuses whose test functions are active at a point (theory, (1.7))."""
+        m, t = len(self.free), self.tangential[self.rubbing]
+        codes = np.where(x[:m] + v[:m] > 0, FRICTIONLESS, OPEN)
+        loaded = codes[self.rubbing] != OPEN
+        bound, reach = share * self._F * x[:m][self.rubbing], x[t] + v[t]
+        slips = np.where(reach > bound, SLIP_PLUS, np.where(reach < -bound, SLIP_MINUS, STICK))
+        codes[self.rubbing] = np.where(loaded, slips, OPEN)
+        return codes
+
+    def _selected(self, codes: NDArray[np.intp], share: float) -> Array | None:
         """The forces of the reduced problem's selection; None where its matrix is singular."""
-        F, rows, columns = self.system.F, [], []
-        for i, code in enumerate(codes):
-            if code == OPEN:
-                continue
-            column = np.zeros(len(self.places))
-            column[i] = 1.0
-            if code in (SLIP_PLUS, SLIP_MINUS):
-                column[self.tangential[i]] = F[self.free[i]] * (1 if code == SLIP_PLUS else -1)
-            rows.append(i)
-            columns.append(column)
-            if code == STICK:
-                rows.append(int(self.tangential[i]))
-                columns.append(np.eye(len(self.places))[rows[-1]])
-        if not rows:
-            return np.zeros(len(self.places))
-        E = np.column_stack(columns)
+        closed, stuck = np.flatnonzero(codes != OPEN), self.tangential[codes == STICK]
+        x, rows = np.zeros(len(self.places)), np.concatenate([closed, stuck])
+        slips = np.flatnonzero((codes == SLIP_PLUS) | (codes == SLIP_MINUS))
+        turn = np.where(codes == SLIP_PLUS, share, -share) * self._friction
+        across = self.R[rows]
+        M = across[:, rows]
+        M[:, np.searchsorted(closed, slips)] += across[:, self.tangential[slips]] * turn[slips]
         try:
-            return np.asarray(E @ np.linalg.solve(self.R[rows] @ E, self.h[rows]))
+            x[rows] = np.linalg.solve(M, self.h[rows])
         except np.linalg.LinAlgError:
             return None
+        x[self.tangential[slips]] = turn[slips] * x[slips]
+        return x
 
-    def _solves(self, x: Array, v: Array) -> bool:
-        m, t = len(self.free), self.tangential
-        if np.min(x[:m], initial=0.0) < -NEAR or np.max(v[:m], initial=0.0) > NEAR:
-            return False
-        sliding = t >= 0
-        bound = self.system.F[self.nodes][sliding] * x[:m][sliding]
-        xt, vt = x[t[sliding]], v[t[sliding]]
-        apart = np.minimum(np.abs(xt - np.sign(vt) * bound), np.abs(vt))
-        return bool(
-            np.all(np.minimum(x[:m], -v[:m]) <= NEAR)
-            and np.all(np.abs(xt) <= bound + NEAR)
-            and np.max(apart, initial=0.0) <= NEAR
-        )
+    def _residual(self, x: Array, v: Array, share: float) -> float:
+        """What the point is off at most: its conditions are min(lambda_n, -w_n) = 0, and of the slip likewise."""
+        m, t = len(self.free), self.tangential[self.rubbing]
+        bound = share * self._F * np.maximum(x[:m][self.rubbing], 0.0)
+        apart = np.abs(np.minimum(x[:m], -v[:m])), np.abs(x[t] - np.clip(x[t] + v[t], -bound, bound))
+        residual = float(max(np.max(part, initial=0.0) for part in apart))
+        return residual if np.isfinite(residual) else np.inf
 
-    def _named(self, i: int, x: Array, v: Array) -> int:
+    def _named(self, x: Array) -> list[int]:
         """The first status that holds up to NEAR: of those that do, one whose equations are regular with others'."""
-        if x[i] <= NEAR:
-            return OPEN
-        t = self.tangential[i]
-        if t < 0:
-            return FRICTIONLESS
-        if abs(v[t]) <= NEAR:
-            return STICK
-        return SLIP_PLUS if v[t] > 0 else SLIP_MINUS
+        v, m, t = self.h - self.R @ x, len(self.free), self.tangential[self.rubbing]
+        codes = np.full(m, FRICTIONLESS)
+        codes[self.rubbing] = np.where(np.abs(v[t]) <= NEAR, STICK, np.where(v[t] > 0, SLIP_PLUS, SLIP_MINUS))
+        codes[x[:m] <= NEAR] = OPEN
+        return [int(code) for code in codes]
 
     # -- the test of definiteness ----------------------------------------------------------------------------------
 
-    def weights(self, x: Array, v: Array, *, exactly: bool, factors: bool) -> Array | None:
+    def weights(self, x: Array, v: Array, *, exactly: bool, sought: Numbers = Numbers.CENTRES) -> Array | None:
         """Numbers for which the form of theory, (6.9), is definite at a solution, as a proof has them, or None.
 
         Parameters
         ----------
         x, v : forces and displacements
         exactly : for a proof that knows the solution exactly
-        factors : see ``weights_of``
+        sought : see ``weights_of``
         """
         if not len(self.places):
             return np.zeros(0)
@@ -172,7 +205,7 @@ class Reduction:
         share = np.where((n <= NEAR) & ((gap > NEAR) | (slip == 0)), np.nan, share)
         wide = self.resting(x, v)[normal] & (not exactly)
         nodes = Nodes(len(self.nodes), normal, tangential, F, share, wide, np.where(gap > NEAR, gap, 0.0), slip)
-        return weights_of(self.R, nodes, factors=factors)
+        return weights_of(self.R, nodes, sought)
 
     def resting(self, x: Array, v: Array) -> NDArray[np.bool_]:
         """Nodes with friction, and free, that touch without load at a solution and do not slide."""

@@ -172,7 +172,7 @@ class Solvers:
             splitting=PlaneSplitting(self.scaled.F, sliding=closing.sliding),
             limits=limits,
             progress=progress,
-            closer=Closer(closing),
+            closer=Closer(self.scaled, closing),
             forms=self._forms,
         )
 

@@ -136,6 +136,8 @@ class TreeSearch:
     def run(self) -> SearchOutcome:
         """Examine the whole tree."""
         start = [self.first()]
+        if self._one(start[0]):
+            return self.outcome
         if self.forms is None:
             self.loop(start, None)
             return self.outcome
@@ -150,23 +152,33 @@ class TreeSearch:
         self.loop(stack, None)
         return self.outcome
 
+    def _one(self, item: TreeNode) -> bool:
+        """Whether one certificate proves that the problem has one solution."""
+        if self.closer is None:
+            return False
+        try:
+            with within(self.limits):
+                found = self.closer.whole()
+        except TimeOverError:
+            return False
+        if found is not None:
+            self.outcome.nodes += 1
+            self._close(item, found)
+        return found is not None
+
     def _begin(self, start: list[TreeNode], held: HeldRecords, forms: Forms) -> list[Any]:
         """Search until it is known how the search goes on: from the beginning, if that is better; what still waits."""
 
         def due() -> bool:
             return forms.due(self.outcome.nodes, self.covered)
 
-        closer, system = self.closer, self.system
-
-        def known() -> bool:
-            assert closer is not None
-            assert isinstance(system, ScaledSystem)
-            return due() or closer.begins_again(system, self.outcome.nodes)
-
-        stack = self.loop(start, known if closer is not None and isinstance(system, ScaledSystem) else due)
-        if stack and not due():
+        closer, stack = self.closer, list[Any](start)
+        while stack:
+            stack = self.loop(stack, lambda: due() or (closer is not None and closer.begins_again(self.outcome.nodes)))
+            if not stack or due():
+                break
             self._forget(held)
-            stack = self.loop(start, due)
+            stack = [] if self._one(start[0]) else list(start)
         if stack and self._pays(forms):
             self._forget(held)
             return list(start)
@@ -318,10 +330,13 @@ class TreeSearch:
         found = (self.closer.again if again else self.closer.closed)(item.codes, relaxation)
         if found is None:
             return False
+        self._close(item, found)
+        return True
+
+    def _close(self, item: TreeNode, found: list[Any]) -> None:
         self.outcome.closed += 1
         self.outcome.solutions += found
         self.covered += item.weight
-        return True
 
     def settled(self, item: TreeNode) -> bool:
         """Whether the certifier decides a complete selection, or leaves it undecided for good."""

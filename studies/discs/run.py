@@ -25,7 +25,7 @@ from unittest.mock import patch
 import numpy as np
 
 import enumsol
-from enumsol.search.definite import weights_of
+from enumsol.search.definite import Numbers, weights_of
 from enumsol.search.reduction import NEAR, Reduction
 from enumsol.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from grazing.run import SOFT, STIFF
@@ -78,10 +78,10 @@ def problems(run):
                     yield kind, name, count, seed, discs(radii, weights, stiffness)
 
 
-def with_ones(*form, factors):
+def with_ones(R, nodes, sought=Numbers.PLAIN):
     """What is found if mu = kappa = 1 and nu = 0."""
-    del factors
-    return weights_of(*form, factors=False)
+    del sought
+    return weights_of(R, nodes, Numbers.PLAIN)
 
 
 def forms(system, root):
@@ -102,7 +102,7 @@ def forms(system, root):
         undecided = tuple(i for i in free if i not in sliding)
         reduction = Reduction(system, codes, undecided, sliding)
         x, v = force[reduction.places], w[reduction.places]
-        found = [reduction.weights(x, v, exactly=True, factors=factors) for factors in (False, True)]
+        found = [reduction.weights(x, v, exactly=True, sought=sought) for sought in (Numbers.PLAIN, Numbers.CENTRES)]
         definite += [yes(numbers is not None) for numbers in found]
     return len(free), len(sides), *definite
 

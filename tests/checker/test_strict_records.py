@@ -20,6 +20,7 @@ from graph_proofs import cut_in_two, forms_at_once, of_kind, triangle
 from proof_tools import MAGIC, bytes_of, copied, proof_of, records_of, sealed
 from rational_checker import Refused, check
 from touching import beside_a_loaded_node
+from trees import by_the_tree
 
 from enumsol import InvalidArgumentError, Proof, ProofFormatError, branch_graph, enumerate_roots, gallery, verify
 from enumsol.search import forms
@@ -35,6 +36,7 @@ POINTS = {
     "in rationals": lambda: (integer_problem(np.random.default_rng(143), 2), 0.0),
     "forms": lambda: (slipping(), 0.0),
     "cut short": lambda: (gallery.chain(2), 5.0),
+    "one certificate": lambda: (slipping(), 0.0),
 }
 GRAPHS = {
     "graph": lambda: (triangle(), (0.0, 5.0)),
@@ -66,7 +68,8 @@ def case(name):
             records = records_of(branch_graph(problem, interval).proof)
         return problem, cut_in_two(records) if name == "halves" else records
     problem, alpha = POINTS[name]()
-    with mock.patch.multiple(forms, NODES=0, MORE=-2.0) if name == "forms" else nullcontext():
+    early = mock.patch.multiple(forms, NODES=0, MORE=-2.0) if name == "forms" else nullcontext()
+    with early, nullcontext() if name in ("one certificate", "touching") else by_the_tree():
         roots = enumerate_roots(problem, alpha, max_nodes=4 if name == "cut short" else None)
     header, *records, footer = records_of(roots.proof)
     if name == "in rationals":

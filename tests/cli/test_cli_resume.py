@@ -36,7 +36,7 @@ def test_a_search_in_two_parts(capsys, tmp_path):
     assert status == 0
 
 
-def test_solve(capsys, tmp_path):
+def test_solve(capsys, tree_only, tmp_path):
     mesh, proof, report = tmp_path / "body.msh", tmp_path / "b.proof", tmp_path / "b.json"
     mesh.write_text(BODY)
     search = ("solve", mesh, *OPTIONS, "--friction", "0.5,0", "--proof", proof, "--json", report, "--resume")

@@ -133,15 +133,15 @@ def any_side(monkeypatch):
     """Nodes are told from sticking and slipping in one direction, whether they slide or not."""
     before, rng = closing.Closer.__init__, np.random.default_rng(2)
 
-    def made(self, certifier):
-        before(self, certifier)
+    def made(self, system, certifier):
+        before(self, system, certifier)
         certifier.sliding.update({i: int(rng.choice([FORWARD, BACKWARD])) for i in range(8) if rng.random() < 0.7})
 
     monkeypatch.setattr(closing.Closer, "__init__", made)
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_splits_by_sides_find_the_same(any_side, seed):
+def test_splits_by_sides_find_the_same(any_side, tree_only, seed):
     rng = np.random.default_rng(seed)
     p = int(rng.integers(1, 5))
     problem = touching_problem(rng, p) if seed % 3 else integer_problem(rng, p)

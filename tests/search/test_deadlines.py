@@ -130,7 +130,7 @@ def test_what_was_not_joined_in_time_is_listed(clock, takes):
     assert roots.at_least <= 1
 
 
-def test_a_form_is_not_sought_beyond_the_limit(clock, takes, monkeypatch):
+def test_a_form_is_not_sought_beyond_the_limit(clock, takes, tree_only, monkeypatch):
     monkeypatch.setattr(forms, "NODES", 0)
     takes(FormAscent, "_candidate")
     problem = gallery.clamped_block(12, 6)

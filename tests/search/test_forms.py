@@ -18,6 +18,8 @@ from enumsol.kernel.rows import row_signs
 from enumsol.search import forms as policy
 from enumsol.search.solvers import Solvers, as_computed
 
+pytestmark = pytest.mark.usefixtures("tree_only")
+
 
 @pytest.fixture
 def eager(monkeypatch):

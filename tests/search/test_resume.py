@@ -6,6 +6,7 @@ import subprocess
 import sys
 import textwrap
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from functools import cache
 
 import numpy as np
@@ -19,6 +20,7 @@ from problems3d import forces
 from proof_fuzz import mutant
 from proof_tools import bytes_of, copied, multipliers, proof_of, records_of, with_multipliers
 from touching import touching_problem
+from trees import by_the_tree
 
 from enumsol import (
     ContactProblem,
@@ -70,6 +72,7 @@ PROBLEMS = {
     "border": lambda: (integer_problem(np.random.default_rng(20), 2), 0.0),
     "unloaded": lambda: (from_condensed(np.eye(4), np.zeros(4), np.full(2, 0.5)), 0.0),
     "forms": lambda: (gallery.clamped_block(12, 6), 0.3),
+    "one certificate": lambda: (gallery.clamped_block(4, 2), 0.3),
     "in space": lambda: (gallery.get("one-node-3d-3").build(), 0),
     "block in space": lambda: (gallery.get("block3d-4").build(), 0.5),
 }
@@ -83,7 +86,8 @@ def known(name):
     if name == "forms":
         policy.NODES, policy.MORE = 0, -2.0
     try:
-        return problem, alpha, enumerate_roots(problem, alpha)
+        with by_the_tree() if name in ("forms", "contradiction", "no root", "border") else nullcontext():
+            return problem, alpha, enumerate_roots(problem, alpha)
     finally:
         policy.NODES, policy.MORE = before
 
@@ -251,7 +255,7 @@ def test_rows_that_do_not_exist_in_space(tmp_path):
 
 @pytest.mark.parametrize("name", ["wedge", "forms", "closed", "block in space"])
 @pytest.mark.parametrize("limits", [{"max_nodes": 7}, {"max_nodes": 40}])
-def test_a_search_in_small_parts(name, limits, tmp_path):
+def test_a_search_in_small_parts(name, limits, tree_only, tmp_path):
     problem, alpha, whole = known(name)
     path = tmp_path / "x.proof"
     found = enumerate_roots(problem, alpha, proof_path=path, resume=True, **limits)

@@ -67,7 +67,7 @@ def test_exact_arithmetic_refuses_large_bodies():
         enumsol.enumerate_roots(gallery.clamped_block(32, 8), 1.0, "exact")
 
 
-def test_statistics_add_up():
+def test_statistics_add_up(tree_only):
     roots = enumsol.enumerate_roots(gallery.clamped_block(14, 4), 2.0, "fast")
     stats = roots.stats
     assert stats.qps == stats.nodes

@@ -102,7 +102,7 @@ def test_one_proof(small_parts, wedge):
 
 
 @pytest.mark.parametrize("nodes", [0, 100])
-def test_one_proof_with_forms(small_parts, monkeypatch, nodes):
+def test_one_proof_with_forms(small_parts, tree_only, monkeypatch, nodes):
     monkeypatch.setattr(policy, "NODES", nodes)
     problem = gallery.clamped_block(32, 16)
     whole = enumerate_roots(problem, 0.3)

@@ -10,15 +10,15 @@ import numpy as np
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.margins import margin_of_form
 from enumsol.search.certifiers.protocol import UndecidedPart, WithoutProof
-from enumsol.search.closing import holds_below, propose, start, without_load
+from enumsol.search.closing import holds_below, without_load
 from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution, VertexLimitError
 
 if TYPE_CHECKING:
     from enumsol.kernel.forms import EnclosedForm
-    from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.margins import Margin
     from enumsol.search.certifiers.protocol import Bound
+    from enumsol.search.closing import Point, Proposal
     from enumsol.selections.floats import FloatSelections
     from enumsol.selections.solution import Codes, SelectionSolver
 
@@ -45,6 +45,8 @@ class FastCertifier(WithoutProof):
     """
 
     hard = False
+    # with other numbers forms are definite where they nearly are not: several points may hold within the tolerance
+    exactly, plain = True, True
 
     def __init__(self, selections: FloatSelections) -> None:
         self._selections = selections
@@ -64,11 +66,10 @@ class FastCertifier(WithoutProof):
             return margin(codes, rows, values) > 2.0 * self._selections.tolerance * shift
         return relaxation.bound > PRUNE_MARGIN + 2.0 * self._selections.tolerance * shift
 
-    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+    def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, none or one, if it can hold one only; within the tolerance."""
+        del near
         solver = self._selections
-        # with omega forms are definite where they nearly are not: several points may hold within the tolerance
-        proposal = propose(solver.system, codes, *start(solver.system, relaxation), exactly=True, factors=False)
         if proposal is None or proposal.weights is None:
             return None
         if 2.0 * solver.tolerance * proposal.reduction.sensitivity > _NEARBY:

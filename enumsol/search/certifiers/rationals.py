@@ -10,7 +10,7 @@ from enumsol.relaxation.rows import imposed_rows
 from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
 from enumsol.search.certifiers.floats import solve_or_open
 from enumsol.search.certifiers.protocol import WithoutProof
-from enumsol.search.closing import holds_below, propose, start
+from enumsol.search.closing import holds_below, propose
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import OPEN, SLIDING, RowKind
 
@@ -20,9 +20,8 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.protocol import Bound, UndecidedPart
-    from enumsol.search.closing import Proposal
+    from enumsol.search.closing import Point, Proposal
     from enumsol.selections.rationals import ExactSelections
     from enumsol.selections.solution import Codes
 
@@ -36,6 +35,7 @@ class ExactCertifier(WithoutProof):
     """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, (6.1))."""
 
     hard = False
+    exactly, plain = True, False
 
     def __init__(
         self, selections: ExactSelections, scaled: ScaledSystem, enclosed: EnclosedSystem | None = None
@@ -50,17 +50,18 @@ class ExactCertifier(WithoutProof):
         """All roots in the selection."""
         return solve_or_open(self._selections, codes)
 
-    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+    def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
-        found = self.closing(codes, *start(self._scaled, relaxation))
+        del near
+        found = self._closing(codes, proposal)
         return None if found is None else found[1]
 
-    def closing(self, codes: Codes, force: Array, w: Array) -> tuple[Proposal, list[SelectionSolution]] | None:
+    def closing(self, codes: Codes, near: Point) -> tuple[Proposal, list[SelectionSolution]] | None:
         """What closes a subtree, and the solutions in it, sought near a point (theory, section 6.11)."""
-        if self._enclosed is None:
-            return None
-        proposal = propose(self._scaled, codes, force, w, exactly=True)
-        if proposal is None or proposal.weights is None:
+        return self._closing(codes, propose(self._scaled, codes, near, exactly=True))
+
+    def _closing(self, codes: Codes, proposal: Proposal | None) -> tuple[Proposal, list[SelectionSolution]] | None:
+        if self._enclosed is None or proposal is None or proposal.weights is None:
             return None
         solver, selection = self._selections, proposal.selection
         solved = solver.solve_equations(selection, solver.system.g)

@@ -17,7 +17,7 @@ from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
 from enumsol.proof.proof_file import fraction_text, packed, shortened
 from enumsol.search.certifiers.margins import energy_margin, margin_of_form
 from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
-from enumsol.search.closing import propose, start, without_load
+from enumsol.search.closing import propose, without_load
 from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import CONDITIONS, RowKind
@@ -31,11 +31,10 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.kernel.forms import EnclosedForm
     from enumsol.proof.parts import Recorder
-    from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.margins import Margin
     from enumsol.search.certifiers.protocol import Bound
     from enumsol.search.certifiers.rationals import ExactCertifier
-    from enumsol.search.closing import Proposal
+    from enumsol.search.closing import Point, Proposal
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -92,6 +91,8 @@ class VerifiedCertifier:
         Where the records of the proof go.
     node_ids : labels of the contact nodes, for messages
     """
+
+    exactly, plain = False, False
 
     def __init__(
         self,
@@ -204,31 +205,25 @@ class VerifiedCertifier:
 
     # -- subtrees closed by their only possible solution (theory, section 6.11) ---------------------------------------
 
-    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+    def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
         if self._enclosed is None:
             return None
-        near = start(self._scaled, relaxation)
-        proposal = propose(self._scaled, codes, *near, exactly=False)
         if proposal is not None and proposal.least >= -NEAR:
             self._take_note(proposal.force, self._scaled.g - self._scaled.S @ proposal.force)
-        return self._closed(codes, proposal, near)
-
-    def _closed(
-        self, codes: Codes, proposal: Proposal | None, near: tuple[Array, Array]
-    ) -> list[SelectionSolution] | None:
         ball = None if proposal is None else self._proven(proposal)
-        # statuses that do not hold strictly are told by rationals, where there are any
-        if proposal is not None and ball is not None and (proposal.strict or ball.is_excluded or self._is_known(ball)):
+        # statuses that do not hold strictly are told by rationals, where there are any, and so is a hardly placed root
+        told = ball is not None and (ball.is_excluded or self._is_known(ball))
+        if proposal is not None and ball is not None and (told or (proposal.strict and not ball.is_wide)):
             return self._closed_by(proposal, ball)
         certifier = None if proposal is not None and proposal.hopeless else self._exact()
-        if certifier is not None and (exact := certifier.closing(codes, *near)) is not None:
+        if certifier is not None and (exact := certifier.closing(codes, near)) is not None:
             closing, solutions = exact
             self._known += [solution.codes for solution in solutions]
             self._escalations.rationals += 1
             self._leaf(Leaf.CLOSED_IN_RATIONALS, closing.selection, closing.numbers, len(solutions))
             return solutions
-        found = None if proposal is None or ball is None else self._closed_by(proposal, ball)
+        found = None if proposal is None or ball is None or ball.is_wide else self._closed_by(proposal, ball)
         if found and proposal is not None and certifier is not None:
             exactly = certifier.solution_near(proposal)
             if exactly is not None:
@@ -245,9 +240,9 @@ class VerifiedCertifier:
         if near is None:
             return None
         self._take_note(near.force, near.w)
-        proposal = propose(self._scaled, codes, near.force, near.w, exactly=False)
+        proposal = propose(self._scaled, codes, (near.force, near.w), exactly=False)
         ball = None if proposal is None else self._proven(proposal)
-        return None if proposal is None or ball is None else self._closed_by(proposal, ball)
+        return None if proposal is None or ball is None or ball.is_wide else self._closed_by(proposal, ball)
 
     def _proven(self, proposal: Proposal) -> ClosedSolution | None:
         system = _present(self._enclosed)
