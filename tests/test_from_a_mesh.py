@@ -27,7 +27,7 @@ def seen(tmp_path_factory):
 def test_the_commands(seen):
     assert len(seen["outputs"]) == 3
     for _, text in seen["outputs"]:
-        assert "complete: yes (proven)" in text
+        assert "complete: yes (proven" in text
     written, described = seen["folder"] / "punch.npz", seen["folder"] / "punch.toml"
     assert enumsol.read_problem(written).fingerprint == fem.read_mesh_problem(described).fingerprint
     assert seen["body"].p == seen["block"].p
@@ -88,4 +88,4 @@ def test_a_mirrored_pair_is_half_of_it_on_a_rigid_foundation(seen):
 def test_from_gmsh_to_the_roots(tmp_path):
     subprocess.run([sys.executable, "-c", GMSH], check=True, capture_output=True, cwd=tmp_path)
     seen = follow(PAGE, tmp_path)
-    assert all("complete: yes (proven)" in text for _, text in seen["outputs"])
+    assert all("complete: yes (proven" in text for _, text in seen["outputs"])

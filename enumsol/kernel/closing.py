@@ -380,21 +380,14 @@ class Reduced:
         least = self.least(numbers)
         if not least > 0:
             return None
+        if len(self.nodes) == self.system.p and not any(code in _SLIDING for code in self.selection):
+            # all nodes are free: where its selection holds strictly, that is closer than (6.10) if Q is hardly definite
+            root = solve_selection(self.system, self.selection)
+            if root is not None and root.is_root:
+                return self._alone(Ball(root.force[self.places], root.force_rad[self.places]), numbers, least)
         x = self._point(force, numbers)
         reach = self._distance(x.mid, self._displacements(x), numbers) / least * SAFE
-        found = self._alone(Ball(x.mid, (x.rad + reach) * SAFE), numbers, least) if np.isfinite(reach) else None
-        if found is None:
-            found = self._regular(numbers, least)
-        return found
-
-    def _regular(self, numbers: Weights, least: float) -> ClosedSolution | None:
-        """The same where the solution is regular and its selection encloses it: closer, where Q is hardly definite."""
-        if any(code in _SLIDING for code in self.selection):
-            return None
-        root = solve_selection(self.system, self.selection)
-        if root is None or not root.is_root:
-            return None
-        return self._alone(Ball(root.force[self.places], root.force_rad[self.places]), numbers, least)
+        return self._alone(Ball(x.mid, (x.rad + reach) * SAFE), numbers, least) if np.isfinite(reach) else None
 
     def _alone(self, x: Ball, numbers: Weights, least: float) -> ClosedSolution | None:
         """The solution that is known to lie in a ball, if Q is definite for every theta that it may have there."""

@@ -206,7 +206,7 @@ class RootSet(Sequence[Root], Immutable):
     def by_one_certificate(self) -> bool:
         """Whether a form that is definite proved, without a tree, that there is one solution (theory, section 6.11)."""
         stats = self.stats
-        return self.whole and len(self) == 1 and stats.closed == 1 == stats.nodes + stats.resumed
+        return self.whole and len(self) == 1 and (stats.closed, stats.pruned, stats.selections) == (1, 0, 0)
 
     @property
     def index_sum(self) -> int | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from enumsol.search.definite import Numbers
+from enumsol.search.numbers import Numbers
 from enumsol.search.reduction import NEAR, Reduction
 from enumsol.selections.solution import SelectionSolution
 from enumsol.statuses import (
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 
 #: So many nodes that slide without load make a search begin again.
 _MANY = 3
-#: With fewer contact nodes a long tree is waited for: of so many nodes for each of these.
-_FEW, _LONG = 24, 8
+#: With fewer contact nodes other numbers than plain ones are sought only once the tree has so many nodes.
+_FEW, _LONG = 24, 256
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class Closer:
         #: Tries of the whole problem that are left, by the number of nodes after which they are due.
         self._tries = [(0, Numbers.DESCENT)]
         if certifier.plain or system.p < _FEW:
-            self._tries = [(0, Numbers.PLAIN), (_LONG * system.p, Numbers.DESCENT)][: 1 if certifier.plain else 2]
+            self._tries = [(0, Numbers.PLAIN), (_LONG, Numbers.DESCENT)][: 1 if certifier.plain else 2]
         self._whole: Proposal | None = None
 
     @property

@@ -1,15 +1,13 @@
-"""Numbers with which the form of theory, (6.9), is definite, as far as floats tell; nothing here is trusted."""
+"""Numbers with which the form of theory, (6.9), is definite, near analytic centres; nothing here is trusted."""
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.deadlines import look
-from enumsol.search.descent import Descent
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,7 +15,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 #: Smallest eigenvalue below which a form counts as not definite.
-_DEFINITE = 1e-10
+DEFINITE = 1e-10
 #: Smallest eigenvalue, as a share of R's diagonal, that is worth the search for it.
 _WORTH = 1e-5
 #: Smallest eigenvalue at which Newton's method need not go on.
@@ -78,48 +76,7 @@ class Nodes:
         return np.where(np.isfinite(self.share), self.share, chosen)
 
 
-class Numbers(enum.Enum):
-    """Where numbers are sought: mu = kappa = 1 and nu = 0 only; near analytic centres besides; or by descent."""
-
-    PLAIN = enum.auto()
-    CENTRES = enum.auto()
-    DESCENT = enum.auto()
-
-
-def weights_of(R: Array, nodes: Nodes, sought: Numbers = Numbers.CENTRES) -> Array | None:
-    """mu, kappa, nu, theta / F and tau for which (6.9) is definite, as a proof has them; None where none were found.
-
-    Parameters
-    ----------
-    R : (k, k) array
-    nodes : Nodes
-    sought : where; analytic centres serve where the form has to serve any theta, and the others hardly or not at all
-
-    Returns
-    -------
-    (count + 4 b,) array
-    """
-    b, F, share, n = len(nodes.F), nodes.F, nodes.first, nodes.normal
-    T = F[:, None] * R[nodes.tangential]
-    tau = np.where(nodes.wide, np.maximum(np.sqrt(np.sum(T * T, axis=1)), _DEFINITE), 0.0)
-    form = R.copy()
-    form[n] -= share[:, None] * T
-    wide = np.flatnonzero(nodes.wide)
-    form -= 0.5 * (T[wide] / tau[wide, None]).T @ T[wide]
-    form[n, n] -= 0.5 * tau
-    try:
-        if np.linalg.eigvalsh(0.5 * (form + form.T))[0] > _DEFINITE:
-            return np.concatenate([np.ones(nodes.count + b), np.zeros(b), share, tau])
-        if sought is Numbers.PLAIN:
-            return None
-        with np.errstate(all="ignore"):
-            search = Descent if sought is Numbers.DESCENT and not len(wide) else _Barrier
-            return search(R, nodes).numbers()
-    except np.linalg.LinAlgError:
-        return None
-
-
-class _Barrier:
+class AnalyticCentres:
     """The largest t for which M - t I is positive semidefinite, by a path of analytic centres.
 
     M is linear in z = (mu, kappa, nu, rho, tau): rho = kappa theta where theta may be chosen, tau where the form has to
@@ -184,7 +141,7 @@ class _Barrier:
             look()
             before = z[-1]
             z, decrement = self._moved(z, weight)
-            if z[-1] > _DEFINITE:
+            if z[-1] > DEFINITE:
                 # farther from the border where it is not far yet: enclosures are wide near it
                 after += 1
                 if after > _AFTER or decrement < _CENTRED or z[-1] > _CLEARLY:
@@ -194,7 +151,7 @@ class _Barrier:
                 if z[-1] + 2.0 * parts / weight < _WORTH * self._scale:
                     return None
                 weight *= _GROWTH
-        return self._found(z) if z[-1] > _DEFINITE else None
+        return self._found(z) if z[-1] > DEFINITE else None
 
     def _found(self, z: Array) -> Array:
         nodes, tau = self._nodes, np.zeros(len(self._nodes.F))

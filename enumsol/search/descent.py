@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize
 
 from enumsol.deadlines import look
 
@@ -69,6 +68,8 @@ class Descent:
         return self._as_written(z) if least > _JUST else None
 
     def _lowered(self, z: Array, weight: float) -> Array:
+        from scipy.optimize import minimize  # not for problems that need no numbers
+
         options = {"maxiter": _STEPS, "maxfun": _STEPS, "maxcor": _STEPS}
         found = minimize(self._objective, z, args=(weight,), jac=True, method="L-BFGS-B", options=options)
         return np.asarray(found.x)

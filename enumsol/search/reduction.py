@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.deadlines import look
-from enumsol.search.definite import Nodes, Numbers, weights_of
+from enumsol.search.definite import Nodes
+from enumsol.search.numbers import Numbers, weights_of
 from enumsol.statuses import BACKWARD, FORWARD, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:

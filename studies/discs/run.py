@@ -25,7 +25,7 @@ from unittest.mock import patch
 import numpy as np
 
 import enumsol
-from enumsol.search.definite import Numbers, weights_of
+from enumsol.search.numbers import Numbers, weights_of
 from enumsol.search.reduction import NEAR, Reduction
 from enumsol.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from grazing.run import SOFT, STIFF

@@ -78,7 +78,7 @@ def test_from_a_mesh_to_the_roots(here, capsys):
     )
     assert status == 0
     assert "RootSet at alpha = 0.5: 1 root" in out
-    assert out.endswith("complete: yes (proven)\n")
+    assert out.endswith("complete: yes (proven: one solution, by one certificate)\n")
     assert err == "enumsol: note: wrote a problem with 12 degrees of freedom and 3 contact nodes to body.npz\n"
     problem = read_problem("body.npz")
     direct = fem.mesh_problem(

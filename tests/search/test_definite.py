@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat
 
-from enumsol.search.definite import Nodes, Numbers, weights_of
+from enumsol.search.definite import Nodes
+from enumsol.search.numbers import Numbers, weights_of
 
 
 def exact(values):

@@ -1,0 +1,227 @@
+"""One certificate in place of the tree where there is one solution: against all selections, in exact arithmetic."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from compare import differences
+from generators import fe_compliance, from_condensed, integer_problem, planted_load, random_load, random_problem
+from proof_tools import copied, proof_of, records_of
+from rational_checker import check_records
+from touching import touching_problem
+from trees import by_the_tree
+
+from enumsol import InvalidArgumentError, enumerate_roots, gallery, is_unique, verify
+from enumsol.deadlines import TimeOverError
+from enumsol.search import closing, descent, reduction
+from enumsol.search.definite import Nodes
+from enumsol.search.reduction import Reduction
+from enumsol.statuses import UNDECIDED
+
+
+def scaled(problem, alpha):
+    return problem.condensed.at(alpha).scaled
+
+
+def whole(problem, alpha):
+    system = scaled(problem, alpha)
+    return Reduction(system, (UNDECIDED,) * system.p, tuple(range(system.p)), {})
+
+
+@pytest.mark.parametrize("traction", [(0.3, -1.0), (1.0, -0.3)])
+@pytest.mark.parametrize("nx", [32, pytest.param(64, marks=pytest.mark.slow)])
+def test_blocks_take_one_node(nx, traction):
+    problem = gallery.clamped_block(nx, nx // 2, traction=traction)
+    for alpha in (0.1, 1.0, 2.0, 5.0):
+        roots = enumerate_roots(problem, alpha)
+        assert (roots.stats.nodes, roots.stats.closed, len(roots)) == (1, 1, 1)
+        assert roots.by_one_certificate
+        assert str(roots).endswith("complete: yes (proven: one solution, by one certificate)")
+        assert [record[0] for record in records_of(roots.proof)[1:-1]] == ["m"]
+        assert verify(problem, roots.proof).complete
+        with by_the_tree():
+            assert not differences(roots, enumerate_roots(problem, alpha))
+
+
+def problems(seed):
+    rng = np.random.default_rng([9, seed])
+    p = int(rng.integers(1, 5))
+    if seed % 4 == 0:
+        return integer_problem(rng, p)
+    if seed % 4 == 1:
+        return touching_problem(rng, p)
+    if seed % 4 == 2:
+        return random_problem(rng, p)
+    S, F = fe_compliance(rng, p), rng.uniform(0.05, 1.2, size=p)
+    g = planted_load(rng, S, F) if seed % 8 == 3 else None
+    return from_condensed(S, random_load(rng, p) if g is None else g, F)
+
+
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 5))])
+def test_all_selections_find_the_same(part, monkeypatch):
+    # other numbers are sought at once, and small bodies are not spared them
+    monkeypatch.setattr(closing, "_FEW", 0)
+    certified = several = 0
+    for seed in range(80 * part, 80 * part + 80):
+        problem = problems(seed)
+        alpha = 1.0 if seed % 4 == 2 else 0
+        exact = enumerate_roots(problem, alpha, "exact", "exhaustive")
+        roots = enumerate_roots(problem, alpha)
+        assert roots.complete
+        assert (len(roots), len(roots.families)) == (len(exact), len(exact.families)), seed
+        assert [root.active for root in roots] == [root.active for root in exact], seed
+        assert [root.index for root in roots] == [root.index for root in exact], seed
+        assert verify(problem, roots.proof).complete
+        assert check_records(problem, records_of(roots.proof)) == records_of(roots.proof)[-1]
+        assert is_unique(problem, alpha) is (len(exact) == 1 and not exact.families)
+        certified += roots.by_one_certificate
+        several += len(exact) > 1
+        if roots.by_one_certificate:
+            assert len(exact) == 1
+            assert not exact.families
+    assert certified > 20
+    assert several > 5
+
+
+def test_long_trees_of_small_bodies_are_cut_short(monkeypatch):
+    monkeypatch.setattr(closing, "_LONG", 10)
+    problem = gallery.clamped_block(8, 4, traction=(1.0, -0.3))
+    with by_the_tree():
+        tree = enumerate_roots(problem, 5.0)
+    assert tree.stats.nodes > 10
+    roots = enumerate_roots(problem, 5.0)
+    assert roots.by_one_certificate
+    assert roots.stats.nodes == 11
+    assert not differences(roots, tree)
+    assert verify(problem, roots.proof).complete
+    with ThreadPoolExecutor(2) as executor:
+        assert not differences(enumerate_roots(problem, 5.0, executor=executor), tree)
+
+
+def test_numbers_that_prove_nothing_cost_their_time_only(monkeypatch):
+    problem = gallery.wedge(4, 4)
+    with by_the_tree():
+        tree = enumerate_roots(problem, 1.0)
+    monkeypatch.setattr(closing, "_LONG", 20)
+    monkeypatch.setattr(closing.Reduction, "weights", lambda self, *_, **__: np.ones(5 * len(self.nodes)))
+    roots = enumerate_roots(problem, 1.0)
+    assert not roots.by_one_certificate
+    assert not differences(roots, tree)
+    assert verify(problem, roots.proof).complete
+
+
+def test_without_a_solution_the_tree_finds_it(monkeypatch):
+    monkeypatch.setattr(reduction, "_NEWTON_STEPS", 0)
+    problem = gallery.clamped_block(8, 4)
+    roots = enumerate_roots(problem, 0.3)
+    assert roots.complete
+    assert roots.stats.nodes > 1
+
+
+def test_a_path_in_friction_where_newton_fails():
+    found = 0
+    for nx in (8, 16, 32, 64):
+        for traction in ((0.3, -1.0), (1.0, -0.3)):
+            sought = whole(gallery.clamped_block(nx, nx // 2, traction=traction), 5.0)
+            start = np.zeros(2 * nx), sought.h
+            found += sought.solution(*start) is None
+            x, _ = sought.sought()
+            assert sought._residual(x, sought.h - sought.R @ x, 1.0) <= 1e-9
+    assert found > 1
+
+
+def nodes_of(rng, b, chosen):
+    share = np.where(chosen, np.nan, rng.uniform(-1, 1, b))
+    n, none = np.arange(b), np.zeros(b, dtype=bool)
+    gap, slip = (np.where(chosen, rng.uniform(0.1, 2, b), 0.0) for _ in range(2))
+    return Nodes(b, n, b + n, rng.uniform(0.1, 2, b), share, none, gap, slip * rng.choice([-1, 1], b))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_slopes_of_the_descent(seed):
+    rng = np.random.default_rng(seed)
+    S = fe_compliance(rng, 4)
+    sought = descent.Descent(S / np.mean(np.diag(S)), nodes_of(rng, 4, rng.random(4) < 0.5))
+    z, weight = 0.1 * rng.normal(size=12), 30.0
+    assert sought._objective(z, weight)[0] < descent._BEYOND
+    slopes = [sought._objective(z + h, weight)[0] - sought._objective(z - h, weight)[0] for h in 1e-5 * np.eye(12)]
+    assert np.allclose(np.array(slopes) / 2e-5, sought._objective(z, weight)[1], atol=1e-7)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_descent_finds_is_definite(seed):
+    """Checked with D written out: D d has mu d_n + nu d_t for lambda_n and kappa (d_t - theta d_n) for lambda_t."""
+    rng = np.random.default_rng(seed)
+    found = 0
+    for _ in range(20):
+        S = fe_compliance(rng, 4)
+        nodes = nodes_of(rng, 4, rng.random(4) < 0.5)
+        numbers = descent.Descent(S, nodes).numbers()
+        if numbers is None:
+            continue
+        found += 1
+        mu, kappa, nu, share, tau = numbers.reshape(5, 4)
+        D = np.block([[np.diag(mu), np.diag(nu)], [-np.diag(kappa * share * nodes.F), np.diag(kappa)]])
+        assert np.linalg.eigvalsh(D.T @ S + S @ D)[0] > 0
+        assert not tau.any()
+        assert np.all(np.abs(nu) * nodes.F <= mu)
+        side = np.sign(nodes.slip)
+        spare = (mu + side * nu * nodes.F) * nodes.gap - kappa * nodes.F * (1 - side * share) * np.abs(nodes.slip)
+        assert np.all(spare[~np.isfinite(nodes.share)] > -1e-12)
+    assert found > 5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_changed_certificates_prove_nothing_false(seed):
+    rng = np.random.default_rng(seed)
+    problem = gallery.clamped_block(4, 2, traction=(1.0, -0.3))
+    records = records_of(enumerate_roots(problem, 1.0).proof)
+    record = records[1]
+    assert record[0] == "m"
+    for place in (3, 4, 5):
+        for k, old in enumerate(record[place]):
+            for new in (-1.0, 0.0, 1e-3 * old, 50.0 * old, -old):
+                forged = copied(records)
+                forged[1][place][k] = new
+                if verify(problem, proof_of(forged)).ok:
+                    # other numbers may do as well; bounds must hold the root
+                    centre, radius, numbers = (np.array(forged[1][i]) for i in (4, 5, 3))
+                    assert np.all(np.abs(centre - record[4]) <= radius)
+                    assert np.all(numbers[:8] > 0)
+                    assert np.all(np.abs(numbers[8:12]) <= numbers[:4])
+    # a problem with three roots takes no certificate, whatever the numbers
+    problem = gallery.one_node_triangle()
+    header, *_ = records_of(enumerate_roots(problem, 5.0).proof)
+    for _ in range(200):
+        codes = [int(rng.choice([0, 1, 2, 3]))]
+        numbers = [*np.exp(rng.normal(size=2)), *rng.uniform(-1, 1, size=2), float(rng.choice([0.0, 1.0]))]
+        forged = [header, ["m", codes, [0], numbers, rng.normal(size=2).tolist(), [1e9, 1e9], 1]]
+        forged.append({"roots": 1, "families": 0, "undecided": 0, "leaves": 1})
+        assert not verify(problem, proof_of(forged)).ok
+
+
+def test_uniqueness_is_an_answer():
+    problem = gallery.two_node_square()
+    assert is_unique(problem, 1) is True
+    assert is_unique(problem, 3.5) is False
+    assert is_unique(problem, 3.5, max_nodes=1) is None
+    assert is_unique(problem, 1, arithmetic="fast") is None
+    assert is_unique(gallery.get("one-node-6.3").build(), 2.0) is False  # a continuum
+    with pytest.raises(InvalidArgumentError, match="alpha"):
+        is_unique(problem, "one")
+
+
+def test_time_that_ends_while_numbers_are_sought(monkeypatch):
+    def late(self):
+        raise TimeOverError
+
+    monkeypatch.setattr(descent.Descent, "numbers", late)
+    problem = gallery.clamped_block(32, 16, traction=(1.0, -0.3))
+    roots = enumerate_roots(problem, 5.0, max_nodes=3)
+    assert not roots.complete
+    assert roots.stats.nodes == 3
+
+
+@pytest.mark.parametrize("arithmetic", ["exact", "fast"])
+def test_other_arithmetics(arithmetic):
+    assert enumerate_roots(gallery.clamped_block(4, 2), 0.3, arithmetic).by_one_certificate
