@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
     from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.kernel.point import VerifiedSelection
 
     Codes = tuple[int, ...]
 
@@ -62,6 +63,8 @@ class ClosedSolution:
         Sign of the determinant of the fixed nodes' equations: the index, if the conditions below hold strictly.
     slack, slack_rad : arrays
         The conditions of the fixed nodes, and of every sliding one: the sign of its slip, unless it is open.
+    regular : VerifiedSelection or None
+        Its selection's solution, where its balls were taken for it.
     """
 
     core: Codes
@@ -73,6 +76,7 @@ class ClosedSolution:
     sign: int
     slack: Array
     slack_rad: Array
+    regular: VerifiedSelection | None = None
 
     @property
     def is_root(self) -> bool:
@@ -384,7 +388,8 @@ class Reduced:
             # all nodes are free: where its selection holds strictly, that is closer than (6.10) if Q is hardly definite
             root = solve_selection(self.system, self.selection)
             if root is not None and root.is_root:
-                return self._alone(Ball(root.force[self.places], root.force_rad[self.places]), numbers, least)
+                alone = self._alone(Ball(root.force[self.places], root.force_rad[self.places]), numbers, least)
+                return None if alone is None else replace(alone, regular=root)
         x = self._point(force, numbers)
         reach = self._distance(x.mid, self._displacements(x), numbers) / least * SAFE
         return self._alone(Ball(x.mid, (x.rad + reach) * SAFE), numbers, least) if np.isfinite(reach) else None

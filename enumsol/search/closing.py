@@ -40,7 +40,9 @@ if TYPE_CHECKING:
 #: So many nodes that slide without load make a search begin again.
 _MANY = 3
 #: With fewer contact nodes other numbers than plain ones are sought only once the tree has so many nodes.
-_FEW, _LONG = 24, 256
+_FEW, _LONG = 48, 512
+#: With so many the solution is sought along a path, too, before there is a tree.
+_PATH = 24
 
 
 @dataclass(frozen=True)
@@ -167,9 +169,11 @@ class Closer:
     def _proposed(self, sought: Numbers) -> Proposal | None:
         """What may be the only solution of the whole problem; takes note of where it is degenerate."""
         system, p = self._system, self._system.p
-        proposal = propose(system, (UNDECIDED,) * p, None, exactly=self._certifier.exactly, sought=sought)
+        codes, exactly = (UNDECIDED,) * p, self._certifier.exactly
+        proposal = propose(system, codes, (np.zeros(2 * p), system.g), exactly=exactly, sought=sought)
+        if proposal is None and (p >= _PATH or sought is Numbers.DESCENT):
+            proposal = propose(system, codes, None, exactly=exactly, sought=sought)
         if proposal is None:
-            self._tries.clear()
             return None
         force, w = self._near(proposal)
         self._touching = int(np.count_nonzero((np.abs(force[:p]) <= NEAR) & (np.abs(w[:p]) <= NEAR)))

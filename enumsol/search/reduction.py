@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 #: A condition of a scaled problem within this of zero may hold as an equation; only the choice of what to try rests on
 #: it.
 NEAR = 1e-9
-_NEWTON_STEPS = 40
-#: The least part of a step of Newton's method.
-_LEAST_PART = 1e-4
+#: Steps of Newton's method for few nodes; one more for so many more of these; at most.
+_NEWTON_STEPS, _NODES_A_STEP, _MOST_STEPS = 16, 4, 40
+#: The least part of a step, and of what a step promises by which the residual has to fall.
+_LEAST_PART, _FALL = 1 / 64, 1e-4
 #: Shares of the friction: the first one, and the least step.
 _FIRST_SHARE, _LEAST_SHARE = 0.25, 1 / 64
 
@@ -91,10 +92,8 @@ class Reduction:
         return None if x is None else (x, self._named(x))
 
     def sought(self) -> tuple[Array, list[int]] | None:
-        """The same from far away: Newton's method without forces, else along F from frictionless contact."""
-        x = self._newton(np.zeros(len(self.places)), self.h, 1.0)
-        if x is None:
-            x = self._along_friction()
+        """The same from far away: along F from frictionless contact."""
+        x = self._along_friction()
         return None if x is None else (x, self._named(x))
 
     def _along_friction(self) -> Array | None:
@@ -115,7 +114,7 @@ class Reduction:
     def _newton(self, x: Array, v: Array, share: float) -> Array | None:
         """A solution with this share of the friction; steps are shortened once a set of statuses comes again."""
         seen, damped, residual = set[bytes](), False, np.inf
-        for _ in range(_NEWTON_STEPS):
+        for _ in range(min(_NEWTON_STEPS + len(self.free) // _NODES_A_STEP, _MOST_STEPS)):
             look()
             codes = self._statuses(x, v, share)
             damped = damped or codes.tobytes() in seen
@@ -136,9 +135,9 @@ class Reduction:
     def _shortened(self, x: Array, ahead: Array, residual: float, share: float) -> Array | None:
         """A point on the way at which the residual is less."""
         part = 1.0
-        while part > _LEAST_PART:
+        while part >= _LEAST_PART:
             point = x + part * (ahead - x)
-            if self._residual(point, self.h - self.R @ point, share) < (1.0 - _LEAST_PART * part) * residual:
+            if self._residual(point, self.h - self.R @ point, share) < (1.0 - _FALL * part) * residual:
                 return point
             part *= 0.5
         return None

@@ -154,7 +154,7 @@ class TreeSearch:
 
     def _one(self, item: TreeNode) -> bool:
         """Whether one certificate proves that the problem has one solution."""
-        if self.closer is None:
+        if self.closer is None or self.limits.max_nodes == 0:
             return False
         try:
             with within(self.limits):
@@ -164,6 +164,7 @@ class TreeSearch:
         if found is not None:
             self.outcome.nodes += 1
             self._close(item, found)
+            self.report(self.covered)
         return found is not None
 
     def _begin(self, start: list[TreeNode], held: HeldRecords, forms: Forms) -> list[Any]:

@@ -287,7 +287,7 @@ class VerifiedCertifier:
         if any(len(codes) > 1 for codes in ball.possible):
             return None
         codes = tuple(code for (code,) in ball.possible)
-        regular = solve_selection(_present(self._enclosed), codes)
+        regular = ball.regular or solve_selection(_present(self._enclosed), codes)
         if regular is None or not regular.is_root:
             return None
         self._verified[codes] = regular
