@@ -126,6 +126,11 @@ class Closer:
         self._wait = self._pause = 0
         return True
 
+    def whole(self, nodes: int) -> list[SelectionSolution] | None:
+        """No try about the whole tree."""
+        del nodes
+        return None
+
     def _look(self, system: ScaledSystem) -> None:
         """Take note of a degenerate solution, if Newton's method finds one."""
         whole = Reduction(system, (UNDECIDED,) * system.p, tuple(range(system.p)), {})

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from enumsol.kernel.forms import EnclosedForm
     from enumsol.search.certifiers.protocol import Bound, Certifier
     from enumsol.search.closing import Closer
+    from enumsol.search.space_closing import SpaceCloser
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
@@ -105,7 +106,7 @@ class TreeSearch:
         splitting: Splitting | None = None,
         limits: SearchLimits | None = None,
         progress: Callable[[SearchProgress], object] | None = None,
-        closer: Closer | None = None,
+        closer: Closer | SpaceCloser | None = None,
         forms: Forms | None = None,
     ) -> None:
         self.system = system
@@ -136,6 +137,8 @@ class TreeSearch:
     def run(self) -> SearchOutcome:
         """Examine the whole tree."""
         start = [self.first()]
+        if self._closed_whole():
+            return self.outcome
         if self.forms is None:
             self.loop(start, None)
             return self.outcome
@@ -149,6 +152,23 @@ class TreeSearch:
             held.release()
         self.loop(stack, None)
         return self.outcome
+
+    def _closed_whole(self) -> bool:
+        """Whether the whole tree is closed by its only possible solution before it is searched."""
+        if self.closer is None or self.limits.max_nodes == 0:
+            return False
+        try:
+            with within(self.limits):
+                found = self.closer.whole(0)
+        except TimeOverError:
+            return False
+        if found is None:
+            return False
+        self.outcome.nodes += 1
+        self.outcome.closed += 1
+        self.outcome.solutions += found
+        self.covered = 1.0
+        return True
 
     def _begin(self, start: list[TreeNode], held: HeldRecords, forms: Forms) -> list[Any]:
         """Search until it is known how the search goes on: from the beginning, if that is better; what still waits."""

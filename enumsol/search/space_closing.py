@@ -1,0 +1,309 @@
+"""In 3D: one certificate before the tree, that the problem has one solution only (theory, section 12.6).
+
+Nothing here is trusted: the certifier proves what is proposed, or the tree is searched.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import scipy.linalg
+import scipy.optimize
+
+from enumsol.search.space_newton import Isotropic
+from enumsol.sectors import SECTORS, nearest, start_of
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.condensation.space import SpaceSystem
+    from enumsol.relaxation.engine import Relaxation
+    from enumsol.selections.solution import Codes
+
+    Array = NDArray[np.float64]
+
+#: A condition of a scaled problem within this of zero may hold as an equation; only what is tried rests on it.
+_NEAR = 1e-9
+#: Level of the sectors in which a regular solution is sought.
+_LEVEL = 20
+#: Smallest eigenvalue of Q relative to S below which it counts as not definite, at which numbers are good enough, and
+#: below which plain numbers leave no hope of better ones.
+_DEFINITE, _GOOD, _HOPELESS = 1e-9, 1e-2, -20.0
+#: Contact nodes from which better numbers than the plain ones are sought; evaluations for that, in rounds of so many.
+_MANY, _EVALUATIONS, _ROUND = 8, 60, 12
+#: Of the gap of an open node, what may serve for its slip.
+_SHARED = 0.5
+
+
+class SpaceClosing(Protocol):
+    """A certifier that can close the whole tree."""
+
+    def close(self, numbers: Array, codes: Codes | None, normal: Array) -> list[Any] | None:
+        """The only solution, as a list; None if not proven.
+
+        Parameters
+        ----------
+        numbers : of the form, as ``kernel.space_closing.Numbers.of`` takes them
+        codes : of a leaf that holds the solution, if it is regular
+        normal : (p,) array, lambda_n near the solution
+        """
+
+
+class SpaceCloser:
+    """Tries once, before the tree, and never below its root.
+
+    Parameters
+    ----------
+    system : SpaceSystem
+    certifier : SpaceClosing
+    regular : bool
+        Plain numbers and regular solutions only.
+    """
+
+    def __init__(self, system: SpaceSystem, certifier: SpaceClosing, *, regular: bool = False) -> None:
+        self._system, self._certifier, self._regular = system, certifier, regular
+        #: No node slides without load in a part of the tree.
+        self.sliding: dict[int, int] = {}
+
+    def due(self, nodes: int) -> bool:
+        """Whether a try is due after so many nodes of the tree."""
+        return nodes == 0
+
+    def whole(self, nodes: int) -> list[Any] | None:
+        """The only solution, as a list, if a try is due and proves it; otherwise None."""
+        return self._tried() if self.due(nodes) else None
+
+    def again(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
+        """The only solution, proven again where an earlier search has proven it."""
+        del relaxation
+        return self._tried() if all(code == UNDECIDED for code in codes) else None
+
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> None:
+        """No partial assignment is closed."""
+
+    def met(self, answer: object) -> None:
+        """Nothing follows from what a leaf holds."""
+
+    def begins_again(self, system: ScaledSystem, nodes: int) -> bool:
+        """A search in 3D does not begin again."""
+        del system, nodes
+        return False
+
+    def _tried(self) -> list[Any] | None:
+        system = self._system
+        problem = Isotropic.of(system)
+        with np.errstate(all="ignore"):
+            y = problem.solution()
+        if y is None:
+            return None
+        point = _Point.of(system, problem, y)
+        if self._regular and point.codes is None:
+            return None
+        numbers = point.numbers(better=not self._regular and system.p >= _MANY)
+        if numbers is None:
+            return None
+        found = None if point.codes is None else self._certifier.close(numbers, point.codes, point.n)
+        if found is None and not self._regular:
+            found = self._certifier.close(numbers, None, point.n)
+        return found
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A solution in floats.
+
+    Attributes
+    ----------
+    n : (p,) array
+        lambda_n, 0 where it is within rounding of that.
+    gap, slip : (p,) and (p, 2) arrays
+        -w_n and v at nodes without load where they matter.
+    theta : (p, 2) array
+        A theta that serves the solution; at open nodes that of length one.
+    wide : (p,) bool array
+        Nodes that touch without load and rest.
+    codes : codes of a leaf that holds it, if its statuses hold strictly
+    """
+
+    system: SpaceSystem
+    n: Array
+    gap: Array
+    slip: Array
+    theta: Array
+    wide: NDArray[np.bool_]
+    codes: Codes | None
+
+    @classmethod
+    def of(cls, system: SpaceSystem, problem: Isotropic, y: Array) -> _Point:
+        p = system.p
+        w = problem.displacements(y)
+        loaded = y[:, 0] > _NEAR
+        n, slip, gap = np.where(loaded, y[:, 0], 0.0), w[:, 1:], np.maximum(-w[:, 0], 0.0)
+        rubs = np.any(system.tau >= 0, axis=1)
+        apart, size = ~loaded & (gap > _NEAR), np.linalg.norm(slip, axis=1)
+        slides = rubs & (size * system.slip_scale > _NEAR)
+        share = np.linalg.norm(y[:, 1:], axis=1) / np.where(loaded, n, 1.0)
+        sticks = loaded & rubs & ~slides
+        theta = np.where(slides[:, None], slip / np.where(slides, size, 1.0)[:, None], 0.0)
+        # exactly at the border of the disc, or clearly inside
+        limit = np.where(share > 1.0 - _NEAR, share, 1.0)
+        theta[sticks] = (y[:, 1:] / (np.where(loaded, n, 1.0) * limit)[:, None])[sticks]
+        strict = np.where(loaded, ~sticks | (share < 1.0 - _NEAR), apart)
+        codes = None
+        if np.all(strict):
+            codes = tuple(cls._code(system, i, bool(loaded[i]), theta[i] if slides[i] else None) for i in range(p))
+        return cls(system, n, np.where(apart, gap, 0.0), slip, theta, ~loaded & ~apart & ~slides & rubs, codes)
+
+    @staticmethod
+    def _code(system: SpaceSystem, i: int, loaded: bool, direction: Array | None) -> int:
+        axes = np.flatnonzero(system.tau[i] >= 0)
+        if not loaded:
+            return OPEN
+        if direction is None:
+            return STICK if len(axes) else FRICTIONLESS
+        if len(axes) == 1:
+            return SLIP_PLUS if direction[axes[0]] > 0 else SLIP_MINUS
+        return SECTORS + _sector(direction, _LEVEL)
+
+    # -- numbers ---------------------------------------------------------------------------------------------------
+
+    def numbers(self, *, better: bool) -> Array | None:
+        """Numbers for which Q is definite, as a proof has them; plain ones, or better ones if these are asked for."""
+        form = _Definite(self)
+        logs, shares = form.plain
+        least = form.least(logs, shares)
+        if least <= _DEFINITE and better and least > _HOPELESS:
+            logs, shares, least = form.improved(logs, shares, least)
+        return form.values(logs, shares) if least > _DEFINITE else None
+
+
+def _sector(direction: Array, level: int) -> int:
+    """The sector of a level that holds a direction."""
+    x, y = direction.tolist()
+    number = nearest(x, y, level)
+    a, b = map(float, start_of(number))
+    if a * y - b * x >= 0:
+        return number
+    first = 1 << level
+    return first + (number - first - 1) % first
+
+
+class _Definite:
+    """Q = (D'S + S D) / 2 of a solution, as a function of logarithms of mu and kappa, and of nu.
+
+    Where a node is open mu = kappa and nu = 0, so that the same theta serves whatever they are. Elsewhere nu = mu z /
+    (1 + |z|^2)^(1/2) for a z in the plane.
+    """
+
+    def __init__(self, point: _Point) -> None:
+        system = point.system
+        self._system, self._S, self._point = system, system.S, point
+        tau, p = system.tau, system.p
+        self._open = point.gap > 0
+        size = np.linalg.norm(point.slip, axis=1)
+        need = 1.0 - _SHARED * point.gap / np.where(size > 0, size, 1.0)
+        theta = np.where(self._open[:, None], point.theta * np.maximum(need, 0.0)[:, None], point.theta)
+        self._theta = np.where((tau >= 0) & ~point.wide[:, None], theta, 0.0)
+        self._unit = np.where(tau >= 0, system.unit[tau], 1.0)
+        self._turn = self._theta / self._unit
+        rows = [np.where((tau[:, k] >= 0)[:, None], system.S[tau[:, k]] / self._unit[:, k, None], 0.0) for k in (0, 1)]
+        self._rows = np.stack(rows, axis=1)
+        self._reach = np.where(point.wide, np.sqrt(np.sum(self._rows**2, axis=(1, 2))), 0.0)
+        self._pushes = (tau >= 0) & ~self._open[:, None]
+        self.plain = np.zeros((2, p)), np.zeros((p, 2))
+
+    def values(self, logs: Array, shares: Array) -> Array:
+        """The numbers as a proof has them."""
+        mu, kappa, nu = self._numbers(logs, shares)
+        places = self._system.tau >= 0
+        wide = np.where(self._point.wide, kappa * np.maximum(self._reach, _NEAR), 0.0)
+        return np.concatenate([mu, kappa, wide, nu[places], self._theta[places]])
+
+    def least(self, logs: Array, shares: Array) -> float:
+        """The smallest eigenvalue of Q relative to S."""
+        Q = self._matrix(*self._numbers(logs, shares))
+        try:
+            return float(scipy.linalg.eigh(Q, self._S, eigvals_only=True, subset_by_index=[0, 0])[0])
+        except (np.linalg.LinAlgError, ValueError):
+            return -np.inf
+
+    def improved(self, logs: Array, shares: Array, least: float) -> tuple[Array, Array, float]:
+        """Better numbers, by -log det(Q + s S) for s falling to 0."""
+        left = _EVALUATIONS
+        x = np.concatenate([logs.ravel(), shares.ravel()])
+        while left > 0 and least < _GOOD:
+            s = max(-1.25 * least, 0.0) + _GOOD
+            options = {"maxfun": min(_ROUND, left), "maxiter": _ROUND}
+            found = scipy.optimize.minimize(self._value, x, (s,), method="L-BFGS-B", jac=True, options=options)
+            left -= max(int(found.nfev), 1)
+            better = self.least(*self._split(found.x))
+            if not better > least + 0.02 * abs(least):
+                break
+            x, least = found.x, better
+        return *self._split(x), least
+
+    def _split(self, x: Array) -> tuple[Array, Array]:
+        p = self._system.p
+        return x[: 2 * p].reshape(2, p), x[2 * p :].reshape(p, 2)
+
+    def _numbers(self, logs: Array, shares: Array) -> tuple[Array, Array, Array]:
+        logs = np.where(self._open, np.mean(logs, axis=0), logs)
+        mu, kappa = np.exp(logs - np.mean(logs))
+        return mu, kappa, np.where(self._pushes, mu[:, None] * self._disc(shares)[0] * (1.0 - _NEAR), 0.0)
+
+    @staticmethod
+    def _disc(shares: Array) -> tuple[Array, Array]:
+        root = np.sqrt(1.0 + np.sum(shares * shares, axis=1, keepdims=True))
+        return shares / root, root
+
+    def _matrix(self, mu: Array, kappa: Array, nu: Array) -> Array:
+        S, tau, p = self._S, self._system.tau, self._system.p
+        form = S.copy()
+        form[:p] = mu[:, None] * S[:p]
+        for k in range(2):
+            has = tau[:, k] >= 0
+            t = tau[has, k]
+            form[:p][has] -= (kappa[has] * self._turn[has, k])[:, None] * S[t]
+            form[t] = kappa[has, None] * S[t] + (nu[has, k] * self._unit[has, k])[:, None] * S[:p][has]
+        wide = np.flatnonzero(self._point.wide)
+        reach = np.maximum(self._reach[wide], _NEAR)
+        for k in range(2):
+            rows = self._rows[wide, k] * np.sqrt(kappa[wide] / reach)[:, None]
+            form -= 0.5 * rows.T @ rows
+        form[wide, wide] -= 0.5 * kappa[wide] * reach
+        return 0.5 * (form + form.T)
+
+    def _value(self, x: Array, s: float) -> tuple[float, Array]:
+        logs, shares = self._split(x)
+        mu, kappa, nu = self._numbers(logs, shares)
+        try:
+            L = np.linalg.cholesky(self._matrix(mu, kappa, nu) + s * self._S)
+        except np.linalg.LinAlgError:
+            return 1e12, np.zeros_like(x)
+        half = scipy.linalg.solve_triangular(L, np.eye(len(L)), lower=True)
+        P = half.T @ half
+        return -2.0 * float(np.sum(np.log(np.diagonal(L)))), self._gradient(P, mu, kappa, nu, shares)
+
+    def _gradient(self, P: Array, mu: Array, kappa: Array, nu: Array, shares: Array) -> Array:
+        tau, p, SP = self._system.tau, self._system.p, self._S @ P
+        node = np.arange(p)
+        by_mu, by_kappa, by_nu = np.diagonal(SP)[:p].copy(), np.zeros(p), np.zeros((p, 2))
+        for k in range(2):
+            has = tau[:, k] >= 0
+            t = tau[has, k]
+            by_kappa[has] += SP[t, t] - self._turn[has, k] * SP[t, node[has]]
+            by_nu[has, k] = SP[node[has], t] * self._unit[has, k]
+        for i in np.flatnonzero(self._point.wide):
+            reach, rows = max(self._reach[i], _NEAR), self._rows[i]
+            by_kappa[i] -= 0.5 * (reach * P[i, i] + float(np.sum((rows @ P) * rows)) / reach)
+        by_nu = np.where(self._pushes, by_nu, 0.0)
+        logs = np.stack([by_mu * mu + np.sum(by_nu * nu, axis=1), by_kappa * kappa])
+        logs = np.where(self._open, np.mean(logs, axis=0), logs)
+        z, root = self._disc(shares)
+        pulled = by_nu * mu[:, None] * (1.0 - _NEAR)
+        pulled = (pulled - z * np.sum(z * pulled, axis=1, keepdims=True)) / root
+        return -np.concatenate([(logs - np.mean(logs)).ravel(), pulled.ravel()])
