@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 #: Forces that are known no better than this, relative to the largest one, are left to the tree.
 _PLACED = 1e-3
+#: Where all are smaller than this (scaled), relative to this.
+_SMALL_FORCE = 1e-6
 _DEGENERATE = "a condition holds with equality, or nearly so, at what may be a root"
 
 
@@ -191,7 +193,7 @@ class SpaceCertifier:
                 found = only_root(self.enclosed, numbers, codes)
         except NotEnclosedError:
             return None
-        if found is None or not np.max(found.y.rad) <= _PLACED * np.max(np.abs(found.y.mid)):
+        if found is None or not np.max(found.y.rad) <= _PLACED * np.max(np.abs(found.y.mid), initial=_SMALL_FORCE):
             return None
         self._roots[codes or (UNDECIDED,) * len(normal)] = found
         unit = self.enclosed.unit

@@ -33,6 +33,8 @@ _LEVEL = 20
 #: Smallest eigenvalue of Q relative to S below which it counts as not definite, at which numbers are good enough, and
 #: below which plain numbers leave no hope of better ones.
 _DEFINITE, _GOOD, _HOPELESS = 1e-9, 1e-2, -20.0
+#: Slack and smallest eigenvalue that fast arithmetic asks for.
+_CLEAR = 1e-6
 #: Contact nodes from which better numbers than the plain ones are sought; evaluations for that, in rounds of so many.
 _MANY, _EVALUATIONS, _ROUND = 8, 60, 12
 #: Of the gap of an open node, what may serve for its slip.
@@ -101,12 +103,12 @@ class SpaceCloser:
         if y is None:
             return None
         point = _Point.of(system, problem, y)
-        if self._regular and point.codes is None:
+        if self._regular and point.slack < _CLEAR:
             return None
-        numbers = point.numbers(better=not self._regular and system.p >= _MANY)
+        numbers = point.numbers(_CLEAR if self._regular else _DEFINITE, better=not self._regular and system.p >= _MANY)
         if numbers is None:
             return None
-        found = None if point.codes is None else self._certifier.close(numbers, point.codes, point.n)
+        found = self._certifier.close(numbers, point.codes, point.n) if point.slack > 0 else None
         if found is None and not self._regular:
             found = self._certifier.close(numbers, None, point.n)
         return found
@@ -121,12 +123,14 @@ class _Point:
     n : (p,) array
         lambda_n, 0 where it is within rounding of that.
     gap, slip : (p,) and (p, 2) arrays
-        -w_n and v at nodes without load where they matter.
+        -w_n of open nodes, 0 elsewhere, and v.
     theta : (p, 2) array
         A theta that serves the solution; at open nodes that of length one.
     wide : (p,) bool array
         Nodes that touch without load and rest.
-    codes : codes of a leaf that holds it, if its statuses hold strictly
+    codes : codes of a leaf that holds it
+    slack : float
+        The least slack of its conditions.
     """
 
     system: SpaceSystem
@@ -135,35 +139,34 @@ class _Point:
     slip: Array
     theta: Array
     wide: NDArray[np.bool_]
-    codes: Codes | None
+    codes: Codes
+    slack: float
 
     @classmethod
     def of(cls, system: SpaceSystem, problem: Isotropic, y: Array) -> _Point:
-        p = system.p
         w = problem.displacements(y)
-        loaded = y[:, 0] > _NEAR
-        n, slip, gap = np.where(loaded, y[:, 0], 0.0), w[:, 1:], np.maximum(-w[:, 0], 0.0)
-        rubs = np.any(system.tau >= 0, axis=1)
-        apart, size = ~loaded & (gap > _NEAR), np.linalg.norm(slip, axis=1)
-        slides = rubs & (size * system.slip_scale > _NEAR)
-        share = np.linalg.norm(y[:, 1:], axis=1) / np.where(loaded, n, 1.0)
-        sticks = loaded & rubs & ~slides
-        theta = np.where(slides[:, None], slip / np.where(slides, size, 1.0)[:, None], 0.0)
-        # exactly at the border of the disc, or clearly inside
-        limit = np.where(share > 1.0 - _NEAR, share, 1.0)
-        theta[sticks] = (y[:, 1:] / (np.where(loaded, n, 1.0) * limit)[:, None])[sticks]
-        strict = np.where(loaded, ~sticks | (share < 1.0 - _NEAR), apart)
-        codes = None
-        if np.all(strict):
-            codes = tuple(cls._code(system, i, bool(loaded[i]), theta[i] if slides[i] else None) for i in range(p))
-        return cls(system, n, np.where(apart, gap, 0.0), slip, theta, ~loaded & ~apart & ~slides & rubs, codes)
+        n, gap, tau, v = np.maximum(y[:, 0], 0.0), np.maximum(-w[:, 0], 0.0), y[:, 1:], w[:, 1:]
+        rubs, size, length = np.any(system.tau >= 0, axis=1), np.linalg.norm(v, axis=1), np.linalg.norm(tau, axis=1)
+        loaded, slip, room = n > _NEAR, size * system.slip_scale, (n - length) * system.disc_scale
+        slides = rubs & (slip > _NEAR)
+        # exactly on the border of the disc, or clearly inside
+        border = loaded & rubs & (slides | (length > (1.0 - _NEAR) * n))
+        divisor = np.where(loaded, np.where(border, length, n), np.where(slides, size, np.inf))
+        theta = np.where(loaded[:, None], tau, v) / divisor[:, None]
+        held = rubs & (slip <= room)
+        slack = np.where(n < gap, gap, np.where(rubs, np.minimum(n, np.where(held, room, slip)), n))
+        codes = tuple(cls._code(system, i, tau[i], bool(n[i] >= gap[i]), bool(held[i])) for i in range(len(n)))
+        apart = ~loaded & (gap > _NEAR)
+        wide = rubs & ~loaded & ~apart & ~slides
+        open_gap = np.where(apart, gap, 0.0)
+        return cls(system, np.where(loaded, n, 0.0), open_gap, v, theta, wide, codes, float(np.min(slack)))
 
     @staticmethod
-    def _code(system: SpaceSystem, i: int, loaded: bool, direction: Array | None) -> int:
+    def _code(system: SpaceSystem, i: int, direction: Array, loaded: bool, held: bool) -> int:
         axes = np.flatnonzero(system.tau[i] >= 0)
         if not loaded:
             return OPEN
-        if direction is None:
+        if held or not len(axes):
             return STICK if len(axes) else FRICTIONLESS
         if len(axes) == 1:
             return SLIP_PLUS if direction[axes[0]] > 0 else SLIP_MINUS
@@ -171,14 +174,17 @@ class _Point:
 
     # -- numbers ---------------------------------------------------------------------------------------------------
 
-    def numbers(self, *, better: bool) -> Array | None:
-        """Numbers for which Q is definite, as a proof has them; plain ones, or better ones if these are asked for."""
+    def numbers(self, enough: float, *, better: bool) -> Array | None:
+        """Numbers for which Q is definite, as a proof has them; plain ones, or better ones if these are asked for.
+
+        ``enough``: the smallest eigenvalue relative to S from which Q counts as definite.
+        """
         form = _Definite(self)
         logs, shares = form.plain
         least = form.least(logs, shares)
-        if least <= _DEFINITE and better and least > _HOPELESS:
+        if least <= enough and better and least > _HOPELESS:
             logs, shares, least = form.improved(logs, shares, least)
-        return form.values(logs, shares) if least > _DEFINITE else None
+        return form.values(logs, shares) if least > enough else None
 
 
 def _sector(direction: Array, level: int) -> int:
