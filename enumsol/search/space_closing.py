@@ -12,6 +12,7 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
+from enumsol.deadlines import look
 from enumsol.search.space_newton import Isotropic
 from enumsol.sectors import SECTORS, nearest, start_of
 from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
@@ -32,11 +33,13 @@ _NEAR = 1e-9
 _LEVEL = 20
 #: Smallest eigenvalue of Q relative to S below which it counts as not definite, at which numbers are good enough, and
 #: below which plain numbers leave no hope of better ones.
-_DEFINITE, _GOOD, _HOPELESS = 1e-9, 1e-2, -20.0
+_DEFINITE, _GOOD, _HOPELESS = 1e-9, 1e-2, -0.5
 #: Slack and smallest eigenvalue that fast arithmetic asks for.
 _CLEAR = 1e-6
 #: Contact nodes from which better numbers than the plain ones are sought; evaluations for that, in rounds of so many.
-_MANY, _EVALUATIONS, _ROUND = 8, 60, 12
+_MANY, _EVALUATIONS, _ROUND = 8, 60, 20
+#: How sharply the smallest eigenvalue counts in each round.
+_HARDNESS = 10.0, 20.0, 40.0
 #: Of the gap of an open node, what may serve for its slip.
 _SHARED = 0.5
 
@@ -238,18 +241,19 @@ class _Definite:
             return -np.inf
 
     def improved(self, logs: Array, shares: Array, least: float) -> tuple[Array, Array, float]:
-        """Better numbers, by -log det(Q + s S) for s falling to 0."""
-        left = _EVALUATIONS
-        x = np.concatenate([logs.ravel(), shares.ravel()])
-        while left > 0 and least < _GOOD:
-            s = max(-1.25 * least, 0.0) + _GOOD
-            options = {"maxfun": min(_ROUND, left), "maxiter": _ROUND}
-            found = scipy.optimize.minimize(self._value, x, (s,), method="L-BFGS-B", jac=True, options=options)
-            left -= max(int(found.nfev), 1)
-            better = self.least(*self._split(found.x))
-            if not better > least + 0.02 * abs(least):
+        """Better numbers: those with the largest soft minimum of the eigenvalues of Q relative to S."""
+        x, left = np.concatenate([logs.ravel(), shares.ravel()]), _EVALUATIONS
+        # columns in which S is the unit matrix
+        columns = np.linalg.inv(np.linalg.cholesky(self._S)).T
+        for hardness in _HARDNESS:
+            if left <= 0 or least > _GOOD:
                 break
-            x, least = found.x, better
+            look()
+            options = {"maxfun": min(_ROUND, left), "maxiter": _ROUND}
+            given = columns, hardness
+            found = scipy.optimize.minimize(self._value, x, given, method="L-BFGS-B", jac=True, options=options)
+            left -= max(int(found.nfev), 1)
+            x, least = found.x, self.least(*self._split(found.x))
         return *self._split(x), least
 
     def _split(self, x: Array) -> tuple[Array, Array]:
@@ -283,16 +287,15 @@ class _Definite:
         form[wide, wide] -= 0.5 * kappa[wide] * reach
         return 0.5 * (form + form.T)
 
-    def _value(self, x: Array, s: float) -> tuple[float, Array]:
+    def _value(self, x: Array, columns: Array, hardness: float) -> tuple[float, Array]:
+        """The logarithm of sum exp(-hardness e) over the eigenvalues e, by the hardness, and its gradient."""
         logs, shares = self._split(x)
         mu, kappa, nu = self._numbers(logs, shares)
-        try:
-            L = np.linalg.cholesky(self._matrix(mu, kappa, nu) + s * self._S)
-        except np.linalg.LinAlgError:
-            return 1e12, np.zeros_like(x)
-        half = scipy.linalg.solve_triangular(L, np.eye(len(L)), lower=True)
-        P = half.T @ half
-        return -2.0 * float(np.sum(np.log(np.diagonal(L)))), self._gradient(P, mu, kappa, nu, shares)
+        sizes, vectors = np.linalg.eigh(columns.T @ self._matrix(mu, kappa, nu) @ columns)
+        parts = np.exp(-hardness * (sizes - sizes[0]))
+        vectors = columns @ vectors
+        P = (vectors * (parts / np.sum(parts))) @ vectors.T
+        return float(np.log(np.sum(parts)) / hardness - sizes[0]), self._gradient(P, mu, kappa, nu, shares)
 
     def _gradient(self, P: Array, mu: Array, kappa: Array, nu: Array, shares: Array) -> Array:
         tau, p, SP = self._system.tau, self._system.p, self._S @ P
