@@ -136,7 +136,8 @@ class Numbers:
         if numbers.shape != (p + 2 * m,) or not np.all(np.isfinite(numbers)):
             return None
         (mu, kappa, wide), pairs = numbers[: 3 * p].reshape(3, p), numbers[3 * p :].reshape(2, m - p)
-        nu, theta = (np.where(system.tau >= 0, np.append(pair, 0.0)[system.tau - p], 0.0) for pair in pairs)
+        place = np.where(system.tau >= 0, system.tau - p, m - p)
+        nu, theta = (np.append(pair, 0.0)[place] for pair in pairs)
         square = np.sum(theta * theta, axis=1)
         whole = np.abs(square - 1.0) < _UNIT_LENGTH
         wrong = (mu <= 0) | (kappa <= 0) | (wide < 0) | (upper_norm(nu, axis=1) > mu)
