@@ -3,6 +3,7 @@
 import signal
 
 import numpy as np
+import problems3d
 import pytest
 
 from enumsol.condensation.enclosure import CondensedEnclosure
@@ -14,6 +15,13 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 @pytest.fixture
 def rng():
     return np.random.default_rng(20121)
+
+
+@pytest.fixture
+def tree_only():
+    """Searches in 3D go through their tree, also where one certificate would do."""
+    with problems3d.by_the_tree():
+        yield
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 #: Directions whose squared length is as near to one stand for the direction of length one.
 _UNIT_LENGTH = 2.0**-40
 #: Units of tau beyond this, or below its inverse, are left to the tree: nothing here underflows with others.
-_LARGEST_UNIT = 2.0**128
+LARGEST_UNIT = 2.0**128
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ class _Form:
         numbers = Numbers.of(system, values)
         if numbers is None or not system.smallest_eigenvalue > 0:
             return None
-        if np.max(np.maximum(system.unit, 1.0 / system.unit)) > _LARGEST_UNIT:
+        if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
             return None
         unit = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
         # units are powers of two: what is rounded is less than TINY

@@ -13,6 +13,7 @@ import scipy.linalg
 import scipy.optimize
 
 from enumsol.deadlines import look
+from enumsol.kernel.space_closing import LARGEST_UNIT
 from enumsol.search.space_newton import Isotropic
 from enumsol.sectors import SECTORS, nearest, start_of
 from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
@@ -80,12 +81,15 @@ class SpaceCloser:
 
     def whole(self, nodes: int) -> list[Any] | None:
         """The only solution, as a list, if a try is due and proves it; otherwise None."""
-        return self._tried() if self.due(nodes) else None
+        if not self.due(nodes):
+            return None
+        with np.errstate(all="ignore"):
+            return self._tried()
 
     def again(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
         """The only solution, proven again where an earlier search has proven it."""
         del relaxation
-        return self._tried() if all(code == UNDECIDED for code in codes) else None
+        return self.whole(0) if all(code == UNDECIDED for code in codes) else None
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> None:
         """No partial assignment is closed."""
@@ -100,9 +104,10 @@ class SpaceCloser:
 
     def _tried(self) -> list[Any] | None:
         system = self._system
+        if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
+            return None
         problem = Isotropic.of(system)
-        with np.errstate(all="ignore"):
-            y = problem.solution()
+        y = problem.solution()
         if y is None:
             return None
         point = _Point.of(system, problem, y)
