@@ -103,7 +103,7 @@ def _is_final(code: int, tangents: int) -> bool:
 
 @dataclass(frozen=True)
 class Numbers:
-    """The numbers of the form of theory, (12.6), node by node.
+    """The numbers of the form of theory, (12.7), node by node.
 
     Where there is no tau, components are 0.
 
@@ -150,7 +150,7 @@ class Numbers:
 
 @dataclass(frozen=True)
 class _Form:
-    """Q of theory, (12.6), and what it proves; in the units of FrictionUnits.
+    """Q of theory, (12.7), and what it proves; in the units of FrictionUnits.
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ class _Form:
         return change
 
     def _gap_serves(self, i: int, w: Ball) -> bool:
-        """Whether theta of a node without load serves for all w in a ball, by its gap (theory, (12.7))."""
+        """Whether theta of a node without load serves for all w in a ball, by its gap (theory, (12.6))."""
         numbers, places = self.numbers, self.system.tau[i]
         t, theta = places[places >= 0], numbers.theta[i][places >= 0]
         gap = -float(w.mid[i] + w.rad[i]) / SAFE
