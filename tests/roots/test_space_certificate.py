@@ -6,6 +6,7 @@ import numpy as np
 import oracles3d
 import pytest
 from problems3d import bounds, by_the_tree, forces, from_compliance, random_compliance, random_coupled, random_one_node
+from space_proofs import RANDOM, random_problem
 
 import enumsol
 from enumsol import enumerate_roots, gallery, verify
@@ -193,9 +194,7 @@ def test_the_sum_over_two_solutions_is_not_negative():
         p = len(F)
         solutions = oracles3d.newton_set(S, g, F, 12, rng)
         scale = np.column_stack([np.ones(p), F])
-        states = []
-        for lam in solutions:
-            states.append((lam.reshape(3, p).T / scale, (g - S @ lam).reshape(3, p).T * scale))
+        states = [(lam.reshape(3, p).T / scale, (g - S @ lam).reshape(3, p).T * scale) for lam in solutions]
         for k, (y, w) in enumerate(states):
             for other_y, other_w in states[:k] + states[k + 1 :]:
                 pairs += 1
@@ -243,29 +242,24 @@ def served(root, F):
     return np.where(length > 1 - 1e-9, theta / np.maximum(length, 0.1), theta)
 
 
-def test_no_numbers_close_a_problem_with_several_roots():
-    """Whatever is proposed for any of its roots."""
-    rng, tried = np.random.default_rng(5), 0
-    for _ in range(80):
-        S, g, F = random_one_node(rng) if rng.random() < 0.5 else random_coupled(rng, 2)
-        problem = from_compliance(S, g, tuple(F.T))
-        with by_the_tree():
-            roots = enumerate_roots(problem, 0, max_nodes=1500)
-        if len(roots) < 2:
-            continue
-        solvers = SpaceSolvers(problem, 0.0, "verified")
-        system, places = solvers.system, solvers.system.tau >= 0
-        leaves = leaf_codes(solvers)
-        for root in roots:
-            for _ in range(6):
-                mu, kappa = 10 ** rng.uniform(-1, 1, (2, system.p))
-                nu = rng.uniform(-0.7, 0.7, (system.p, 2)) * mu[:, None] * rng.integers(0, 2)
-                values = mu, kappa, np.zeros(system.p), nu[places], served(root, F)[places]
-                tried += 1
-                numbers = np.concatenate(values)
-                assert only_solution(solvers.enclosed, numbers, root.lambda_n / system.force) is None
-                assert all(only_root(solvers.enclosed, numbers, codes) is None for codes in leaves)
-    assert tried > 50
+@pytest.mark.parametrize("name", [name for name, roots in RANDOM.items() if roots > 1], ids=str)
+def test_no_numbers_close_a_problem_with_several_roots(name):
+    """Whatever is proposed for any of its roots, the right theta among it."""
+    rng, problem = np.random.default_rng(5), random_problem(*name)
+    with by_the_tree():
+        roots = enumerate_roots(problem, 0)
+    assert len(roots) == RANDOM[name]
+    solvers, F = SpaceSolvers(problem, 0.0, "verified"), problem.friction_at(0)
+    system, places = solvers.system, solvers.system.tau >= 0
+    leaves = leaf_codes(solvers)
+    for root in roots:
+        for _ in range(30):
+            mu, kappa = 10 ** rng.uniform(-2, 2, (2, system.p))
+            nu = rng.uniform(-0.7, 0.7, (system.p, 2)) * mu[:, None] * rng.integers(0, 2)
+            theta = served(root, F) * rng.choice([1.0, 1.0, 0.5, 0.0], (system.p, 1))
+            numbers = np.concatenate([mu, kappa, np.zeros(system.p), nu[places], theta[places]])
+            assert only_solution(solvers.enclosed, numbers, root.lambda_n / system.force) is None
+            assert all(only_root(solvers.enclosed, numbers, codes) is None for codes in leaves)
 
 
 def leaf_codes(solvers):
