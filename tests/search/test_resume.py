@@ -6,6 +6,7 @@ import subprocess
 import sys
 import textwrap
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from functools import cache
 
 import numpy as np
@@ -15,7 +16,7 @@ from compare import differences
 from generators import from_condensed, integer_problem
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from problems3d import forces
+from problems3d import by_the_tree, forces
 from proof_fuzz import mutant
 from proof_tools import bytes_of, copied, multipliers, proof_of, records_of, with_multipliers
 from touching import touching_problem
@@ -72,7 +73,13 @@ PROBLEMS = {
     "forms": lambda: (gallery.clamped_block(12, 6), 0.3),
     "in space": lambda: (gallery.get("one-node-3d-3").build(), 0),
     "block in space": lambda: (gallery.get("block3d-4").build(), 0.5),
+    "closed in space": lambda: (gallery.get("block3d-9").build(), 0.5),
 }
+
+
+def searched(name):
+    """A context in which the tree is searched where one certificate would do."""
+    return by_the_tree() if name == "block in space" else nullcontext()
 
 
 @cache
@@ -83,7 +90,8 @@ def known(name):
     if name == "forms":
         policy.NODES, policy.MORE = 0, -2.0
     try:
-        return problem, alpha, enumerate_roots(problem, alpha)
+        with searched(name):
+            return problem, alpha, enumerate_roots(problem, alpha)
     finally:
         policy.NODES, policy.MORE = before
 
@@ -254,7 +262,8 @@ def test_rows_that_do_not_exist_in_space(tmp_path):
 def test_a_search_in_small_parts(name, limits, tmp_path):
     problem, alpha, whole = known(name)
     path = tmp_path / "x.proof"
-    found = enumerate_roots(problem, alpha, proof_path=path, resume=True, **limits)
+    with searched(name):
+        found = enumerate_roots(problem, alpha, proof_path=path, resume=True, **limits)
     assert found.stats.resumed == 0
     parts = 1
     while not found.complete:
@@ -309,7 +318,7 @@ def test_a_time_limit_is_about_what_is_searched_anew(tmp_path, monkeypatch):
     check("wedge", found)
 
 
-@pytest.mark.parametrize("name", ["wedge", "forms", "closed", "block in space"])
+@pytest.mark.parametrize("name", ["wedge", "forms", "closed", "block in space", "closed in space"])
 def test_with_an_executor(name, tmp_path):
     problem, alpha, whole = known(name)
     data = bytes_of(whole.proof)
@@ -318,7 +327,8 @@ def test_with_an_executor(name, tmp_path):
             check(name, resumed(name, data[:size], tmp_path / "x.proof", executor=executor))
         path = tmp_path / "x.proof"
         path.unlink()
-        found = enumerate_roots(problem, alpha, proof_path=path, executor=executor, max_nodes=2)
+        with searched(name):
+            found = enumerate_roots(problem, alpha, proof_path=path, executor=executor, max_nodes=2)
         assert found.complete or found.stopped
         check(name, enumerate_roots(problem, alpha, proof_path=path, resume=True))
 
