@@ -168,6 +168,7 @@ class TreeSearch:
         self.outcome.closed += 1
         self.outcome.solutions += found
         self.covered = 1.0
+        self.report(self.covered)
         return True
 
     def _begin(self, start: list[TreeNode], held: HeldRecords, forms: Forms) -> list[Any]:
