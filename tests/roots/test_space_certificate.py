@@ -5,7 +5,16 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import oracles3d
 import pytest
-from problems3d import bounds, by_the_tree, forces, from_compliance, random_compliance, random_coupled, random_one_node
+from problems3d import (
+    bounds,
+    by_the_tree,
+    exactly,
+    forces,
+    from_compliance,
+    random_compliance,
+    random_coupled,
+    random_one_node,
+)
 from space_proofs import RANDOM, random_problem
 
 import enumsol
@@ -272,21 +281,10 @@ def leaf_codes(solvers):
 
 # -- degenerate solutions ----------------------------------------------------------------------------------------------
 
-ONE = np.eye(3)
-
-
-def coupled(p, seed=1):
-    return random_compliance(np.random.default_rng(seed), p)
-
-
-def reaching(S, lam, w):
-    """g for which lam and w solve."""
-    return S @ np.ravel(lam, order="F") + np.ravel(w, order="F")
-
 
 #: lambda and w node by node with F = (1, 1), and the statuses that hold
 DEGENERATE = {
-    "grazing and sliding": ([[0, 0, 0], [2, 1, 0]], [[0, 0.3, -0.4], [0, 0, 0]], ("open slip", "stick")),
+    "grazing and sliding": ([[0, 0, 0], [2, 1, 0]], [[0, 0.375, -0.5], [0, 0, 0]], ("open slip", "stick")),
     "at rest without load": ([[0, 0, 0], [2, 1, 0.5]], [[0, 0, 0], [0, 0, 0]], ("open slip stick", "stick")),
     "just sticking": ([[5, 4, 3], [0, 0, 0]], [[0, 0, 0], [-1, 0.5, 0]], ("slip stick", "open")),
     "just sticking along an axis": ([[2, -2, 0]], [[0, 0, 0]], ("slip stick",)),
@@ -306,18 +304,14 @@ def names(root):
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_degenerate_solutions_are_roots(name):
     lam, w, statuses = DEGENERATE[name]
-    p = len(lam)
-    S = np.eye(3 * p) + 0.1 * coupled(p) / p
-    problem = from_compliance(S, reaching(S, lam, w), 1.0)
-    root = closed(problem)
+    root = closed(exactly(lam, w))
     assert names(root) == statuses
     assert not root.regular
     assert root.margin == 0
     assert all(status in held for status, held in zip(root.statuses, root.active, strict=True))
     low, high = bounds(root)
-    # the inverse of S in the problem is rounded
-    assert np.all(low - 1e-9 <= np.ravel(lam, order="F"))
-    assert np.all(np.ravel(lam, order="F") <= high + 1e-9)
+    assert np.all(low <= np.ravel(lam, order="F"))
+    assert np.all(np.ravel(lam, order="F") <= high)
     assert np.max(high - low) < 1e-9
     for value, box in ((root.u_n, root.enclosure.u_n), (root.u_t, root.enclosure.u_t)):
         assert np.all(box[..., 0] <= value)
