@@ -67,7 +67,8 @@ What counts as one root
 
     In 3D a root that slips along the common end of two sectors is found in both. Roots of leaves with the same statuses
     are one if the directions of one lie in the box of angles in which the other is proven to be the only one, and two
-    if their forces differ for certain. Where neither is proven, one more part counts as undecided.
+    if their forces differ for certain. Where neither is proven, one more part counts as undecided. A root that closes
+    the whole tree is the only solution, whatever statuses hold there.
 
 Cross-checks
     They use nothing of the proof and are printed with the result. The indices of all roots and families add up to +1,

@@ -54,7 +54,7 @@ class OnlySolution:
     index = 1
 
 
-def only_solution(system: EnclosedSpace, numbers: Array, normal: Array) -> OnlySolution | None:
+def only_solution(system: EnclosedSpace, numbers: Array, normal: Array, errors: float = 1.0) -> OnlySolution | None:
     """The only solution near a point, or None where that is not proven.
 
     Parameters
@@ -62,6 +62,8 @@ def only_solution(system: EnclosedSpace, numbers: Array, normal: Array) -> OnlyS
     system : EnclosedSpace
     numbers : see ``Numbers.of``
     normal : (p,) array, lambda_n of the point, scaled; what is negative counts as 0
+    errors : what is not known of theta counts as often: 1 proves, a writer of proofs takes more, so that a checker,
+        which rounds otherwise, comes to the same answer
 
     Raises
     ------
@@ -70,10 +72,10 @@ def only_solution(system: EnclosedSpace, numbers: Array, normal: Array) -> OnlyS
     """
     with np.errstate(all="ignore"):
         form = _Form.of(system, numbers)
-        return None if form is None else form.enclosed(normal)
+        return None if form is None else form.enclosed(normal, errors)
 
 
-def only_root(system: EnclosedSpace, numbers: Array, codes: Sequence[int]) -> SpaceRoot | None:
+def only_root(system: EnclosedSpace, numbers: Array, codes: Sequence[int], errors: float = 1.0) -> SpaceRoot | None:
     """The regular root of a leaf, if it is proven that it has one and that there is no other solution at all.
 
     Parameters and errors as for ``only_solution``; ``codes`` are those of the leaf.
@@ -86,7 +88,7 @@ def only_root(system: EnclosedSpace, numbers: Array, codes: Sequence[int]) -> Sp
         # the degree of a problem is +1
         if form is None or not isinstance(root, SpaceRoot) or root.index != 1:
             return None
-        return root if form.serves(root.y, root.w) else None
+        return root if form.serves(root.y, root.w, errors) else None
 
 
 def is_complete(system: EnclosedSpace, codes: Sequence[int]) -> bool:
@@ -186,7 +188,7 @@ class _Form:
 
     # -- enclosure -------------------------------------------------------------------------------------------------
 
-    def enclosed(self, normal: Array) -> OnlySolution | None:
+    def enclosed(self, normal: Array, errors: float) -> OnlySolution | None:
         """The only solution by its distance from a point, None where it is not proven to be the only one."""
         tau, p = self.system.tau, len(self.system.tau)
         n = np.maximum(normal, 0.0)
@@ -207,7 +209,7 @@ class _Form:
         for i in np.flatnonzero((n == 0) & (w.mid[:p] + w.rad[:p] < 0)):
             y.rad[[i, *tau[i][tau[i] >= 0]]] = 0.0
         w = self._displacements(y)
-        return self._described(y, w) if self.serves(y, w) else None
+        return self._described(y, w) if self.serves(y, w, errors) else None
 
     def _displacements(self, y: Ball) -> Ball:
         S, g = Ball(self.system.S, self.system.S_rad), Ball(self.system.g, self.system.g_rad)
@@ -258,7 +260,7 @@ class _Form:
 
     # -- uniqueness ------------------------------------------------------------------------------------------------
 
-    def serves(self, y: Ball, w: Ball) -> bool:
+    def serves(self, y: Ball, w: Ball, errors: float) -> bool:
         """Whether any solution within these balls is the only one, given that all lie there or that it exists."""
         numbers, system = self.numbers, self.system
         off = np.array([self._off(i, y, w) for i in range(len(system.tau))])
@@ -269,7 +271,7 @@ class _Form:
             t = system.tau[has, k]
             slopes[has, k] = upper_norm(size[t], axis=1) / system.unit[t] * SAFE
         lost = numbers.kappa * off * upper_norm(slopes, axis=1)
-        return bool(self.least > upper_norm(lost * SAFE + TINY) * SAFE)
+        return bool(self.least > errors * upper_norm(lost * SAFE + TINY) * SAFE)
 
     def _off(self, i: int, y: Ball, w: Ball) -> float:
         """How far theta is at most from one that serves a solution within a node's balls; infinite if that is open."""

@@ -188,9 +188,9 @@ class SpaceCertifier:
         found: SpaceRoot | OnlySolution | None
         try:
             if codes is None:
-                found = only_solution(self.enclosed, numbers, normal)
+                found = only_solution(self.enclosed, numbers, normal, errors=2.0)
             else:
-                found = only_root(self.enclosed, numbers, codes)
+                found = only_root(self.enclosed, numbers, codes, errors=2.0)
         except NotEnclosedError:
             return None
         if found is None or not np.max(found.y.rad) <= _PLACED * np.max(np.abs(found.y.mid), initial=_SMALL_FORCE):

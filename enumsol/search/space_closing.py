@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import scipy.linalg
-import scipy.optimize
 
 from enumsol.deadlines import look
 from enumsol.kernel.space_closing import LARGEST_UNIT
@@ -247,6 +246,8 @@ class _Definite:
 
     def improved(self, logs: Array, shares: Array, least: float) -> tuple[Array, Array, float]:
         """Better numbers: those with the largest soft minimum of the eigenvalues of Q relative to S."""
+        from scipy.optimize import minimize  # seldom needed
+
         x, left = np.concatenate([logs.ravel(), shares.ravel()]), _EVALUATIONS
         # columns in which S is the unit matrix
         columns = np.linalg.inv(np.linalg.cholesky(self._S)).T
@@ -256,7 +257,7 @@ class _Definite:
             look()
             options = {"maxfun": min(_ROUND, left), "maxiter": _ROUND}
             given = columns, hardness
-            found = scipy.optimize.minimize(self._value, x, given, method="L-BFGS-B", jac=True, options=options)
+            found = minimize(self._value, x, given, method="L-BFGS-B", jac=True, options=options)
             left -= max(int(found.nfev), 1)
             x, least = found.x, self.least(*self._split(found.x))
         return *self._split(x), least
