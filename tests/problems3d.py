@@ -13,6 +13,15 @@ def from_compliance(S, g, friction, **more):
     return ContactProblem3D(0.5 * (A + A.T), rows[:p], rows[p : 2 * p], rows[2 * p :], A @ g, friction=friction, **more)
 
 
+def exactly(lam, w, friction=1.0):
+    """A problem of coupled nodes whose solution is lambda and w (p, 3), without any rounding."""
+    size, p = np.size(lam), len(lam)
+    A = 4.0 * np.eye(size) + np.random.default_rng(1).integers(-2, 3, (size, size)) / 8
+    A = 0.5 * (A + A.T)
+    rows, load = np.eye(size), A @ np.ravel(w, order="F") + np.ravel(lam, order="F")
+    return ContactProblem3D(A, rows[:p], rows[p : 2 * p], rows[2 * p :], load, friction=friction)
+
+
 def random_compliance(rng, p):
     X = rng.normal(size=(3 * p, 3 * p))
     return X @ X.T + 0.5 * np.eye(3 * p)

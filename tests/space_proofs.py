@@ -9,6 +9,7 @@ import numpy as np
 import proof_fuzz
 from problems3d import from_compliance
 from proof_tools import bytes_of, copied, proof_of, records_of
+from trees import by_the_tree
 
 from enumsol import enumerate_roots, gallery
 
@@ -48,7 +49,7 @@ def with_small_friction():
 
 @functools.cache
 def case(name):
-    """Problem, alpha, records and bytes of the proof of a set of roots."""
+    """Problem, alpha, records and bytes of the proof of a set of roots, by the tree."""
     alpha = 0.0
     if name == "end":
         problem = on_the_end_of_a_sector()
@@ -60,7 +61,8 @@ def case(name):
         problem, alpha = gallery.block3d(*name[1]), name[2]
     else:
         problem = random_problem(*name)
-    roots = enumerate_roots(problem, alpha)
+    with by_the_tree():
+        roots = enumerate_roots(problem, alpha)
     return problem, alpha, records_of(roots.proof), bytes_of(roots.proof)
 
 

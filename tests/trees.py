@@ -1,10 +1,17 @@
 """Searches that go through their tree, also where one certificate would do."""
 
-from unittest import mock
+from contextlib import contextmanager
+
+import pytest
 
 from enumsol.search.closing import Closer
+from enumsol.search.space_closing import SpaceCloser
 
 
+@contextmanager
 def by_the_tree():
-    """A context in which that is so."""
-    return mock.patch.object(Closer, "_due", return_value=False)
+    """In this context that is so."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Closer, "_due", lambda self, nodes: False)
+        patch.setattr(SpaceCloser, "whole", lambda self: None)
+        yield

@@ -30,8 +30,9 @@ What checker and search share
       digits, loaded only where a box asks for it; ``kernel.ball_arrays`` (in 3D, too);
     - for problems in 3D, and loaded for their proofs only: ``kernel.space``, the rows and branchings and the
       exclusion inequality; ``kernel.leaves``, what a complete assignment holds and which leaves share a root;
-      ``sectors``, the ends of sectors; ``condensation.space``, balls for S and g in the variables in which friction is
-      isotropic; ``problem3d``, ``body3d`` and ``friction``, the data and their checks;
+      ``kernel.space_closing``, the test that a whole problem has one solution only; ``sectors``, the ends of sectors;
+      ``condensation.space``, balls for S and g in the variables in which friction is isotropic; ``problem3d``,
+      ``body3d`` and ``friction``, the data and their checks;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
       search whether it does at all (then there is no proof);
       ``condensation.affine``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
@@ -66,7 +67,8 @@ What counts as one root
 
     In 3D a root that slips along the common end of two sectors is found in both. Roots of leaves with the same statuses
     are one if the directions of one lie in the box of angles in which the other is proven to be the only one, and two
-    if their forces differ for certain. Where neither is proven, one more part counts as undecided.
+    if their forces differ for certain. Where neither is proven, one more part counts as undecided. A root that closes
+    the whole tree is the only solution, whatever statuses hold there.
 
 Cross-checks
     They use nothing of the proof and are printed with the result. The indices of all roots and families add up to +1,

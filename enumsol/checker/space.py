@@ -15,6 +15,7 @@ from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.condensation.space import EnclosedSpace
 from enumsol.kernel.leaves import Open, distinct_roots, settle
 from enumsol.kernel.space import CONTACT, UNDECIDED, children_of, exclusion_margin
+from enumsol.kernel.space_closing import only_root, only_solution
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, rational_from, shown, shown_alpha
 from enumsol.proof.reading_space import multipliers_in_space
 from enumsol.sectors import DEEPEST, SECTORS, level_of
@@ -23,9 +24,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.kernel.leaves import SpaceRoot
+    from enumsol.kernel.space_closing import OnlySolution
 
 #: Entries of a leaf's record, by its kind.
-_ENTRIES = {"x": 3, "n": 1, "r": 4, "z": 1, "u": 2}
+_ENTRIES = {"x": 3, "n": 1, "r": 4, "z": 1, "u": 2, "m": 6}
 
 
 @dataclass
@@ -87,6 +89,8 @@ class SpaceChecker(TreeChecker):
             # g = 0: the energy bound reads y' S y <= 0
             self.regular += 1
             return None if unloaded else "the problem is not unloaded"
+        if kind == "m":
+            return self._only(codes, record)
         if any(code in (CONTACT, UNDECIDED) for code in codes):
             return "a root or a solved selection is claimed where statuses are still open"
         return self._settled(codes, record)
@@ -100,7 +104,27 @@ class SpaceChecker(TreeChecker):
         if found is None:
             return "it holds no root"
         self.roots.append((codes, found))
-        _, mid, rad, index = record
+        return self._placed(found, record[1:])
+
+    def _only(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        """The only solution of all."""
+        if any(code != UNDECIDED for code in codes):
+            return "its only solution is claimed below the root of the tree"
+        system, p, m = self.system, self.problem.p, len(self.system.g)
+        _, values, leaf, mid, *_ = record
+        numbers, centre = numbers_from(values, p + 2 * m), numbers_from(mid, m)
+        if not isinstance(leaf, list) or not all(type(code) is int for code in leaf):
+            return "its leaf is no list of codes"
+        found: OnlySolution | SpaceRoot | None
+        found = only_root(system, numbers, tuple(leaf)) if leaf else only_solution(system, numbers, centre[:p])
+        if found is None:
+            return "its solution is not proven to be the only one"
+        self.regular += 1
+        return self._placed(found, record[3:])
+
+    def _placed(self, found: SpaceRoot | OnlySolution, said: list[Any]) -> str | None:
+        """Why the ball and the index that are said to be those of a root are not, or None."""
+        mid, rad, index = said
         centre, radius = (numbers_from(values, len(found.y.mid)) for values in (mid, rad))
         with np.errstate(over="ignore", invalid="ignore"):
             unit = self.system.unit

@@ -35,7 +35,8 @@ class Root3D(ContactState):
     index : int or None
         Local degree: the sign of the Jacobian determinant of the normal map (theory, section 12.4).
     regular : bool
-        Every condition holds strictly.
+        Every condition holds strictly. Otherwise it is the only solution (theory, section 12.6), and ``active`` has for
+        every node the statuses that may hold.
     margin : float
         The least slack of the conditions, in scaled units [-].
     enclosure : Enclosure or None

@@ -56,13 +56,14 @@ class Undecided(Sealed):
     >>> roots.undecided[0].reason
     'the search was stopped before it got here'
 
-    A node in 3D that sticks at its limit:
+    A node in 3D that slides with any lambda_n from 0 to 1:
 
     >>> import numpy as np
-    >>> problem = enumsol.ContactProblem3D(np.eye(3), *np.eye(3)[:, None], [5, 4, 3], friction=1)
+    >>> A = np.array([[2, 1, 0], [1, 1, 0], [0, 0, 1]])
+    >>> problem = enumsol.ContactProblem3D(A, *np.eye(3)[:, None], [1, 1, 0], friction=1)
     >>> region = enumsol.enumerate_roots(problem, alpha=0).undecided[0]
-    >>> region.statuses, region.leaves, region.bounds.lambda_n.round(9).tolist()
-    (('contact',), 2, [[5.0, 5.0]])
+    >>> region.statuses, region.leaves, region.bounds.lambda_n.round(3).tolist()
+    ((None,), 4, [[0.0, 1.207]])
     """
 
     statuses: tuple[ContactStatus | str | None, ...]

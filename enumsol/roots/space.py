@@ -12,11 +12,12 @@ from enumsol.arithmetic.balls import SAFE, UNIT
 from enumsol.errors import InvalidArgumentError
 from enumsol.kernel.ball_arrays import Ball
 from enumsol.kernel.leaves import distinct_roots
+from enumsol.kernel.space_closing import OnlySolution
 from enumsol.roots.enumeration import Enumeration
 from enumsol.roots.root import Enclosure
 from enumsol.roots.root3d import Root3D
 from enumsol.roots.root_set import RootSet, Undecided
-from enumsol.roots.space_regions import regions_of, slip_angles, with_zeros
+from enumsol.roots.space_regions import loose_angles, regions_of, slip_angles, with_zeros
 from enumsol.sealed import sealed
 from enumsol.search.space_solvers import SpaceSolvers
 from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus
@@ -51,8 +52,10 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         self.problem, self.alpha, self.arithmetic = solvers.problem, solvers.alpha, solvers.arithmetic
         self.system, self.enclosed = solvers.system, solvers.enclosed
 
-    def _distinct(self) -> tuple[list[tuple[Codes, SpaceRoot]], list[Codes]]:
-        return distinct_roots(self.certifier.certified.verified.items())
+    def _distinct(self) -> tuple[list[tuple[Codes, Any]], list[Codes]]:
+        verified = self.certifier.certified.verified
+        only = [(codes, root) for codes, root in verified.items() if isinstance(root, OnlySolution)]
+        return (only, []) if only else distinct_roots(verified.items())
 
     def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
         return lambda solutions: len(solutions) >= stop_after and len(self._distinct()[0]) >= stop_after
@@ -60,7 +63,9 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
     def _result(self) -> RootSet:
         outcome = self.outcome
         distinct, doubtful = self._distinct()
-        roots = [self._root(codes, root) for codes, root in distinct]
+        roots = [
+            self._only(root) if isinstance(root, OnlySolution) else self._root(codes, root) for codes, root in distinct
+        ]
         if self.unloaded:
             roots = [self._rest()]
         roots.sort(key=lambda root: (-float(np.sum(root.lambda_n)), root.lambda_n.tolist(), root.lambda_t.tolist()))
@@ -104,6 +109,32 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             regular=True,
             margin=found.slack,
             enclosure=self._root_enclosure(codes, found),
+            _condensed=self.problem.condensed,
+        )
+
+    def _only(self, found: OnlySolution) -> Root3D:
+        """The only solution, whose statuses need not be known."""
+        system, p = self.system, self.system.p
+        bounds = self._enclosure(found.y, Ball(found.w.mid, np.where(found.w.rad > 0, np.inf, 0.0)))
+        lambda_n = found.y.mid[:p] * system.force
+        lambda_t = system.tangential(found.y.mid) * system.F * system.force[:, None]
+        u_n, u_t = self._displacements(lambda_n, lambda_t)
+        u_n, u_t = (np.clip(u, b[..., 0], b[..., 1]) for u, b in ((u_n, bounds.u_n), (u_t, bounds.u_t)))
+        active = tuple(frozenset(_possible(found, i, u_t[i], rubs=bool(np.any(system.tau[i] >= 0)))) for i in range(p))
+        order = (ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP)
+        return Root3D(
+            alpha=self.alpha,
+            statuses=tuple(next(status for status in order if status in held) for held in active),
+            active=active,
+            lambda_n=lambda_n,
+            lambda_t=lambda_t,
+            u_n=u_n,
+            u_t=u_t,
+            slip_angle=np.array([_around(*pair) for pair in zip(*loose_angles(self.enclosed, found), strict=True)]),
+            index=found.index,
+            regular=False,
+            margin=0.0,
+            enclosure=bounds,
             _condensed=self.problem.condensed,
         )
 
@@ -227,6 +258,14 @@ def _status(code: int, u_t: Array) -> ContactStatus:
     if code == STICK or (code == FRICTIONLESS and not np.any(u_t)):
         return ContactStatus.STICK
     return ContactStatus.SLIP
+
+
+def _possible(found: OnlySolution, i: int, u_t: Array, *, rubs: bool) -> list[ContactStatus]:
+    """The statuses that a node may have."""
+    touching = [_status(FRICTIONLESS, u_t)] if found.stick[i] else []
+    if rubs:
+        touching = [ContactStatus.STICK] * bool(found.stick[i]) + [ContactStatus.SLIP] * bool(found.slip[i])
+    return [ContactStatus.OPEN] * bool(found.open[i]) + touching
 
 
 def _around(middle: float, radius: float) -> Array:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space import EnclosedSpace
     from enumsol.kernel.leaves import Open, SpaceRoot
+    from enumsol.kernel.space_closing import OnlySolution
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -112,6 +113,22 @@ def slip_angles(system: EnclosedSpace, codes: Codes, leaf: SpaceRoot | Open | No
     if leaf is not None:
         angle[turning] = np.arctan2(leaf.centre[:, 1], leaf.centre[:, 0]) + leaf.angle
         radius[turning] = leaf.angle_rad * SAFE + 1e-14
+    return angle, radius
+
+
+def loose_angles(system: EnclosedSpace, found: OnlySolution) -> tuple[Array, Array]:
+    """Directions of v as angles and radii, (p,) each; nan where a node does not slip against friction for certain."""
+    angle, radius = np.full((2, len(found.slip)), np.nan)
+    for i in np.flatnonzero(found.slip):
+        t = system.tau[i]
+        if not np.any(t >= 0):
+            continue
+        scale = system.slip_scale[i] / system.unit[t]
+        v, r = np.where(t >= 0, found.w.mid[t] * scale, 0.0), np.where(t >= 0, found.w.rad[t] * scale, 0.0)
+        known, wide = float(np.linalg.norm(v)), float(upper_norm(r * SAFE + TINY))
+        angle[i] = np.arctan2(v[1], v[0])
+        # sin x >= 2 x / pi
+        radius[i] = 0.5 * np.pi * wide / known * SAFE + 1e-14 if known > wide * SAFE else np.pi
     return angle, radius
 
 

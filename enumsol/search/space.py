@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.kernel.leaves import Open, settle
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.kernel.leaves import Open, SpaceRoot, settle
 from enumsol.kernel.space import exclusion_margin, row_terms
+from enumsol.kernel.space_closing import OnlySolution, only_root, only_solution
 from enumsol.proof.reading_space import multipliers_in_space
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space import SpaceEngine
@@ -20,13 +22,20 @@ from enumsol.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from numpy.typing import NDArray
+
     from enumsol.condensation.space import EnclosedSpace
-    from enumsol.kernel.leaves import SpaceRoot
     from enumsol.proof.parts import Recorder
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.protocol import Bound
     from enumsol.selections.solution import Codes
 
+    Array = NDArray[np.float64]
+
+#: Forces that are known no better than this, relative to the largest one, are left to the tree.
+_PLACED = 1e-3
+#: Where all are smaller than this (scaled), relative to this.
+_SMALL_FORCE = 1e-6
 _DEGENERATE = "a condition holds with equality, or nearly so, at what may be a root"
 
 
@@ -122,7 +131,7 @@ class SpaceCertifier:
 
     def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, recorder: Recorder) -> None:
         self._engine, self.enclosed, self.recorder = engine, enclosed, recorder
-        self._roots: dict[Codes, SpaceRoot] = {}
+        self._roots: dict[Codes, SpaceRoot | OnlySolution] = {}
         self.sliding: dict[int, int] = {}
         self._leaves = 0
 
@@ -166,6 +175,31 @@ class SpaceCertifier:
             unit = self.enclosed.unit
             self._leaf("r", (answer.y.mid * unit).tolist(), (4.0 * answer.y.rad * unit).tolist(), answer.index)
         return answer
+
+    def close(self, numbers: Array, codes: Codes | None, normal: Array) -> list[SpaceRoot | OnlySolution] | None:
+        """The only solution of the whole problem, as a list, and its leaf written; None if that is not proven.
+
+        Parameters
+        ----------
+        numbers : of the form, as ``kernel.space_closing.Numbers.of`` takes them
+        codes : of a leaf that holds the solution; None: its statuses need not hold strictly
+        normal : (p,) array, lambda_n near the solution
+        """
+        found: SpaceRoot | OnlySolution | None
+        try:
+            if codes is None:
+                found = only_solution(self.enclosed, numbers, normal, errors=2.0)
+            else:
+                found = only_root(self.enclosed, numbers, codes, errors=2.0)
+        except NotEnclosedError:
+            return None
+        if found is None or not np.max(found.y.rad) <= _PLACED * np.max(np.abs(found.y.mid), initial=_SMALL_FORCE):
+            return None
+        self._roots[codes or (UNDECIDED,) * len(normal)] = found
+        unit = self.enclosed.unit
+        ball = (found.y.mid * unit).tolist(), (4.0 * found.y.rad * unit).tolist()
+        self._leaf("m", numbers.tolist(), list(codes or ()), *ball, found.index)
+        return [found]
 
     def unloaded(self) -> None:
         """Write the proof of the unloaded body."""

@@ -13,6 +13,7 @@ from enumsol.relaxation.space import SpaceEngine
 from enumsol.search.certifiers.protocol import Unrecorded
 from enumsol.search.proof_header import point_header, unit_exponents
 from enumsol.search.space import SpaceCertifier, SpaceReader, SpaceSplitting
+from enumsol.search.space_closing import SpaceCloser
 from enumsol.search.tree import TreeSearch
 
 if TYPE_CHECKING:
@@ -88,8 +89,18 @@ class SpaceSolvers:
     ) -> TreeSearch:
         """A search of the tree with a certifier made here."""
         engine = self._engine
-        splitting = SpaceSplitting(engine)
-        return TreeSearch(self.system, certifier, engine=engine, splitting=splitting, limits=limits, progress=progress)
+        closer = None
+        if isinstance(certifier, SpaceCertifier):
+            closer = SpaceCloser(self.system, certifier, regular=self.arithmetic == "fast")
+        return TreeSearch(
+            self.system,
+            certifier,
+            engine=engine,
+            splitting=SpaceSplitting(engine),
+            limits=limits,
+            progress=progress,
+            closer=closer,
+        )
 
     def remake(self) -> Callable[[], SpaceSolvers]:
         """Makes the same again, also in another process."""

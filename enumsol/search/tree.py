@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from enumsol.kernel.forms import EnclosedForm
     from enumsol.search.certifiers.protocol import Bound, Certifier
     from enumsol.search.closing import Closer
+    from enumsol.search.space_closing import SpaceCloser
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
@@ -105,7 +106,7 @@ class TreeSearch:
         splitting: Splitting | None = None,
         limits: SearchLimits | None = None,
         progress: Callable[[SearchProgress], object] | None = None,
-        closer: Closer | None = None,
+        closer: Closer | SpaceCloser | None = None,
         forms: Forms | None = None,
     ) -> None:
         self.system = system

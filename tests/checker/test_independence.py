@@ -19,6 +19,7 @@ IN_SPACE = {
     "enumsol.checker.space",
     "enumsol.kernel.space",
     "enumsol.kernel.leaves",
+    "enumsol.kernel.space_closing",
     "enumsol.condensation.space",
     "enumsol.sectors",
 }
@@ -58,6 +59,7 @@ SHARED = {
     "kernel.rows": None,
     "kernel.space": None,
     "kernel.leaves": None,
+    "kernel.space_closing": {"LARGEST_UNIT", "OnlySolution", "only_root", "only_solution"},
     "kernel.ball_arrays": None,
     "proof.begun": None,
     "proof.forms": None,

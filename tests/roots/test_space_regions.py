@@ -16,6 +16,7 @@ from enumsol.roots.space_regions import _hull, regions_of
 from enumsol.search.space_solvers import SpaceSolvers
 from enumsol.sectors import SECTORS
 
+pytestmark = pytest.mark.usefixtures("tree_only")
 LOADED = (np.eye(3), [1, 3, 2])
 STUCK_AT_ITS_LIMIT = (np.eye(3), [5, 4, 3])
 #: It slides with any lambda_n from 0, where it grazes, to 1, where it would stick.

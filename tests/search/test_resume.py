@@ -75,7 +75,17 @@ PROBLEMS = {
     "one certificate": lambda: (gallery.clamped_block(4, 2), 0.3),
     "in space": lambda: (gallery.get("one-node-3d-3").build(), 0),
     "block in space": lambda: (gallery.get("block3d-4").build(), 0.5),
+    "closed in space": lambda: (gallery.get("block3d-9").build(), 0.5),
 }
+
+
+#: Those with records that one certificate would do without.
+TREES = ("forms", "contradiction", "no root", "border", "block in space")
+
+
+def searched(name):
+    """A context in which the tree is searched where one certificate would do."""
+    return by_the_tree() if name in TREES else nullcontext()
 
 
 @cache
@@ -86,7 +96,7 @@ def known(name):
     if name == "forms":
         policy.NODES, policy.MORE = 0, -2.0
     try:
-        with by_the_tree() if name in ("forms", "contradiction", "no root", "border") else nullcontext():
+        with searched(name):
             return problem, alpha, enumerate_roots(problem, alpha)
     finally:
         policy.NODES, policy.MORE = before
@@ -255,10 +265,11 @@ def test_rows_that_do_not_exist_in_space(tmp_path):
 
 @pytest.mark.parametrize("name", ["wedge", "forms", "closed", "block in space"])
 @pytest.mark.parametrize("limits", [{"max_nodes": 7}, {"max_nodes": 40}])
-def test_a_search_in_small_parts(name, limits, tree_only, tmp_path):
+def test_a_search_in_small_parts(name, limits, tmp_path):
     problem, alpha, whole = known(name)
     path = tmp_path / "x.proof"
-    found = enumerate_roots(problem, alpha, proof_path=path, resume=True, **limits)
+    with searched(name):
+        found = enumerate_roots(problem, alpha, proof_path=path, resume=True, **limits)
     assert found.stats.resumed == 0
     parts = 1
     while not found.complete:
@@ -313,7 +324,7 @@ def test_a_time_limit_is_about_what_is_searched_anew(tmp_path, monkeypatch):
     check("wedge", found)
 
 
-@pytest.mark.parametrize("name", ["wedge", "forms", "closed", "block in space"])
+@pytest.mark.parametrize("name", ["wedge", "forms", "closed", "block in space", "closed in space"])
 def test_with_an_executor(name, tmp_path):
     problem, alpha, whole = known(name)
     data = bytes_of(whole.proof)
@@ -322,7 +333,8 @@ def test_with_an_executor(name, tmp_path):
             check(name, resumed(name, data[:size], tmp_path / "x.proof", executor=executor))
         path = tmp_path / "x.proof"
         path.unlink()
-        found = enumerate_roots(problem, alpha, proof_path=path, executor=executor, max_nodes=2)
+        with searched(name):
+            found = enumerate_roots(problem, alpha, proof_path=path, executor=executor, max_nodes=2)
         assert found.complete or found.stopped
         check(name, enumerate_roots(problem, alpha, proof_path=path, resume=True))
 

@@ -14,6 +14,8 @@ import enumsol
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.search import parallel
 
+pytestmark = pytest.mark.usefixtures("tree_only")
+
 
 def three_nodes():
     """Three nodes that do not influence each other, with three roots each: 27 roots."""

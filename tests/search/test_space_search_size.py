@@ -5,6 +5,8 @@ import pytest
 import enumsol
 from enumsol import gallery
 
+pytestmark = pytest.mark.usefixtures("tree_only")
+
 
 @pytest.mark.parametrize(
     ("cells", "F", "most"),
