@@ -48,6 +48,29 @@ def assert_refused(status, out, err, *parts):
 # -- what is printed ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("alpha", "more", "status", "line", "unique"),
+    [
+        ("1", (), 0, "unique: yes (proven by one certificate)", True),
+        ("5", (), 0, "unique: no (two solutions, proven; --unique looks for no more)", False),
+        ("5", ("--max-nodes", "1"), 3, "unique: not known (complete: no (stopped after max_nodes = 1 node, ", None),
+        ("1", ("--arithmetic", "fast"), 0, "unique: not known (fast arithmetic proves nothing)", None),
+    ],
+)
+def test_is_there_one_solution(alpha, more, status, line, unique, capsys, tmp_path):
+    report = tmp_path / "x.json"
+    ended, out, _ = run(capsys, "roots", "gallery:one-node-6.1", "--alpha", alpha, "--unique", "--json", report, *more)
+    assert ended == status
+    assert out.startswith(line)
+    assert len(out.splitlines()) == 1
+    assert json.loads(report.read_text())["unique"] is unique
+
+
+def test_one_solution_or_so_many(capsys):
+    both = ("roots", "gallery:one-node-6.1", "--alpha", "5", "--unique", "--stop-after", "3")
+    assert_refused(*run(capsys, *both), "--stop-after is 3 with --unique")
+
+
 def test_roots_of_the_first_example(capsys):
     status, out, err = run(capsys, "roots", "gallery:one-node-6.1", "--alpha", 5)
     assert (status, err) == (0, "")
