@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 #: Entries of |I - R M| must sum to less than this in every row for a selection to count as regular.
 _CONTRACTION = 0.5
+#: Of rounding in long double, which some processors have no better than double; what an operation adds is half of it.
+_LONG = float(np.finfo(np.longdouble).eps)
 
 
 def exclusion_margin(
@@ -260,9 +262,12 @@ def verified_solve(M: Array, M_rad: Array, b: Array, b_rad: Array) -> tuple[Arra
         return None
     y = upper @ (lower @ bP)
     y = y + upper @ (lower @ (bP - MP @ y))
-    rest = bP - MP @ y
-    rest_rad = bP_rad + MP_rad @ np.abs(y) + k * (np.abs(bP) + np.abs(MP) @ np.abs(y)) * (1 + k) + TINY
-    step = np.abs(upper @ (lower @ rest)) + reach @ (rest_rad + k * np.abs(rest))
+    # what the rounding of the rest would add is more than all the rest where M is ill-conditioned
+    rest = (bP.astype(np.longdouble) - MP.astype(np.longdouble) @ y.astype(np.longdouble)).astype(np.float64)
+    size = (np.abs(bP) + np.abs(MP) @ np.abs(y)) * (1 + k)
+    rest_rad = (bP_rad + MP_rad @ np.abs(y)) * (1 + k) + (n + 4) * _LONG * size + 2 * UNIT * np.abs(rest) + TINY
+    inverse = np.abs(upper @ lower) + k * reach
+    step = np.abs(upper @ (lower @ rest)) + k * (reach @ np.abs(rest)) + inverse @ rest_rad
     step = step * (1 + k) * SAFE + TINY
     # |error| <= step + defect |error|, and ||error|| <= ||step|| / (1 - contraction)
     largest = float(np.max(step)) / (1.0 - contraction) * SAFE
