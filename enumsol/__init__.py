@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from enumsol.roots.enumerate import enumerate_roots
     from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
     from enumsol.roots.root_set import RootSet, SearchStats, Undecided
+    from enumsol.roots.unique import is_unique
     from enumsol.search.outcome import SearchProgress
     from enumsol.statuses import ContactStatus, sign_array
 

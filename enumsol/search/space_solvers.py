@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from fractions import Fraction
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.space import EnclosedSpace, SpaceSystem
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from enumsol.proof.parts import Recorder
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.outcome import SearchLimits, SearchProgress
+    from enumsol.search.space_closing import SpaceClosing
 
 
 class SpaceSolvers:
@@ -88,10 +89,7 @@ class SpaceSolvers:
         progress: Callable[[SearchProgress], object] | None = None,
     ) -> TreeSearch:
         """A search of the tree with a certifier made here."""
-        engine = self._engine
-        closer = None
-        if isinstance(certifier, SpaceCertifier):
-            closer = SpaceCloser(self.system, certifier, regular=self.arithmetic == "fast")
+        engine, closing = self._engine, cast("SpaceClosing", certifier)
         return TreeSearch(
             self.system,
             certifier,
@@ -99,7 +97,7 @@ class SpaceSolvers:
             splitting=SpaceSplitting(engine),
             limits=limits,
             progress=progress,
-            closer=closer,
+            closer=SpaceCloser(self.system, closing, regular=self.arithmetic == "fast"),
         )
 
     def remake(self) -> Callable[[], SpaceSolvers]:

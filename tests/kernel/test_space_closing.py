@@ -25,7 +25,7 @@ class Proposals:
 
 def proposed(solvers):
     taken = Proposals()
-    SpaceCloser(solvers.system, taken).whole(0)
+    SpaceCloser(solvers.system, taken).whole()
     return taken.proposed
 
 
