@@ -50,7 +50,7 @@ def test_the_selection_of_h_is_the_one_that_the_sign_array_names():
     for _ in range(40):
         equation = random_equation(rng)
         n, p = equation.problem.n, equation.problem.p
-        for _ in range(150):
+        for _ in range(50):
             x = np.concatenate([rng.normal(size=n), rng.normal(size=2 * p) * np.exp(rng.normal())])
             alpha = rng.uniform(0, 3)
             signs = equation.signs(x, alpha)
@@ -62,7 +62,7 @@ def test_the_selection_of_h_is_the_one_that_the_sign_array_names():
             seen.update(map(tuple, signs.tolist()))
             negative += int(np.sum(x[n : n + p] < 0))
     assert seen == set(itertools.product((-1, 1), repeat=3))  # all eight, the fourth piece of P included
-    assert negative > 5_000
+    assert negative > 1_700
 
 
 def test_other_sign_arrays_name_other_functions():

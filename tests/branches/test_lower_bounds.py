@@ -212,8 +212,8 @@ def test_claims_are_true():
 
 @pytest.mark.slow
 def test_many_claims_are_true():
-    graphs, cut, asked, sharp = check([*range(110, 136), 201], 50)
-    assert (graphs, cut > 90) == (162, True)
+    graphs, cut, asked, sharp = check([*range(110, 123), 201], 50)
+    assert (graphs, cut > 45) == (84, True)
     assert sharp > 0.8 * asked
 
 

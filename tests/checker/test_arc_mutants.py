@@ -344,9 +344,9 @@ def test_mutants_accepted_as_a_whole_are_true(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", range(7))
+@pytest.mark.parametrize("block", range(4))
 @pytest.mark.parametrize("name", ORIGINALS)
-def test_ten_thousand_mutants_accepted_as_a_whole_are_true(name, block):
+def test_thousands_of_mutants_accepted_as_a_whole_are_true(name, block):
     rng = random.Random(f"{name} {block}")
     records = original(name)[1]
     for _ in range(MUTANTS):

@@ -321,8 +321,8 @@ def test_multipliers_have_to_be_finite():
 @pytest.mark.parametrize(
     "name",
     [
-        *((1, 22), SEVERAL, "one tangent", "small friction"),
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ((2, 5), "end")),
+        *((1, 22), SEVERAL, "one tangent"),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("small friction", (2, 5), "end")),
     ],
     ids=str,
 )
