@@ -136,7 +136,7 @@ def determinant_sign(M: Ball) -> int:
         return 1
     scale = column_scale(M)
     solved = verified_solve(M.mid * scale, M.rad * scale + TINY, np.zeros(n), np.zeros(n))
-    return 0 if solved is None else solved[2]
+    return 0 if solved is None else solved.sign
 
 
 def nearly_singular(M: Array) -> bool:

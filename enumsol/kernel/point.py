@@ -215,8 +215,7 @@ def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSe
     solved = verified_solve(M * scale, M_rad * scale + TINY, system.g[rows], system.g_rad[rows])
     if solved is None:
         return None
-    y, y_rad, sign = solved
-    y, y_rad = y * scale, y_rad * scale + TINY
+    y, y_rad, sign = solved.y * scale, solved.radius * scale + TINY, solved.sign
     count = len(closed)
     force, force_rad = np.zeros(2 * p), np.zeros(2 * p)
     force[closed], force_rad[closed] = y[:count], y_rad[:count]
@@ -229,10 +228,63 @@ def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSe
     w_rad = system.g_rad + np.abs(S) @ (force_rad + size * np.abs(force)) + system.S_rad @ (np.abs(force) + force_rad)
     w_rad = (w_rad * (1 + size) + 2 * UNIT * np.abs(w) + size * np.abs(system.g)) * SAFE + TINY
     w[rows], w_rad[rows] = 0.0, 0.0
+    found = _conditions(system, status, force, force_rad, w, w_rad, sign)
+    if found.is_root or found.is_excluded:
+        return found
+    w_rad = np.fmin(w_rad, _closer(system, parts, solved, scale, force, force_rad))
+    w_rad[rows] = 0.0
     return _conditions(system, status, force, force_rad, w, w_rad, sign)
 
 
-def verified_solve(M: Array, M_rad: Array, b: Array, b_rad: Array) -> tuple[Array, Array, int] | None:
+def _closer(
+    system: EnclosedSystem, parts: _Equations, solved: VerifiedSolution, scale: Array, force: Array, force_rad: Array
+) -> Array:
+    """Radii of g - S lambda in which errors of lambda cancel: those of a solution of ill-conditioned equations do.
+
+    With lambda = E (y + e), e = R rest + (I - R M) e: S E R is not large where S E and R are.
+    """
+    S, size = system.S, gamma(2 * system.p + 2)
+    moved = np.hstack([S[:, parts.closed] + S[:, parts.across] * parts.slipping, S[:, parts.held]]) * scale
+    product, reach = moved @ solved.inverse, np.abs(moved)
+    k = gamma(moved.shape[1] + 8)
+    # what rounds off in the inverse and in both products, and what is left of e
+    beside = (np.abs(solved.inverse) * k + solved.rounded) @ solved.rest + solved.defect @ solved.radius
+    error = (np.abs(product) @ solved.rest) * (1 + k) + (reach @ beside) * (1 + k) ** 3
+    # of F, where E is a ball, and of S and g; then of g - S lambda as it is computed
+    turned = np.zeros_like(force)
+    turned[parts.across] = parts.uncertain * (np.abs(force[parts.closed]) + force_rad[parts.closed])
+    turned[parts.across] += 4 * UNIT * np.abs(parts.slipping) * (np.abs(force[parts.closed]) + force_rad[parts.closed])
+    most = np.abs(force) + force_rad
+    error += system.g_rad + system.S_rad @ most + np.abs(S) @ (turned + size * most)
+    return (error * (1 + size) + size * np.abs(system.g)) * SAFE * SAFE + TINY
+
+
+@dataclass(frozen=True)
+class VerifiedSolution:
+    """The solutions of M y = b for all M and b in balls.
+
+    Attributes
+    ----------
+    y, radius : (n,) arrays
+    sign : of det M
+    inverse, rounded : (n, n) arrays
+        The midpoint and the radius of a matrix R near M^-1, of rows in another order.
+    rest : (n,) array
+        Bound of |b - M y| in that order.
+    defect : (n, n) array
+        Bound of |I - R M|.
+    """
+
+    y: Array
+    radius: Array
+    sign: int
+    inverse: Array
+    rounded: Array
+    rest: Array
+    defect: Array
+
+
+def verified_solve(M: Array, M_rad: Array, b: Array, b_rad: Array) -> VerifiedSolution | None:
     """Ball of the solutions of M y = b and the sign of det M, or None when M is not proven regular.
 
     R = U^{-1} L^{-1} P with explicit triangular approximations has a determinant of known sign; ||I - R M|| < 1 then
@@ -266,13 +318,14 @@ def verified_solve(M: Array, M_rad: Array, b: Array, b_rad: Array) -> tuple[Arra
     rest = (bP.astype(np.longdouble) - MP.astype(np.longdouble) @ y.astype(np.longdouble)).astype(np.float64)
     size = (np.abs(bP) + np.abs(MP) @ np.abs(y)) * (1 + k)
     rest_rad = (bP_rad + MP_rad @ np.abs(y)) * (1 + k) + (n + 4) * _LONG * size + 2 * UNIT * np.abs(rest) + TINY
-    inverse = np.abs(upper @ lower) + k * reach
-    step = np.abs(upper @ (lower @ rest)) + k * (reach @ np.abs(rest)) + inverse @ rest_rad
+    inverse, rounded = upper @ lower, k * reach
+    step = np.abs(upper @ (lower @ rest)) + rounded @ np.abs(rest) + (np.abs(inverse) + rounded) @ rest_rad
     step = step * (1 + k) * SAFE + TINY
     # |error| <= step + defect |error|, and ||error|| <= ||step|| / (1 - contraction)
     largest = float(np.max(step)) / (1.0 - contraction) * SAFE
     radius = (step + upper_sum(defect, axis=1) * largest) * SAFE
-    return y, radius, sign * (1 - 2 * (negative % 2))
+    rest = (np.abs(rest) + rest_rad) * (1 + k)
+    return VerifiedSolution(y, radius, sign * (1 - 2 * (negative % 2)), inverse, rounded, rest, defect)
 
 
 def row_balls(

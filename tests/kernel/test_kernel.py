@@ -10,6 +10,7 @@ from oracles import _affine, _at, _conditions, exact_condense
 from proof_tools import Judge, det_sign, leaves_of, multipliers, records_of
 
 from enumsol import enumerate_roots, gallery
+from enumsol.kernel import point
 from enumsol.kernel.point import exclusion_margin, exclusion_margins, solve_selection
 from enumsol.kernel.rows import row_signs
 from enumsol.search.certifiers._margin import Margins
@@ -285,3 +286,35 @@ def test_scaled_units_change_nothing():
     assert bench.enclosed is not None
     assert bench.data == "problem"
     assert bench.enclosed.smallest_eigenvalue <= np.linalg.eigvalsh(bench.scaled.S)[0]
+
+
+def test_displacements_of_ill_conditioned_selections(monkeypatch):
+    """On weak springs forces are known far worse than displacements; radii in which that cancels are true, too."""
+    radii = []
+
+    def recorded(*args, closer=point._closer):
+        radii.append(closer(*args))
+        return radii[-1]
+
+    monkeypatch.setattr(point, "_closer", recorded)
+    for name in ("is_root", "is_excluded"):
+        monkeypatch.setattr(point.VerifiedSelection, name, property(lambda _: False))
+    rng, times = np.random.default_rng(5), []
+    for _ in range(40):
+        S, v = fe_compliance(rng, 2), rng.normal(size=4)
+        S = S + 10.0 ** rng.uniform(0, 9) * np.outer(v, v)
+        problem = from_condensed(0.5 * (S + S.T), rng.normal(size=4), rng.choice([0.1, 1.0, 30.0], size=2))
+        system, exact = system_of(problem), exact_condense(problem, 0.0)
+        for codes in product(range(4), repeat=2):
+            radii.clear()
+            _check_selection(system, *exact, codes)
+            if not radii:
+                continue
+            ball = solve_selection(system, codes)
+            point_of, _ = _affine(_conditions(*exact, codes)[0])
+            for r in np.flatnonzero(ball.w_rad > 0):
+                w = exact[1][r] - sum(exact[0][r][k] * point_of[k] for k in range(4))
+                assert abs(w - Fraction(float(ball.w[r]))) <= Fraction(float(radii[0][r]))
+                times.append(radii[0][r] / (np.abs(system.S) @ ball.force_rad + system.g_rad)[r])
+    assert len(times) > 300
+    assert np.quantile(times, 0.2) < 0.2
