@@ -16,7 +16,7 @@ in 2D: a path from 24 contact nodes on, and below 48 other numbers than plain on
 ``largest``: the last F at which plain and any numbers do, by bisection over F = 0.02 to 20, each 1.155 times the one
 before. 20 is tried first, and stands for 20 or more. Bisection takes for granted that there is one such end: every
 second F was tried once, for all but the block with 256 contact nodes, and so it was. ``before`` is the F up to which
-one solution follows without a search: by theory, (5.9), in 2D, and by the estimate of section 11.5 in 3D. Then, for p
+one solution follows without a search: by theory, (5.9), in 2D, and by that of theory, section 11.5, in 3D. Then, for p
 up to 32, the tree at the next F after ``any``, or at 20: its ``roots``, and ``alone`` if it ended with one; after
 ``any`` the certificate has ended then, and uniqueness has not. ``several from`` is the first F at which a search, cut
 likewise, finds several roots, for p up to 14.
