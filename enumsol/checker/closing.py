@@ -10,7 +10,6 @@ from flint import fmpq_mat
 from enumsol.arithmetic.balls import SAFE
 from enumsol.arithmetic.rationals import to_fraction
 from enumsol.kernel.closing import closed_solution, final_codes, only_solution, same_solution
-from enumsol.kernel.point import solve_selection
 from enumsol.kernel.rows import BACKWARD, CONTACT, FORWARD, OPEN, STICK, UNDECIDED, refines
 from enumsol.proof.reading import numbers_from, same
 
@@ -56,10 +55,8 @@ def closed_by_balls(
 def one_regular_root(system: EnclosedSystem, record: list[Any], force: Array) -> bool:
     """Whether a record of kind "m" proves that all data in the balls have one root, regular and in its selection."""
     free, selection, weights, mid = _read(system, record)
-    root = solve_selection(system, selection) if len(free) == system.p else None
-    if root is None or not root.is_root:
-        return False
-    return closed_solution(system, selection, free, weights, mid / force) is not None
+    ball = closed_solution(system, selection, free, weights, mid / force)
+    return ball is not None and ball.regular is not None
 
 
 def closed_in_rationals(
