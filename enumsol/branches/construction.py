@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from enumsol.arithmetic.rationals import rational
+from enumsol.branches.closed_pieces import ClosedPieces
 from enumsol.branches.following import follow
 from enumsol.branches.gluing import glue
 from enumsol.branches.graph import BranchGraph
@@ -33,7 +35,7 @@ from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite
 from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
-from enumsol.deadlines import Deadline, over, within
+from enumsol.deadlines import Deadline, TimeOverError, over, within
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.problem import ContactProblem
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
@@ -161,11 +163,15 @@ def branch_graph(
         deadline=limits.deadline,
         progress=_stage(progress, "search"),
     )
-    candidates = _candidates(search, exact, executor)
+    closed = ClosedPieces()
+    search.closed = closed.pieces
+    candidates = _candidates(search, exact, executor, traced, closed)
     searched = time.perf_counter()
     limits = limits.extended(started)
     with within(limits.part(_JOINED)):
-        made = _make(problem, search, candidates, traced, exact, _stage(progress, "arcs"), limits.part(_WORKED_OUT))
+        made = _make(
+            problem, search, candidates, traced, closed, exact, _stage(progress, "arcs"), limits.part(_WORKED_OUT)
+        )
     stats = GraphStats(
         pieces=len(search.pieces),
         nodes=search.nodes,
@@ -208,6 +214,7 @@ def _make(
     search: IntervalSearch,
     candidates: set[Codes],
     traced: TracedProblem | None,
+    closed: ClosedPieces,
     exact: ExactCondensed | None,
     tick: Callable[[float], object] | None,
     limits: Limited,
@@ -221,7 +228,15 @@ def _make(
     if traced is not None:
         # after Ctrl-C only as much as takes a moment
         most = _BOXES_AFTER_INTERRUPT if any(stop.interrupted for stop in made.stops) else None
-        made.followed = follow(traced, search.pieces, tick, cut_short=bool(made.stops), most=most, limits=limits)
+        made.followed = follow(
+            traced,
+            search.pieces,
+            tick,
+            known=closed.traces,
+            cut_short=bool(made.stops),
+            most=most,
+            limits=limits,
+        )
         joined, stopped = made.followed.joined, made.followed.stopped
         made.stops += [] if stopped is None else [stopped]
         large = over() or problem.n > EXACT_DOF_LIMIT or _exact_work(problem, candidates) > LARGEST_EXACT_WORK
@@ -280,12 +295,24 @@ def _certifier(
     return FastIntervalCertifier() if arithmetic == "fast" else VerifiedIntervalCertifier(problem, exact, zero)
 
 
-def _candidates(search: IntervalSearch, exact: ExactCondensed | None, executor: Executor | None) -> set[Codes]:
-    """The selections that may hold somewhere; Ctrl-C keeps those that were found."""
+def _candidates(
+    search: IntervalSearch,
+    exact: ExactCondensed | None,
+    executor: Executor | None,
+    traced: TracedProblem | None,
+    closed: ClosedPieces,
+) -> set[Codes]:
+    """The selections that may hold somewhere; Ctrl-C keeps those that were found.
+
+    ``closed`` takes the pieces that need no tree.
+    """
     if exact is not None and exact.unloaded:
         # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
         return {(OPEN,) * exact.p}
     try:
+        if traced is not None:
+            with suppress(TimeOverError), within(Deadline(search.deadline)):
+                closed.find(traced)
         if executor is None:
             search.run()
         else:

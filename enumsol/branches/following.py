@@ -67,6 +67,7 @@ def follow(
     pieces: Sequence[SearchedPiece],
     tick: Callable[[float], object] | None = None,
     *,
+    known: Sequence[Trace] = (),
     cut_short: bool = False,
     most: int | None = None,
     limits: Limited | None = None,
@@ -78,6 +79,7 @@ def follow(
     traced : TracedProblem
     pieces : sequence of SearchedPiece
     tick : called with the share of the selections done
+    known : traces of selections that are taken over if they are as long
     cut_short : the search was stopped before it had looked everywhere
     most : int, optional
         No further selections are followed after so many boxes, as if Ctrl-C had been pressed.
@@ -89,6 +91,8 @@ def follow(
         for codes in found.selections:
             where.setdefault(codes, []).append((found.piece.a, found.piece.b))
     followed = Followed(traced.force, traced.length)
+    if not cut_short:
+        followed.traces += _taken_over(traced, where, known)
     waiting = sorted(where)
     # their matrices grow with the square of the number of nodes
     together = min(max(_LEAST, _TOGETHER // traced.problem.p**2), _MOST) if most is None else _FEW
@@ -110,6 +114,21 @@ def follow(
             done = len({trace.selection.rows.codes for trace in followed.traces})
             followed.stopped = Stop(reason, done, arcs_of=len(waiting))
             break
+    followed.traces.sort(key=lambda trace: trace.selection.rows.codes)
     missing = cut_short or followed.stopped is not None
     followed.joined = join(followed.traces, traced.interval, traced.origin, traced.sharpen, cut_short=missing)
     return followed
+
+
+def _taken_over(traced: TracedProblem, where: dict[Codes, list[Bounds]], known: Sequence[Trace]) -> list[Trace]:
+    """Of the known traces those of selections that have all of theirs; these are taken out of ``where``."""
+    found: dict[Codes, list[Trace]] = {}
+    for trace in known:
+        found.setdefault(trace.selection.rows.codes, []).append(trace)
+    taken: list[Trace] = []
+    for codes, traces in found.items():
+        spans = [(trace.low, trace.high, trace.side) for trace in traces]
+        if codes in where and sorted(spans) == sorted(traced.spans(where[codes])):
+            taken += traces
+            del where[codes]
+    return taken

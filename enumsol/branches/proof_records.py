@@ -35,6 +35,7 @@ class GraphLeaf(enum.StrEnum):
     EXCLUDED_BY_FORM = "f"
     SELECTION = "s"
     CUT = "c"
+    CLOSED = "m"
 
 
 def write_graph_proof(
@@ -66,7 +67,9 @@ def write_graph_proof(
     selections = set()
     leaves = 0
     for found in pieces:
-        units = unit_exponents(found.system.scaled.force, found.system.scaled.length)
+        one = np.ones(2 * problem.p)
+        scaled = None if found.system is None else found.system.scaled
+        units = unit_exponents(*((one, one) if scaled is None else (scaled.force, scaled.length)))
         writer.write(
             {
                 "piece": [str(found.piece.a), str(found.piece.b)],
@@ -82,6 +85,9 @@ def write_graph_proof(
                 declared = leaf.form
                 writer.write([_FORM, *declared.tolist()])
             writer.write([kind, _text(leaf.codes), *packed(leaf.rows, leaf.values)])
+        if found.numbers is not None:
+            numbers = found.numbers
+            writer.write([GraphLeaf.CLOSED, *(part.tolist() for part in (numbers.mu, numbers.kappa, numbers.nu))])
         for kind, kept in ((GraphLeaf.SELECTION, found.selections), (GraphLeaf.CUT, found.cut)):
             for codes in kept:
                 writer.write([kind, _text(codes)])

@@ -55,6 +55,7 @@ class TracedProblem:
             # the load at the end that is farther away
             far = max(interval, key=lambda end: abs(end - Fraction(self.origin or 0)))
             scaled = problem.condensed.at(float(far)).scaled
+        self.units = scaled
         self.force, self.length = scaled.force, scaled.length
         self._systems = {
             side: ArcSystem.of(problem.enclosure, self.force, self.length, side)

@@ -11,7 +11,7 @@ g vanishes, and indices balance. What a proof leaves open is counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.checker.arc_boxes import Boxes, BoxSelection, check_entries, inside, number
+from enumsol.checker.arc_closing import Arc, Event
 from enumsol.kernel.arc_selections import ArcSelection, ArcSystem
 from enumsol.kernel.rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.kernel.selection_rows import (
@@ -33,8 +34,9 @@ from enumsol.kernel.selection_rows import (
 from enumsol.proof.reading import RefusedError, codes_from, names_only, same, shown, units_from
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from enumsol.checker.arc_closing import ClosedPiece
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.problem import ContactProblem
 
@@ -52,20 +54,6 @@ _PAIRS = (
     ((STICK, CONE_PLUS), (SLIP_PLUS, SLIP_FORWARD)),
     ((STICK, CONE_MINUS), (SLIP_MINUS, SLIP_BACKWARD)),
 )
-
-
-@dataclass
-class _Event:
-    """A point at which one condition of a selection vanishes."""
-
-    codes: Codes
-    side: int
-    condition: tuple[int, int]
-    part: tuple[Fraction, Fraction]
-    zero: tuple[Fraction, Fraction]
-    rising: bool
-    index: int
-    partners: list[_Event] = field(default_factory=list)
 
 
 @dataclass
@@ -96,6 +84,8 @@ class ArcChecker:
         The alpha at which g vanishes, if it lies in the interval.
     pieces : mapping of codes to lists of (Fraction, Fraction)
         Where selections were handed on.
+    closed : sequence of ClosedPiece
+        Pieces whose solutions are said to lie on the arcs through them.
     fail : called with a sentence for every failure
     """
 
@@ -106,13 +96,16 @@ class ArcChecker:
         interval: tuple[Fraction, Fraction],
         origin: Fraction | None,
         pieces: Mapping[Codes, list[tuple[Fraction, Fraction]]],
+        closed: Sequence[ClosedPiece],
         fail: Callable[[str], None],
     ) -> None:
         self._problem, self._enclosure, self._interval, self._origin = problem, enclosure, interval, origin
         self._fail = fail
         self._due = {(codes, *span) for codes, where in pieces.items() for span in self._spans(where)}
         self._systems: dict[int, ArcSystem] = {}
-        self._events: list[_Event] = []
+        self._closed = closed
+        self._events: list[Event] = []
+        self._arcs: list[Arc] = []
         self._count = ArcCount()
         self._boxes = Boxes(fail)
         self.traces = 0
@@ -143,6 +136,10 @@ class ArcChecker:
         if self._due:
             self._fail(f"{len(self._due)} of the selections handed on are not traced")
         self._pair()
+        for piece in self._closed:
+            failure = piece.failure(self._arcs, self._systems, self._origin)
+            if failure is not None:
+                self._fail(f"the piece from {float(piece.a)} to {float(piece.b)}: {failure}")
         for place, total in self._degrees.items():
             if not self._count.open and total != 1:
                 self._fail(f"the indices at the {place} alpha add up to {total}; expected 1")
@@ -221,8 +218,9 @@ class ArcChecker:
             return alpha >= self._origin if upper else alpha <= self._origin
         return alpha >= self._interval[1] if upper else alpha <= self._interval[0]
 
-    def arc(self, index: int, starts: int | None) -> None:
-        """Count an arc; one that begins at an end of the interval, or where g vanishes, with its side."""
+    def arc(self, arc: Arc, index: int, starts: int | None) -> None:
+        """Keep an arc; one that begins at an end of the interval, or where g vanishes, with its side."""
+        self._arcs.append(arc)
         self._count.arcs += 1
         if starts is not None:
             self._degrees["unloaded" if starts == 1 and "unloaded" in self._degrees else "first"] += index
@@ -231,7 +229,7 @@ class ArcChecker:
         """Count an interval that was left open."""
         self._count.open += 1
 
-    def event(self, event: _Event) -> None:
+    def event(self, event: Event) -> None:
         """Keep an event for pairing."""
         self._events.append(event)
 
@@ -254,7 +252,7 @@ class ArcChecker:
 
     def _pair(self) -> None:
         """Pair events; each belongs to exactly one other, unless something beside it was left open."""
-        by_codes: dict[tuple[Codes, int, tuple[int, int]], list[_Event]] = {}
+        by_codes: dict[tuple[Codes, int, tuple[int, int]], list[Event]] = {}
         for event in self._events:
             by_codes.setdefault((event.codes, event.side, event.condition), []).append(event)
         for event in self._events:
@@ -293,45 +291,55 @@ class _Follower:
     ) -> None:
         self.codes, self._conditions = codes, conditions
         self._checker, self._side, self._ends = checker, side, ends
-        self._holds, self._index, self._first, self._open = False, 0, True, False
+        self._index, self._first, self._open = 0, True, False
+        self._arc: Arc | None = None
 
     def part(self, kind: str, part: list[Any], ends: tuple[Fraction, Fraction]) -> None:
         """Go on through a part."""
         if kind == "u":
             if not self._open:  # parts that touch are one interval
                 self._checker.left_open()
-            self._holds = False
+            self._arc = None
         elif kind == "n":
-            if self._holds:
+            if self._arc is not None:
                 self._checker.fail(self.codes, ends[0])
-            self._holds = False
+            self._arc = None
         else:
             self._present(kind, part, ends)
         self._open, self._first = kind == "u", False
 
     def _present(self, kind: str, part: list[Any], ends: tuple[Fraction, Fraction]) -> None:
         """A part in which the selection holds somewhere."""
-        rising = kind == "e" and part[4] == 1
-        if rising and self._holds:
-            self._checker.fail(self.codes, ends[0])
-        if not rising and not self._holds:
-            starts = self._first and self._checker.end_at(self._ends[0], self._side, upper=False)
-            if not starts and not self._open:
-                self._checker.fail(self.codes, ends[0])
-            self._checker.arc(part[2], self._side if starts else None)
-        elif rising:
-            self._checker.arc(part[2], None)
-        elif part[2] != self._index:
-            self._checker.fail(self.codes, ends[0])
-        self._holds, self._index = not (kind == "e" and part[4] == 0), part[2]
+        event = None
         if kind == "e":
             zero = (number(part[5]), number(part[6]))
             condition = self._conditions[part[3]]
-            self._checker.event(_Event(self.codes, self._side, condition, ends, zero, rising, part[2]))
+            event = Event(self.codes, self._side, condition, ends, zero, part[4] == 1, part[2], [])
+            self._checker.event(event)
+        rising = event is not None and event.rising
+        if rising and self._arc is not None:
+            self._checker.fail(self.codes, ends[0])
+        if not rising and self._arc is None:
+            starts = self._first and self._checker.end_at(self._ends[0], self._side, upper=False)
+            if not starts and not self._open:
+                self._checker.fail(self.codes, ends[0])
+            self._arc = Arc(self.codes, self._side, ends[0], ends[0])
+            self._checker.arc(self._arc, part[2], self._side if starts else None)
+        elif event is not None and rising:
+            self._arc = Arc(self.codes, self._side, event.zero[1], event.zero[1], event)
+            self._checker.arc(self._arc, part[2], None)
+        elif part[2] != self._index:
+            self._checker.fail(self.codes, ends[0])
+        self._index = part[2]
+        assert self._arc is not None
+        self._arc.high = ends[1]
+        if event is not None and not rising:
+            self._arc.high, self._arc.head = event.zero[0], event
+            self._arc = None
 
     def finish(self) -> None:
         """The end of the trace."""
-        if self._holds and not self._checker.end_at(self._ends[1], self._side, upper=True):
+        if self._arc is not None and not self._checker.end_at(self._ends[1], self._side, upper=True):
             self._checker.fail(self.codes, self._ends[1])
 
 

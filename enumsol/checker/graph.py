@@ -5,9 +5,9 @@ Records (see enumsol.proof.proof_file for the file and the reader): a header ``{
 for every piece ``{"piece": [a, b], "force", "length", "roots"}``, then its leaves ``["x", codes, rows, multipliers]``
 (no solution anywhere in the piece), ``["f", codes, rows, multipliers]`` (the same by the form declared last, ``["q",
 mu, nu, alpha, beta]``), ``["s", codes]`` (a selection handed on) and ``["c", codes]`` (left to both halves of the
-piece); then, if the proof holds them, arcs (see enumsol.checker.arcs); at the end ``{"pieces", "leaves",
-"selections"}``, with arcs ``"traces"`` and ``"arcs"``, too. Codes are strings of p digits; ends of pieces are
-fractions ``"a/b"`` in decimal digits.
+piece), or ``["m", mu, kappa, nu]`` (all solutions lie on the arcs of the selections handed on); then, if the proof
+holds them, arcs (see enumsol.checker.arcs); at the end ``{"pieces", "leaves", "selections"}``, with arcs ``"traces"``
+and ``"arcs"``, too. Codes are strings of p digits; ends of pieces are fractions ``"a/b"`` in decimal digits.
 
 What is checked: pieces partition the interval (it is cut first where g vanishes, see ``condensation.unloaded``), with
 the subtrees left by a piece searched in both its halves; the leaves of every piece cover all selections of its roots;
@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.checker.arc_closing import ClosedPiece
 from enumsol.checker.arcs import ArcChecker, ArcCount
 from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
@@ -72,6 +73,8 @@ _LOOK = 1024
 #: Entries of a leaf's record, by its kind, and those of a form's.
 _ENTRIES = {"x": 4, "f": 4, "s": 2, "c": 2}
 _FORM, _FORM_ENTRIES = "q", 5
+#: Begins the record of a piece without a tree.
+_CLOSED = "m"
 _END = object()
 
 
@@ -93,6 +96,7 @@ class _Piece:
     #: multipliers of the form declared last, and the form
     declared: Array | None = None
     forms: tuple[EnclosedForm, ...] | None = None
+    closed: ClosedPiece | None = None
 
     def declare(self, record: list[Any]) -> None:
         """Read a form."""
@@ -129,6 +133,7 @@ class GraphChecker:
         self.pieces = self.leaves = 0
         self.selections: set[bytes] = set()
         self._handed: dict[tuple[int, ...], list[tuple[Fraction, Fraction]]] = {}
+        self._closed: list[ClosedPiece] = []
         self.interval: tuple[Fraction, Fraction] | None = None
         self.data: Data = "problem"
         self.arcs: ArcCount | None = None
@@ -173,9 +178,11 @@ class GraphChecker:
         claim = {"pieces": self.pieces, "leaves": self.leaves, "selections": len(self.selections)}
         if self.data == "problem" and isinstance(record, dict) and "force" in record and "piece" not in record:
             origin = self._zero if self._zero is not None and a <= self._zero <= b else None
-            checker = ArcChecker(self.problem, self.enclosure, (a, b), origin, self._handed, self._fail)
+            checker = ArcChecker(self.problem, self.enclosure, (a, b), origin, self._handed, self._closed, self._fail)
             self.arcs, record = checker.run(record, records)
             claim |= {"traces": checker.traces, "arcs": self.arcs.arcs}
+        elif self._closed:
+            self._fail("pieces are said to be decided by their arcs, but there are none")
         if not same(record, claim):
             found = shown(record) if isinstance(record, (dict, list)) else "missing"
             self._fail(f"the counts at the end are {found}; the pieces give {claim!r}")
@@ -218,7 +225,9 @@ class GraphChecker:
         record = next(records, _END)
         while isinstance(record, list):
             batch: list[list[Any]] = []
-            while isinstance(record, list) and len(batch) < _BATCH and not (batch and record[:1] == [_FORM]):
+            while (
+                isinstance(record, list) and len(batch) < _BATCH and not (batch and record[:1] in ([_FORM], [_CLOSED]))
+            ):
                 batch.append(record)
                 record = next(records, _END)
             try:
@@ -231,7 +240,11 @@ class GraphChecker:
             self._fail(f"piece {number}: a selection handed on is not complete")
         elif np.any((handed != OPEN) & ((handed == FRICTIONLESS) == np.array(self._friction))):
             self._fail(f"piece {number}: a selection handed on has a status that a node cannot have")
-        if not covers(piece.roots, piece.leaves(), self._friction):
+        if piece.closed is not None:
+            if np.any(piece.roots != UNDECIDED) or len(handed) < len(piece.leaves()):
+                self._fail(f"piece {number}: it is decided by its arcs, but not whole, or has other leaves")
+            self._closed.append(piece.closed)
+        elif not covers(piece.roots, piece.leaves(), self._friction):
             self._fail(f"piece {number}: its leaves do not cover all selections")
         self.selections.update(row.tobytes() for row in handed)
         for row in handed.tolist():
@@ -249,9 +262,14 @@ class GraphChecker:
         return _Piece(a, b, *units, codes_from(record["roots"], self.problem.p))
 
     def _read_leaves(self, piece: _Piece, batch: list[list[Any]]) -> None:
-        """Record some leaves, the first perhaps a form, and check the inequalities of those claimed to be empty."""
+        """Record some leaves, the first perhaps a form or the piece's numbers, and check those claimed to be empty."""
         if batch[0][:1] == [_FORM]:
             piece.declare(batch[0])
+            batch = batch[1:]
+        elif batch[0][:1] == [_CLOSED]:
+            if piece.closed is not None:
+                raise ValueError("it is decided by its arcs twice")
+            piece.closed = ClosedPiece.read(piece.a, piece.b, batch[0], self.problem.p)
             batch = batch[1:]
         for record in batch:
             kind = record[0] if record else None

@@ -100,7 +100,7 @@ class Expansion:
     def __init__(self, selection: ArcSelection, low: float, high: float, series: Series) -> None:
         self.low, self.high, self.series = low, high, series
         self.apart = _APART * (high - low)
-        self._selection = selection
+        self.selection = selection
         coefficients = series.coefficients
         # the sums below have coefficients of Bernstein polynomials that add up to at most these sizes
         k = gamma(8 * coefficients.shape[1])
@@ -152,7 +152,7 @@ class Expansion:
         ``slope`` is the sign of its slope there.
         """
         zero = next((alpha for alpha in self.zeros(condition) if low < alpha < high), 0.5 * (low + high))
-        found, rise = self._selection.at(zero), self._rise(condition, zero)
+        found, rise = self.selection.at(zero), self._rise(condition, zero)
         if found is None or not np.isfinite(rise) or rise * slope <= 0.0:
             return low, high
         zero -= float(found[2].mid[condition]) / rise
@@ -161,7 +161,7 @@ class Expansion:
             first, last = zero - width, zero + width
             if not low <= first < last <= high:
                 break
-            if [self._selection.sign_at(alpha, condition) for alpha in (first, last)] == [-slope, slope]:
+            if [self.selection.sign_at(alpha, condition) for alpha in (first, last)] == [-slope, slope]:
                 return first, last
             width *= 2.0
         return low, high

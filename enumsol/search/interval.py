@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import CondensedProblem
+    from enumsol.kernel.arc_closing import PieceNumbers
     from enumsol.selections.solution import Codes
 
 #: Pieces are not cut below this part of the interval.
@@ -58,7 +59,8 @@ class SearchedPiece:
     Attributes
     ----------
     piece : Piece
-    system : IntervalSystem
+    system : IntervalSystem or None
+        None where there was no tree.
     roots : list of codes
         Partial assignments whose subtrees were searched.
     empty : list of EmptyLeaf
@@ -67,14 +69,17 @@ class SearchedPiece:
         Complete selections, handed on.
     cut : list of codes
         Subtrees that both halves of the piece take over as their roots; or that a search stopped early left.
+    numbers : PieceNumbers or None
+        Numbers with which the arcs of its selections hold all solutions: no tree was searched (theory, section 7.15).
     """
 
     piece: Piece
-    system: IntervalSystem
+    system: IntervalSystem | None
     roots: list[Codes]
     empty: list[EmptyLeaf] = field(default_factory=list)
     selections: list[Codes] = field(default_factory=list)
     cut: list[Codes] = field(default_factory=list)
+    numbers: PieceNumbers | None = None
 
 
 class IntervalCertifier(Protocol):
@@ -191,6 +196,12 @@ class Worker:
         return IntervalSystem.from_problem(self._condensed, *ends, origin, proposals=self.leaves.rational)
 
 
+def whole_pieces(a: Fraction, b: Fraction, origin: Fraction | None) -> list[Piece]:
+    """The interval, or its parts on both sides of the alpha at which g vanishes."""
+    ends = [a, origin, b] if origin is not None and a < origin < b else [a, b]
+    return [Piece(x, y) for x, y in itertools.pairwise(ends)]
+
+
 class IntervalSearch:
     """The search over the whole interval.
 
@@ -216,6 +227,8 @@ class IntervalSearch:
     stopped : Stop or None
     selections : set of codes
         All complete selections that the trees could not exclude.
+    closed : mapping of Piece to (PieceNumbers, codes)
+        Pieces that need no tree: all their solutions lie on the arcs of these selections.
     checkable : bool
         Whether a checker can repeat what was excluded.
     """
@@ -239,14 +252,30 @@ class IntervalSearch:
         self.nodes = 0
         self.stopped: Stop | None = None
         self.selections: set[Codes] = set()
+        self.closed: Mapping[Piece, tuple[PieceNumbers, Sequence[Codes]]] = {}
         self.checkable = leaves.checkable
 
     def first(self) -> list[Task]:
         """The whole tree over the whole interval, or over both sides of the alpha at which g vanishes."""
-        a, b = self.interval
-        ends = [a, self._origin, b] if self._origin is not None and a < self._origin < b else [a, b]
         everything = (Subtree((UNDECIDED,) * self._p),)
-        return [Task(Piece(x, y), everything) for x, y in itertools.pairwise(ends)]
+        return [Task(piece, everything) for piece in whole_pieces(*self.interval, self._origin)]
+
+    def trees(self) -> list[Task]:
+        """The trees with which the search begins, where a tree is needed."""
+        waiting, found = self.first()[::-1], []
+        while waiting:
+            task = waiting.pop()
+            if task.piece not in self.closed:
+                halves = self._in_halves(task)
+                waiting += halves[::-1]
+                found += [] if halves else [task]
+        return found
+
+    def _in_halves(self, task: Task) -> list[Task]:
+        """Both halves at once, where a part of the piece needs no tree."""
+        a, b = task.piece.a, task.piece.b
+        inside = any(a <= piece.a and piece.b <= b for piece in self.closed if piece != task.piece)
+        return Task.halves(task.piece, task.roots) if inside else []
 
     def run(self, known: Mapping[Task, TreeResult] | None = None) -> None:
         """Search all pieces; ``known`` holds the results of tasks that were searched elsewhere.
@@ -258,9 +287,18 @@ class IntervalSearch:
         waiting = self.first()[::-1]
         while waiting:
             task = waiting.pop()
-            found = SearchedPiece(task.piece, self.worker.system(task.piece), [root.codes for root in task.roots])
+            found = SearchedPiece(task.piece, None, [root.codes for root in task.roots])
             self.pieces.append(found)
-            cut = self._search(task, found, known)
+            halves = self._in_halves(task)
+            if task.piece in self.closed:
+                found.numbers, found.selections[:] = self.closed[task.piece]
+                self.selections.update(found.selections)
+                cut = []
+            elif halves:
+                cut = list(task.roots)
+            else:
+                found.system = self.worker.system(task.piece)
+                cut = self._search(task, found, known)
             if self.stopped is not None and found.cut:
                 if not go_on:
                     return

@@ -69,7 +69,9 @@ class _Ahead:
     def run(self) -> None:
         """Search all trees, until a limit is reached."""
         search = self._search
-        for task in search.first():
+        a, b = search.interval
+        self._share = sum((piece.b - piece.a for piece in search.closed), Fraction(0)) / (b - a)
+        for task in search.trees():
             self._begin(task)
         while self._tasks:
             job = self._crew.next(self._seconds())

@@ -1,0 +1,220 @@
+"""One branch of solutions followed over alpha in floats, selection by selection; nothing here is trusted.
+
+Where the problem has one solution it is the whole graph (theory, section 7.15).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.deadlines import look
+from enumsol.kernel.selection_rows import (
+    CONE_MINUS,
+    CONE_PLUS,
+    NORMAL_FORCE,
+    SLIP_BACKWARD,
+    SLIP_FORWARD,
+    SelectionRows,
+)
+from enumsol.search.reduction import NEAR, Reduction
+from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.condensed import CondensedProblem, ScaledSystem
+    from enumsol.selections.solution import Codes
+
+    Array = NDArray[np.float64]
+
+#: Where a chain begins, beside the end of its interval, by its length; steps to an event, and how close is near enough.
+_BESIDE, _STEPS, _CLOSE = 1e-7, 40, 1e-12
+#: Selections of a chain, by contact nodes.
+_MOST = 16
+#: A condition that vanishes at an event falls behind it by more than this, by its size, where the branch turns back.
+_TURNS = 1e-9
+_ACROSS = {
+    SLIP_FORWARD: STICK,
+    SLIP_BACKWARD: STICK,
+    CONE_PLUS: SLIP_PLUS,
+    CONE_MINUS: SLIP_MINUS,
+    NORMAL_FORCE: OPEN,
+}
+
+
+@dataclass(frozen=True)
+class Link:
+    """A selection and where it seems to hold."""
+
+    low: float
+    high: float
+    codes: Codes
+
+
+class LoadedSystem:
+    """The condensed problem as a function of alpha in fixed units, on one side of an alpha at which g vanishes.
+
+    Parameters
+    ----------
+    condensed : CondensedProblem
+    units : ScaledSystem
+        With the compliance and the units.
+    side : 1.0 or -1.0 above or below an alpha at which g vanishes: the load is +-g1; else 0.0
+    """
+
+    def __init__(self, condensed: CondensedProblem, units: ScaledSystem, side: float) -> None:
+        self.S, self._units = units.S, units
+        self.F0, self.F1 = condensed.F0, condensed.F1
+        slope = condensed.g1 / units.length
+        self.g0, self.g1 = (side * slope, np.zeros_like(slope)) if side else (condensed.g0 / units.length, slope)
+
+    @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+        return len(self.F0)
+
+    def at(self, alpha: float) -> ScaledSystem:
+        """The system at one alpha."""
+        return replace(self._units, g=self.g0 + alpha * self.g1, F=np.maximum(self.F0 + alpha * self.F1, 0.0))
+
+    def reduction(self, alpha: float) -> Reduction:
+        """The problem at one alpha with all nodes free."""
+        return Reduction(self.at(alpha), (UNDECIDED,) * self.p, tuple(range(self.p)), {})
+
+
+class SelectionCurve:
+    """A selection's solution as a function of alpha."""
+
+    def __init__(self, system: LoadedSystem, codes: Codes) -> None:
+        self._system, self.rows = system, SelectionRows(codes)
+        S, rows, p = system.S, self.rows, system.p
+        self._fixed, self._turning = S[:, rows.unknown], S[:, p + rows.slip] * rows.slip_signs
+
+    def at(self, alpha: float) -> tuple[Array, Array, Array, Array, Array, Array]:
+        """lambda, w and the conditions, then their slopes.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            The selection is singular.
+        """
+        system, rows, p = self._system, self.rows, self._system.p
+        F, F1 = system.F0 + alpha * system.F1, system.F1
+        W, dW = self._fixed.copy(), np.zeros_like(self._fixed)
+        W[:, rows.slip_columns] += self._turning * F[rows.slip]
+        dW[:, rows.slip_columns] = self._turning * F1[rows.slip]
+        g, M = system.g0 + alpha * system.g1, W[rows.unknown]
+        y: Array = np.linalg.solve(M, g[rows.unknown])
+        dy: Array = np.linalg.solve(M, system.g1[rows.unknown] - dW[rows.unknown] @ y)
+        w, dw = g - W @ y, np.asarray(system.g1 - W @ dy - dW @ y)
+        force, slope = np.zeros(2 * p), np.zeros(2 * p)
+        force[rows.unknown], slope[rows.unknown] = y, dy
+        n, dn = y[rows.slip_columns], dy[rows.slip_columns]
+        force[p + rows.slip] = rows.slip_signs * F[rows.slip] * n
+        slope[p + rows.slip] = rows.slip_signs * (F1[rows.slip] * n + F[rows.slip] * dn)
+        n, dn = y[rows.stick_columns], dy[rows.stick_columns]
+        bound, widens = F[rows.stick] * n, np.asarray(F1[rows.stick] * n + F[rows.stick] * dn)
+        return force, w, self._conditions(w, y, bound), slope, dw, self._conditions(dw, dy, widens)
+
+    def _conditions(self, w: Array, y: Array, bound: Array) -> Array:
+        """The conditions, or their slopes."""
+        rows = self.rows
+        closed, stuck = y[: len(rows.closed)], y[len(rows.closed) :]
+        return np.concatenate([rows.moving_signs * w[rows.moving], closed, bound - stuck, bound + stuck])
+
+
+class Chains:
+    """Branches of solutions that go on with alpha, as far as they were followed.
+
+    Parameters
+    ----------
+    system : LoadedSystem
+    last : float
+        End of the interval.
+    """
+
+    def __init__(self, system: LoadedSystem, last: float) -> None:
+        self.system, self._last = system, last
+        self._known: list[list[Link]] = []
+
+    def over(self, low: float, high: float) -> list[Link] | None:
+        """The selections of one branch from low to high, in order; None where none was found that goes so far."""
+        for chain in self._known:
+            if chain[0].low <= low and high <= chain[-1].high:
+                return [link for link in chain if link.high >= low and link.low <= high]
+        chain = self._followed(low)
+        if not chain or chain[-1].high < high:
+            return None
+        self._known.append(chain)
+        return [link for link in chain if link.low <= high]
+
+    @cached_property
+    def _most(self) -> int:
+        return _MOST * (self.system.p + 4)
+
+    def _followed(self, first: float) -> list[Link]:
+        """The branch of the solution beside an alpha."""
+        alpha = first + _BESIDE * (self._last - first)
+        try:
+            codes = self._statuses(alpha)
+            found: list[Link] = []
+            while codes is not None and len(found) < self._most:
+                look()
+                curve = SelectionCurve(self.system, codes)
+                event = self._event(curve, alpha)
+                if event is None:
+                    break
+                end, condition = event
+                found.append(Link(found[-1].high if found else first, end, codes))
+                if condition is None:
+                    break
+                codes, alpha = self._beyond(curve, end, condition), end
+        except np.linalg.LinAlgError:
+            pass
+        return found
+
+    def _statuses(self, alpha: float) -> Codes | None:
+        system = self.system.at(alpha)
+        reduction = self.system.reduction(alpha)
+        found = reduction.solution(np.zeros(2 * system.p), system.g) or reduction.sought()
+        return None if found is None else tuple(found[1])
+
+    def _event(self, curve: SelectionCurve, alpha: float) -> tuple[float, int | None] | None:
+        """Where a condition vanishes next, and which; the end of the interval and None where none does."""
+        first = alpha
+        for _ in range(_STEPS):
+            *_, values, _, _, slopes = curve.at(alpha)
+            ahead = np.full(len(values), np.inf)
+            falls = slopes < 0
+            ahead[falls] = values[falls] / -slopes[falls]
+            condition = int(np.argmin(ahead))
+            step = max(float(ahead[condition]), first - alpha)
+            if abs(step) <= _CLOSE * max(abs(alpha), abs(self._last - first)):
+                return alpha, condition
+            if not alpha + step < self._last:
+                if alpha == self._last:
+                    return (alpha, None) if np.min(values) >= -NEAR else None
+                step = self._last - alpha
+            alpha += step
+        return None
+
+    def _beyond(self, curve: SelectionCurve, alpha: float, condition: int) -> Codes | None:
+        """The selection behind an event; None where the branch turns back."""
+        node, kind = curve.rows.conditions[condition]
+        if kind in _ACROSS:
+            code = _ACROSS[kind]
+        else:
+            slip = float(curve.at(alpha)[1][self.system.p + node])
+            rubs = self.system.F0[node] != 0 or self.system.F1[node] != 0
+            code = (SLIP_PLUS if slip > 0 else SLIP_MINUS) if rubs else FRICTIONLESS
+        codes = curve.rows.codes
+        beyond = SelectionCurve(self.system, (*codes[:node], code, *codes[node + 1 :]))
+        *_, values, _, _, slopes = beyond.at(alpha)
+        own = [k for k, (i, _) in enumerate(beyond.rows.conditions) if i == node]
+        vanishing = min(own, key=lambda k: abs(float(values[k])))
+        turns = slopes[vanishing] < -_TURNS * np.max(np.abs(slopes), initial=0.0)
+        return None if turns else beyond.rows.codes
