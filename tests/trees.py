@@ -4,6 +4,7 @@ from contextlib import contextmanager
 
 import pytest
 
+from enumsol.branches.closed_pieces import ClosedPieces
 from enumsol.search.closing import Closer
 from enumsol.search.space_closing import SpaceCloser
 
@@ -14,4 +15,5 @@ def by_the_tree():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Closer, "_due", lambda self, nodes: False)
         patch.setattr(SpaceCloser, "whole", lambda self: None)
+        patch.setattr(ClosedPieces, "find", lambda self, traced: None)
         yield

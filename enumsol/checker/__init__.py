@@ -27,7 +27,8 @@ What checker and search share
     - for the arcs of branch graphs: ``kernel.selection_rows``, the numbers of unknowns and conditions;
       ``kernel.arc_selections``, ``kernel.arc_series``, ``kernel.bernstein`` and ``kernel.arcs``, a selection over an
       interval as a series with bounds of its error; ``kernel.precise`` and ``kernel.many_digits``, the same with many
-      digits, loaded only where a box asks for it; ``kernel.ball_arrays`` (in 3D, too);
+      digits, loaded only where a box asks for it; ``kernel.arc_closing``, the test by which the roots of arcs are the
+      only solutions over a piece; ``kernel.ball_arrays`` (in 3D, too);
     - for problems in 3D, and loaded for their proofs only: ``kernel.space``, the rows and branchings and the
       exclusion inequality; ``kernel.leaves``, what a complete assignment holds and which leaves share a root;
       ``kernel.space_closing``, the test that a whole problem has one solution only; ``sectors``, the ends of sectors;

@@ -1,7 +1,8 @@
 """Pieces of a graph's proof that hold no tree: the arcs through them are tested to hold all solutions.
 
 Record ``["m", mu, kappa, nu]`` of a piece (docs/proof_format.md, under Pieces): numbers of the form of theory, (6.9).
-At every alpha of the piece some arc has a root, and the form is definite with what serves this root (section 7.15).
+At every alpha of the piece some arc has a root, and the form is definite with what serves this root (theory,
+section 7.15).
 """
 
 from __future__ import annotations

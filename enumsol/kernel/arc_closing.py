@@ -1,7 +1,7 @@
 """The trusted test of pieces with one solution: along an arc its root is the only one (theory, section 7.15).
 
 At one alpha a solution is the only one if the form (6.9) is definite for numbers theta that serve it. Along an arc
-theta follows the solution, which is known as polynomials in tau with bounds of their errors (section 7.14).
+theta follows the solution, which is known as polynomials in tau with bounds of their errors (theory, section 7.14).
 """
 
 from __future__ import annotations

@@ -108,8 +108,8 @@ class SelectionCurve:
         W[:, rows.slip_columns] += self._turning * F[rows.slip]
         dW[:, rows.slip_columns] = self._turning * F1[rows.slip]
         g, M = system.g0 + alpha * system.g1, W[rows.unknown]
-        y: Array = np.linalg.solve(M, g[rows.unknown])
-        dy: Array = np.linalg.solve(M, system.g1[rows.unknown] - dW[rows.unknown] @ y)
+        y = np.asarray(np.linalg.solve(M, g[rows.unknown]))
+        dy = np.asarray(np.linalg.solve(M, system.g1[rows.unknown] - dW[rows.unknown] @ y))
         w, dw = g - W @ y, np.asarray(system.g1 - W @ dy - dW @ y)
         force, slope = np.zeros(2 * p), np.zeros(2 * p)
         force[rows.unknown], slope[rows.unknown] = y, dy

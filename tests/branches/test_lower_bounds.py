@@ -7,6 +7,7 @@ alphas the enumeration of its roots in rationals.
 import json
 import re
 from bisect import bisect_left
+from contextlib import nullcontext
 from fractions import Fraction
 from itertools import product
 from math import inf, nextafter
@@ -23,6 +24,7 @@ from branches.problems import (
     without_friction_somewhere,
 )
 from branches.test_degenerate import uncoupled
+from trees import by_the_tree
 
 from enumsol import BranchGraph, ContactProblem, branch_graph, enumerate_roots, gallery
 from enumsol.arithmetic.rationals import rational
@@ -165,7 +167,10 @@ def graphs_of(seed):
     kinds = [(256, "whole"), (256, "nodes"), (25, "nodes"), (problem.n, "nodes"), (25, "whole")]
     kinds += [((256, 25, problem.n)[int(rng.integers(3))], "interrupted")]
     for n, way in kinds:
-        yield full, cut_short(larger.get(n, problem), interval, rng, full.stats.nodes, way), f"{seed}, n = {n}, {way}"
+        # without a tree hardly anything is cut short
+        with nullcontext() if way == "whole" else by_the_tree():
+            graph = cut_short(larger.get(n, problem), interval, rng, full.stats.nodes, way)
+        yield full, graph, f"{seed}, n = {n}, {way}"
 
 
 def wedged(n, count=2):

@@ -46,6 +46,7 @@ SHARED = {
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
     "condensation.space": {"EnclosedSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
+    "kernel.arc_closing": {"PieceNumbers", "only_roots"},
     "kernel.arc_selections": None,
     "kernel.arcs": None,
     "kernel.interval": {

@@ -185,7 +185,7 @@ def test_an_interrupted_search_keeps_its_arcs():
 
 
 @pytest.mark.parametrize(("boxes", "followed"), [(500, False), (1, True)])
-def test_after_an_interrupted_search_not_all_is_followed(boxes, followed, monkeypatch):
+def test_after_an_interrupted_search_not_all_is_followed(boxes, followed, tree_only, monkeypatch):
     """Only until so many boxes are made, and the graph says so."""
     monkeypatch.setattr(construction, "_BOXES_AFTER_INTERRUPT", boxes)
     found = []
