@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 _MOST_LINKS = 6
 #: Halvings of the interval, and of a piece some of whose arcs are not proven to hold all solutions.
 _HALVINGS, _VAIN_HALVINGS = 14, 4
+#: Alphas at which no numbers are found, after which they are sought no more: so many, and one for so many nodes.
+_VAIN, _NODES_FOR_ONE = 2, 16
 #: How far around a link the test goes, by the length of the interval: its ends are known in floats only.
 _AROUND = 1e-9
 #: Bounds of errors are multiplied by the first, and the form must be definite by the second, so that a checker that
@@ -144,6 +146,7 @@ class _Proposals:
         self._around = _AROUND * float(whole.b - whole.a)
         ones = np.ones(self._system.p)
         self._numbers = [PieceNumbers(ones, ones, 0.0 * ones)]
+        self._vain = _VAIN + self._system.p // _NODES_FOR_ONE
 
     def run(self) -> list[_Proposed]:
         """Pieces in order."""
@@ -177,12 +180,16 @@ class _Proposals:
         link, some = links[failing], len(links) > 1
         low, high = max(link.low, ends[0]), min(link.high, ends[1])
         for alpha in (0.5 * (low + high), low, high):
+            if self._vain == 0:
+                break
             found = self._sought(link, alpha)
+            self._vain -= found is None
             some = some or found is not None
             if found is not None and np.any(found.nu):
                 self._numbers = [*self._numbers[:1], found]
                 return (_Proposed(piece, found, spans) if self._only(asked, found) else None), True
-        return None, some
+        beside = [(asked[0][0], ends[0], ends[0] + self._around), (asked[-1][0], ends[1] - self._around, ends[1])]
+        return None, some or any(self._only([one], self._numbers[0]) for one in beside)
 
     def _only(self, asked: Sequence[tuple[ArcSelection, float, float]], numbers: PieceNumbers) -> bool:
         return only_roots(asked, numbers, _ERRORS, _MARGIN)

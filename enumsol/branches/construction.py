@@ -174,6 +174,7 @@ def branch_graph(
         )
     stats = GraphStats(
         pieces=len(search.pieces),
+        closed=sum(found.numbers is not None for found in search.pieces),
         nodes=search.nodes,
         selections=len(candidates),
         search_seconds=searched - started,

@@ -27,7 +27,9 @@ class GraphStats:
     Attributes
     ----------
     pieces : int
-        Parts of the interval, each searched by a tree of its own.
+        Parts of the interval that were looked at; each is searched by a tree of its own, closed, or cut in halves.
+    closed : int
+        Of these, pieces without a tree: one branch is proven to hold all their solutions (theory, section 7.15).
     nodes : int
         Nodes of all trees.
     selections : int
@@ -37,6 +39,7 @@ class GraphStats:
     """
 
     pieces: int = 0
+    closed: int = 0
     nodes: int = 0
     selections: int = 0
     search_seconds: float = 0.0

@@ -160,6 +160,7 @@ class GraphChecker:
             self.data,
             None if self.arcs is None else self.arcs.arcs,
             0 if self.arcs is None else self.arcs.open,
+            len(self._closed),
         )
 
     def _check(self, interval: tuple[Fraction, Fraction], records: Iterator[Any]) -> None:

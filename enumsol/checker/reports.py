@@ -95,6 +95,8 @@ class GraphVerificationReport:
         Arcs of these selections, all of them checked with their ends; None where the proof does not hold them.
     open : int
         Short intervals of alpha in which the proof leaves open what some selection does.
+    closed : int
+        Pieces without a tree: their only branch is proven to hold all solutions.
     """
 
     ok: bool
@@ -106,6 +108,7 @@ class GraphVerificationReport:
     data: str
     arcs: int | None = None
     open: int = 0
+    closed: int = 0
 
     @property
     def complete(self) -> bool:
@@ -119,6 +122,8 @@ class GraphVerificationReport:
         ends = () if self.interval is None else tuple(float(end) for end in self.interval)
         where = f" for alpha in [{ends[0]:g}, {ends[1]:g}]" if ends else ""
         found = f"{counted(self.leaves, 'leaf', 'leaves')} in {counted(self.pieces, 'piece')}"
+        if self.closed:
+            found += f", {self.closed} of them with one solution, by one certificate"
         if not self.ok:
             return _refusal(where, self.failures, found)
         return "\n".join(

@@ -1,0 +1,196 @@
+"""Pieces of the interval without a tree: the arcs through them are proven to hold all solutions (theory, 7.15)."""
+
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from branches.problems import generic_problem
+from branches.test_lower_bounds import KINDS, case, padded
+from generators import through_the_unloaded_state
+from trees import by_the_tree
+
+import enumsol.branches.closed_pieces
+from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
+from enumsol.branches.closed_pieces import ClosedPieces
+from enumsol.branches.traced import TracedProblem
+from enumsol.condensation.unloaded import vanishing_alpha
+from enumsol.errors import Interrupted
+from enumsol.kernel.arc_closing import PieceNumbers, only_roots
+
+
+def traced(problem, interval):
+    return TracedProblem(problem, tuple(map(Fraction, interval)), vanishing_alpha(problem, "problem"))
+
+
+def same(graph, other):
+    """Whether two graphs have the same arcs between the same vertices."""
+    arcs, others = ([(arc.statuses, arc.index, arc.tail, arc.head) for arc in one.arcs] for one in (graph, other))
+    kinds, alphas = ([v.kind for v in one.vertices] for one in (graph, other))
+    near = np.allclose([v.alpha for v in graph.vertices], [v.alpha for v in other.vertices], rtol=1e-9, atol=1e-9)
+    return arcs == others and kinds == alphas and near
+
+
+@pytest.mark.parametrize(
+    ("traction", "length", "interval"),
+    [((0.3, -1.0), 1.0, (0, 3)), ((1.0, -0.3), 2.0, (0, 1)), ((0.0, -1.0), 1.0, (0.5, 5)), ((-0.3, -1.0), 1.0, (0, 1))],
+)
+def test_blocks_need_no_tree(traction, length, interval):
+    problem = gallery.clamped_block(8, 4, length, traction=traction)
+    graph = branch_graph(problem, interval)
+    assert graph.complete
+    assert graph.stats.nodes == 0 < graph.stats.closed
+    with by_the_tree():
+        other = branch_graph(problem, interval)
+    assert other.stats.closed == 0 < other.stats.nodes
+    assert same(graph, other)
+    report = verify(problem, graph.proof)
+    assert report.complete
+    assert (report.closed, report.leaves) == (graph.stats.closed, 0)
+    assert "with one solution, by one certificate" in repr(report)
+
+
+def test_numbers_are_sought_where_plain_ones_do_not_serve():
+    problem = gallery.clamped_block(32, 16, 0.5, traction=(1.0, -0.3))
+    graph = branch_graph(problem, (1, 2))
+    assert graph.complete
+    assert graph.stats.nodes == 0
+    assert any(np.any(found.numbers.nu) for found in graph.pieces if found.numbers is not None)
+    assert verify(problem, graph.proof).complete
+
+
+def test_a_load_that_vanishes_inside():
+    small, interval = through_the_unloaded_state()
+    body = padded(ContactProblem(small.A, small.Bn, small.Bt, [0.0, 0.0], load_slope=[1.5, -4.0], friction=0.5), 25)
+    graph = branch_graph(body, interval)
+    assert graph.complete
+    assert graph.stats.nodes == 0 < graph.stats.closed
+    with by_the_tree():
+        assert same(graph, branch_graph(body, interval))
+    assert verify(body, graph.proof).complete
+
+
+def check(seeds):
+    """Graphs of random problems against exact ones; the numbers of graphs and of those with closed pieces."""
+    graphs = closed = 0
+    for seed in seeds:
+        problem, interval = case(seed)
+        body = padded(problem, 25)
+        graph, exact = branch_graph(body, interval), branch_graph(problem, interval, "exact")
+        steps, true = graph.claims.steps(), exact.claims.steps()
+        if graph.complete:
+            assert (steps.at, steps.between) == (true.at, true.between), seed
+            assert np.allclose([float(x) for x in steps.alphas], [float(x) for x in true.alphas], atol=1e-9), seed
+        if graph.proof is not None:
+            assert verify(body, graph.proof).ok, seed
+        graphs += 1
+        closed += graph.stats.closed > 0
+    return graphs, closed
+
+
+def test_counts_are_the_exact_ones():
+    graphs, closed = check(range(300, 306))
+    assert closed > 0.4 * graphs
+
+
+@pytest.mark.slow
+def test_many_counts_are_the_exact_ones():
+    graphs, closed = check(range(306, 406))
+    assert closed > 0.4 * graphs
+
+
+def only_where_alone(seed, count):
+    """Whether what the kernel says is true, whatever the numbers; how often it said yes, and of several solutions."""
+    rng = np.random.default_rng([15, seed])
+    yes = several = 0
+    for k in range(count):
+        make = (
+            generic_problem(rng, int(rng.integers(1, 4)), KINDS[k % 3]) if k % 2 else case(int(rng.integers(10**6)))[0]
+        )
+        problem, interval = make, (Fraction(0), Fraction(int(rng.integers(2, 9))))
+        bodies, graph = traced(problem, interval), branch_graph(problem, interval, "exact")
+        for _ in range(10):
+            alpha = interval[1] * Fraction(int(rng.integers(1, 64)), 64)
+            if alpha == bodies.origin:
+                continue
+            side = 0.0 if bodies.origin is None else 1.0 if alpha > bodies.origin else -1.0
+            number = graph.multiplicity_at(alpha)
+            for arc in [a for a in graph.arcs if a.interval[0] < alpha < a.interval[1]]:
+                reach = (arc.interval[1] - arc.interval[0]) * 10.0 ** -rng.uniform(0, 6)
+                low, high = max(float(alpha) - reach, arc.interval[0]), min(float(alpha) + reach, arc.interval[1])
+                mu, kappa = np.exp(rng.normal(size=(2, problem.p)) * rng.choice([0.0, 0.3, 1.0]))
+                F = np.maximum(problem.friction_at(low), problem.friction_at(high))
+                nu = rng.choice([0.0, 1.0]) * mu / np.where(F > 0, F, 1.0) * rng.uniform(-1, 1, size=problem.p)
+                selection = bodies.selection(arc.selections[0], side)
+                alone = only_roots([(selection, low, high)], PieceNumbers(mu, kappa, nu))
+                assert not alone or number == 1, (seed, k, float(alpha))
+                yes += alone
+                several += number > 1
+    return yes, several
+
+
+def test_what_the_kernel_says_is_true():
+    yes, several = only_where_alone(1, 20)
+    assert yes > 25
+    assert several > 10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2, 6))
+def test_what_the_kernel_says_is_true_of_many(seed):
+    yes, several = only_where_alone(seed, 300)
+    assert yes > 500
+    assert several > 100
+
+
+def test_numbers_that_are_too_large_are_refused():
+    problem = gallery.clamped_block(4, 2)
+    body, chain = traced(problem, (0, 1)), branch_graph(problem, (0, 1)).arcs[-1]
+    asked = [(body.selection(chain.selections[0], 0.0), *chain.interval)]
+    one = np.ones(problem.p)
+    assert only_roots(asked, PieceNumbers(one, one, 0.0 * one))
+    assert not only_roots(asked, PieceNumbers(one, one, 2.0 * one))
+    assert not only_roots(asked, PieceNumbers(one, 1e6 * one, 0.0 * one))
+    assert PieceNumbers(one, one, -one).usable
+    assert not PieceNumbers(one, 0.0 * one, one).usable
+    assert not PieceNumbers(np.inf * one, one, one).usable
+
+
+def test_the_same_with_workers():
+    """Some pieces closed, others searched by trees in workers."""
+    problem = padded(gallery.get("two-node-6.4").build(), 25)
+    graph = branch_graph(problem, (0, 5))
+    assert graph.stats.nodes > 0 < graph.stats.closed
+    with ThreadPoolExecutor(2) as executor:
+        other = branch_graph(problem, (0, 5), executor=executor)
+    assert (graph.stats.pieces, graph.stats.nodes) == (other.stats.pieces, other.stats.nodes)
+    assert list(graph.proof.records()) == list(other.proof.records())
+
+
+def test_an_interruption_claims_nothing(monkeypatch):
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(enumsol.branches.closed_pieces, "only_roots", stop)
+    with pytest.raises(Interrupted) as caught:
+        branch_graph(gallery.clamped_block(8, 4), (0, 3))
+    assert not caught.value.partial.complete
+    assert caught.value.partial.proof is None
+
+
+def test_the_time_may_be_over_at_once():
+    graph = branch_graph(gallery.clamped_block(8, 4), (0, 3), time_limit=1e-9)
+    assert not graph.complete
+    assert all(graph.at_least(alpha) == 1 for alpha in (0, 1, 3))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_closed_pieces_have_one_solution(seed):
+    """Also where several conditions vanish at once, without degrees of freedom beside the contact nodes."""
+    problem, interval = case(500 + seed)
+    closed = ClosedPieces()
+    closed.find(traced(problem, interval))
+    with by_the_tree():
+        for piece in closed.pieces:
+            for alpha in (piece.a, piece.middle, piece.b):
+                assert len(enumerate_roots(problem, alpha, "exact")) == 1, (seed, float(alpha))
