@@ -172,12 +172,12 @@ class _Proposals:
             for link in links
         ]
         asked = [(self._traced.selection(codes, self._side), low, high) for codes, low, high in spans]
-        failing = 0
+        alone = list[bool]()
         for numbers in self._numbers:
-            failing = next((k for k, one in enumerate(asked) if not self._only([one], numbers)), -1)
-            if failing < 0:
+            alone = self._only(asked, numbers)
+            if all(alone):
                 return _Proposed(piece, numbers, spans), True
-        link, some = links[failing], len(links) > 1
+        link, some = links[alone.index(False)], any(alone)
         low, high = max(link.low, ends[0]), min(link.high, ends[1])
         for alpha in (0.5 * (low + high), low, high):
             if self._vain == 0:
@@ -187,11 +187,11 @@ class _Proposals:
             some = some or found is not None
             if found is not None and np.any(found.nu):
                 self._numbers = [*self._numbers[:1], found]
-                return (_Proposed(piece, found, spans) if self._only(asked, found) else None), True
+                return (_Proposed(piece, found, spans) if all(self._only(asked, found)) else None), True
         beside = [(asked[0][0], ends[0], ends[0] + self._around), (asked[-1][0], ends[1] - self._around, ends[1])]
-        return None, some or any(self._only([one], self._numbers[0]) for one in beside)
+        return None, some or any(self._only(beside, self._numbers[0]))
 
-    def _only(self, asked: Sequence[tuple[ArcSelection, float, float]], numbers: PieceNumbers) -> bool:
+    def _only(self, asked: Sequence[tuple[ArcSelection, float, float]], numbers: PieceNumbers) -> list[bool]:
         return only_roots(asked, numbers, _ERRORS, _MARGIN)
 
     def _sought(self, link: Link, alpha: float) -> PieceNumbers | None:

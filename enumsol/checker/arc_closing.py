@@ -92,7 +92,7 @@ class ClosedPiece:
             low = self.a if arc.tail is None else max(self.a, arc.tail.zero[0])
             high = self.b if arc.head is None else min(self.b, arc.head.zero[1])
             spans.append((ArcSelection(systems[side], arc.codes), _below(low), -_below(-high)))
-        return None if only_roots(spans, self.numbers) else "its arcs are not proven to hold all its solutions"
+        return None if all(only_roots(spans, self.numbers)) else "its arcs are not proven to hold all its solutions"
 
     def _chain(self, arcs: Sequence[Arc]) -> list[Arc] | None:
         """Arcs one after another, of which one holds at every alpha of the piece."""

@@ -53,8 +53,8 @@ class PieceNumbers:
         return bool(finite and np.all(self.mu > 0) and np.all(self.kappa > 0))
 
 
-def only_roots(asked: Sequence[Span], numbers: PieceNumbers, errors: float = 1.0, margin: float = 0.0) -> bool:
-    """Whether at every alpha at which one of these selections has a root there is no other solution.
+def only_roots(asked: Sequence[Span], numbers: PieceNumbers, errors: float = 1.0, margin: float = 0.0) -> list[bool]:
+    """Of every selection whether there is no other solution at any alpha at which it has a root.
 
     Parameters
     ----------
@@ -66,21 +66,23 @@ def only_roots(asked: Sequence[Span], numbers: PieceNumbers, errors: float = 1.0
     margin : the smallest eigenvalue must be larger than this, relative to the largest entry
         A search asks for more than its checker, which may round otherwise.
     """
-    waiting = [(span, _HALVINGS) for span in asked]
+    found, waiting = [True] * len(asked), [(k, span, _HALVINGS) for k, span in enumerate(asked)]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         while waiting:
             rest = []
-            for expansion, (span, halvings) in zip(expansions([s for s, _ in waiting], errors), waiting, strict=True):
+            known = expansions([span for _, span, _ in waiting], errors)
+            for expansion, (k, span, halvings) in zip(known, waiting, strict=True):
                 along = None if expansion is None else _Along(expansion, numbers)
                 if along is not None and along.alone(margin):
                     continue
                 selection, low, high = span
                 middle = 0.5 * (low + high)
                 if not halvings or not low < middle < high or (along is not None and along.hopeless):
-                    return False
-                rest += [((selection, low, middle), halvings - 1), ((selection, middle, high), halvings - 1)]
-            waiting = rest
-    return True
+                    found[k] = False
+                    continue
+                rest += [(k, (selection, *part), halvings - 1) for part in ((low, middle), (middle, high))]
+            waiting = [left for left in rest if found[left[0]]]
+    return found
 
 
 class _Along:

@@ -1,4 +1,4 @@
-"""Pieces of the interval without a tree: the arcs through them are proven to hold all solutions (theory, 7.15)."""
+"""Pieces of the interval without a tree: arcs are proven to hold all solutions there (theory, section 7.15)."""
 
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
@@ -122,7 +122,7 @@ def only_where_alone(seed, count):
                 F = np.maximum(problem.friction_at(low), problem.friction_at(high))
                 nu = rng.choice([0.0, 1.0]) * mu / np.where(F > 0, F, 1.0) * rng.uniform(-1, 1, size=problem.p)
                 selection = bodies.selection(arc.selections[0], side)
-                alone = only_roots([(selection, low, high)], PieceNumbers(mu, kappa, nu))
+                (alone,) = only_roots([(selection, low, high)], PieceNumbers(mu, kappa, nu))
                 assert not alone or number == 1, (seed, k, float(alpha))
                 yes += alone
                 several += number > 1
@@ -148,9 +148,8 @@ def test_numbers_that_are_too_large_are_refused():
     body, chain = traced(problem, (0, 1)), branch_graph(problem, (0, 1)).arcs[-1]
     asked = [(body.selection(chain.selections[0], 0.0), *chain.interval)]
     one = np.ones(problem.p)
-    assert only_roots(asked, PieceNumbers(one, one, 0.0 * one))
-    assert not only_roots(asked, PieceNumbers(one, one, 2.0 * one))
-    assert not only_roots(asked, PieceNumbers(one, 1e6 * one, 0.0 * one))
+    numbers = PieceNumbers(one, one, 0.0 * one), PieceNumbers(one, one, 2.0 * one), PieceNumbers(one, 1e6 * one, one)
+    assert [only_roots(asked, each) for each in numbers] == [[True], [False], [False]]
     assert PieceNumbers(one, one, -one).usable
     assert not PieceNumbers(one, 0.0 * one, one).usable
     assert not PieceNumbers(np.inf * one, one, one).usable

@@ -17,7 +17,7 @@ def draw(capsys, tmp_path, name, *options):
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("nodes", [1, 2, 5, 7])
-def test_after_so_many_nodes(capsys, tmp_path, name, nodes):
+def test_after_so_many_nodes(capsys, tmp_path, tree_only, name, nodes):
     quantity = "lambda_n" if nodes != 2 else "u_t"
     status, out = draw(capsys, tmp_path, name, "--max-nodes", nodes, "--quantity", quantity)
     assert status == 3
