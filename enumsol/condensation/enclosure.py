@@ -1,10 +1,12 @@
 """Rigorous enclosures of the condensed problem, from the user's own A, Bn, Bt, f (theory, section 4.4).
 
-With X an approximation of A^{-1} K, K = [B', f, load_slope], and R = K - A X its residual,
+With X an approximation of A^{-1} K, K = [B', f, load_slope], R = K - A X its residual and Y an approximation of
+A^{-1} R,
 
-    B A^{-1} K  =  B X  +  X_B' R  +  R_B' A^{-1} R,      |R_i' A^{-1} R_j|  <=  ||R_i|| ||R_j|| / lambda_min(A),
+    B A^{-1} K  =  B X  +  B Y  +  B A^{-1} (R - A Y),      |b_i' A^{-1} z|  <=  ||A^{-1} b_i|| ||z||,
 
-so the error is quadratic in the residual, which is computed in more than the working precision.
+where ||A^{-1} b_i|| <= ||X_i + Y_i|| + ||(R - A Y)_i|| / lambda_min(A). So the error is that of the rounding of two
+sums and of second order in the residual, which is computed in more than the working precision.
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ from enumsol.errors import EnumsolError
 from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from enumsol.arithmetic.balls import Array
     from enumsol.checks import AlphaLike
@@ -105,12 +107,12 @@ class CondensedEnclosure(Sealed):
                 "A is positive definite only within rounding: its smallest eigenvalue, after scaling to a unit "
                 "diagonal, could not be proven positive"
             )
-        X = np.empty(K.shape)
-        for part in _column_blocks(K):
-            # not refined: the products below correct X by its residual
-            columns = problem.factorization.solve(K[:, part].toarray() / scale[:, None], refined=False)
-            X[:, part] = columns / scale[:, None]
-        mid, rad = _products(A, B, K, X, bound)
+
+        def solve(columns: Array) -> Array:
+            # not refined: what is left is bounded
+            return np.asarray(problem.factorization.solve(columns / scale[:, None], refined=False) / scale[:, None])
+
+        mid, rad = _products(A, B, K, solve, bound)
         S, S_rad = mid[:, :size], rad[:, :size]
         # the exact S is symmetric and lies in both triangles' balls
         sym = 0.5 * (S + S.T)
@@ -205,25 +207,29 @@ def _column_blocks(K: sp.csc_array) -> Iterator[slice]:
         yield slice(start, min(start + _COLUMNS, K.shape[1]))
 
 
-def _products(A: sp.csr_array, B: sp.csr_array, K: sp.csc_array, X: Array, bound: float) -> tuple[Array, Array]:
-    """B A^{-1} K as a ball; of what is n long only X and a block of columns are dense."""
+def _products(
+    A: sp.csr_array, B: sp.csr_array, K: sp.csc_array, solve: Callable[[Array], Array], bound: float
+) -> tuple[Array, Array]:
+    """B A^{-1} K as a ball; of what is n long only a block of columns is dense."""
     n, rows = A.shape[0], B.shape[0]
-    first = B @ X
-    k = int(np.max(np.diff(B.indptr))) + 1
-    size = np.abs(X)
-    first_rad = gamma(k) * (abs(B) @ size) * (1 + gamma(k)) * SAFE
-    second, second_rad, norms = np.empty_like(first), np.empty_like(first), np.empty(K.shape[1])
+    k, few = gamma(int(np.max(np.diff(B.indptr))) + 1), gamma(int(np.max(np.diff(A.indptr))) + 3)
+    B_size, A_size = abs(B), abs(A)
+    mid, rad = np.empty((rows, K.shape[1])), np.empty((rows, K.shape[1]))
+    lengths, left = np.empty(K.shape[1]), np.empty(K.shape[1])
     for part in _column_blocks(K):
-        R, R_rad = residual(A, X[:, part], K[:, part].toarray())
-        second[:, part] = X[:, :rows].T @ R
-        np.abs(R, out=R)
-        norms[part] = upper_norm(R + R_rad, axis=0) * SAFE
-        R *= gamma(n + 1)
-        R += R_rad
-        second_rad[:, part] = (size[:, :rows].T @ R) * (1 + gamma(n + 2)) * SAFE
-    third = norms[:rows, None] * norms[None, :] / bound * SAFE
-    mid = first + second
-    return mid, (first_rad + second_rad + third + 2 * UNIT * np.abs(mid)) * SAFE + (n + 2) * TINY
+        columns = K[:, part].toarray()
+        X = solve(columns)
+        R, R_rad = residual(A, X, columns)
+        Y = solve(R)
+        first, second = B @ X, B @ Y
+        mid[:, part] = first + second
+        # what Y leaves of R, with the rounding of this
+        R_rad += few * (np.abs(R) + A_size @ np.abs(Y)) * (1 + few) * SAFE
+        left[part] = upper_norm(np.abs(R - A @ Y) + R_rad, axis=0) * SAFE
+        sizes = np.abs(X) + np.abs(Y)
+        rad[:, part] = (k * (B_size @ sizes) * (1 + 2 * k) + 2 * UNIT * np.abs(mid[:, part])) * SAFE
+        lengths[part] = (upper_norm(sizes, axis=0) + left[part] / bound) * SAFE
+    return mid, (rad + lengths[:rows, None] * left) * SAFE + (n + 2) * TINY
 
 
 @dataclass(frozen=True)
