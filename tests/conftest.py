@@ -1,6 +1,7 @@
 """Set-up of the whole suite."""
 
 import signal
+from collections import defaultdict
 
 import numpy as np
 import pytest
@@ -59,8 +60,19 @@ UNTRACED = {
 }
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Coverage is not measured in slow tests and in those of `UNTRACED`."""
+    """What is slow, and in what coverage is not measured: that, and the tests of `UNTRACED`."""
+    cases = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("few"):
+            cases[item.parent, item.originalname].append(item)
+    for found in cases.values():
+        (count,) = found[0].get_closest_marker("few").args
+        quick = {len(found) * k // count for k in range(count)}
+        for k, item in enumerate(found):
+            if k not in quick:
+                item.add_marker("slow")
     if config.pluginmanager.hasplugin("_cov"):
         for item in items:
             if item.get_closest_marker("slow") or item.path.stem in UNTRACED:

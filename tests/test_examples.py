@@ -32,6 +32,7 @@ def run(test):
 TESTS = {test.name: test for test in examples()}
 
 
+@pytest.mark.few(21)
 @pytest.mark.parametrize("name", sorted(TESTS))
 def test_example(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -170,6 +170,7 @@ def test_descriptions_of_problems(tmp_path):
     assert outcomes == {True, False}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["p.npz", "p.h5", "folder"])
 def test_problems(tmp_path, name):
     if name.endswith("h5"):

@@ -46,6 +46,7 @@ def test_a_problem_loads_sparse_matrices_and_nothing_rare():
     assert "scipy.sparse.linalg" not in modules
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("problem", "alpha", "roots"),
     [
@@ -113,6 +114,7 @@ def test_every_public_name_is_found():
     assert sorted([*homes, "gallery"]) == sorted(enumsol.__all__)
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize("name", sorted(enumsol._MODULES))
 def test_modules_are_attributes_after_a_plain_import(name):
     assert f"enumsol.{name}" in modules_after(f"import enumsol; enumsol.{name}")

@@ -12,6 +12,7 @@ from enumsol.branches import branch_graph
 KINDS = ("friction", "load", "both")
 
 
+@pytest.mark.few(10)
 @pytest.mark.parametrize("seed", range(30))
 def test_generic_problems_at_random_alphas(seed):
     rng = np.random.default_rng(seed)
@@ -35,6 +36,7 @@ def test_exact_arithmetic_proves_generic_graphs_complete(seed):
     assert_same_roots(graph.roots_at(alpha), enumerate_roots(problem, alpha, "exact"))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("block", range(6))
 def test_degenerate_problems_at_their_critical_alphas_too(block):
     for seed in range(20 * block, 20 * block + 20):
@@ -53,6 +55,7 @@ def test_degenerate_problems_at_their_critical_alphas_too(block):
             assert graph.multiplicity_at(alpha) == len(roots) + len(roots.families)
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", ["two-node-6.4", "two-node-6.5", "two-node-6.6", "two-node-5", "chain-4-coupled"])
 def test_gallery_problems(name, rng):
     problem = gallery.get(name).build()

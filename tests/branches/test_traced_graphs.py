@@ -114,6 +114,7 @@ FAMILIES = {
 }
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 def test_graphs_from_balls_are_those_from_exact_algebra(family, monkeypatch):
     count, decided, boxes = FAMILIES[family]
@@ -145,6 +146,7 @@ def _compared(family, seeds, boxes, monkeypatch):
         yield graphs
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("push", [0.0, 1e-16, 1e-12, 1e-6, 1e-3])
 def test_a_pitchfork_is_left_open(push):
     graphs = two_graphs(pair(push), (0, 6))
@@ -205,6 +207,7 @@ def test_without_any_load_there_is_nothing_to_trace():
     assert graph.proof is None or verify(problem, graph.proof).ok
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", [3, 17, 39])
 def test_boxes_far_from_zero_may_be_long(seed):
     rng = np.random.default_rng(seed)

@@ -315,6 +315,7 @@ def judge(name, records):
 # -- tests -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("name", ORIGINALS)
 def test_the_oracle_agrees_with_the_originals(name):
     _, records, report, oracle = original(name)
@@ -331,6 +332,7 @@ def test_the_oracle_agrees_with_the_originals(name):
             assert not oracle.is_true(codes, side, ["h", part[1], 1], low)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "open" else []) for name in ORIGINALS]
 )
@@ -353,6 +355,7 @@ def test_thousands_of_mutants_accepted_as_a_whole_are_true(name, block):
         judge(name, mutant(rng, records))
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", [name for name in ORIGINALS if name != "open"])
 def test_an_arc_removed_with_its_events_is_refused(name):
     _, records, *_ = original(name)

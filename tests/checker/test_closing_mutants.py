@@ -105,6 +105,7 @@ def accepted(problem, records):
 KINDS = ["m", "M", "slides", "sides", "any theta"]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_both_checkers_accept(kind):
     for problem, records in cases(kind):
@@ -133,6 +134,7 @@ def changed(record, rng):
     return record
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_accepted_mutant_is_still_a_proof(kind):
     rng, refused = np.random.default_rng(5), 0
@@ -218,6 +220,7 @@ def test_the_independent_checker_refuses_as_well():
         check_records(problem, [*records[:k], forged, *records[k + 1 :]])
 
 
+@pytest.mark.slow
 def test_proofs_with_closed_subtrees_have_no_stability_radius():
     """Unless the whole problem is closed, and its solution regular: that is a root of all data nearby."""
     for kind in ("m", "M"):

@@ -48,6 +48,7 @@ def refused(problem, records):
     return not report.ok and bool(report.failures)
 
 
+@pytest.mark.few(4)
 def test_a_verified_graph_is_complete_and_its_proof_verifies(proven):
     problem, graph = proven
     assert graph.complete

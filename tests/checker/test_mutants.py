@@ -96,6 +96,7 @@ def _mutate(draw, records):
         records[k] = [draw(st.sampled_from(("n", "N", "u", "z")))]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", NAMES)
 @QUICK
 @given(data=st.data())

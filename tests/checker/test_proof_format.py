@@ -99,6 +99,7 @@ def test_every_kind_of_leaf_is_among_them():
     assert kinds == {"b", "x", "r", "n", "N", "D", "z", "m", "M"}
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize("make", [random_problem, integer_problem, singular_problem])
 @pytest.mark.parametrize("p", [1, 2, 3])
 def test_point_proofs_of_random_problems_are_accepted(make, p):
@@ -282,6 +283,7 @@ def test_another_alpha_makes_other_roots():
     assert refused(problem, [{**records[0], "alpha": "9/2"}, *records[1:]])
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("arcs", [True, False])
 @pytest.mark.parametrize("name", ["friction", "load", "both", "unloaded", "everything"])
 def test_forged_graph_proofs(name, arcs):

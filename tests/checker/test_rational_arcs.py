@@ -46,6 +46,7 @@ def spread(found, most=7):
 # -- forgeries ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", GRAPHS)
 def test_forged_parts_that_hold(name):
     problem, records, _ = graph(name)
@@ -64,6 +65,7 @@ def test_forged_parts_that_hold_nothing(name):
             assert refused(problem, with_part(records, k, i, other)), other
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", EVENTFUL)
 def test_forged_events(name):
     problem, records, _ = graph(name)
@@ -157,6 +159,7 @@ def test_a_removed_event_makes_arcs_begin_and_end_for_no_reason(name):
             assert refused(problem, merged)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", GRAPHS)
 def test_parts_left_open(name):
     """What a proof says less it may say; arcs that end there count."""
@@ -170,6 +173,7 @@ def test_parts_left_open(name):
     assert made.complete
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", GRAPHS)
 def test_forged_traces_and_boxes(name):
     problem, records, _ = graph(name)
@@ -232,6 +236,7 @@ def random_graph(make, seed, p):
     return ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f, friction=(F, F1), **load), (0.0, 2.0)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize(
     ("make", "p"), [(random_problem, 1), (random_problem, 2), (integer_problem, 2), (singular_problem, 2)]
@@ -294,6 +299,7 @@ def test_the_sign_at_an_irrational_zero():
     assert [zero.sign_of(fmpq_poly([-fmpq(k, 100), 1])) for k in (141, 142)] == [1, -1]
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize("seed", range(6))
 def test_empty_selections_at_single_alphas_and_between(seed):
     """Against vertices at samples, singular selections among them."""

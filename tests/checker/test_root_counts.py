@@ -86,6 +86,7 @@ def outline(roots):
     return singles, sorted((family.dimension, family.index, family.vertices.shape) for family in roots.families)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("p", "first", "last"),
     [(1, 0, 130), (2, 0, 60), (3, 0, 40)]
@@ -128,6 +129,7 @@ def contained(exact, roots):
     return not left
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("p", "count"), [(1, 40), (2, 60), (3, 30)])
 def test_without_rationals_the_count_is_right_or_open(p, count, monkeypatch):
     verified = []

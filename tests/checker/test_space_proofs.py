@@ -26,6 +26,7 @@ def refused(name, records):
     return " ".join(report.failures)
 
 
+@pytest.mark.few(9)
 @pytest.mark.parametrize("name", NAMES, ids=str)
 def test_proofs_are_accepted(name):
     problem, alpha, records, data = case(name)
@@ -318,6 +319,7 @@ def test_multipliers_have_to_be_finite():
 # -- mutants -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "name",
     [

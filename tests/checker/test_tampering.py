@@ -99,6 +99,7 @@ def test_swapped_children_prove_nothing(name):
             refused(name, changed)
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", NAMES)
 def test_changed_multipliers(name):
     problem, records, _ = case(name)
@@ -183,6 +184,7 @@ def test_changed_rational_roots(name):
             refused(name, changed)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", ["two-node-5", "wedge-8-3", "chain-2-coupled"])
 def test_a_certificate_at_another_leaf(name):
     problem, records, _ = case(name)

@@ -47,6 +47,7 @@ def verbs(proof, folder):
     }
 
 
+@pytest.mark.slow
 def test_every_verb_can_be_quiet_and_writes_json(proof, tmp_path, capsys):
     pytest.importorskip("plotly")
     commands = verbs(proof, tmp_path)
@@ -95,6 +96,7 @@ def test_the_table_of_exit_statuses_is_complete():
     assert [(int(number), name) for number, name in rows] == [(status.value, status.name) for status in ExitStatus]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("words", "expected"),
     [

@@ -150,6 +150,7 @@ def test_options_of_supports_and_obstacles(here, capsys):
     assert "complete: yes" in out
 
 
+@pytest.mark.few(22)
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [

@@ -81,6 +81,7 @@ def test_its_table_calls_the_ends_of_its_arcs_unsettled(cut):
         assert set(cut.vertices_frame()["kind"]) == {"unsettled", "end"}
 
 
+@pytest.mark.few(2)
 def test_its_plot_shows_a_lower_bound_and_says_that_it_is_not_complete(cut, tmp_path):
     figure = cut.plot(file=tmp_path / "cut.png")
     assert (tmp_path / "cut.png").stat().st_size > 0

@@ -274,6 +274,7 @@ def test_labels_on_the_command_line(capsys, tmp_path):
     assert_refused(*run(capsys, "audit", body, points), f"{points} has no column 'lambda_t_right'", expected)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("labels", [(1, 0), (0, 5), (5, 1)])
 def test_columns_that_fit_row_numbers_and_labels_are_refused(capsys, tmp_path, labels):
     """(1, 0): each name fits two nodes. (0, 5), (5, 1): a file with columns for more nodes than those in contact."""

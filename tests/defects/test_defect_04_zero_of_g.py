@@ -39,6 +39,7 @@ def test_the_example_of_the_report():
     assert (report.pieces, report.data) == (2, "problem")
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("zero", ZEROS, ids=str)
 @pytest.mark.parametrize("friction", [0.0, 1.0, (0.0, 1.0)], ids=str)
 @pytest.mark.parametrize("p", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
@@ -49,6 +50,7 @@ def test_g_vanishes_by_load_and_offsets_together(p, zero, friction):
         assert (zero in ends_of_pieces(graph)) == (0 <= zero <= 10)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("zero", ZEROS, ids=str)
 def test_g_that_almost_vanishes(zero):
     rng = np.random.default_rng([5, zero.numerator + 3, zero.denominator])

@@ -88,6 +88,7 @@ def test_the_unloaded_body_without_friction_has_its_names():
         assert (root.enclosure is None) == (arithmetic == "fast")
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("arithmetic", ["verified", "exact"])
 @pytest.mark.parametrize("make", [random_problem, integer_problem, singular_problem])
 def test_numbers_of_random_problems_lie_in_their_enclosures(make, arithmetic):
@@ -97,6 +98,7 @@ def test_numbers_of_random_problems_lie_in_their_enclosures(make, arithmetic):
         assert outside(roots) == []
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize("arithmetic", ["verified", "exact"])
 @pytest.mark.parametrize("power", [-60, -20, 20, 60])
 def test_numbers_of_badly_scaled_problems_lie_in_their_enclosures(power, arithmetic):
@@ -116,6 +118,7 @@ SMALL = [
 ]
 
 
+@pytest.mark.few(11)
 @pytest.mark.parametrize("entry", SMALL)
 def test_numbers_of_the_gallery_lie_in_their_enclosures(entry):
     assert outside(enumerate_roots(entry.build(), entry.alpha)) == []

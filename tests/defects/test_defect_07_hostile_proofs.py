@@ -128,6 +128,7 @@ def test_those_proofs_hold_records_of_every_kind():
 # -- memory and work ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", ["stopped", "graph in several pieces"])
 @pytest.mark.parametrize("line", ["[]", "null", '["u",""]', '["s","000"]', "{}"])
 def test_a_small_file_of_very_many_records(name, line, monkeypatch):
@@ -142,6 +143,7 @@ def test_a_small_file_of_very_many_records(name, line, monkeypatch):
     assert effort.memory < 20e6
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", ["stopped", "graph in several pieces"])
 @pytest.mark.parametrize("part", ["[],", '"",', "0,", '["0/1"],', "[" * 1000])
 def test_a_small_file_of_one_long_record(name, part, monkeypatch):
@@ -363,6 +365,7 @@ def test_what_is_no_interval(interval):
     refused(*changed("graph", 1, piece=interval))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("value", [1e300, -1e300, 1.7e308, 5e-324, float("inf"), float("-inf"), float("nan")])
 def test_a_huge_multiplier(value):
     # warnings are errors here
@@ -458,6 +461,7 @@ def test_codes_of_a_graph(codes):
         refused(*changed("graph in several pieces", 1, roots=roots))
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", POINTS)
 def test_every_record_has_its_entries(name):
     problem, proof = before(name)
@@ -586,6 +590,7 @@ def is_true(name, report, records):
     return all(holding(name, a + (b - a) * Fraction(k, 4)) <= report.selections for k in range(5))
 
 
+@pytest.mark.few(1)
 @pytest.mark.usefixtures("enclosed_once")
 @pytest.mark.parametrize("name", BEFORE)
 def test_mutants(name, monkeypatch):

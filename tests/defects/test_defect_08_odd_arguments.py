@@ -190,6 +190,7 @@ CALLS = [
 CASES = [(function, good, name) for function, good, names in CALLS for name in names.split()]
 
 
+@pytest.mark.few(9)
 @pytest.mark.parametrize(
     ("function", "good", "name"), CASES, ids=[f"{function.__qualname__}-{name}" for function, _, name in CASES]
 )

@@ -189,6 +189,7 @@ def _forces(problem, alpha):
     return root.lambda_n, root.lambda_t
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", TAKE)
 def test_every_function_takes_every_kind_of_number(problem, graph, name):
     known = {exact: TAKE[name](problem, graph, exact, exact) for exact in {exact for _, exact in NUMBERS.values()}}
@@ -284,6 +285,7 @@ def test_only_paths_may_go_to_infinity(problem):
 # -- the command line ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(30)
 @pytest.mark.parametrize("text", ["five", "nan", "inf", "1e400", "1e-400", "1e4000000", "1e-4000000", "1/0", "", "1_0"])
 @pytest.mark.parametrize(
     ("option", "arguments"),

@@ -164,6 +164,7 @@ def closing(*streams):
     return {"preexec_fn": close, **{name: None for k, name in ((1, "stdout"), (2, "stderr")) if k in streams}}
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["nothing", "roots", "roots json", "gallery list"])
 def test_stdout_that_was_closed(place, name):
     done = enumsol_command(place, *PRINTING[name], **closing(1))
@@ -171,6 +172,7 @@ def test_stdout_that_was_closed(place, name):
     assert done.returncode == 74
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["help", "roots", "graph", "verify"])
 def test_stderr_that_was_closed_or_is_full_is_not_missed(place, name):
     expected = enumsol_command(place, *PRINTING[name])
@@ -183,6 +185,7 @@ def test_stderr_that_was_closed_or_is_full_is_not_missed(place, name):
         assert lines == [line for line in expected.stdout.splitlines() if "seconds" not in line]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("arguments", [("rots",), ("roots", "gallery:nothing", "--alpha", 5)])
 def test_a_mistake_keeps_its_status_when_there_is_nowhere_to_tell_it(place, arguments):
     with open(FULL, "w") as full:
@@ -205,6 +208,7 @@ WRITING = [
 ]
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("verb", "option", "file"), WRITING)
 def test_a_file_on_a_full_disk(place, capsys, monkeypatch, verb, option, file):
     monkeypatch.chdir(place)

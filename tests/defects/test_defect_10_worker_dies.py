@@ -59,6 +59,7 @@ def check(found, problem, alpha):
 # -- enumerate_roots ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("healthy", [0, 1, 12])
 @pytest.mark.parametrize("death", DEATHS)
 def test_a_process_that_dies(wedge, death, healthy, tmp_path):
@@ -177,6 +178,7 @@ def test_what_kills_every_worker_is_done_here():
         assert results(pool, dies_in_workers, (os.getpid(),)) == ([os.getpid()], 3)
 
 
+@pytest.mark.slow
 def test_pools_are_made_anew_in_a_process_of_their_own():
     """A process of the tests was once lost beside them, and all that it had still to do."""
     variables = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
@@ -212,6 +214,7 @@ def test_a_table_whose_thread_runs_out_of_memory(square):
     check_table(table, square)
 
 
+@pytest.mark.slow
 def test_dask_workers_that_die(square, wedge):
     dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
     with (

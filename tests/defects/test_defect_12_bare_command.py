@@ -4,6 +4,7 @@ import pytest
 from cli.test_cli import call
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("group", [(), ("gallery",)])
 def test_it_is_the_help_on_stdout(group):
     bare, asked = call(*group), call(*group, "--help")

@@ -32,6 +32,7 @@ def total(root, problem):
     return -(problem.contact_rows.T @ rows) @ np.eye(3)[problem.mesh.dofs % 3]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", [4, 8, *SECOND])
 def test_patch_test(kind):
     """Constant stress is in equilibrium with its own tractions, on distorted cells."""
@@ -81,6 +82,7 @@ def test_contact_nodes_of_six_node_triangles_lie_between_their_corners():
     assert np.allclose(np.sort(whole.areas) * 36, [1] * 4 + [4] * 4 + [16])
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", SECOND)
 def test_springs_are_positive_and_carry_their_share(kind):
     mesh = solid((1, 1, 1), kind, (2.0, 1.0, 1.0))
@@ -97,6 +99,7 @@ def test_springs_are_positive_and_carry_their_share(kind):
     assert np.allclose(moves.T @ full @ moves, np.diag([4, 4, 2]), atol=1e-10)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", SECOND)
 def test_a_turned_body_has_the_same_roots(kind):
     mesh = solid((1, 1, 1), kind)
@@ -151,6 +154,7 @@ def test_first_and_second_order_agree():
         assert np.allclose(forces[kind], forces[8], rtol=0, atol=0.02 * forces[8][2])
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", SECOND)
 def test_a_curved_contact_boundary(kind):
     """A shell inside of a cylinder: normals and areas are those of the circle nearly to second order."""
@@ -216,6 +220,7 @@ def test_the_same_from_a_basis_of_scikit_fem():
 # -- files -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("kind", "name", "facet"), [(10, "tetra10", "triangle6"), (27, "hexahedron27", "quad9")])
 @pytest.mark.parametrize("suffix", ["msh", "vtu"])
 def test_files(kind, name, facet, suffix, tmp_path):

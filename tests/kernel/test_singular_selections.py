@@ -62,6 +62,7 @@ def float_roots(S, g, F, tolerance=1e-9):
     return points
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(("seed", "load"), HUNTED)
 def test_false_roots_are_refused(seed, load):
     problem, planted = hunted(seed, load)
@@ -82,6 +83,7 @@ def test_false_roots_are_refused(seed, load):
     assert (report.roots, report.families) == (len(exact), len(exact.families))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("seed", "load"), HUNTED[1:4])
 def test_exact_count_by_an_oracle_in_fractions(seed, load):
     problem, _ = hunted(seed, load)
@@ -91,6 +93,7 @@ def test_exact_count_by_an_oracle_in_fractions(seed, load):
     assert len(roots.families) == sum(c.dimension > 0 for c in components)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_selection_that_holds_a_root_is_never_contradicted(seed):
     rng = np.random.default_rng([seed, 88])

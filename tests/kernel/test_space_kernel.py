@@ -275,6 +275,7 @@ def test_a_root_of_a_ball_of_data_holds_that_of_every_data(p, seed):
     assert checked
 
 
+@pytest.mark.slow
 def test_a_root_is_one_where_rounding_ends_its_refinement():
     # of data that differ by rounding: a last box that was a hair wider than the one before left the leaf open, for
     # 38 of these 100, and so did the linear algebra of some processors

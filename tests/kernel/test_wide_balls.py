@@ -59,6 +59,7 @@ def exact_bound(judge, rows, values):
     return sum(a * x for a, x in zip(linear, least, strict=True)) / 2 + constant
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("width", [1e-10, 1e-6, 1e-3])
 def test_margins_hold_for_every_corner(width):
     rng = np.random.default_rng(1)

@@ -87,6 +87,7 @@ def descend(rng, system, engine):
         node = node.child(*rows_of(codes, F, [i]), last=bool(rng.random() < 0.5))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_values_agree_with_an_interior_point_solver(seed):
     rng = np.random.default_rng(seed)
@@ -105,6 +106,7 @@ def test_values_agree_with_an_interior_point_solver(seed):
     assert min(seen.values()) > 15
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("engine", [ActiveSetEngine, InteriorPointEngine])
 @pytest.mark.parametrize("seed", range(4))
 def test_multipliers_prove_the_bound(engine, seed):

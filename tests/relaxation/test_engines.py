@@ -84,6 +84,7 @@ class Failing:
         monkeypatch.setattr(cls, "__init__", init)
 
 
+@pytest.mark.few(17)
 @pytest.mark.parametrize("share", [0.2, 1.0])
 @pytest.mark.parametrize(("problem", "alpha"), PROBLEMS)
 def test_a_stalling_engine_is_replaced(monkeypatch, problem, alpha, share):
@@ -97,6 +98,7 @@ def test_a_stalling_engine_is_replaced(monkeypatch, problem, alpha, share):
     assert not differences(roots, want)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("share", [0.2, 0.5])
 def test_where_both_fail_the_search_branches_on(monkeypatch, share, seed):

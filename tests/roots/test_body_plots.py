@@ -71,6 +71,7 @@ def test_all_roots_side_by_side_in_one_scale(wedge):
     assert "the first 12 of 27 roots" in many.get_suptitle()
 
 
+@pytest.mark.slow
 def test_in_space():
     problem = enumsol.gallery.get("wedge3d-8-5").build()
     roots = enumsol.enumerate_roots(problem, 2.0)

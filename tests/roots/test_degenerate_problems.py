@@ -32,6 +32,7 @@ def check(problem, rng, methods=METHODS):
     return components
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("seed", "sizes", "count"), [(0, (1, 2), 200), (1, (3,), 30)])
 def test_integer_data(seed, sizes, count):
     rng = np.random.default_rng(seed)
@@ -65,6 +66,7 @@ def near(rng, p, low, high):
     return ContactProblem(problem.A, problem.Bn, problem.Bt, f, friction=(F, 0.0))
 
 
+@pytest.mark.slow
 def test_near_coincidences_in_exact_arithmetic():
     rng = np.random.default_rng(4)
     for _ in range(60):

@@ -60,6 +60,7 @@ def names(part):
     return tuple(getattr(status, "value", status) for status in part.statuses)
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", CASES)
 def test_one_region_that_holds_what_is_known(name):
     nodes, statuses, known = CASES[name]
@@ -138,6 +139,7 @@ def test_regular_roots_beside_a_region_stay_roots():
     assert roots.at_least == 1
 
 
+@pytest.mark.slow
 def test_executors_find_the_same_regions():
     for name in ("twice stick at its limit", "unloaded beside a loaded one"):
         problem = from_compliance(*beside(CASES[name][0]), 1.0)

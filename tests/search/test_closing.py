@@ -60,6 +60,7 @@ def test_a_row_of_unequal_discs(weights):
     assert verify(problem, roots.proof).complete
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", range(2))
 def test_a_row_of_stiff_discs_of_any_weights(seed):
     problem = row_of_discs(20, weights=np.random.default_rng(seed).uniform(1.5, 3.0, 20), friction=0.9)
@@ -140,6 +141,7 @@ def any_side(monkeypatch):
     monkeypatch.setattr(closing.Closer, "__init__", made)
 
 
+@pytest.mark.few(18)
 @pytest.mark.parametrize("seed", range(30))
 def test_splits_by_sides_find_the_same(any_side, tree_only, seed):
     rng = np.random.default_rng(seed)
@@ -153,6 +155,7 @@ def test_splits_by_sides_find_the_same(any_side, tree_only, seed):
     assert [root.active for root in enumerate_roots(problem, 0, "exact")] == [root.active for root in exact]
 
 
+@pytest.mark.few(28)
 @pytest.mark.parametrize("seed", range(40))
 def test_the_roots_are_those_of_all_selections(every_node, seed):
     rng = np.random.default_rng(seed)
@@ -237,6 +240,7 @@ def test_fast_arithmetic():
         assert roots.index_sum == len(roots) == 1
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("workers", [1, 2])
 def test_sides_are_told_to_workers(workers, monkeypatch):
     problem = row_of_discs(12, weights=(2.0, 3.0), friction=0.9)

@@ -209,6 +209,7 @@ def agrees(problem, records):
     return accepted
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", range(8))
 def test_changed_forms_prove_nothing_false(eager, seed):
     problem, records = proven(seed)
@@ -238,6 +239,7 @@ def test_changed_forms_prove_nothing_false(eager, seed):
         agrees(problem, changed)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("seed", range(4))
 def test_leaves_refer_to_forms_that_serve_them(eager, seed):
     problem, records = proven(seed)

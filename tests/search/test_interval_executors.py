@@ -50,6 +50,7 @@ def arcs(graph):
     return [(arc.tail, arc.head, arc.selections) for arc in graph.arcs]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_same_graph_and_proof_as_without_workers(name, executors):
     problem, interval = PROBLEMS[name]()

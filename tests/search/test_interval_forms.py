@@ -29,6 +29,7 @@ def shape(graph):
     return sorted((arc.selections, arc.index, round(arc.lo, 9), round(arc.hi, 9)) for arc in graph.arcs)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_graphs_and_both_checkers_agree(kind):
     by_forms = 0

@@ -170,6 +170,7 @@ def test_a_file_cut_anywhere(data, tmp_path_factory):
     check(name, resumed(name, whole[:size], tmp_path_factory.mktemp("cut") / "x.proof"))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_as_much_is_taken_as_the_file_holds(name, tmp_path):
     whole = bytes_of(known(name)[2].proof)
@@ -263,6 +264,7 @@ def test_rows_that_do_not_exist_in_space(tmp_path):
 # -- limits ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", ["wedge", "forms", "closed", "block in space"])
 @pytest.mark.parametrize("limits", [{"max_nodes": 7}, {"max_nodes": 40}])
 def test_a_search_in_small_parts(name, limits, tmp_path):

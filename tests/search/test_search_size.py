@@ -8,6 +8,7 @@ import enumsol
 from enumsol import gallery
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize("length", [1.0, 2.0])
 @pytest.mark.parametrize("traction", [(0.3, -1.0), (0.0, -1.0)])
 @pytest.mark.parametrize("p", [8, 14, 20, 32])
@@ -30,6 +31,7 @@ def test_loads_that_lift_part_of_the_block(p):
             assert roots.stats.nodes <= 8 * p * len(roots)
 
 
+@pytest.mark.slow
 def test_a_hundred_nodes_with_high_friction():
     # branching by the largest violation alone takes 140,000 nodes here
     roots = enumsol.enumerate_roots(gallery.clamped_block(100, 50, 2.0, traction=(1.0, -0.3)), 10.0)
@@ -38,6 +40,7 @@ def test_a_hundred_nodes_with_high_friction():
     assert roots.stats.nodes < 8_000
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("p", [8, 14, 20, 32])
 def test_wedges(p):
     for name in (f"wedge-{p}-3", f"wedge-{p}-5"):

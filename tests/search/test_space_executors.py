@@ -73,6 +73,7 @@ def assert_equal(one, other):
     assert [values(root) for root in one] == [values(root) for root in other]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_same_roots_and_one_proof_whatever_the_number_of_workers(name, executors):
     problem, alpha = PROBLEMS[name]()
@@ -149,6 +150,7 @@ def test_an_interruption_keeps_what_was_found(executors, many, monkeypatch):
     assert not partial.complete
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("healthy", [0, 3])
 def test_a_lost_worker_costs_time_and_nothing_else(healthy, many):
     with ProcessPoolExecutor(2) as pool, pytest.warns(RuntimeWarning, match="a worker died"):

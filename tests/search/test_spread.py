@@ -150,6 +150,7 @@ def test_an_interruption_keeps_what_came_in(small_parts, wedge, tmp_path):
     assert not differences(found, whole, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_dask(small_parts, wedge):
     distributed = pytest.importorskip("distributed")
     problem, alpha, whole = wedge

@@ -98,6 +98,7 @@ def test_a_study_runs_at_its_smoke_size(name, tmp_path):
     assert results() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [on_this_platform(name) for name in PEERS])
 def test_a_study_without_its_peer_does_the_rest_and_says_so(name, tmp_path):
     library, sentence, column = PEERS[name]
@@ -124,6 +125,7 @@ def test_the_profile_knows_every_function_that_it_names(tmp_path):
     assert run("-c", code).splitlines()[1] == "[]"
 
 
+@pytest.mark.slow
 def test_one_part_of_a_study(tmp_path):
     run(STUDIES, "samples_vs_graph", "--smoke", "--results", tmp_path, "--part", "thin")
     assert {file.name for file in tmp_path.iterdir()} == {"branch_thin.csv", "branch_thin.txt", "branch_thin.png"}
