@@ -226,6 +226,14 @@ class Weights:
                 return None
         return replace(self, slope=slope)
 
+    def beside(self, x: Ball, tangential: NDArray[np.intp]) -> Weights:
+        """With theta = lambda_t / lambda_n at the middle of a solution's ball where it is not F or -F, nor tau > 0."""
+        n, t = x.mid[self.normal], x.mid[tangential]
+        told = (self.tau == 0) & (np.abs(self.share) < 1) & (n > 0)
+        ratio = np.where(told, t / np.where(told, n, 1.0), self.slope.mid)
+        # off says how far that is from theta
+        return replace(self, slope=Ball(ratio, np.where(told, 0.0, self.slope.rad)))
+
     def beyond(self, k: int, gap: float, up: float, down: float) -> float:
         """What w_t of a node that is open is too large for the numbers, if -w_n >= gap and -down <= w_t <= up."""
         excess = 0.0
@@ -381,27 +389,33 @@ class Reduced:
 
     def enclosed(self, numbers: Weights, force: Array) -> ClosedSolution | None:
         """The solution as a ball, None where it is not proven to exist and to be the only one."""
-        least = self.least(numbers)
-        if not least > 0:
-            return None
         if len(self.nodes) == self.system.p and not any(code in _SLIDING for code in self.selection):
             # all nodes are free: where its selection holds strictly, that is closer than (6.10) if Q is hardly definite
             root = solve_selection(self.system, self.selection)
             if root is not None and root.is_root:
-                alone = self._alone(Ball(root.force[self.places], root.force_rad[self.places]), numbers, least)
+                # R is S and h is g: so these are x and w here, and w is closer than R times the radii of x gives it
+                x = Ball(root.force[self.places], root.force_rad[self.places])
+                w = Ball(root.w[self.places], root.w_rad[self.places])
+                numbers = numbers.beside(x, self.tangential[numbers.normal])
+                alone = self._alone(x, w, numbers, self.least(numbers))
                 return None if alone is None else replace(alone, regular=root)
+        least = self.least(numbers)
+        if not least > 0:
+            return None
         x = self._point(force, numbers)
         reach = self._distance(x.mid, self._displacements(x), numbers) / least * SAFE
-        return self._alone(Ball(x.mid, (x.rad + reach) * SAFE), numbers, least) if np.isfinite(reach) else None
-
-    def _alone(self, x: Ball, numbers: Weights, least: float) -> ClosedSolution | None:
-        """The solution that is known to lie in a ball, if Q is definite for every theta that it may have there."""
+        if not np.isfinite(reach):
+            return None
+        x = Ball(x.mid, (x.rad + reach) * SAFE)
         w = self._displacements(x)
         for i, node in enumerate(self.nodes):
             # open at every solution
             if self.selection[node] == OPEN and w.mid[i] + w.rad[i] < 0:
                 x.rad[[i, self.tangential[i]] if self.tangential[i] >= 0 else i] = 0.0
-        w = self._displacements(x)
+        return self._alone(x, self._displacements(x), numbers, least)
+
+    def _alone(self, x: Ball, w: Ball, numbers: Weights, least: float) -> ClosedSolution | None:
+        """The solution that is known to lie in a ball, if Q is definite for every theta that it may have there."""
         n, t = numbers.normal, self.tangential[numbers.normal]
         off = np.array([numbers.off(k, x[a], x[b], w[a], w[b]) for k, (a, b) in enumerate(zip(n, t, strict=True))])
         # at each of them Q is not smaller than this
