@@ -214,9 +214,15 @@ class Point(Proof):
             need(set(codes) == {6} and not rest and not any(self.forms.g), "the body is loaded")
             self.polytopes.append(((0,) * self.p, 0))
         else:
-            need(kind in ("n", "N", "r", "D", "m", "M"), "an unknown leaf")
+            need(kind in ("n", "N", "r", "D", "a", "m", "M"), "an unknown leaf")
             if kind == "m":
                 self.closings.leaf(codes, *rest)
+                return
+            if kind == "a":
+                selection, numbers, strengths, rows, values, *claim = rest
+                terms = self.terms(codes, [rows, values], self.scale, self.friction)
+                self.closings.alone(codes, selection, numbers, strengths, terms)
+                self.root(selection, *claim)
                 return
             if kind == "M":
                 self.polytopes += self.closings.exact_leaf(codes, *rest)
@@ -261,7 +267,7 @@ class Point(Proof):
             need(abs(x - m) <= r, "an enclosure misses the root")
         need(integer(index) == (1 if N.det() > 0 else -1), "an index is wrong")
         self.regular += 1
-        self.roots.append(codes)
+        self.roots.append(tuple(codes))
 
     def polytope(self, codes, points, dimension):
         vertices = self.forms.hull(codes)

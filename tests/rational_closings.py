@@ -1,4 +1,4 @@
-"""[5.3, m and M] Leaves that close a subtree by its only possible solution, for rational_checker, in rationals.
+"""[5.3, a, m and M] Leaves that close a subtree by its only possible solution, for rational_checker, in rationals.
 
 Nothing of enumsol is imported. That a solution is the only one is not believed because a form is definite: all
 selections of the free nodes are tried as well. Numbers in brackets are sections of docs/proof_format.md.
@@ -64,6 +64,49 @@ class Closings:
         need(integer(count) == int(touching and all(holds.values())), "a leaf holds another number of roots")
         return [(tuple(selection), 0)] if count else []
 
+    def alone(self, codes, selection, numbers, strengths, terms):
+        """A root that is the only one below an assignment."""
+        need(len(selection) == self.p, "a selection has another size")
+        for i, code in enumerate(selection):
+            need(integer(code) in self.below(codes[i], i), "a selection is none below its assignment")
+        equations = self.forms.equations(selection)
+        N = fmpq_mat([form[:-1] for form in equations])
+        need(N.det() != 0, "a selection is singular")
+        point = N.solve(column_of([-form[-1] for form in equations])).entries()
+        need(all(_value(form, point) > 0 for form in self.forms.conditions(selection)), "a condition is not strict")
+        lone = Lone(self.forms, codes, self.friction)
+        nodes, own = lone.nodes, lone.own
+        numbers = [exact(value) for value in numbers]
+        need(len(numbers) == len(nodes) + 3 * len(own), "there are not as many numbers as a form has")
+        mu, rest = dict(zip(nodes, numbers, strict=False)), numbers[len(nodes) :]
+        kappa, nu, share = (dict(zip(own, rest[k * len(own) :], strict=False)) for k in range(3))
+        need(all(value > 0 for value in [*mu.values(), *kappa.values()]), "a number is not positive")
+        theta = {}
+        for i in own:
+            F, (n, t, w_n, w_t) = self.forms.F[i], self.values(point, i)
+            need(abs(nu[i]) * F <= mu[i] and abs(share[i]) <= 1, "a number is too large")
+            need(selection[i] not in (2, 3) or share[i] == 5 - 2 * selection[i], "theta does not serve slip")
+            theta[i] = t / n if n > 0 else share[i] * F
+            if n == 0:
+                need((mu[i] + nu[i] * F) * -w_n >= kappa[i] * (F - theta[i]) * w_t, "theta does not serve slip+")
+                need((mu[i] - nu[i] * F) * -w_n >= kappa[i] * (F + theta[i]) * -w_t, "theta does not serve slip-")
+        need(len(strengths) == 2 * self.p, "there are not as many strengths as components")
+        z = [exact(value) / self.unit[k % self.p] for k, value in enumerate(strengths)]
+        need(min(z) >= 0 and all(codes[i] == 1 or z[self.p + i] == 0 for i in range(self.p)), "a strength is wrong")
+        for i in range(self.p):
+            if z[i] > 0 and codes[i] > 5:
+                need(selection[i] != 0, "an open node has no force to lose")
+                spare = mu[i] * point[i] + nu.get(i, 0) * point[self.p + i]
+                gap, square = lone.gap(terms, i)
+                need(spare >= z[i] * gap and (spare - z[i] * gap) ** 2 >= z[i] ** 2 * square, "a strength is too large")
+        need(lone.definite(mu, kappa, nu, theta, z), "a form is not definite")
+        # which is not believed
+        for other in product(*(self.below(code, i) for i, code in enumerate(codes))):
+            need(other == tuple(selection) or not self.forms.hull(other), "there is another solution")
+
+    def below(self, code, i):
+        return {5: (1, 2, 3), 6: FINAL[bool(self.friction[i])], **SIDES}.get(code, (code,))
+
     def apart(self, others):
         """[5.4] How many closed roots solve none of these selections."""
         return sum(not any(self.solves(codes, point) for codes in others) for point in self.points.values())
@@ -124,6 +167,58 @@ class Closings:
 
     def conditions(self, code, i, point):
         return [_value(self.forms.row(kind, i), point) for kind in KINDS[code]]
+
+
+class Lone:
+    """Components of lambda that an assignment leaves: d with lambda_t = +-F lambda_n put in, and no open nodes."""
+
+    def __init__(self, forms, codes, friction):
+        self.forms, p = forms, forms.p
+        self.nodes = [i for i, code in enumerate(codes) if code != 0]
+        self.own = [i for i in self.nodes if friction[i] and codes[i] in (1, 5, 6)]
+        self.columns = []
+        for i in self.nodes:
+            side = {2: 1, 7: 1, 3: -1, 8: -1}.get(codes[i], 0)
+            self.columns.append({i: fmpq(1), p + i: side * forms.F[i]})
+        self.columns += [{p + i: fmpq(1)} for i in self.own]
+
+    def moved(self, k):
+        """(S d)_k as a form of the components."""
+        return [sum((x * self.forms.rows[k][j] for j, x in column.items()), fmpq(0)) for column in self.columns]
+
+    def gap(self, terms, i):
+        """What -w_n of a node is at most, less a root; and what is under the root."""
+        v, constant = list(self.forms.g), fmpq(0)
+        for number, u in terms:
+            *a, a0 = self.forms.row(*divmod(number, self.forms.p))
+            v = [x + u * y for x, y in zip(v, a, strict=True)]
+            constant += u * a0
+        middle = [x / 2 for x in self.forms.S.solve(column_of(v)).entries()]
+        least = -constant - sum((x * y for x, y in zip(v, middle, strict=True)), fmpq(0)) / 2
+        return -_value(self.forms.move(1, i), middle), max(-least, fmpq(0)) * self.forms.rows[i][i]
+
+    def definite(self, mu, kappa, nu, theta, z):
+        size, p = len(self.columns), self.forms.p
+        Q = [[fmpq(0)] * size for _ in range(size)]
+
+        def add(left, right):
+            for a in range(size):
+                for b in range(size):
+                    Q[a][b] += (left[a] * right[b] + left[b] * right[a]) / 2
+
+        place = {i: k for k, i in enumerate(self.nodes)} | {p + i: len(self.nodes) + k for k, i in enumerate(self.own)}
+        for i in self.nodes:
+            n, r = [fmpq(0)] * size, self.moved(i)
+            n[place[i]] = mu[i]
+            if i in theta:
+                n[place[p + i]] = nu[i]
+                t = [fmpq(0)] * size
+                t[place[i]], t[place[p + i]] = -kappa[i] * theta[i], kappa[i]
+                add(t, self.moved(p + i))
+            add(n, r)
+            for k in (i, p + i):
+                add([z[k] * x for x in self.moved(k)], self.moved(k))
+        return all(fmpq_mat([row[:k] for row in Q[:k]]).det() > 0 for k in range(1, size + 1))
 
 
 class Reduced:

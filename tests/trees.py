@@ -5,7 +5,9 @@ from contextlib import contextmanager
 import pytest
 
 from enumsol.branches.closed_pieces import ClosedPieces
+from enumsol.search import closing
 from enumsol.search.closing import Closer
+from enumsol.search.numbers import Numbers
 from enumsol.search.space_closing import SpaceCloser
 
 
@@ -14,6 +16,25 @@ def by_the_tree():
     """In this context that is so."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Closer, "_due", lambda self, nodes: False)
-        patch.setattr(SpaceCloser, "whole", lambda self: None)
+        patch.setattr(SpaceCloser, "whole", lambda self, relaxed: None)
         patch.setattr(ClosedPieces, "find", lambda self, traced: None)
+        yield
+
+
+@contextmanager
+def above_known_roots():
+    """In this context every assignment above the solution that Newton's method finds is tried, in small bodies too."""
+    with pytest.MonkeyPatch.context() as patch:
+
+        def whole(self, relaxed):
+            self._proposed(Numbers.PLAIN)
+
+        def due(self, nodes):
+            self._told = 0
+            return False
+
+        patch.setattr(Closer, "whole", whole)
+        patch.setattr(Closer, "_due", due)
+        patch.setattr(closing, "_FEW", 0)
+        patch.setattr(closing, "_TRIES", 1000)
         yield

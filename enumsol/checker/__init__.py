@@ -23,7 +23,8 @@ What checker and search share
       contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled copy of
       the inequality); ``kernel.bounds``, what multipliers prove; ``kernel.forms``, other forms than the energy;
     - ``kernel.closing``, the test by which a subtree is closed by its only possible solution, and which of these
-      solutions are the same; its linear systems of balls, ``kernel.ball_arrays``;
+      solutions are the same; ``kernel.lone``, the test that a root is alone below an assignment; ``kernel.weights``,
+      the form of both, and ``kernel.ball_arrays``, their linear systems of balls;
     - for the arcs of branch graphs: ``kernel.selection_rows``, the numbers of unknowns and conditions;
       ``kernel.arc_selections``, ``kernel.arc_series``, ``kernel.bernstein`` and ``kernel.arcs``, a selection over an
       interval as a series with bounds of its error; ``kernel.precise`` and ``kernel.many_digits``, the same with many
@@ -39,9 +40,9 @@ What checker and search share
       ``condensation.affine``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
       definite matrix, and floats as rationals;
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file; a search that goes on
-      with an earlier proof reads its multipliers and forms by ``proof.reading``, ``proof.reading_space`` and
-      ``proof.forms``, too, from what ``proof.begun`` finds, and proves them again before ``proof.writer`` and
-      ``proof.parts`` have them;
+      with an earlier proof reads its multipliers and forms by ``proof.reading``, ``proof.reading_space``,
+      ``proof.forms`` and ``proof.lone``, too, from what ``proof.begun`` finds, and proves them again before
+      ``proof.writer`` and ``proof.parts`` have them;
     - ``problem``, ``body2d``, ``contact_body``, ``condensation.data``, ``condensation.condensed``,
       ``condensation.factorization``, ``sealed``, ``checks``, ``array_checks``, ``files``, ``texts`` and ``errors``: the
       data, their checks and their fingerprint, the factorization of A (no bound assumes that it is accurate), S and g

@@ -96,7 +96,7 @@ class ClosedPiece:
 
     def _chain(self, arcs: Sequence[Arc]) -> list[Arc] | None:
         """Arcs one after another, of which one holds at every alpha of the piece."""
-        begins = {id(arc.tail): arc for arc in arcs if arc.tail is not None}
+        begins = {arc.tail: arc for arc in arcs if arc.tail is not None}
         arc = next((arc for arc in arcs if arc.low <= self.a and self.a <= _end(arc)), None)
         found = []
         while arc is not None:
@@ -105,7 +105,7 @@ class ClosedPiece:
                 return found
             partners = [] if arc.head is None else arc.head.partners
             goes_on = len(partners) == 1 and partners[0].rising
-            arc = begins.get(id(partners[0])) if goes_on else None
+            arc = begins.get(partners[0]) if goes_on else None
         return None
 
 

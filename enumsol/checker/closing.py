@@ -9,8 +9,8 @@ from flint import fmpq_mat
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.arithmetic.rationals import to_fraction
-from enumsol.kernel.closing import closed_solution, final_codes, only_solution, same_solution
-from enumsol.kernel.rows import BACKWARD, CONTACT, FORWARD, OPEN, STICK, UNDECIDED, refines
+from enumsol.kernel.closing import closed_solution, only_solution, same_solution
+from enumsol.kernel.rows import BACKWARD, CONTACT, FORWARD, OPEN, STICK, UNDECIDED, final_codes, refines
 from enumsol.proof.reading import numbers_from, same
 
 if TYPE_CHECKING:

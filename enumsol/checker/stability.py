@@ -16,8 +16,10 @@ from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.verify import Checker, verify
 from enumsol.checks import instance_of
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
+from enumsol.kernel.lone import lone_root
 from enumsol.kernel.point import exclusion_margins, solve_selection
 from enumsol.problem import ContactProblem
+from enumsol.proof.lone import LoneRoot
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -179,6 +181,12 @@ class _WidenedChecker(Checker):
         if reason is None and not self._passes(lambda system: one_regular_root(system, record, self.force)):
             self.radius, reason = 0.0, "it was proven for the given data alone"
         return reason
+
+    def _alone(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        lone = LoneRoot.read(record, codes, [F > 0 for F in self.friction])
+        self.regular += 1
+        holds = self._passes(lambda system: lone_root(system, codes, *lone.arguments) is not None)
+        return None if holds else "it does not hold for all data"
 
     def _closed_in_rationals(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         self.radius = 0.0

@@ -21,9 +21,11 @@ from enumsol.checker.reports import GraphVerificationReport, VerificationReport
 from enumsol.checker.tree import TreeChecker
 from enumsol.checks import instance_of, optional_callable
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
+from enumsol.kernel.lone import lone_root
 from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
 from enumsol.kernel.rows import FRICTIONLESS, ROW_KINDS, UNDECIDED, coverings_of, row_signs
 from enumsol.problem import ContactProblem
+from enumsol.proof.lone import LoneRoot
 from enumsol.proof.proof_file import Proof, fraction_text
 from enumsol.proof.reading import (
     RefusedError,
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
 
     from enumsol.checker.rational import RationalSystem
     from enumsol.kernel.closing import ClosedSolution
+    from enumsol.kernel.point import VerifiedSelection
     from enumsol.problem3d import ContactProblem3D
 
     #: codes of a selection, the vertices of its root set, and its dimension
@@ -212,10 +215,12 @@ class Checker(TreeChecker):
         kind = record[0]
         if kind == "f":
             return self._by_forms.add(self.leaves, codes, record)
-        if not isinstance(kind, str) or kind not in (*_ENTRIES, "m"):
+        if not isinstance(kind, str) or kind not in (*_ENTRIES, "m", "a"):
             return f"unknown kind of record {shown(kind)}"
         if kind == "m":
             return self._closed(codes, record)
+        if kind == "a":
+            return self._alone(codes, record)
         if len(record) != _ENTRIES[kind]:
             return f"its record has {len(record)} entries; expected {_ENTRIES[kind]}"
         if kind == "x":
@@ -247,9 +252,12 @@ class Checker(TreeChecker):
             return "its selection is not proven regular"
         if not ball.is_root:
             return "its candidate is not proven to be a root"
+        return self._regular(codes, ball, *record[1:])
+
+    def _regular(self, codes: tuple[int, ...], ball: VerifiedSelection, mid: Any, rad: Any, index: Any) -> str | None:
+        """Count a regular root, and look at what is said of it."""
         self.regular += 1
         self.strict.append(codes)
-        _, mid, rad, index = record
         centre, radius = (numbers_from(values, len(ball.force)) for values in (mid, rad))
         with np.errstate(over="ignore", invalid="ignore"):
             reach = np.abs(centre - ball.force * self.force) + ball.force_rad * self.force
@@ -265,6 +273,13 @@ class Checker(TreeChecker):
         if ball is not None:
             self.closed[ball.core] = ball
         return reason
+
+    def _alone(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        lone = LoneRoot.read(record, codes, [F > 0 for F in self.friction])
+        root = lone_root(self.system, codes, *lone.arguments)
+        return (
+            "its root is not proven to be alone" if root is None else self._regular(lone.selection, root, *record[-3:])
+        )
 
     def _closed_in_rationals(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
         from enumsol.checker.closing import closed_in_rationals

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, upper_norm
+from enumsol.arithmetic.balls import SAFE
 from enumsol.kernel.ball_arrays import Ball, determinant_sign, solution
 from enumsol.kernel.point import row_balls, solve_selection
 from enumsol.kernel.rows import (
@@ -25,8 +25,10 @@ from enumsol.kernel.rows import (
     SLIP_PLUS,
     STICK,
     UNDECIDED,
+    final_codes,
     refines,
 )
+from enumsol.kernel.weights import Components, Weights
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -94,11 +96,6 @@ class ClosedSolution:
         return bool(np.max(self.force_rad, initial=0.0) > _WIDE * np.max(np.abs(self.force), initial=0.0))
 
 
-def final_codes(friction: bool) -> tuple[int, ...]:
-    """The final codes of a node."""
-    return (OPEN, STICK, SLIP_PLUS, SLIP_MINUS) if friction else (OPEN, FRICTIONLESS)
-
-
 def closed_solution(
     system: EnclosedSystem, selection: Codes, free: Sequence[int], weights: Array, force: Array
 ) -> ClosedSolution | None:
@@ -161,149 +158,27 @@ def same_solution(
 
 
 _SLIDING = (FORWARD, BACKWARD)
-_SIGNS = {SLIP_PLUS: 1, SLIP_MINUS: -1}
 
 
 @dataclass(frozen=True)
-class Weights:
-    """The numbers of the form of theory, (6.9).
-
-    Attributes
-    ----------
-    mu : one number a node
-    kappa, nu, share, tau : one number for every free node with friction
-    slope : Ball
-        theta there.
-    friction : Ball
-        F there.
-    normal : places of lambda_n of free nodes with friction
-    """
-
-    mu: Array
-    kappa: Array
-    nu: Array
-    share: Array
-    tau: Array
-    slope: Ball
-    friction: Ball
-    normal: NDArray[np.intp]
-
-    @classmethod
-    def of(cls, reduced: Reduced, numbers: Array) -> Weights | None:
-        """From one array: mu of all nodes, then kappa, nu, theta / F and tau of the free ones with friction.
-
-        mu and kappa are positive, |nu| F <= mu, |theta| <= F; theta = +-F at nodes that slip in the selection; tau is
-        not negative, and theta = 0 where it is positive. None where this is not so.
-        """
-        system, m, normal = reduced.system, len(reduced.nodes), np.flatnonzero(reduced.tangential >= 0)
-        if len(numbers) != m + 4 * len(normal) or not np.all(np.isfinite(numbers)):
-            return None
-        mu, (kappa, nu, share, tau) = numbers[:m], numbers[m:].reshape(4, -1)
-        nodes = reduced.nodes[normal]
-        friction = Ball(system.F[nodes], system.F_rad[nodes])
-        sides = np.array([_SIGNS.get(reduced.selection[i], 0) for i in nodes])
-        wrong = (np.abs(share) > 1) | ((sides != 0) & (share != sides)) | ((tau > 0) & (share != 0))
-        wrong |= np.abs(nu) * friction.size * SAFE + TINY > mu[normal]
-        if np.any(wrong) or np.any(mu <= 0) or np.any(kappa <= 0) or np.any(tau < 0):
-            return None
-        turned = friction * Ball.exact(share)
-        whole = np.abs(share) == 1
-        slope = Ball(np.where(whole, share * friction.mid, turned.mid), np.where(whole, friction.rad, turned.rad))
-        return cls(mu, kappa, nu, share, tau, slope, friction, normal)
-
-    def at(self, reduced: Reduced, point: Sequence[Any], w: Sequence[Any]) -> Weights | None:
-        """With theta = lambda_t / lambda_n where lambda_n > 0 at a rational solution; None if they do not serve it."""
-        p, slope = reduced.system.p, Ball(self.slope.mid.copy(), self.slope.rad.copy())
-        for k, i in enumerate(self.normal):
-            node = int(reduced.nodes[i])
-            if self.tau[k] > 0:
-                continue
-            if point[node] != 0:
-                ratio = point[p + node] / point[node]
-                slope.mid[k] = int(ratio.p) / int(ratio.q)
-                slope.rad[k] = 2 * UNIT * abs(slope.mid[k]) + TINY
-            elif self.beyond(k, *_bounds(w[node], w[p + node])) > 0:
-                return None
-        return replace(self, slope=slope)
-
-    def beyond(self, k: int, gap: float, up: float, down: float) -> float:
-        """What w_t of a node that is open is too large for the numbers, if -w_n >= gap and -down <= w_t <= up."""
-        excess = 0.0
-        for side, size in ((1.0, up), (-1.0, down)):
-            left = (1.0 - side * self.share[k]) * self.kappa[k] * self.friction.size[k] * SAFE
-            if left > 0 and size > 0:
-                normal = self.mu[self.normal[k]] + side * self.nu[k] * self.friction.mid[k]
-                normal -= (abs(self.nu[k]) * self.friction.rad[k] + 4 * UNIT * self.mu[self.normal[k]]) * SAFE
-                excess = max(excess, size - max(normal, 0.0) * gap / left / SAFE)
-        return float(excess * SAFE)
-
-    def off(self, k: int, n: Ball, t: Ball, w_n: Ball, w_t: Ball) -> float:
-        """How far theta is at most from one that serves a solution within a node's balls; infinite if that is open."""
-        share, F = float(self.share[k]), self.friction[k]
-        slips = np.sign(w_t.mid) if abs(w_t.mid) > w_t.rad else 0.0
-        if self.tau[k] > 0 or (slips and share == slips):
-            return 0.0
-        if w_n.mid + w_n.rad < 0:
-            up, down = (max(float(side), 0.0) * SAFE for side in (w_t.mid + w_t.rad, w_t.rad - w_t.mid))
-            return np.inf if self.beyond(k, -float(w_n.mid + w_n.rad) / SAFE, up, down) > 0 else 0.0
-        low = float(n.mid - n.rad) / SAFE
-        if low <= 0:
-            return np.inf
-        slope = self.slope[k]
-        if slips:
-            return float((abs(slips * F.mid - slope.mid) + F.rad + slope.rad) * SAFE)
-        # |lambda_t / lambda_n - theta| = |lambda_t - theta lambda_n| / lambda_n
-        apart = t - slope * n
-        return float(apart.size / low * SAFE)
-
-    def moved(self, change: Array) -> float:
-        """Upper bound of ||D'delta||, |delta| <= change."""
-        m, n = len(self.mu), self.normal
-        along = self.mu * change[:m]
-        along[n] += self.kappa * self.slope.size * change[m:]
-        across = np.abs(self.nu) * change[n] + self.kappa * change[m:]
-        return float(upper_norm(np.concatenate([along, across]) * SAFE + TINY) * SAFE)
-
-
-def _bounds(w_n: Any, w_t: Any) -> tuple[float, float, float]:
-    """-w_n >= 0 from below, and from above w_t and -w_t where they are positive, of rationals."""
-    try:
-        gap, slip = -int(w_n.p) / int(w_n.q), int(w_t.p) / int(w_t.q)
-    except OverflowError:
-        return 0.0, np.inf, np.inf
-    size = abs(slip) * SAFE + TINY
-    return max(gap / SAFE - TINY, 0.0), size * bool(w_t > 0), size * bool(w_t < 0)
-
-
-@dataclass(frozen=True)
-class Reduced:
+class Reduced(Components):
     """w = h - R x on the nodes that are free or slide, by elimination of the fixed ones.
 
     Attributes
     ----------
     nodes : int array
         Those that are free, then those that slide.
-    places : int array
-        Of x in lambda: lambda_n of all these nodes, then lambda_t of the free ones with friction.
-    tangential : int array
-        Place of lambda_t among them, for all nodes; -1 where there is none.
     turn : Ball
         lambda_t of a sliding node is so many times its lambda_n, +-F; zero for free nodes.
     E, Z : Ball
         lambda = E y + P x, and y = Z (1, -x): the fixed nodes' forces for x.
-    R, h : Ball
+    h : Ball
     """
 
-    system: EnclosedSystem
-    selection: Codes
-    nodes: NDArray[np.intp]
-    places: NDArray[np.intp]
-    tangential: NDArray[np.intp]
     rows: NDArray[np.intp]
     turn: Ball
     E: Ball
     Z: Ball
-    R: Ball
     h: Ball
     sign: int
 
@@ -346,68 +221,38 @@ class Reduced:
             return None
         moved = (S[places] @ forms) @ Z
         R, h = across[places] - moved[:, 1:], g[places] - moved[:, 0]
-        return cls(system, selection, nodes, places, tangential, rows, turn, forms, Z, R, h, sign)
-
-    def form(self, numbers: Weights) -> Ball:
-        """D'R, of which (6.9) is the symmetric part."""
-        R, n, t = self.R, np.flatnonzero(self.tangential >= 0), self.tangential[self.tangential >= 0]
-        form = Ball(R.mid.copy(), R.rad.copy())
-        along = R[: len(self.nodes)] * Ball.exact(numbers.mu[:, None])
-        turned = (numbers.slope * Ball.exact(numbers.kappa))[:, None]
-        across = R[n] * Ball.exact(numbers.nu[:, None]) + R[t] * Ball.exact(numbers.kappa[:, None])
-        for rows, part in ((np.arange(len(self.nodes)), along), (n, along[n] - R[t] * turned), (t, across)):
-            form.mid[rows], form.rad[rows] = part.mid, part.rad
-        return form
-
-    def least(self, numbers: Weights) -> float:
-        """Lower bound of the smallest eigenvalue of Q (theory, (6.9)), at most 0 where none positive is proven."""
-        if not len(self.places):
-            return 1.0
-        used = np.flatnonzero(numbers.tau > 0)
-        normal, tau = numbers.normal[used], numbers.tau[used]
-        # weights at least kappa F / sqrt(tau), for any rounding
-        weight = numbers.kappa[used] * numbers.friction.size[used] / np.sqrt(tau) * SAFE + TINY
-        T = self.R[self.tangential[normal]] * Ball.exact(weight[:, None])
-        square = Ball(T.mid.T, T.rad.T) @ T
-        Q = self.form(numbers) - Ball(0.5 * square.mid, 0.5 * square.rad)
-        Q.mid[normal, normal] -= 0.5 * tau
-        Q.rad[normal, normal] += UNIT * (np.abs(Q.mid[normal, normal]) + tau)
-        mid = 0.5 * (Q.mid + Q.mid.T)
-        # the symmetric part of the form lies in the mean of both triangles
-        rad = (np.maximum(Q.rad, Q.rad.T) + 4 * UNIT * np.abs(mid)) * SAFE
-        if not (np.all(np.isfinite(mid)) and np.all(np.isfinite(rad))):
-            return 0.0
-        return float((dense_eigenvalue_bound(mid) - upper_norm(rad)) / SAFE)
+        return cls(system, selection, nodes, places, tangential, R, rows, turn, forms, Z, h, sign)
 
     def enclosed(self, numbers: Weights, force: Array) -> ClosedSolution | None:
         """The solution as a ball, None where it is not proven to exist and to be the only one."""
-        least = self.least(numbers)
-        if not least > 0:
-            return None
         if len(self.nodes) == self.system.p and not any(code in _SLIDING for code in self.selection):
             # all nodes are free: where its selection holds strictly, that is closer than (6.10) if Q is hardly definite
             root = solve_selection(self.system, self.selection)
             if root is not None and root.is_root:
-                alone = self._alone(Ball(root.force[self.places], root.force_rad[self.places]), numbers, least)
+                # R is S and h is g: so these are x and w here, and w is closer than R times the radii of x gives it
+                x = Ball(root.force[self.places], root.force_rad[self.places])
+                w = Ball(root.w[self.places], root.w_rad[self.places])
+                numbers = numbers.beside(x, self.tangential[numbers.normal])
+                alone = self._alone(x, w, numbers, self.least(numbers))
                 return None if alone is None else replace(alone, regular=root)
+        least = self.least(numbers)
+        if not least > 0:
+            return None
         x = self._point(force, numbers)
         reach = self._distance(x.mid, self._displacements(x), numbers) / least * SAFE
-        return self._alone(Ball(x.mid, (x.rad + reach) * SAFE), numbers, least) if np.isfinite(reach) else None
-
-    def _alone(self, x: Ball, numbers: Weights, least: float) -> ClosedSolution | None:
-        """The solution that is known to lie in a ball, if Q is definite for every theta that it may have there."""
+        if not np.isfinite(reach):
+            return None
+        x = Ball(x.mid, (x.rad + reach) * SAFE)
         w = self._displacements(x)
         for i, node in enumerate(self.nodes):
             # open at every solution
             if self.selection[node] == OPEN and w.mid[i] + w.rad[i] < 0:
                 x.rad[[i, self.tangential[i]] if self.tangential[i] >= 0 else i] = 0.0
-        w = self._displacements(x)
-        n, t = numbers.normal, self.tangential[numbers.normal]
-        off = np.array([numbers.off(k, x[a], x[b], w[a], w[b]) for k, (a, b) in enumerate(zip(n, t, strict=True))])
-        # at each of them Q is not smaller than this
-        if not least > upper_norm(numbers.kappa * off * upper_norm(self.R[t].size, axis=1)) * SAFE:
-            return None
-        return self._solution(x, w)
+        return self._alone(x, self._displacements(x), numbers, least)
+
+    def _alone(self, x: Ball, w: Ball, numbers: Weights, least: float) -> ClosedSolution | None:
+        """The solution that is known to lie in a ball, if Q is definite for every theta that it may have there."""
+        return self._solution(x, w) if self.serves(numbers, x, w, least) else None
 
     def _displacements(self, x: Ball) -> Ball:
         """w of the free components."""

@@ -93,6 +93,11 @@ def coverings_of(code: int, *, friction: bool) -> tuple[tuple[int, ...], ...]:
     return ((children,) if children else ()) + (_SLIDING if code == UNDECIDED and friction else ())
 
 
+def final_codes(friction: bool) -> tuple[int, ...]:
+    """The final codes of a node."""
+    return (OPEN, STICK, SLIP_PLUS, SLIP_MINUS) if friction else (OPEN, FRICTIONLESS)
+
+
 def refines(code: int, partial: int) -> bool:
     """Whether a (partial) status is part of another one."""
     return partial in (code, UNDECIDED) or code in _CHILDREN.get(partial, ())

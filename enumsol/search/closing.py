@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from enumsol.search.lone import KnownRoot, Lone
 from enumsol.search.numbers import Numbers
 from enumsol.search.reduction import NEAR, Reduction
 from enumsol.selections.solution import SelectionSolution
@@ -27,10 +28,14 @@ from enumsol.statuses import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.protocol import Bound
+    from enumsol.search.lone import LoneProposal
     from enumsol.selections.solution import ActiveSets, Codes
 
     Array = NDArray[np.float64]
@@ -41,6 +46,8 @@ if TYPE_CHECKING:
 _MANY = 3
 #: With fewer contact nodes other numbers than plain ones are sought only once the tree has so many nodes.
 _FEW, _LONG = 48, 512
+#: Of a root that is known, assignments above it are tried until so large a share of the nodes more is told.
+_TRIES = 16
 #: With so many the solution is sought along a path, too, before there is a tree.
 _PATH = 24
 
@@ -96,12 +103,18 @@ class Closing(Protocol):
         It knows a solution exactly, so that statuses need not hold strictly.
     plain : bool
         It takes mu = kappa = 1 and nu = 0 only.
+    lone : bool
+        It can prove that a regular root is alone.
     """
 
     hard: bool
     sliding: dict[int, int]
     exactly: bool
     plain: bool
+    lone: bool
+
+    def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[SelectionSolution] | None:
+        """The root of what is proposed, if it is proven to be the only one below a partial assignment; else None."""
 
     def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven.
@@ -136,20 +149,31 @@ class Closer:
         if certifier.plain or system.p < _FEW:
             self._tries = [(0, Numbers.PLAIN), (_LONG, Numbers.DESCENT)][: 1 if certifier.plain else 2]
         self._whole: Proposal | None = None
+        #: A root whose form was not definite for the whole problem, and the statuses that are told before the next try.
+        self.known: KnownRoot | None = None
+        self._told = 1
 
     @property
     def sliding(self) -> dict[int, int]:
         """Those of the certifier."""
         return self._certifier.sliding
 
-    def whole(self) -> list[SelectionSolution] | None:
-        """All solutions of the problem, if one certificate proves that there is one only."""
+    def whole(self, relaxed: Callable[[Codes], Relaxation | None]) -> list[SelectionSolution] | None:
+        """All solutions of the problem, if one certificate proves that there is one only.
+
+        ``relaxed`` gives the relaxation of an assignment, if it is solved.
+        """
         proposal, self._whole = self._whole, None
         if proposal is None and self._due(0):
             proposal = self._proposed(self._tries.pop(0)[1])
-        if proposal is None or proposal.weights is None:
+        if proposal is None:
             return None
-        return self._certifier.closed((UNDECIDED,) * self._system.p, proposal, self._near(proposal))
+        codes, found = (UNDECIDED,) * self._system.p, None
+        if proposal.weights is not None:
+            found = self._certifier.closed(codes, proposal, self._near(proposal))
+        if found is None and self.known is not None and self._system.p >= _FEW:
+            found = self._alone(codes, relaxed(codes), descent=True)
+        return found
 
     def begins_again(self, nodes: int) -> bool:
         """Whether so much has become known after some nodes that a search had better begin again."""
@@ -176,6 +200,7 @@ class Closer:
         if proposal is None:
             return None
         force, w = self._near(proposal)
+        self.known = KnownRoot(proposal.selection, force, w) if proposal.strict and self._certifier.lone else None
         self._touching = int(np.count_nonzero((np.abs(force[:p]) <= NEAR) & (np.abs(w[:p]) <= NEAR)))
         self._alert = self._alert or self._touching > 0
         self._certifier.sliding |= without_load(system, force, w)
@@ -193,7 +218,7 @@ class Closer:
         """The solutions of a subtree that was closed in an earlier search."""
         if all(code == UNDECIDED for code in codes):
             self._whole = self._proposed(Numbers.PLAIN if self._certifier.plain else Numbers.DESCENT)
-            return self.whole()
+            return self.whole(lambda _: relaxation)
         return self._tried(codes, relaxation)
 
     def _tried(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
@@ -207,6 +232,8 @@ class Closer:
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions of a subtree that can be closed, None where it has to be searched."""
+        if self.known is not None and (found := self._above_known(codes, relaxation)) is not None:
+            return found
         # at a solution without slip the energy is zero, and that is its minimum
         alert = self._alert or bool(self._certifier.sliding)
         if not alert and (relaxation is None or abs(relaxation.bound) > NEAR):
@@ -220,6 +247,29 @@ class Closer:
         self._pause = 2 * self._pause + 1 if found is None else 0
         self._wait = self._pause
         return found
+
+    def _above_known(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        """The known root, if it is proven to be the only one; fewer tries than there are statuses to be told."""
+        p = self._system.p
+        told = sum(code != UNDECIDED for code in codes)
+        if p < _FEW or told < self._told or self.known is None or not self.known.below(codes):
+            return None
+        found = self._alone(codes, relaxation)
+        if found is None:
+            self._told = told + max(1, p // _TRIES)
+        return found
+
+    def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[SelectionSolution] | None:
+        """The root of what an earlier search proposed, if it is proven to be the only one; None if not."""
+        return self._certifier.alone(codes, proposal, bound) if self._certifier.lone else None
+
+    def _alone(
+        self, codes: Codes, relaxation: Relaxation | None, *, descent: bool = False
+    ) -> list[SelectionSolution] | None:
+        if self.known is None or relaxation is None:
+            return None
+        proposal = Lone(self._system, codes, self.known, relaxation).proposal(descent=descent)
+        return None if proposal is None else self._certifier.alone(codes, proposal, relaxation)
 
 
 def _touches(codes: Codes, relaxation: Relaxation | None) -> bool:

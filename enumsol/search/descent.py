@@ -23,6 +23,8 @@ _HOPELESS, _FAR, _SLOW = -4.0, -0.5, 0.9
 _ROUNDS, _STEPS, _ABOVE = 10, 15, 1.2
 #: The objective where M is not definite.
 _BEYOND = 1e10
+#: What mu begins with where the squares of gaps count.
+_BEGINNINGS = (1.0, 2.0, 3.0)
 #: Of the gap that a node has, what may serve for its slip.
 _SHARED = 0.5
 
@@ -39,6 +41,8 @@ class Descent:
     ----------
     R : (k, k) array, its symmetric part positive definite
     nodes : Nodes, none of them wide
+    spare : (2, m) array, optional
+        The squares of the first m components of R d count, times mu times the first and nu times the second of these.
 
     Raises
     ------
@@ -46,8 +50,9 @@ class Descent:
         The symmetric part of R is not positive definite.
     """
 
-    def __init__(self, R: Array, nodes: Nodes) -> None:
+    def __init__(self, R: Array, nodes: Nodes, spare: Array | None = None) -> None:
         self._R, self._nodes = R, nodes
+        self._spare = None if spare is None else (spare[0], spare[1, nodes.normal])
         m, b, chosen = nodes.count, len(nodes.F), ~np.isfinite(nodes.share)
         self._mu, self._kappa, self._nu = slice(0, m), slice(m, m + b), slice(m + b, m + 2 * b)
         self._fixed = nodes.F * np.where(chosen, 0.0, nodes.share)
@@ -59,6 +64,10 @@ class Descent:
     def numbers(self) -> Array | None:
         """mu, kappa, nu, theta / F and tau as a proof has them, or None."""
         z = np.zeros(self._nu.stop)
+        if self._spare is not None:
+            # what the squares need of mu
+            starts = [np.where(np.arange(len(z)) < self._mu.stop, np.log(mu), 0.0) for mu in _BEGINNINGS]
+            z = max(starts, key=self._least)
         least, lowest = self._least(z), _HOPELESS
         for _ in range(_ROUNDS):
             if least > _CLEARLY or least < lowest:
@@ -90,6 +99,10 @@ class Descent:
         form[: len(mu)] = mu[:, None] * R[: len(mu)]
         form[n] -= rho[:, None] * R[t]
         form[t] = nu[:, None] * R[n] + kappa[:, None] * R[t]
+        if self._spare is not None:
+            strength = mu * self._spare[0]
+            strength[n] += nu * self._spare[1]
+            form += R[: len(mu)].T @ (strength[:, None] * R[: len(mu)])
         return 0.5 * (form + form.T)
 
     def _least(self, z: Array) -> float:
@@ -112,6 +125,9 @@ class Descent:
         P = np.linalg.inv(M)
         # slopes of -log det M, which are -tr(P dM)
         by_mu, by_kappa, by_nu = (-np.sum(R[i] * P[j], axis=1) for i, j in ((slice(len(mu)),) * 2, (t, t), (n, t)))
+        if self._spare is not None:
+            squares = np.sum((R[: len(mu)] @ P) * R[: len(mu)], axis=1)
+            by_mu, by_nu = by_mu - self._spare[0] * squares, by_nu - self._spare[1] * squares[n]
         by_rho = np.sum(R[t] * P[n], axis=1)
         by_kappa += by_rho * np.where(side != 0, side * F, self._fixed)
         by_mu[n] -= by_rho * side * self._give

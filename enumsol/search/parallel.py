@@ -105,8 +105,10 @@ class _Sent:
     key: bytes
 
     @classmethod
-    def of(cls, remake: Callable[[], Searchable], form: EnclosedForm | None, sliding: dict[int, int]) -> _Sent:
-        data = pickle.dumps((remake, form, sliding))
+    def of(
+        cls, remake: Callable[[], Searchable], form: EnclosedForm | None, sliding: dict[int, int], known: Any
+    ) -> _Sent:
+        data = pickle.dumps((remake, form, sliding, known))
         return cls(form, dict(sliding), data, hashlib.sha256(data).digest())
 
 
@@ -187,7 +189,8 @@ class Spread:
         afresh = not all(isinstance(item, _Part) for item in waiting)
         sliding = self._search.certifier.sliding
         if self._sent is None or self._sent.form is not form or (afresh and self._sent.sliding != sliding):
-            self._sent, self._known = _Sent.of(self._remake, form, sliding), False
+            known = None if self._search.closer is None else self._search.closer.known
+            self._sent, self._known = _Sent.of(self._remake, form, sliding, known), False
         elif not afresh:
             return waiting
         self.cancel()
@@ -301,13 +304,15 @@ def _search_part(
     if getattr(_local, "key", None) != key:
         if data is None:
             return None
-        remake, _local.form, _local.sliding = pickle.loads(data)
+        remake, _local.form, _local.sliding, _local.known = pickle.loads(data)
         _local.solvers, _local.key = remake(), key
     solvers: Searchable = _local.solvers.fresh()
     records = _Records()
     certifier = solvers.certifier(records)
     certifier.sliding.update(_local.sliding)
     search = solvers.search(certifier)
+    if search.closer is not None:
+        search.closer.known = _local.known
     if search.forms is not None:
         search.forms.use(search.engine, _local.form)
     deadline = None if seconds is None else time.perf_counter() + seconds

@@ -15,12 +15,14 @@ import numpy as np
 from enumsol.kernel.forms import EnclosedForm
 from enumsol.kernel.rows import ROW_KINDS
 from enumsol.proof.forms import DeclaredForm
+from enumsol.proof.lone import LoneRoot
 from enumsol.proof.reading import multipliers_from
+from enumsol.search.lone import LoneProposal
 from enumsol.search.tree import TreeNode
 from enumsol.statuses import CONTACT, SLIDING, UNDECIDED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
 #: Progress is reported after so many nodes.
 _REPORT_EVERY = 64
 #: Kinds of leaves (docs/proof_format.md): excluded by multipliers, closed by a solution, solved selections.
-_EXCLUDED, _CLOSED, _SOLVED = ("x", "X", "f"), ("m", "M"), ("n", "r", "N", "D")
+_EXCLUDED, _CLOSED, _SOLVED, _ALONE = ("x", "X", "f"), ("m", "M"), ("n", "r", "N", "D"), "a"
 
 
 @dataclass(frozen=True)
@@ -62,19 +64,22 @@ class Reader(Protocol):
     def bound(self, codes: Codes, record: list[Any]) -> Bound:
         """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
 
+    def lone(self, codes: Codes, record: list[Any]) -> tuple[LoneProposal, Bound]:
+        """What is said to show that a root is alone below it; ValueError where the record makes no sense."""
+
 
 class PlaneReader:
     """Of proofs in 2D.
 
     Parameters
     ----------
-    p : number of contact nodes
+    friction : whether each contact node has any
     enclosed : EnclosedSystem or None
         Balls for the system, by which forms are proven.
     """
 
-    def __init__(self, p: int, enclosed: EnclosedSystem | None) -> None:
-        self._p, self._enclosed = p, enclosed
+    def __init__(self, friction: Sequence[bool], enclosed: EnclosedSystem | None) -> None:
+        self._p, self._friction, self._enclosed = len(friction), friction, enclosed
         self._declared: list[DeclaredForm] = []
         #: Forms that were used, the last one last.
         self._used: dict[DeclaredForm, EnclosedForm] = {}
@@ -95,6 +100,11 @@ class PlaneReader:
         if record[0] == "f":
             form, record = self._form(codes, record), record[1:]
         return RecordedBound(*multipliers_from(record[1:], ROW_KINDS * self._p), form)
+
+    def lone(self, codes: Codes, record: list[Any]) -> tuple[LoneProposal, Bound]:
+        """What is said to show that a root is alone below it; ValueError where the record makes no sense."""
+        said = LoneRoot.read(record, codes, self._friction)
+        return LoneProposal(said.selection, said.weights, said.strengths), RecordedBound(said.rows, said.values)
 
     def _form(self, codes: Codes, record: list[Any]) -> EnclosedForm:
         back = record[1] if len(record) > 1 else None
@@ -209,6 +219,11 @@ class Replay:
             except ValueError:
                 return False
             return search.excluded(item, bound)
+        if kind == _ALONE:
+            try:
+                return search.alone(item, *self._reader.lone(item.codes, record))
+            except ValueError:
+                return False
         if kind in _CLOSED:
             return search.closed(item, search.relaxed(item.codes), again=True)
         partial = any(code in (CONTACT, UNDECIDED, *SLIDING) for code in item.codes)

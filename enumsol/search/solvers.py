@@ -204,7 +204,7 @@ class Solvers:
 
     def reader(self) -> PlaneReader:
         """Understands the records of an earlier proof."""
-        return PlaneReader(self.problem.p, self.enclosed)
+        return PlaneReader((self.scaled.F > 0).tolist(), self.enclosed)
 
     def proof_header(self) -> dict[str, Any]:
         """First record of a proof (see enumsol.proof.proof_file).

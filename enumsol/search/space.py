@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from enumsol.proof.parts import Recorder
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.protocol import Bound
+    from enumsol.search.lone import LoneProposal
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -95,6 +96,11 @@ class SpaceReader:
 
     def form_over(self, codes: Codes) -> None:
         """No form."""
+
+    def lone(self, codes: Codes, record: list[Any]) -> tuple[LoneProposal, Bound]:
+        """No root is proven to be alone so in 3D."""
+        del codes, record
+        raise ValueError("a lone root in a proof in 3D")
 
     def bound(self, codes: Codes, record: list[Any]) -> Bound:
         """What is said to exclude a partial assignment; ValueError where the record makes no sense."""

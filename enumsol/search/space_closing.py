@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space import SpaceSystem
     from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.lone import KnownRoot
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -70,11 +71,13 @@ class SpaceCloser:
 
     def __init__(self, system: SpaceSystem, certifier: SpaceClosing, *, regular: bool = False) -> None:
         self._system, self._certifier, self._regular = system, certifier, regular
-        #: No node slides without load in a part of the tree.
+        #: No node slides without load in a part of the tree, and no root is tried there.
         self.sliding: dict[int, int] = {}
+        self.known: KnownRoot | None = None
 
-    def whole(self) -> list[Any] | None:
+    def whole(self, relaxed: object = None) -> list[Any] | None:
         """The only solution, as a list; None where that is not proven."""
+        del relaxed
         with np.errstate(all="ignore"):
             return self._tried()
 
@@ -85,6 +88,9 @@ class SpaceCloser:
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> None:
         """No partial assignment is closed."""
+
+    def alone(self, codes: Codes, proposal: object, bound: object) -> None:
+        """Nor by a root that is alone below it."""
 
     def met(self, answer: object) -> None:
         """Nothing follows from what a leaf holds."""

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from enumsol.kernel.forms import EnclosedForm
     from enumsol.search.certifiers.protocol import Bound, Certifier
     from enumsol.search.closing import Closer
+    from enumsol.search.lone import LoneProposal
     from enumsol.search.space_closing import SpaceCloser
 
 #: Progress is reported and limits on time are looked at after this many nodes.
@@ -159,7 +160,7 @@ class TreeSearch:
             return False
         try:
             with within(self.limits):
-                found = self.closer.whole()
+                found = self.closer.whole(self.relaxed)
         except TimeOverError:
             return False
         if found is not None:
@@ -330,6 +331,14 @@ class TreeSearch:
         if self.closer is None:
             return False
         found = (self.closer.again if again else self.closer.closed)(item.codes, relaxation)
+        if found is None:
+            return False
+        self._close(item, found)
+        return True
+
+    def alone(self, item: TreeNode, proposal: LoneProposal, bound: Bound) -> bool:
+        """Whether the subtree is closed by a root that is proven to be the only one."""
+        found = None if self.closer is None else self.closer.alone(item.codes, proposal, bound)
         if found is None:
             return False
         self._close(item, found)

@@ -48,6 +48,7 @@ from enumsol.branches.claims import uniqueness_bound
 from enumsol.search.closing import propose
 from enumsol.search.numbers import Numbers
 from enumsol.statuses import UNDECIDED
+from one_certificate.graphs import graphs
 from shared.clock import least_time, timed
 from shared.figures import BLUE, GREEN, GREY, ORANGE, RED, panels
 from shared.loads import DRAGGED, PRESSED
@@ -70,8 +71,6 @@ SEVERAL_P = 14
 #: p of the wedges whose cost is compared, and how many runs.
 WEDGES, SMOKE_WEDGES, RUNS, SMOKE_RUNS = (8, 14, 20, 32), (8,), 5, 2
 ENOUGH = 0.05
-#: Cells of the blocks and wedges whose graphs are made, and contact nodes up to which trees alone are asked as well.
-BLOCKS, SMOKE_BLOCKS, GRAPH_WEDGES, TREE_P = (32, 64, 100), (8,), (4, 7), 64
 
 
 class Case(NamedTuple):
@@ -132,8 +131,7 @@ def whole_by(numbers: Numbers | None) -> Iterator[None]:
     with ExitStack() as stack:
         stack.enter_context(patch("enumsol.search.closing.propose", proposed))
         if numbers is None:
-            stack.enter_context(patch("enumsol.search.space_closing.SpaceCloser.whole", lambda self: None))
-            stack.enter_context(patch("enumsol.branches.closed_pieces.ClosedPieces.find", lambda self, traced: None))
+            stack.enter_context(patch("enumsol.search.space_closing.SpaceCloser.whole", lambda self, relaxed: None))
         if numbers is Numbers.PLAIN:
             # what is sought in 3D are better numbers than those given
             stack.enter_context(patch("scipy.optimize.minimize", unchanged))
@@ -278,31 +276,6 @@ def cost(p: int, alpha: float, runs: int) -> dict[str, Any]:
     }
 
 
-def graph(case: Case) -> dict[str, Any]:
-    """A branch graph with and without pieces that need no tree."""
-    problem = prepared(case)
-    found, taken = timed(enumsol.branch_graph, problem, (0.0, 3.0))
-    checked, proof_taken = timed(enumsol.verify, problem, found.proof)
-    assert checked.complete
-    by_tree: dict[str, Any] = {"tree nodes": "-", "tree s": "-"}
-    if problem.p <= TREE_P:
-        with whole_by(None):
-            tree, tree_taken = timed(enumsol.branch_graph, problem, (0.0, 3.0))
-        assert [arc.statuses for arc in tree.arcs] == [arc.statuses for arc in found.arcs]
-        by_tree = {"tree nodes": tree.stats.nodes, "tree s": tree_taken}
-    return {
-        "problem": case.name,
-        "p": problem.p,
-        "arcs": len(found.arcs),
-        "pieces": found.stats.pieces,
-        "closed": found.stats.closed,
-        "nodes": found.stats.nodes,
-        "seconds": taken,
-        "proof s": proof_taken,
-        **by_tree,
-    }
-
-
 def conclusions(rows: list[dict[str, Any]]) -> Iterator[str]:
     """How many are decided, by what, and which have one root and are not."""
     for space in ("2D", "3D"):
@@ -393,9 +366,4 @@ def main(run: Run) -> None:
     ]
     ratios = [r["ratio"] for r in costs]
     run.table("cost", costs, f"with the certificate {span(ratios)} times as long as without")
-    cases = [Case("", f"block {nx}x16", partial(gallery.clamped_block, nx, 16, nx / 64)) for nx in BLOCKS]
-    cases += map(wedge, GRAPH_WEDGES)
-    if run.smoke:
-        cases = [Case("", f"block {nx}x4", partial(gallery.clamped_block, nx, 4)) for nx in SMOKE_BLOCKS]
-    graph(cases[0])  # imports once more
-    run.table("graphs", list(map(graph, cases)))
+    run.table("graphs", graphs(smoke=run.smoke))

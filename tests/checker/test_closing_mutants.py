@@ -5,9 +5,11 @@ from itertools import product
 
 import numpy as np
 import pytest
+from generators import integer_problem, random_problem
 from proof_tools import copied, proof_of, records_of
 from rational_checker import Refused, check_records
 from touching import beside_a_loaded_node, row_of_discs, touching_problem
+from trees import above_known_roots
 
 from enumsol import enumerate_roots, verify
 from enumsol.checker.stability import stability_radius
@@ -23,6 +25,8 @@ def cases(kind):
         return cases_with_sides(kind)
     if kind == "any theta":
         return cases_with_any_theta()
+    if kind == "a":
+        return cases_with_lone_roots()
     found = []
     with pytest.MonkeyPatch.context() as patch:
         before = closing.Closer.closed
@@ -75,6 +79,21 @@ def cases_with_any_theta():
     return found
 
 
+def cases_with_lone_roots():
+    """Proofs with roots that are alone below an assignment."""
+    found = []
+    with above_known_roots():
+        for seed in range(60):
+            rng = np.random.default_rng([6, seed])
+            problem = [random_problem, integer_problem, touching_problem][seed % 3](rng, int(rng.integers(2, 4)))
+            roots = enumerate_roots(problem, 0)
+            records = records_of(roots.proof)
+            if roots.certified_data == "problem" and roots.complete and leaves(records, "a"):
+                found.append((problem, records))
+    assert len(found) > 15
+    return found
+
+
 def numbers_in(record):
     """mu, and kappa, nu, theta / F and tau in rows, of a leaf "m" of which all nodes have friction."""
     sliding, numbers = sum(code > 6 for code in record[1]), record[3]
@@ -102,7 +121,7 @@ def accepted(problem, records):
     return report.ok
 
 
-KINDS = ["m", "M", "slides", "sides", "any theta"]
+KINDS = ["a", "m", "M", "slides", "sides", "any theta"]
 
 
 @pytest.mark.few(1)
@@ -183,6 +202,30 @@ def test_forged_numbers_are_refused(kind):
             for forged in forgeries:
                 record = [*records[k][:3], forged, *records[k][4:]]
                 assert not verify(problem, proof_of([*records[:k], record, *records[k + 1 :]])).ok, (forged, numbers)
+
+
+def test_a_lone_root_is_no_other_and_no_wider():
+    for problem, records in cases("a"):
+        for k in leaves(records, "a"):
+            record, p = records[k], problem.p
+            forgeries = [
+                record[:-1],
+                [*record, 1],
+                [*record[:8], -record[8]],
+                [*record[:7], [-1.0] * (2 * p), record[8]],
+            ]
+            forgeries += [[*record[:3], wrong, *record[4:]] for wrong in ([-1.0] * (2 * p), [1.0] * p, [1e3] * (2 * p))]
+            for forged in forgeries:
+                others = [*records[:k], forged, *records[k + 1 :]]
+                assert not accepted(problem, others) or check_records(problem, others)
+            # the whole problem in its place, whatever the numbers
+            footer = {"roots": 1, "families": 0, "undecided": 0, "leaves": 1}
+            numbers = [1.0] * (p + int(np.count_nonzero(problem.friction[0]))) + [0.0] * (
+                2 * int(np.count_nonzero(problem.friction[0]))
+            )
+            for strength in (0.0, 1.0, 1e3):
+                whole = [records[0], ["a", record[1], numbers, [strength] * p + [0.0] * p, *record[4:]], footer]
+                assert not accepted(problem, whole) or check_records(problem, whole)
 
 
 def test_forged_counts_are_refused():

@@ -20,7 +20,7 @@ from problems3d import forces
 from proof_fuzz import mutant
 from proof_tools import bytes_of, copied, multipliers, proof_of, records_of, with_multipliers
 from touching import touching_problem
-from trees import by_the_tree
+from trees import above_known_roots, by_the_tree
 
 from enumsol import (
     ContactProblem,
@@ -73,6 +73,7 @@ PROBLEMS = {
     "unloaded": lambda: (from_condensed(np.eye(4), np.zeros(4), np.full(2, 0.5)), 0.0),
     "forms": lambda: (gallery.clamped_block(12, 6), 0.3),
     "one certificate": lambda: (gallery.clamped_block(4, 2), 0.3),
+    "alone": wedge,
     "in space": lambda: (gallery.get("one-node-3d-3").build(), 0),
     "block in space": lambda: (gallery.get("block3d-4").build(), 0.5),
     "closed in space": lambda: (gallery.get("block3d-9").build(), 0.5),
@@ -85,7 +86,7 @@ TREES = ("forms", "contradiction", "no root", "border", "block in space")
 
 def searched(name):
     """A context in which the tree is searched where one certificate would do."""
-    return by_the_tree() if name in TREES else nullcontext()
+    return above_known_roots() if name == "alone" else by_the_tree() if name in TREES else nullcontext()
 
 
 @cache
@@ -129,7 +130,7 @@ def resumed(name, data, path, **options):
 
 def test_the_problems_have_all_kinds_of_records():
     kinds = {record[0] for name in PROBLEMS for record in records_of(known(name)[2].proof)[1:-1]}
-    assert kinds == {"b", "q", "x", "f", "n", "r", "N", "D", "z", "m", "M", "u"}  # "X": below
+    assert kinds == {"b", "q", "x", "f", "n", "r", "N", "D", "z", "a", "m", "M", "u"}  # "X": below
 
 
 def test_exclusions_in_rationals(tmp_path, monkeypatch):

@@ -46,7 +46,7 @@ class FastCertifier(WithoutProof):
 
     hard = False
     # with other numbers forms are definite where they nearly are not: several points may hold within the tolerance
-    exactly, plain = True, True
+    exactly, plain, lone = True, True, False
 
     def __init__(self, selections: FloatSelections) -> None:
         self._selections = selections

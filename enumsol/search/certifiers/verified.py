@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.kernel.closing import ClosedSolution, closed_solution, same_solution
+from enumsol.kernel.lone import lone_root
 from enumsol.kernel.point import VerifiedSelection, holds_no_root, solve_selection
 from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
 from enumsol.proof.proof_file import fraction_text, packed, shortened
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from enumsol.search.certifiers.protocol import Bound
     from enumsol.search.certifiers.rationals import ExactCertifier
     from enumsol.search.closing import Point, Proposal
+    from enumsol.search.lone import LoneProposal
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -56,6 +58,7 @@ class Leaf(enum.StrEnum):
     UNLOADED = "z"
     UNDECIDED = "u"
     CLOSED = "m"
+    ALONE = "a"
     CLOSED_IN_RATIONALS = "M"
 
 
@@ -92,7 +95,7 @@ class VerifiedCertifier:
     node_ids : labels of the contact nodes, for messages
     """
 
-    exactly, plain = False, False
+    exactly, plain, lone = False, False, True
 
     def __init__(
         self,
@@ -231,6 +234,23 @@ class VerifiedCertifier:
                 return [exactly]
         return found
 
+    def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[SelectionSolution] | None:
+        """The root of what is proposed, if it is proven to be the only one below a partial assignment; else None."""
+        if self._enclosed is None:
+            return None
+        rows, values = bound.multipliers()
+        kind, node = np.divmod(rows, self._scaled.p)
+        signs = row_signs(np.array(codes), self._scaled.F)[node, kind]
+        keep = (signs == FREE) | ((signs == NONNEGATIVE) & (values > 0))
+        rows, values = rows[keep], values[keep]
+        given = proposal.selection, proposal.weights, proposal.strengths
+        root = lone_root(self._enclosed, codes, *given, rows, values)
+        if root is None:
+            return None
+        self._escalations.balls += 1
+        numbers = [proposal.weights.tolist(), proposal.strengths.ravel().tolist(), *packed(rows, values)]
+        return [self._regular(proposal.selection, root, Leaf.ALONE, proposal.selection, *numbers)]
+
     def _take_note(self, force: Array, w: Array) -> None:
         """Take note of nodes that slide without load at a solution."""
         self.sliding |= without_load(self._scaled, force, w)
@@ -311,11 +331,12 @@ class VerifiedCertifier:
         self._forms.clear()
         self._known.clear()
 
-    def _regular(self, codes: Codes, ball: VerifiedSelection) -> SelectionSolution:
+    def _regular(self, codes: Codes, ball: VerifiedSelection, *leaf: Any) -> SelectionSolution:
+        """Write a leaf with a regular root; ``leaf`` is what comes before its enclosure."""
         self._verified[codes] = ball
         force = ball.force * self._scaled.force
         radius = ball.force_rad * self._scaled.force * _WIDEN
-        self._leaf(Leaf.REGULAR_ROOT, force.tolist(), radius.tolist(), ball.det_sign)
+        self._leaf(*(leaf or (Leaf.REGULAR_ROOT,)), force.tolist(), radius.tolist(), ball.det_sign)
         return SelectionSolution(codes, (ball.force,), 0, ball.det_sign, strict=True)
 
     def _undecided(self, codes: Codes, reason: str, hint: str) -> UndecidedPart:

@@ -1,0 +1,119 @@
+"""Roots that are proven to be alone below an assignment, against all selections and against the tree without them."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from compare import differences
+from generators import fe_compliance, from_condensed, integer_problem, planted_load, random_load, random_problem
+from proof_tools import records_of
+from rational_checker import check_records
+from touching import touching_problem
+from trees import above_known_roots, by_the_tree
+
+from enumsol import enumerate_roots, gallery, verify
+from enumsol.checker.stability import stability_radius
+from enumsol.search import closing, parallel
+from enumsol.search.lone import KnownRoot
+
+
+def kinds(proof):
+    return [record[0] for record in records_of(proof)[1:-1]]
+
+
+@pytest.mark.parametrize(
+    ("size", "traction", "alpha"),
+    [
+        ((128, 16, 2), (1.0, -0.3), 2.0),
+        pytest.param((256, 16, 4), (0.3, -1.0), 5.0, marks=pytest.mark.slow),
+    ],
+)
+def test_blocks_that_are_not_definite_take_one_node(size, traction, alpha, monkeypatch):
+    monkeypatch.setattr(closing.Reduction, "weights", lambda *_, **__: None)
+    problem = gallery.clamped_block(*size, traction=traction)
+    roots = enumerate_roots(problem, alpha, max_nodes=1)
+    assert roots.by_one_certificate
+    assert kinds(roots.proof) == ["a"]
+    assert verify(problem, roots.proof).complete
+    assert stability_radius(problem, roots.proof) > 0
+    if size[0] < 200:
+        with by_the_tree():
+            tree = enumerate_roots(problem, alpha)
+        assert tree.stats.nodes > 1000
+        assert not differences(roots, tree)
+
+
+def problems(seed):
+    rng = np.random.default_rng([24, seed])
+    p = int(rng.integers(1, 5))
+    if seed % 4 == 0:
+        return integer_problem(rng, p)
+    if seed % 4 == 1:
+        return touching_problem(rng, p)
+    if seed % 4 == 2:
+        return random_problem(rng, p)
+    S, F = fe_compliance(rng, p), rng.uniform(0.05, 3.0, size=p)
+    g = planted_load(rng, S, F) if seed % 8 == 3 else None
+    return from_condensed(S, random_load(rng, p) if g is None else g, F)
+
+
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
+def test_all_selections_find_the_same(part):
+    lone = several = 0
+    for seed in range(100 * part, 100 * part + 100):
+        problem = problems(seed)
+        exact = enumerate_roots(problem, 0, "exact", "exhaustive")
+        with above_known_roots():
+            roots = enumerate_roots(problem, 0)
+        assert roots.complete
+        assert (len(roots), len(roots.families)) == (len(exact), len(exact.families)), seed
+        assert [root.active for root in roots] == [root.active for root in exact], seed
+        assert [root.index for root in roots] == [root.index for root in exact], seed
+        assert verify(problem, roots.proof).complete
+        found = kinds(roots.proof).count("a")
+        if found or seed % 10 == 0:
+            assert check_records(problem, records_of(roots.proof)) == records_of(roots.proof)[-1]
+        lone += found
+        several += found and len(exact) > 1
+    assert lone > 30
+    assert several > 3
+
+
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 10))])
+def test_the_tree_without_them_finds_the_same(part):
+    fewer = 0
+    for seed in range(60 * part, 60 * part + 60):
+        rng = np.random.default_rng([25, seed])
+        p = int(rng.integers(4, 9))
+        problem = random_problem(rng, p) if seed % 2 else touching_problem(rng, p)
+        with by_the_tree():
+            tree = enumerate_roots(problem, 0)
+        with above_known_roots():
+            roots = enumerate_roots(problem, 0)
+        assert not differences(roots, tree)
+        assert verify(problem, roots.proof).complete
+        assert roots.stats.nodes <= tree.stats.nodes or roots.stats.closed
+        fewer += roots.stats.nodes < tree.stats.nodes
+    assert fewer > 10
+
+
+def test_workers_know_the_root(monkeypatch):
+    monkeypatch.setattr(parallel, "FIRST", 8)
+    monkeypatch.setattr(parallel, "NODES", 16)
+    problem = gallery.get("wedge-8-5").build()
+    with above_known_roots(), ThreadPoolExecutor(2) as executor:
+        alone, together = enumerate_roots(problem, 2.2), enumerate_roots(problem, 2.2, executor=executor)
+    assert "a" in kinds(alone.proof)
+    assert "a" in kinds(together.proof)
+    assert not differences(alone, together)
+    assert verify(problem, together.proof).complete
+    assert check_records(problem, records_of(together.proof)) == records_of(together.proof)[-1]
+
+
+def test_what_lies_below():
+    problem = gallery.wedge(4, 4)
+    scaled = problem.condensed.at(1.0).scaled
+    known = KnownRoot((0,) * problem.p, np.zeros(2 * problem.p), scaled.g)
+    assert known.below((6,) * problem.p)
+    assert not known.below((5,) + (6,) * (problem.p - 1))
+    assert known.below((7,) + (8,) * (problem.p - 1))
