@@ -46,8 +46,8 @@ if TYPE_CHECKING:
 _MANY = 3
 #: With fewer contact nodes other numbers than plain ones are sought only once the tree has so many nodes.
 _FEW, _LONG = 48, 512
-#: Of a root that is known, assignments above it are tried until so large a share of the nodes more is told.
-_TRIES = 16
+#: Above a known root a try that failed waits until one in so many nodes more has something told of it.
+_TRIES = 8
 #: With so many the solution is sought along a path, too, before there is a tree.
 _PATH = 24
 
@@ -163,15 +163,18 @@ class Closer:
 
         ``relaxed`` gives the relaxation of an assignment, if it is solved.
         """
+        codes, lone = (UNDECIDED,) * self._system.p, self._certifier.lone and self._system.p >= _FEW
         proposal, self._whole = self._whole, None
         if proposal is None and self._due(0):
-            proposal = self._proposed(self._tries.pop(0)[1])
-        if proposal is None:
-            return None
-        codes, found = (UNDECIDED,) * self._system.p, None
-        if proposal.weights is not None:
+            sought = self._tries.pop(0)[1]
+            # a regular solution is tried with the same numbers below, and what is left out of the form besides
+            proposal = self._proposed(Numbers.PLAIN if lone else sought)
+            if proposal is not None and proposal.weights is None and lone and self.known is None:
+                proposal = self._proposed(sought)
+        found = None
+        if proposal is not None and proposal.weights is not None:
             found = self._certifier.closed(codes, proposal, self._near(proposal))
-        if found is None and self.known is not None and self._system.p >= _FEW:
+        if found is None and lone and self.known is not None:
             found = self._alone(codes, relaxed(codes), descent=True)
         return found
 

@@ -19,12 +19,14 @@ if TYPE_CHECKING:
 _CLEARLY, _JUST = 2e-3, 1e-6
 #: Where no descent is tried; where another round is not, nor where a round leaves more than this share of what lacks.
 _HOPELESS, _FAR, _SLOW = -4.0, -0.5, 0.9
+#: Both where squares count: on blocks worse ones were not mended, or took longer than the tree.
+_HOPELESS_SQUARES, _FAR_SQUARES = -1.0, -0.14
 #: Rounds, steps of each, and the weight of H in one by what lacked before it.
 _ROUNDS, _STEPS, _ABOVE = 10, 15, 1.2
 #: The objective where M is not definite.
 _BEYOND = 1e10
-#: What mu begins with where the squares of gaps count.
-_BEGINNINGS = (1.0, 2.0, 3.0)
+#: What mu begins with where squares count.
+_BEGINNING = 3.0
 #: Of the gap that a node has, what may serve for its slip.
 _SHARED = 0.5
 
@@ -65,15 +67,14 @@ class Descent:
         """mu, kappa, nu, theta / F and tau as a proof has them, or None."""
         z = np.zeros(self._nu.stop)
         if self._spare is not None:
-            # what the squares need of mu
-            starts = [np.where(np.arange(len(z)) < self._mu.stop, np.log(mu), 0.0) for mu in _BEGINNINGS]
-            z = max(starts, key=self._least)
-        least, lowest = self._least(z), _HOPELESS
+            z[self._mu] = np.log(_BEGINNING)
+        lowest, far = (_HOPELESS, _FAR) if self._spare is None else (_HOPELESS_SQUARES, _FAR_SQUARES)
+        least = self._least(z)
         for _ in range(_ROUNDS):
             if least > _CLEARLY or least < lowest:
                 break
             z = self._lowered(z, _ABOVE * max(-least, 0.0) + _CLEARLY)
-            least, lowest = self._least(z), max(_SLOW * least, _FAR) if least < 0 else 0.0
+            least, lowest = self._least(z), max(_SLOW * least, far) if least < 0 else 0.0
         return self._as_written(z) if least > _JUST else None
 
     def _lowered(self, z: Array, weight: float) -> Array:

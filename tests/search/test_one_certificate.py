@@ -38,7 +38,7 @@ def test_blocks_take_one_node(nx, traction):
         assert (roots.stats.nodes, roots.stats.closed, len(roots)) == (1, 1, 1)
         assert roots.by_one_certificate
         assert str(roots).endswith("complete: yes (proven: one solution, by one certificate)")
-        assert [record[0] for record in records_of(roots.proof)[1:-1]] == ["m"]
+        assert [record[0] for record in records_of(roots.proof)[1:-1]] in (["m"], ["a"])
         assert verify(problem, roots.proof).complete
         with by_the_tree():
             assert not differences(roots, enumerate_roots(problem, alpha))
@@ -138,11 +138,13 @@ def nodes_of(rng, b, chosen):
     return Nodes(b, n, b + n, rng.uniform(0.1, 2, b), share, none, gap, slip * rng.choice([-1, 1], b))
 
 
+@pytest.mark.parametrize("squares", [False, True])
 @pytest.mark.parametrize("seed", range(10))
-def test_slopes_of_the_descent(seed):
+def test_slopes_of_the_descent(seed, squares):
     rng = np.random.default_rng(seed)
     S = fe_compliance(rng, 4)
-    sought = descent.Descent(S / np.mean(np.diag(S)), nodes_of(rng, 4, rng.random(4) < 0.5))
+    spare = rng.uniform(0.0, 0.5, (2, 4)) if squares else None
+    sought = descent.Descent(S / np.mean(np.diag(S)), nodes_of(rng, 4, rng.random(4) < 0.5), spare)
     z, weight = 0.1 * rng.normal(size=12), 30.0
     assert sought._objective(z, weight)[0] < descent._BEYOND
     slopes = [sought._objective(z + h, weight)[0] - sought._objective(z - h, weight)[0] for h in 1e-5 * np.eye(12)]
