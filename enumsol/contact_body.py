@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from enumsol.checks import AlphaLike
     from enumsol.condensation.factorization import Factorization
+    from enumsol.condensation.products import Products
 
 #: An asymmetry of A up to this fraction of max|A| is rounding of the user's assembly and is averaged away.
 ASYMMETRY_TOLERANCE = 1e-12
@@ -122,6 +123,13 @@ class ContactBody(Immutable):
         from enumsol.condensation.factorization import Factorization  # scipy's solvers come with the first use
 
         return Factorization(self.A)
+
+    @cached_property
+    def products(self) -> Products | None:
+        """What condensation and enclosure have in common; None where the data cannot be scaled without rounding."""
+        from enumsol.condensation.products import Products  # as above
+
+        return Products.of(self)
 
     def is_unloaded(self, alpha: AlphaLike) -> bool:
         """Whether load, gap and slip offset are exactly zero at alpha: then only lambda = 0, w = 0 solves."""

@@ -130,7 +130,7 @@ class ContactProblem(ContactBody):
         """
         from enumsol.condensation.enclosure import CondensedEnclosure  # as above
 
-        return CondensedEnclosure.from_problem(self)
+        return CondensedEnclosure.from_problem(self, self.products)
 
     def friction_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
         """Coefficients F(alpha) = F0 + alpha F1, shape (p,).

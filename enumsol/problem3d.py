@@ -180,7 +180,7 @@ class ContactProblem3D(ContactBody):
         """
         from enumsol.condensation.enclosure import CondensedEnclosure  # as above
 
-        return CondensedEnclosure.from_problem(self)
+        return CondensedEnclosure.from_problem(self, self.products)
 
     def coefficients(self, alpha: AlphaLike, slip: ArrayLike) -> NDArray[np.float64]:
         """Coefficients F1, F2 at alpha for slips of shape (p,) [length], shape (p, 2).

@@ -30,9 +30,9 @@ def enclosed_once(monkeypatch):
     """Many proofs of one problem are checked: its S and g, over a third of the work, are enclosed once a test."""
     enclose, known = CondensedEnclosure.from_problem, {}
 
-    def from_problem(problem):
+    def from_problem(problem, products=None):
         if problem not in known:
-            known[problem] = enclose(problem)
+            known[problem] = enclose(problem, products)
         return known[problem]
 
     monkeypatch.setattr(CondensedEnclosure, "from_problem", staticmethod(from_problem))

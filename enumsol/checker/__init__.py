@@ -17,8 +17,8 @@ What checker and search share
     serve both, and an error in one of them may write a false proof and accept it:
 
     - ``kernel.rows``: the codes, the rows and the branchings that cover, on which writer and reader have to agree;
-    - ``condensation.enclosure`` and ``arithmetic.balls``: balls for S, g and F, and the proofs that A and S are
-      positive definite;
+    - ``condensation.products``, ``condensation.enclosure`` and ``arithmetic.balls``: balls for S, g and F, and the
+      proofs that A and S are positive definite;
     - ``kernel.point`` and ``kernel.interval``: the exclusion inequality, the verified solve of a selection and the
       contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled copy of
       the inequality); ``kernel.bounds``, what multipliers prove; ``kernel.forms``, other forms than the energy;

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from enumsol.checks import AlphaLike
     from enumsol.condensation.data import CondensableData, ProblemData
+    from enumsol.condensation.products import WithProducts
 
 #: Units of force and length lie between 2^-900 and 2^900; products and quotients of two of them and proofs need that.
 UNIT_EXPONENT = 900
@@ -175,6 +176,9 @@ def _rounding(S: NDArray[np.float64]) -> float:
     return _ROUNDINGS * len(S) * float(np.finfo(np.float64).eps)
 
 
+_OVERFLOW = "A, f: the condensed problem overflows float64; expected data in smaller units"
+
+
 @dataclass(frozen=True)
 class Condensation(Sealed):
     """A problem condensed to its contact forces for all alpha: S, and g(alpha) = g0 + alpha g1.
@@ -193,23 +197,20 @@ class Condensation(Sealed):
     problem: CondensableData = field(repr=False)
 
     @classmethod
-    def from_problem(cls, problem: CondensableData) -> Self:
-        """Condense with one sparse factorization; dense memory stays at RHS_BLOCK vectors of length n."""
-        B = problem.contact_rows
-        size = B.shape[0]
+    def from_problem(cls, problem: WithProducts) -> Self:
+        """Condense with one sparse factorization; of what is n long only a block of columns is dense."""
         offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
-        slope = problem.load_slope
-        S = np.empty((size, size))
+        products = problem.products
+        if products is None:
+            raise InvalidProblemError(_OVERFLOW)
+        size = len(products.mid)
         # what overflows is found and named below
         with np.errstate(over="ignore", invalid="ignore"):
-            for start in range(0, size, RHS_BLOCK):
-                stop = min(start + RHS_BLOCK, size)
-                S[:, start:stop] = B @ problem.factorization.solve(B[start:stop].T.toarray())
-            S = 0.5 * (S + S.T)
-            g0 = B @ problem.factorization.solve(problem.f) - offset
-            g1 = np.zeros(size) if slope is None else B @ problem.factorization.solve(slope)
+            S = 0.5 * (products.mid[:, :size] + products.mid[:, :size].T)
+            free = np.where(products.still, 0.0, products.mid[:, size:] * products.lift)
+            g0, g1 = free[:, 0] - offset, free[:, 1]
         if not (np.all(np.isfinite(S)) and np.all(np.isfinite(g0)) and np.all(np.isfinite(g1))):
-            raise InvalidProblemError("A, f: the condensed problem overflows float64; expected data in smaller units")
+            raise InvalidProblemError(_OVERFLOW)
         return cls(S, g0, g1, problem)
 
     @cached_property

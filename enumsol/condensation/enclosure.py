@@ -1,12 +1,6 @@
 """Rigorous enclosures of the condensed problem, from the user's own A, Bn, Bt, f (theory, section 4.4).
 
-With X an approximation of A^{-1} K, K = [B', f, load_slope], R = K - A X its residual and Y an approximation of
-A^{-1} R,
-
-    B A^{-1} K  =  B X  +  B Y  +  B A^{-1} (R - A Y),      |b_i' A^{-1} z|  <=  ||A^{-1} b_i|| ||z||,
-
-where ||A^{-1} b_i|| <= ||X_i + Y_i|| + ||(R - A Y)_i|| / lambda_min(A). So the error is that of the rounding of two
-sums and of second order in the residual, which is computed in more than the working precision.
+S and g as computed, with the bounds of their errors, are in ``condensation.products``.
 """
 
 from __future__ import annotations
@@ -25,24 +19,19 @@ from enumsol.arithmetic.balls import (
     UNIT,
     dense_eigenvalue_bound,
     gamma,
-    residual,
     sparse_eigenvalue_bound,
     upper_norm,
 )
 from enumsol.checks import alpha_value
 from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.products import Products, scaled
 from enumsol.errors import EnumsolError
 from enumsol.sealed import Sealed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
     from enumsol.arithmetic.balls import Array
     from enumsol.checks import AlphaLike
     from enumsol.condensation.data import CondensableData
-
-#: Columns that are made dense together.
-_COLUMNS = 32
 
 
 class NotEnclosedError(EnumsolError):
@@ -71,8 +60,8 @@ class CondensedEnclosure(Sealed):
     problem: Any = field(repr=False)  # in 2D or 3D
 
     @classmethod
-    def from_problem(cls, problem: CondensableData) -> CondensedEnclosure:
-        """Enclose S and g from the problem's own matrices.
+    def from_problem(cls, problem: CondensableData, products: Products | None = None) -> CondensedEnclosure:
+        """Enclose S and g from the problem's own matrices; ``products`` of it are taken if they are known.
 
         Raises
         ------
@@ -80,48 +69,34 @@ class CondensedEnclosure(Sealed):
             A is positive definite only within rounding.
         """
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            enclosed = cls._from_problem(problem)
+            enclosed = cls._from_problem(problem, products)
         balls = (enclosed.S, enclosed.S_rad, enclosed.g0, enclosed.g0_rad, enclosed.g1, enclosed.g1_rad)
         if not all(np.all(np.isfinite(array)) for array in balls):
             raise NotEnclosedError(_OVERFLOW)
         return enclosed
 
     @classmethod
-    def _from_problem(cls, problem: CondensableData) -> CondensedEnclosure:
-        n = problem.n
-        # np.ldexp, and not a power function, gives powers of two by definition
-        scale = np.ldexp(1.0, -np.round(0.5 * np.log2(problem.A.diagonal())).astype(int))
-        A = _scaled(sp.csr_array(problem.A), scale, scale)
-        rows = problem.contact_rows
-        size = rows.shape[0]
-        B = _scaled(rows, np.ones(size), scale)
-        slope = np.zeros(n) if problem.load_slope is None else problem.load_slope
-        loads = np.column_stack([_exact_product(array, scale) for array in (problem.f, slope)])
-        # loads of size one, so that norms of their residuals neither overflow nor underflow
-        lift = np.ldexp(1.0, np.clip(np.frexp(np.max(np.abs(loads), axis=0))[1], -1000, 1000))
-        K = sp.hstack([B.T, sp.csc_array(_exact_product(loads, 1.0 / lift))], format="csc")
-        # before there are dense columns: the factors of A - mu I are what takes most memory
+    def _from_problem(cls, problem: CondensableData, products: Products | None) -> CondensedEnclosure:
+        products = Products.of(problem) if products is None else products
+        if products is None:
+            raise NotEnclosedError(_OVERFLOW)
+        scale, size = products.scale, len(products.mid)
+        A = scaled(sp.csr_array(problem.A), scale, scale)
         bound = sparse_eigenvalue_bound(sp.csc_array(A), _smallest_eigenvalue(problem, scale))
         if not bound > 0:
             raise NotEnclosedError(
                 "A is positive definite only within rounding: its smallest eigenvalue, after scaling to a unit "
                 "diagonal, could not be proven positive"
             )
-
-        def solve(columns: Array) -> Array:
-            # not refined: what is left is bounded
-            return np.asarray(problem.factorization.solve(columns / scale[:, None], refined=False) / scale[:, None])
-
-        mid, rad = _products(A, B, K, solve, bound)
+        mid, rad = products.mid, products.radii(bound)
         S, S_rad = mid[:, :size], rad[:, :size]
         # the exact S is symmetric and lies in both triangles' balls
         sym = 0.5 * (S + S.T)
         S_rad = (np.maximum(S_rad, S_rad.T) + np.abs(S - S.T) + 2 * UNIT * np.abs(sym)) * SAFE
         offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
-        free, free_rad = mid[:, size:] * lift, rad[:, size:] * lift + TINY
+        free, free_rad = mid[:, size:] * products.lift, rad[:, size:] * products.lift + TINY
         # no load moves nothing, exactly: what covers underflow in a norm would be huge beside a tiny load
-        still = ~np.any(loads, axis=0)
-        free[:, still] = free_rad[:, still] = 0.0
+        free[:, products.still] = free_rad[:, products.still] = 0.0
         g0 = free[:, 0] - offset
         g0_rad = (free_rad[:, 0] + 2 * UNIT * np.abs(g0)) * SAFE + TINY
         return cls(sym, S_rad, g0, g0_rad, free[:, 1], free_rad[:, 1], bound, problem)
@@ -174,21 +149,6 @@ _LEAST_PAIR = 2.0**-1000
 _OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"
 
 
-def _exact_product(values: Array, factor: Array) -> Array:
-    """Values times powers of two; refused where that is not exact."""
-    product = values * factor
-    if not (np.all(np.isfinite(product)) and np.array_equal(product / factor, values)):
-        raise NotEnclosedError(_OVERFLOW)
-    return np.asarray(product)
-
-
-def _scaled(matrix: sp.csr_array, left: Array, right: Array) -> sp.csr_array:
-    """diag(left) matrix diag(right), exactly, for powers of two."""
-    rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
-    data = _exact_product(matrix.data, left[rows] * right[matrix.indices])
-    return sp.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
-
-
 def _smallest_eigenvalue(problem: CondensableData, scale: Array) -> float:
     """Estimate of the smallest eigenvalue of the scaled A by inverse iteration."""
     vector = np.random.default_rng(1).normal(size=problem.n)
@@ -199,37 +159,6 @@ def _smallest_eigenvalue(problem: CondensableData, scale: Array) -> float:
         value = 1.0 / float(np.linalg.norm(image))
         vector = image
     return value
-
-
-def _column_blocks(K: sp.csc_array) -> Iterator[slice]:
-    """Columns of K, as many at a time as are made dense."""
-    for start in range(0, K.shape[1], _COLUMNS):
-        yield slice(start, min(start + _COLUMNS, K.shape[1]))
-
-
-def _products(
-    A: sp.csr_array, B: sp.csr_array, K: sp.csc_array, solve: Callable[[Array], Array], bound: float
-) -> tuple[Array, Array]:
-    """B A^{-1} K as a ball; of what is n long only a block of columns is dense."""
-    n, rows = A.shape[0], B.shape[0]
-    k, few = gamma(int(np.max(np.diff(B.indptr))) + 1), gamma(int(np.max(np.diff(A.indptr))) + 3)
-    B_size, A_size = abs(B), abs(A)
-    mid, rad = np.empty((rows, K.shape[1])), np.empty((rows, K.shape[1]))
-    lengths, left = np.empty(K.shape[1]), np.empty(K.shape[1])
-    for part in _column_blocks(K):
-        columns = K[:, part].toarray()
-        X = solve(columns)
-        R, R_rad = residual(A, X, columns)
-        Y = solve(R)
-        first, second = B @ X, B @ Y
-        mid[:, part] = first + second
-        # what Y leaves of R, with the rounding of this
-        R_rad += few * (np.abs(R) + A_size @ np.abs(Y)) * (1 + few) * SAFE
-        left[part] = upper_norm(np.abs(R - A @ Y) + R_rad, axis=0) * SAFE
-        sizes = np.abs(X) + np.abs(Y)
-        rad[:, part] = (k * (B_size @ sizes) * (1 + 2 * k) + 2 * UNIT * np.abs(mid[:, part])) * SAFE
-        lengths[part] = (upper_norm(sizes, axis=0) + left[part] / bound) * SAFE
-    return mid, (rad + lengths[:rows, None] * left) * SAFE + (n + 2) * TINY
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,131 @@
+"""B A^{-1} [B', f, load_slope] in floats, with what bounds its error (theory, section 4.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, residual, upper_norm
+from enumsol.condensation.data import CondensableData
+from enumsol.sealed import Sealed
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.arithmetic.balls import Array
+
+#: Columns that are made dense together.
+_COLUMNS = 16
+
+
+class WithProducts(CondensableData, Protocol):
+    """A problem that keeps its products."""
+
+    @property
+    def products(self) -> Products | None:
+        """B A^{-1} [B', f, load_slope]; None where the data cannot be scaled without rounding."""
+
+
+@dataclass(frozen=True)
+class Products(Sealed):
+    """S = B A^{-1} B' and what the loads move, as computed, before anything is known of A's smallest eigenvalue.
+
+    With X an approximation of A^{-1} K, K = [B', f, load_slope], R = K - A X its residual and Y an approximation of
+    A^{-1} R,
+
+        B A^{-1} K  =  B X  +  B Y  +  B A^{-1} (R - A Y),      |b_i' A^{-1} z|  <=  ||A^{-1} b_i|| ||z||,
+
+    where ||A^{-1} b_i|| <= ||X_i + Y_i|| + ||(R - A Y)_i|| / lambda_min(A). So the error is that of the rounding of two
+    sums and of second order in the residual, which is computed in more than the working precision.
+
+    Attributes
+    ----------
+    mid : (m, m + 2) array
+        B X + B Y, of loads divided by ``lift``.
+    rounded : (m, m + 2) array
+        Bounds of its rounding errors.
+    lengths, left : (m + 2,) arrays
+        Bounds of ||X + Y|| and ||R - A Y||, A scaled by ``scale`` to a diagonal near one.
+    scale : (n,) array of powers of two
+    lift : (2,) array of powers of two
+    still : (2,) bool array
+        Loads that are zero.
+    """
+
+    mid: Array
+    rounded: Array
+    lengths: Array
+    left: Array
+    scale: Array
+    lift: Array
+    still: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, problem: CondensableData) -> Products | None:
+        """Those of a problem; None where it cannot be scaled without rounding."""
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            # np.ldexp, and not a power function, gives powers of two by definition
+            scale = np.ldexp(1.0, -np.round(0.5 * np.log2(problem.A.diagonal())).astype(int))
+            slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
+            try:
+                A = scaled(sp.csr_array(problem.A), scale, scale)
+                B = scaled(problem.contact_rows, np.ones(problem.contact_rows.shape[0]), scale)
+                loads = np.column_stack([_exact_product(array, scale) for array in (problem.f, slope)])
+                # loads of size one, so that norms of their residuals neither overflow nor underflow
+                lift = np.ldexp(1.0, np.clip(np.frexp(np.max(np.abs(loads), axis=0))[1], -1000, 1000))
+                K = sp.hstack([B.T, sp.csc_array(_exact_product(loads, 1.0 / lift))], format="csc")
+            except FloatingPointError:
+                return None
+
+            def solve(columns: Array) -> Array:
+                # not refined: what is left is bounded
+                return np.asarray(problem.factorization.solve(columns / scale[:, None], refined=False) / scale[:, None])
+
+            size, k = B.shape[0], gamma(int(np.max(np.diff(B.indptr))) + 1)
+            few, B_size, A_size = gamma(int(np.max(np.diff(A.indptr))) + 3), abs(B), abs(A)
+            mid, rounded = np.empty((size, K.shape[1])), np.empty((size, K.shape[1]))
+            lengths, left = np.empty(K.shape[1]), np.empty(K.shape[1])
+            for start in range(0, K.shape[1], _COLUMNS):
+                part = slice(start, min(start + _COLUMNS, K.shape[1]))
+                columns = K[:, part].toarray()
+                X = solve(columns)
+                R, R_rad = residual(A, X, columns)
+                Y = solve(R)
+                mid[:, part] = B @ X + B @ Y
+                # what Y leaves of R, with the rounding of this
+                R_rad += few * (np.abs(R) + A_size @ np.abs(Y)) * (1 + few) * SAFE
+                left[part] = upper_norm(np.abs(R - A @ Y) + R_rad, axis=0) * SAFE
+                sizes = np.abs(X) + np.abs(Y)
+                rounded[:, part] = (k * (B_size @ sizes) * (1 + 2 * k) + 2 * UNIT * np.abs(mid[:, part])) * SAFE
+                lengths[part] = upper_norm(sizes, axis=0) * SAFE
+            return cls(mid, rounded, lengths, left, scale, lift, ~np.any(loads, axis=0))
+
+    def radii(self, bound: float) -> Array:
+        """Bounds of all errors, for a lower bound on the smallest eigenvalue of the scaled A."""
+        rows = len(self.mid)
+        lengths = (self.lengths[:rows] + self.left[:rows] / bound) * SAFE
+        return (self.rounded + lengths[:, None] * self.left) * SAFE + (len(self.scale) + 2) * TINY
+
+
+def _exact_product(values: Array, factor: Array) -> Array:
+    """Values times powers of two.
+
+    Raises
+    ------
+    FloatingPointError
+        That is not exact.
+    """
+    product = values * factor
+    if not (np.all(np.isfinite(product)) and np.array_equal(product / factor, values)):
+        raise FloatingPointError
+    return np.asarray(product)
+
+
+def scaled(matrix: sp.csr_array, left: Array, right: Array) -> sp.csr_array:
+    """diag(left) matrix diag(right), exactly, for powers of two."""
+    rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    data = _exact_product(matrix.data, left[rows] * right[matrix.indices])
+    return sp.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
