@@ -221,7 +221,7 @@ class Trace:
 
 
 class Arcs:
-    """[6.5] All arcs of a proof on [a, b]; alpha_0 or None; where selections were handed on, by codes; closed pieces."""
+    """[6.5] All arcs of a proof on [a, b]; alpha_0 or None; by codes where selections were handed on; closed pieces."""
 
     def __init__(self, data, interval, origin, handed_on, closed):
         self._data, (self._a, self._b), self._closed = data, interval, closed

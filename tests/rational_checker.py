@@ -337,10 +337,11 @@ class Graph(Proof):
             loads = [[value if x == self.origin else -value for value in self.data.g1]]
         forms = [Forms(self.data.S, g, F_hi, F_lo) for g in loads]
         covered, cut, declared = set(), [], None
-        closed = any(record[0] == "m" for record in leaves)
-        need(not closed or roots == ["6" * self.p], "a piece closed by its arcs is not whole")
-        need(not closed or sorted({*(record[0] for record in leaves)} | {"s"}) == ["m", "s"], "a closed piece has others")
-        need(sum(record[0] == "m" for record in leaves) < 2, "a piece is closed twice")
+        kinds = [record[0] for record in leaves]
+        closed = "m" in kinds
+        if closed:
+            need(roots == ["6" * self.p], "a piece closed by its arcs is not whole")
+            need(kinds.count("m") == 1 and set(kinds) <= {"m", "s"}, "a piece closed by its arcs holds more than that")
         for kind, text, *rest in leaves:
             if kind == "m":
                 self.closed.append(ClosedPiece(self.data, x, y, text, *rest))

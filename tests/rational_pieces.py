@@ -1,4 +1,4 @@
-"""[6.3, pieces without a tree] Pieces of graph proofs that are closed by their arcs, for rational_checker, in rationals.
+"""[6.3, pieces without a tree] Pieces of graph proofs that are closed by their arcs, for rational_checker.
 
 Nothing of enumsol is imported. That a solution is the only one is not believed because a form is definite: at some
 alphas of every piece all selections are tried as well. Numbers in brackets are sections of docs/proof_format.md.
@@ -8,7 +8,6 @@ from functools import cached_property
 from itertools import islice, product
 
 from flint import fmpq, fmpq_mat, fmpq_poly
-from rational_arcs import Selection
 from rational_forms import Forms, _value, exact, need
 from rational_zeros import cells, interpolated, one_sign
 
@@ -66,10 +65,8 @@ class ClosedPiece:
             going = [entry for entry in held if entry[0] <= reached <= entry[1]]
             need(going, "no arcs lead through a piece")
             _, high, parts = max(going, key=lambda entry: entry[1])
-            for selection, low, top in parts:
-                low, top = max(low, reached), min(top, self.y)
-                if low <= top:
-                    found.append((selection, low, top))
+            needed = [(selection, max(start, reached), min(end, self.y)) for selection, start, end in parts]
+            found += [part for part in needed if part[1] <= part[2]]
             if high >= self.y:
                 return found
             need(high > reached, "no arcs lead through a piece")
