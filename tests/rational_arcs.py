@@ -6,7 +6,7 @@ found by interpolation; what a part of a trace says about them is decided by Stu
 
 from functools import cached_property
 from itertools import combinations
-from math import comb
+from math import comb, inf, nextafter
 
 from flint import fmpq, fmpq_mat
 from rational_forms import Forms, decimal_fraction, exact, integer, need
@@ -266,7 +266,7 @@ class Arcs:
         belongs = [
             due
             for due in self._due
-            if "".join(map(str, due[0])) == text and low <= due[1] and due[2] <= high and due[3] == side
+            if "".join(map(str, due[0])) == text and _beside(low, due[1]) and _beside(-high, -due[2]) and due[3] == side
         ]
         need(belongs, "a trace is about no selection handed on")
         first = min(belongs, key=lambda due: due[1])
@@ -299,6 +299,12 @@ class Arcs:
                 need((event[6] != other[6]) == (event[7] == other[7]), "indices do not balance at an event")
         matched = list(zip(events, partners, strict=True))
         return [event for event, found in matched if not found], [(event, *found) for event, found in matched if found]
+
+
+def _beside(low, alpha):
+    """Whether it is the largest float that is at most alpha."""
+    value = int(low.p) / int(low.q)
+    return low == exact(value) <= alpha < exact(nextafter(value, inf))
 
 
 def _partners(event, other):
