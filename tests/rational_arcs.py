@@ -6,7 +6,7 @@ found by interpolation; what a part of a trace says about them is decided by Stu
 
 from functools import cached_property
 from itertools import combinations
-from math import comb
+from math import comb, inf, nextafter
 
 from flint import fmpq, fmpq_mat
 from rational_forms import Forms, decimal_fraction, exact, integer, need
@@ -54,18 +54,18 @@ class Selection:
     """A selection along the interval, under the load g(alpha) (side 0) or side times its slope."""
 
     def __init__(self, data, codes, side):
-        self._data, self._codes, self._side, self._p = data, codes, side, len(codes)
+        self._data, self.codes, self.side, self._p = data, codes, side, len(codes)
         groups = [{0: 4}, {2: 5, 3: 6}, dict.fromkeys((1, 2, 3, 4), 0), {1: 2}, {1: 3}]
         #: [6.5, conditions] Kind of row and node, by number.
         self.conditions = [(group[code], i) for group in groups for i, code in enumerate(codes) if code in group]
 
     def _forms(self, alpha):
         data = self._data
-        g = [self._side * value for value in data.g1] if self._side else data.load(alpha)
+        g = [self.side * value for value in data.g1] if self.side else data.load(alpha)
         return Forms(data.S, g, data.friction(alpha))
 
     def _equations(self, alpha):
-        return self._forms(alpha).equations(self._codes)
+        return self._forms(alpha).equations(self.codes)
 
     def _given(self, alpha):
         forms = self._forms(alpha)
@@ -82,16 +82,16 @@ class Selection:
         return System(square, lambda alpha: self._equations(alpha) + self._given(alpha), varying + 2)
 
     @cached_property
-    def _own(self):
+    def own(self):
         return self._system(range(2 * self._p), ())
 
     @property
     def _values(self):
-        return self._own.values[2 * self._p :]
+        return self.own.values[2 * self._p :]
 
     def _index(self, x, y):
         """The sign of det N in all of [x, y], or 0."""
-        return one_sign(self._own.determinant, x, y)
+        return one_sign(self.own.determinant, x, y)
 
     def holds(self, x, y, index):
         """[6.5] A part "h"."""
@@ -116,7 +116,7 @@ class Selection:
         """[6.5] A part "n"."""
         if self._index(x, y) and any(one_sign(value, x, y) == -self._index(x, y) for value in self._values):
             return
-        determinant, products = self._own.determinant, self._own.products
+        determinant, products = self.own.determinant, self.own.products
         if determinant == 0 and not any(product != 0 for product in products):
             need(not self._has_vertex(None, x, y), "a singular selection has a solution")
             return
@@ -165,6 +165,8 @@ class Trace:
         self.arcs = self.border = self.left_open = 0
         #: (condition, x, y, first, last, rising, index)
         self.events = []
+        #: Parts with a solution: (kind, x, y, first, last, rising)
+        self.present = []
         self._index, self._before = 0, None
 
     def part(self, x, y, kind, *rest, starts):
@@ -184,6 +186,7 @@ class Trace:
             if kind == "h":
                 need(len(rest) == 1, "an unknown part")
                 self.selection.holds(x, y, index)
+                self.present.append(("h", x, y, x, y, False))
             else:
                 rising = self._event(x, y, *rest)
             self._present(index, rising, starts)
@@ -197,6 +200,7 @@ class Trace:
         need(integer(rising) in (0, 1), "an event neither begins nor ends")
         self.selection.event(x, y, index, condition, rising, first, last)
         self.events.append((self.selection.conditions[condition], x, y, first, last, rising, index))
+        self.present.append(("e", x, y, first, last, rising))
         return bool(rising)
 
     def _present(self, index, rising, starts):
@@ -217,10 +221,10 @@ class Trace:
 
 
 class Arcs:
-    """[6.5] All arcs of a proof on [a, b]; alpha_0 or None; where selections were handed on, by codes."""
+    """[6.5] All arcs of a proof on [a, b]; alpha_0 or None; by codes where selections were handed on; closed pieces."""
 
-    def __init__(self, data, interval, origin, handed_on):
-        self._data, (self._a, self._b) = data, interval
+    def __init__(self, data, interval, origin, handed_on, closed):
+        self._data, (self._a, self._b), self._closed = data, interval, closed
         self._origin = origin if origin is not None and self._a <= origin <= self._b else None
         self._due = [(codes, *span) for codes, where in handed_on.items() for span in self._spans(where)]
         self._traces = []
@@ -247,10 +251,12 @@ class Arcs:
         need(integer(head["traces"]) == len(self._traces), "another number of traces")
         need(not self._due, "a selection handed on has no trace")
         left_open = any(trace.left_open for trace in self._traces)
-        alone = self._unpaired()
+        alone, pairs = self._paired()
         need(left_open or not alone, "an event has no partner")
         border = sum(trace.border for trace in self._traces if trace.side < 1 or self._origin == self._a)
         need(left_open or border == 1, "indices at the first alpha do not add up to 1")
+        for piece in self._closed:
+            piece.check(self._traces, pairs, self._origin)
         return {"traces": len(self._traces), "arcs": sum(trace.arcs for trace in self._traces)}
 
     def _trace(self, record, boxes):
@@ -260,7 +266,7 @@ class Arcs:
         belongs = [
             due
             for due in self._due
-            if "".join(map(str, due[0])) == text and low <= due[1] and due[2] <= high and due[3] == side
+            if "".join(map(str, due[0])) == text and _beside(low, due[1]) and _beside(-high, -due[2]) and due[3] == side
         ]
         need(belongs, "a trace is about no selection handed on")
         first = min(belongs, key=lambda due: due[1])
@@ -283,15 +289,22 @@ class Arcs:
         trace.finish(high >= (self._origin if side == -1 else self._b))
         return trace
 
-    def _unpaired(self):
-        """[6.5, events] Pair events; those without a partner."""
+    def _paired(self):
+        """[6.5, events] Events without a partner, and pairs."""
         events = [(trace, *event) for trace in self._traces for event in trace.events]
         partners = [[other for other in events if _partners(event, other)] for event in events]
         for event, found in zip(events, partners, strict=True):
             need(len(found) < 2, "an event has two partners")
             for other in found:
                 need((event[6] != other[6]) == (event[7] == other[7]), "indices do not balance at an event")
-        return [event for event, found in zip(events, partners, strict=True) if not found]
+        matched = list(zip(events, partners, strict=True))
+        return [event for event, found in matched if not found], [(event, *found) for event, found in matched if found]
+
+
+def _beside(low, alpha):
+    """Whether it is the largest float that is at most alpha."""
+    value = int(low.p) / int(low.q)
+    return low == exact(value) <= alpha < exact(nextafter(value, inf))
 
 
 def _partners(event, other):

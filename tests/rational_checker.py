@@ -29,6 +29,7 @@ from rational_forms import (
     multipliers,
     need,
 )
+from rational_pieces import ClosedPiece
 
 MAGIC = b"enumsol-proof 1\n"
 DIGEST = 32
@@ -298,7 +299,7 @@ class Graph(Proof):
         self.origin = self.data.origin()
         self.pieces = self.leaves = 0
         #: Codes of the selections handed on, with the pieces in which they were.
-        self.handed_on = {}
+        self.handed_on, self.closed = {}, []
 
     def run(self, records):
         """[6.2]"""
@@ -323,9 +324,11 @@ class Graph(Proof):
         if "pieces" not in records[position]:
             need(set(records[position]) == {"traces", "force", "length"}, "arcs begin with other names")
             self.units(records[position])
-            arcs = Arcs(self.data, (self.a, self.b), self.origin, self.handed_on)
+            arcs = Arcs(self.data, (self.a, self.b), self.origin, self.handed_on, self.closed)
             counts |= arcs.run(records[position], records[position + 1 : -1])
             position = len(records) - 1
+        else:
+            need(not self.closed, "pieces are closed by arcs that are missing")
         need(are(records[position:], [counts]), f"the footer is not {counts}")
         return set(self.handed_on)
 
@@ -340,7 +343,15 @@ class Graph(Proof):
             loads = [[value if x == self.origin else -value for value in self.data.g1]]
         forms = [Forms(self.data.S, g, F_hi, F_lo) for g in loads]
         covered, cut, declared = set(), [], None
+        kinds = [record[0] for record in leaves]
+        closed = "m" in kinds
+        if closed:
+            need(roots == ["6" * self.p], "a piece closed by its arcs is not whole")
+            need(kinds.count("m") == 1 and set(kinds) <= {"m", "s"}, "a piece closed by its arcs holds more than that")
         for kind, text, *rest in leaves:
+            if kind == "m":
+                self.closed.append(ClosedPiece(self.data, x, y, text, *rest))
+                continue
             if kind == "q":
                 declared = [list(map(exact, values)) for values in (text, *rest)]
                 need([len(values) for values in declared] == [self.p] * 4, "a form has another size")
@@ -365,15 +376,16 @@ class Graph(Proof):
                 cut.append(text)
             else:
                 need(max(codes) < 5, "a selection handed on is not complete")
+                need(self.selections_below(codes, friction), "a node cannot have its code")
                 self.handed_on.setdefault(codes, []).append((x, y))
-        for root in roots:
+        for root in () if closed else roots:
             need(covered.issuperset(self.selections_below(self.codes(root), friction)), "a selection is in no leaf")
         self.pieces += 1
         return cut
 
     @staticmethod
     def selections_below(codes, friction):
-        return product(*(refinements(code, positive) for code, positive in zip(codes, friction, strict=True)))
+        return list(product(*(refinements(code, positive) for code, positive in zip(codes, friction, strict=True))))
 
     def codes(self, text):
         need(re.fullmatch(f"[0-6]{{{self.p}}}", text, re.ASCII), "no codes")

@@ -242,7 +242,7 @@ class GraphChecker:
         elif np.any((handed != OPEN) & ((handed == FRICTIONLESS) == np.array(self._friction))):
             self._fail(f"piece {number}: a selection handed on has a status that a node cannot have")
         if piece.closed is not None:
-            if np.any(piece.roots != UNDECIDED) or len(handed) < len(piece.leaves()):
+            if np.any(piece.roots != UNDECIDED) or len(handed) < len(piece.leaves()) or piece.declared is not None:
                 self._fail(f"piece {number}: it is decided by its arcs, but not whole, or has other leaves")
             self._closed.append(piece.closed)
         elif not covers(piece.roots, piece.leaves(), self._friction):

@@ -331,4 +331,4 @@ def said_empty(selection, x, y):
 
 
 def said_singular(data, codes, x):
-    return Selection(data, codes, 0)._own.determinant(x) == 0
+    return Selection(data, codes, 0).own.determinant(x) == 0
