@@ -16,7 +16,7 @@ def by_the_tree():
     """In this context that is so."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Closer, "_due", lambda self, nodes: False)
-        patch.setattr(SpaceCloser, "whole", lambda self, relaxed: None)
+        patch.setattr(SpaceCloser, "whole", lambda self: None)
         patch.setattr(ClosedPieces, "find", lambda self, traced: None)
         yield
 
@@ -24,17 +24,18 @@ def by_the_tree():
 @contextmanager
 def above_known_roots():
     """In this context every assignment above the solution that Newton's method finds is tried, in small bodies too."""
+    before = Closer.closed
     with pytest.MonkeyPatch.context() as patch:
 
-        def whole(self, relaxed):
+        def whole(self):
             self._proposed(Numbers.PLAIN)
+            self.known = self._regular
 
-        def due(self, nodes):
+        def closed(self, codes, relaxation):
             self._told = 0
-            return False
+            return before(self, codes, relaxation)
 
         patch.setattr(Closer, "whole", whole)
-        patch.setattr(Closer, "_due", due)
+        patch.setattr(Closer, "closed", closed)
         patch.setattr(closing, "_FEW", 0)
-        patch.setattr(closing, "_TRIES", 1000)
         yield

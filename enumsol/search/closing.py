@@ -46,8 +46,11 @@ if TYPE_CHECKING:
 _MANY = 3
 #: With fewer contact nodes other numbers than plain ones are sought only once the tree has so many nodes.
 _FEW, _LONG = 48, 512
-#: Above a known root a try that failed waits until one in so many nodes more has something told of it.
-_TRIES = 8
+#: Assignments above a known root are tried once the tree has so many nodes: a try costs as much as some of them.
+_TALL = 256
+#: After a try above a known root the next one comes when something is told of one more in so many nodes, or the
+#: relaxation's bound is so much nearer to zero.
+_TRIES, _NEARER = 4, 0.5
 #: With so many the solution is sought along a path, too, before there is a tree.
 _PATH = 24
 
@@ -149,37 +152,39 @@ class Closer:
         if certifier.plain or system.p < _FEW:
             self._tries = [(0, Numbers.PLAIN), (_LONG, Numbers.DESCENT)][: 1 if certifier.plain else 2]
         self._whole: Proposal | None = None
-        #: A root whose form was not definite for the whole problem, and the statuses that are told before the next try.
+        #: The regular solution that was found for the whole problem, and the same where it is worth a try in the tree.
+        self._regular: KnownRoot | None = None
         self.known: KnownRoot | None = None
-        self._told = 1
+        self._told, self._bound = 1, 0.0
+        #: The relaxation of an assignment with the energy, if it is solved; a search tells it.
+        self.relaxed: Callable[[Codes], Relaxation | None] = lambda _: None
 
     @property
     def sliding(self) -> dict[int, int]:
         """Those of the certifier."""
         return self._certifier.sliding
 
-    def whole(self, relaxed: Callable[[Codes], Relaxation | None]) -> list[SelectionSolution] | None:
-        """All solutions of the problem, if one certificate proves that there is one only.
-
-        ``relaxed`` gives the relaxation of an assignment, if it is solved.
-        """
+    def whole(self) -> list[SelectionSolution] | None:
+        """All solutions of the problem, if one certificate proves that there is one only."""
         codes, lone = (UNDECIDED,) * self._system.p, self._certifier.lone and self._system.p >= _FEW
         proposal, self._whole = self._whole, None
         if proposal is None and self._due(0):
             sought = self._tries.pop(0)[1]
             # a regular solution is tried with the same numbers below, and what is left out of the form besides
             proposal = self._proposed(Numbers.PLAIN if lone else sought)
-            if proposal is not None and proposal.weights is None and lone and self.known is None:
+            if proposal is not None and proposal.weights is None and lone and self._regular is None:
                 proposal = self._proposed(sought)
         found = None
         if proposal is not None and proposal.weights is not None:
             found = self._certifier.closed(codes, proposal, self._near(proposal))
-        if found is None and lone and self.known is not None:
-            found = self._alone(codes, relaxed(codes), descent=True)
+        if found is None and lone and self._regular is not None:
+            found = self._alone(codes, self._regular, self.relaxed(codes), descent=True)
         return found
 
     def begins_again(self, nodes: int) -> bool:
         """Whether so much has become known after some nodes that a search had better begin again."""
+        if nodes >= _TALL and self._system.p >= _FEW:
+            self.known = self._regular
         if self._due(nodes):
             self._whole = self._proposed(self._tries.pop(0)[1])
             if self._whole is not None and self._whole.weights is not None:
@@ -203,7 +208,7 @@ class Closer:
         if proposal is None:
             return None
         force, w = self._near(proposal)
-        self.known = KnownRoot(proposal.selection, force, w) if proposal.strict and self._certifier.lone else None
+        self._regular = KnownRoot(proposal.selection, force, w) if proposal.strict and self._certifier.lone else None
         self._touching = int(np.count_nonzero((np.abs(force[:p]) <= NEAR) & (np.abs(w[:p]) <= NEAR)))
         self._alert = self._alert or self._touching > 0
         self._certifier.sliding |= without_load(system, force, w)
@@ -221,7 +226,7 @@ class Closer:
         """The solutions of a subtree that was closed in an earlier search."""
         if all(code == UNDECIDED for code in codes):
             self._whole = self._proposed(Numbers.PLAIN if self._certifier.plain else Numbers.DESCENT)
-            return self.whole(lambda _: relaxation)
+            return self.whole()
         return self._tried(codes, relaxation)
 
     def _tried(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
@@ -252,26 +257,26 @@ class Closer:
         return found
 
     def _above_known(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
-        """The known root, if it is proven to be the only one; fewer tries than there are statuses to be told."""
-        p = self._system.p
-        told = sum(code != UNDECIDED for code in codes)
-        if p < _FEW or told < self._told or self.known is None or not self.known.below(codes):
+        """The known root, if it is proven to be the only one; a few tries between the whole problem and its leaf."""
+        p, known = self._system.p, self.known
+        if known is None or relaxation is None:
             return None
-        found = self._alone(codes, relaxation)
-        if found is None:
-            self._told = told + max(1, p // _TRIES)
-        return found
+        told = sum(code != UNDECIDED for code in codes)
+        if (told < self._told and relaxation.bound < self._bound) or not known.below(codes):
+            return None
+        self._told, self._bound = told + max(1, p // _TRIES), _NEARER * relaxation.bound
+        return self._alone(codes, known, relaxation if relaxation.form is None else self.relaxed(codes))
 
     def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[SelectionSolution] | None:
         """The root of what an earlier search proposed, if it is proven to be the only one; None if not."""
         return self._certifier.alone(codes, proposal, bound) if self._certifier.lone else None
 
     def _alone(
-        self, codes: Codes, relaxation: Relaxation | None, *, descent: bool = False
+        self, codes: Codes, known: KnownRoot, relaxation: Relaxation | None, *, descent: bool = False
     ) -> list[SelectionSolution] | None:
-        if self.known is None or relaxation is None:
+        if relaxation is None:
             return None
-        proposal = Lone(self._system, codes, self.known, relaxation).proposal(descent=descent)
+        proposal = Lone(self._system, codes, known, relaxation).proposal(descent=descent)
         return None if proposal is None else self._certifier.alone(codes, proposal, relaxation)
 
 

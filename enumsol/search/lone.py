@@ -124,14 +124,15 @@ class Lone:
         """mu, kappa, nu, theta / F and tau with which the form is definite, or None."""
         b, count = len(self.nodes.F), self.nodes.count
         share = self.nodes.first
-        vanishing = np.zeros(len(self.places))
-        vanishing[:count][self.touching] = _STIFF
-        vanishing[count:][self.stuck] = _STIFF
+        normal, tangential = self.R[:count], self.R[count:]
+        vanishing = np.concatenate([self.touching, self.stuck]) * _STIFF
         fixed = self.R.T @ (vanishing[:, None] * self.R)
+        fixed[count:] += tangential
+        fixed[self.nodes.normal] -= (share * self.nodes.F)[:, None] * tangential
+        by_mu = normal.T @ (self.spare[0][:, None] * normal)
+        by_mu[:count] += normal
         for mu in _FACTORS:
-            form = fixed + self.R.T @ (np.concatenate([mu * self.spare[0], np.zeros(b)])[:, None] * self.R)
-            form += np.concatenate([mu * self.R[:count], self.R[count:]])
-            form[self.nodes.normal] -= (share * self.nodes.F)[:, None] * self.R[self.nodes.tangential]
+            form = fixed + mu * by_mu
             if _is_definite(0.5 * (form + form.T)):
                 return np.concatenate([np.full(count, mu), np.ones(b), np.zeros(b), share, np.zeros(b)])
         if not descent:

@@ -74,10 +74,10 @@ class SpaceCloser:
         #: No node slides without load in a part of the tree, and no root is tried there.
         self.sliding: dict[int, int] = {}
         self.known: KnownRoot | None = None
+        self.relaxed: object = None
 
-    def whole(self, relaxed: object = None) -> list[Any] | None:
+    def whole(self) -> list[Any] | None:
         """The only solution, as a list; None where that is not proven."""
-        del relaxed
         with np.errstate(all="ignore"):
             return self._tried()
 

@@ -118,6 +118,8 @@ class TreeSearch:
         self.limits = limits or SearchLimits()
         self.progress = progress
         self.closer = closer
+        if closer is not None:
+            closer.relaxed = self.relaxed
         self.forms = forms
         self.outcome = SearchOutcome()
         self._fallback: InteriorPointEngine | None = None
@@ -160,7 +162,7 @@ class TreeSearch:
             return False
         try:
             with within(self.limits):
-                found = self.closer.whole(self.relaxed)
+                found = self.closer.whole()
         except TimeOverError:
             return False
         if found is not None:
@@ -398,17 +400,16 @@ class TreeSearch:
             return item.parent.child(*self._rows.of(item.changed, codes[item.changed]), last=item.last)
         return self._root(codes)
 
-    def _root(self, codes: Codes) -> Relaxation:
-        """The relaxation of a partial assignment without a parent's."""
-        engine = self.engine
-        if self.forms is not None and self.forms.in_use:
-            engine = self.forms.engine
+    def _root(self, codes: Codes, engine: Any = None) -> Relaxation:
+        """The relaxation of a partial assignment without a parent; by default with the form in use, if there is one."""
+        if engine is None:
+            engine = self.engine if self.forms is None or not self.forms.in_use else self.forms.engine
         relaxation: Relaxation = engine.root(*self._rows.over(codes, range(len(codes))))
         return relaxation
 
     def relaxed(self, codes: Codes) -> Relaxation | None:
-        """The relaxation of a partial assignment, if it is solved and leaves a minimiser."""
-        relaxation = self._root(codes)
+        """The relaxation of a partial assignment with the energy, if it is solved and leaves a minimiser."""
+        relaxation = self._root(codes, self.engine)
         return None if relaxation.stalled or relaxation.pruned else relaxation
 
     def _fall_back(self, codes: Codes) -> Relaxation | None:

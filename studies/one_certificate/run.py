@@ -131,7 +131,7 @@ def whole_by(numbers: Numbers | None) -> Iterator[None]:
     with ExitStack() as stack:
         stack.enter_context(patch("enumsol.search.closing.propose", proposed))
         if numbers is None:
-            stack.enter_context(patch("enumsol.search.space_closing.SpaceCloser.whole", lambda self, relaxed: None))
+            stack.enter_context(patch("enumsol.search.space_closing.SpaceCloser.whole", lambda self: None))
         if numbers is Numbers.PLAIN:
             # what is sought in 3D are better numbers than those given
             stack.enter_context(patch("scipy.optimize.minimize", unchanged))
