@@ -2,16 +2,19 @@
 
 import functools
 from fractions import Fraction
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, takewhile
 
 import numpy as np
 import pytest
 from branches.test_lower_bounds import case, padded
+from flint import fmpq
 from generators import through_the_unloaded_state
 from graph_proofs import accepted, of_kind, refused, replaced, three_with_everything, without_arcs
 from proof_tools import bytes_of, copied, proof_of, records_of
+from rational_arcs import Selection
 from rational_checker import check
-from rational_pieces import ClosedPiece
+from rational_forms import Data
+from rational_pieces import ClosedPiece, _Along
 from trees import by_the_tree
 
 from enumsol import ContactProblem, branch_graph, gallery, verify
@@ -360,6 +363,63 @@ def test_events_without_partners(name):
                 assert report.ok <= accepted(body, counted(changed))
                 given += not report.ok
     assert given
+
+
+def widened(records):
+    """The same with parts of events that take in what holds beside them."""
+    changed = copied(records)
+    for k in of_kind(changed, "b"):
+        parts = []
+        for part in changed[k][4]:
+            before = parts[-1] if parts else None
+            if before and part[0] == "h" and before[0] == "e" and before[4] == 1:
+                parts[-1] = ["e", part[1], *before[2:]]
+            elif before and part[0] == "e" and part[4] == 0 and before[0] == "h":
+                parts[-1] = part
+            else:
+                parts.append(part)
+        changed[k][4] = parts
+    return changed
+
+
+@pytest.mark.parametrize("wide", [pytest.param(False, marks=pytest.mark.slow), True])
+def test_the_form_is_asked_of_every_arc(wide):
+    """Numbers that serve one of two arcs over a piece, and not the other."""
+    body, records = proven("everything")
+    records = widened(records) if wide else records
+    assert verify(body, proof_of(records)).ok
+    assert accepted(body, records)
+    data, rng, k = Data(body), np.random.default_rng(4), of_kind(records, "m")[0]
+    held = sorted((middle_of(records, records[j][1]), tuple(map(int, records[j][1]))) for j in of_kind(records, "s"))
+    where, codes = zip(*held, strict=True)
+    selections = [Selection(data, each, 0) for each in codes]
+    own, wrong = np.array(records[k][1:]), {"first": False, "last": False}
+    for _ in range(400):
+        mu, kappa = own[:2] * np.exp(rng.normal(size=(2, body.p)))
+        numbers = mu.tolist(), kappa.tolist(), [0.0] * body.p
+        piece = ClosedPiece(data, fmpq(0), fmpq(3), *numbers)
+        serves = [piece._alone(_Along(piece, each), at, at, 0) for each, at in zip(selections, where, strict=True)]
+        found = {"first": serves[-1] and not serves[0], "last": serves[0] and not serves[-1]}
+        for which in [which for which, seen in wrong.items() if found[which] and not seen]:
+            assert refused(body, replaced(records, k, ["m", *numbers])), serves
+            wrong[which] = True
+        if all(wrong.values()):
+            return
+    raise AssertionError(wrong)
+
+
+def middle_of(records, codes):
+    """An alpha at which a selection has a solution."""
+    first = next(k for k in of_kind(records, "t") if records[k][1] == codes)
+    begin = records[first][2]
+    for part in (part for box in takewhile(lambda record: record[0] == "b", records[first + 1 :]) for part in box[4]):
+        low, high = Fraction(begin), Fraction(part[1])
+        if part[0] == "e":
+            low, high = (Fraction(part[6]), high) if part[4] == 1 else (low, Fraction(part[5]))
+        if part[0] in "he":
+            return fmpq(*((low + high) / 2).as_integer_ratio())
+        begin = part[1]
+    raise AssertionError(codes)
 
 
 # -- forgeries: several solutions --------------------------------------------------------------------------------------
