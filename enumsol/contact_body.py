@@ -125,8 +125,8 @@ class ContactBody(Immutable):
         return Factorization(self.A)
 
     @cached_property
-    def products(self) -> Products | None:
-        """What condensation and enclosure have in common; None where the data cannot be scaled without rounding."""
+    def products(self) -> Products:
+        """What condensation and enclosure have in common."""
         from enumsol.condensation.products import Products  # as above
 
         return Products.of(self)

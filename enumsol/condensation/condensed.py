@@ -176,9 +176,6 @@ def _rounding(S: NDArray[np.float64]) -> float:
     return _ROUNDINGS * len(S) * float(np.finfo(np.float64).eps)
 
 
-_OVERFLOW = "A, f: the condensed problem overflows float64; expected data in smaller units"
-
-
 @dataclass(frozen=True)
 class Condensation(Sealed):
     """A problem condensed to its contact forces for all alpha: S, and g(alpha) = g0 + alpha g1.
@@ -201,8 +198,6 @@ class Condensation(Sealed):
         """Condense with one sparse factorization; of what is n long only a block of columns is dense."""
         offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
         products = problem.products
-        if products is None:
-            raise InvalidProblemError(_OVERFLOW)
         size = len(products.mid)
         # what overflows is found and named below
         with np.errstate(over="ignore", invalid="ignore"):
@@ -210,7 +205,7 @@ class Condensation(Sealed):
             free = np.where(products.still, 0.0, products.mid[:, size:] * products.lift)
             g0, g1 = free[:, 0] - offset, free[:, 1]
         if not (np.all(np.isfinite(S)) and np.all(np.isfinite(g0)) and np.all(np.isfinite(g1))):
-            raise InvalidProblemError(_OVERFLOW)
+            raise InvalidProblemError("A, f: the condensed problem overflows float64; expected data in smaller units")
         return cls(S, g0, g1, problem)
 
     @cached_property

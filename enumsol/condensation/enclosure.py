@@ -78,10 +78,10 @@ class CondensedEnclosure(Sealed):
     @classmethod
     def _from_problem(cls, problem: CondensableData, products: Products | None) -> CondensedEnclosure:
         products = Products.of(problem) if products is None else products
-        if products is None:
+        if not products.bounded:
             raise NotEnclosedError(_OVERFLOW)
         scale, size = products.scale, len(products.mid)
-        A = scaled(sp.csr_array(problem.A), scale, scale)
+        A, _ = scaled(sp.csr_array(problem.A), scale, scale)
         bound = sparse_eigenvalue_bound(sp.csc_array(A), _smallest_eigenvalue(problem, scale))
         if not bound > 0:
             raise NotEnclosedError(

@@ -25,8 +25,8 @@ class WithProducts(CondensableData, Protocol):
     """A problem that keeps its products."""
 
     @property
-    def products(self) -> Products | None:
-        """B A^{-1} [B', f, load_slope]; None where the data cannot be scaled without rounding."""
+    def products(self) -> Products:
+        """B A^{-1} [B', f, load_slope]."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,8 @@ class Products(Sealed):
     lift : (2,) array of powers of two
     still : (2,) bool array
         Loads that are zero.
+    bounded : bool
+        Whether the data could be scaled without rounding. Without it nothing bounds the errors.
     """
 
     mid: Array
@@ -62,31 +64,33 @@ class Products(Sealed):
     scale: Array
     lift: Array
     still: NDArray[np.bool_]
+    bounded: bool
 
     @classmethod
-    def of(cls, problem: CondensableData) -> Products | None:
-        """Those of a problem; None where it cannot be scaled without rounding."""
+    def of(cls, problem: CondensableData) -> Products:
+        """Those of a problem."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             # np.ldexp, and not a power function, gives powers of two by definition
-            scale = np.ldexp(1.0, -np.round(0.5 * np.log2(problem.A.diagonal())).astype(int))
+            exponent = -np.round(0.5 * np.log2(problem.A.diagonal())).astype(int)
+            scale = np.ldexp(1.0, exponent)
+            A, exact_A = scaled(sp.csr_array(problem.A), scale, scale)
+            B, exact_B = scaled(problem.contact_rows, np.ones(problem.contact_rows.shape[0]), scale)
             slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
-            try:
-                A = scaled(sp.csr_array(problem.A), scale, scale)
-                B = scaled(problem.contact_rows, np.ones(problem.contact_rows.shape[0]), scale)
-                loads = np.column_stack([_exact_product(array, scale) for array in (problem.f, slope)])
-                # loads of size one, so that norms of their residuals neither overflow nor underflow
-                lift = np.ldexp(1.0, np.clip(np.frexp(np.max(np.abs(loads), axis=0))[1], -1000, 1000))
-                K = sp.hstack([B.T, sp.csc_array(_exact_product(loads, 1.0 / lift))], format="csc")
-            except FloatingPointError:
-                return None
+            loads = np.column_stack([problem.f, slope])
+            # loads of size one, so that norms of their residuals neither overflow nor underflow
+            size = np.max(np.where(loads != 0, np.frexp(loads)[1] + exponent[:, None], -1000), axis=0)
+            lift = np.clip(size, -1000, 1000)
+            power = exponent[:, None] - lift
+            K = sp.hstack([B.T, sp.csc_array(np.ldexp(loads, power))], format="csc")
+            exact_loads = np.array_equal(np.ldexp(np.ldexp(loads, power), -power), loads)
 
             def solve(columns: Array) -> Array:
                 # not refined: what is left is bounded
                 return np.asarray(problem.factorization.solve(columns / scale[:, None], refined=False) / scale[:, None])
 
-            size, k = B.shape[0], gamma(int(np.max(np.diff(B.indptr))) + 1)
+            rows, k = B.shape[0], gamma(int(np.max(np.diff(B.indptr))) + 1)
             few, B_size, A_size = gamma(int(np.max(np.diff(A.indptr))) + 3), abs(B), abs(A)
-            mid, rounded = np.empty((size, K.shape[1])), np.empty((size, K.shape[1]))
+            mid, rounded = np.empty((rows, K.shape[1])), np.empty((rows, K.shape[1]))
             lengths, left = np.empty(K.shape[1]), np.empty(K.shape[1])
             for start in range(0, K.shape[1], _COLUMNS):
                 part = slice(start, min(start + _COLUMNS, K.shape[1]))
@@ -101,7 +105,8 @@ class Products(Sealed):
                 sizes = np.abs(X) + np.abs(Y)
                 rounded[:, part] = (k * (B_size @ sizes) * (1 + 2 * k) + 2 * UNIT * np.abs(mid[:, part])) * SAFE
                 lengths[part] = upper_norm(sizes, axis=0) * SAFE
-            return cls(mid, rounded, lengths, left, scale, lift, ~np.any(loads, axis=0))
+            bounded = exact_A and exact_B and exact_loads
+            return cls(mid, rounded, lengths, left, scale, np.ldexp(1.0, lift), ~np.any(loads, axis=0), bounded)
 
     def radii(self, bound: float) -> Array:
         """Bounds of all errors, for a lower bound on the smallest eigenvalue of the scaled A."""
@@ -110,22 +115,10 @@ class Products(Sealed):
         return (self.rounded + lengths[:, None] * self.left) * SAFE + (len(self.scale) + 2) * TINY
 
 
-def _exact_product(values: Array, factor: Array) -> Array:
-    """Values times powers of two.
-
-    Raises
-    ------
-    FloatingPointError
-        That is not exact.
-    """
-    product = values * factor
-    if not (np.all(np.isfinite(product)) and np.array_equal(product / factor, values)):
-        raise FloatingPointError
-    return np.asarray(product)
-
-
-def scaled(matrix: sp.csr_array, left: Array, right: Array) -> sp.csr_array:
-    """diag(left) matrix diag(right), exactly, for powers of two."""
+def scaled(matrix: sp.csr_array, left: Array, right: Array) -> tuple[sp.csr_array, bool]:
+    """diag(left) matrix diag(right) for powers of two, and whether that is exact."""
     rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
-    data = _exact_product(matrix.data, left[rows] * right[matrix.indices])
-    return sp.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
+    factor = left[rows] * right[matrix.indices]
+    data = matrix.data * factor
+    exact = bool(np.all(np.isfinite(data))) and np.array_equal(data / factor, matrix.data)
+    return sp.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape), exact

@@ -205,7 +205,8 @@ class _Iteration:
         better, change = self.system.corrected(self.forces)
         unit = np.tile(self.system.force, 1 + self.system.tangents)
         largest = float(np.max(np.abs(self.forces * unit)))
-        self.rounding = float(np.max(np.abs(change * unit))) / largest if largest > 0 else 0.0
+        moved = float(np.max(np.maximum(np.abs(change), self.system.noise(self.forces)) * unit))
+        self.rounding = moved / largest if largest > 0 else 0.0
         if ended is Outcome.ROUNDING:
             self.rounding = max(self.rounding, *self.sizes[-_PATIENCE:])
         return better

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
+from enumsol.arithmetic.balls import UNIT
 from enumsol.checks import Alpha, alpha_value
 from enumsol.condensation.condensed import cholesky_factor, load_unit, node_units
 from enumsol.errors import InvalidArgumentError
@@ -157,6 +158,11 @@ class ContactSystem:
         w = (problem.contact_rows @ self.displacement(forces) - offset) / np.tile(self.length, 1 + self.tangents)
         g = w + self.S @ forces
         return replace(self, g=g), np.asarray(cho_solve((self.cholesky, True), g - self.g, check_finite=False))
+
+    def noise(self, forces: Vector) -> Vector:
+        """What every scaled force changes by, in the mean, where S lambda is rounded (theory, (11.13))."""
+        inverse = cho_solve((self.cholesky, True), np.eye(len(self.S)), check_finite=False)
+        return np.asarray(UNIT * np.sqrt(inverse**2 @ (self.S**2 @ forces**2)))
 
     def scaled(self, values: Vector, unit: Vector, name: str) -> Vector:
         """Forces or displacements of nodes or rows by the factors ``unit``, which are those of one tangent or of all.

@@ -13,6 +13,7 @@ import rational_arcs
 import rational_checker
 import rational_closings
 import rational_forms
+import rational_pieces
 import rational_zeros
 from generators import integer_problem, random_problem, singular_problem
 from graph_proofs import (
@@ -67,7 +68,15 @@ def point(name):
 
 
 def test_the_checker_imports_nothing_of_the_package():
-    modules, names = (rational_checker, rational_arcs, rational_closings, rational_forms, rational_zeros), set()
+    names = set()
+    modules = (
+        rational_checker,
+        rational_arcs,
+        rational_closings,
+        rational_forms,
+        rational_pieces,
+        rational_zeros,
+    )
     for module in modules:
         tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
         names |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
