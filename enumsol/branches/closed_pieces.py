@@ -38,6 +38,9 @@ _MOST_LINKS = 6
 _HALVINGS, _VAIN_HALVINGS = 14, 4
 #: Alphas at which no numbers are found, after which they are sought no more: so many, and one for so many nodes.
 _VAIN, _NODES_FOR_ONE = 2, 16
+#: Pieces tried in vain after which none is halved any more: so many, and one for so many nodes. Trees of few nodes are
+#: fast, and where there are several solutions nothing comes of smaller pieces.
+_VAIN_TRIES = 3
 #: How far around a link the test goes, by the length of the interval: its ends are known in floats only.
 _AROUND = 1e-9
 #: Bounds of errors are multiplied by the first, and the form must be definite by the second, so that a checker that
@@ -151,6 +154,7 @@ class _Proposals:
     def run(self) -> list[_Proposed]:
         """Pieces in order."""
         waiting, found = [(self._whole, _HALVINGS, _VAIN_HALVINGS)], list[_Proposed]()
+        tries = _VAIN_TRIES + self._system.p // _NODES_FOR_ONE
         while waiting:
             look()
             piece, halvings, vain = waiting.pop()
@@ -159,7 +163,9 @@ class _Proposals:
             proposed, some = (None, True) if links is None or many else self._tried(piece, links)
             if proposed is not None:
                 found.append(proposed)
-            elif halvings and (many or (vain and some)):
+                continue
+            tries -= not many
+            if halvings and (many or (vain and some and tries > 0)):
                 halves = Piece(piece.a, piece.middle), Piece(piece.middle, piece.b)
                 waiting += [(half, halvings - 1, vain if many else vain - 1) for half in halves[::-1]]
         return found

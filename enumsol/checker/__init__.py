@@ -31,10 +31,10 @@ What checker and search share
       digits, loaded only where a box asks for it; ``kernel.arc_closing``, the test by which the roots of arcs are the
       only solutions over a piece; ``kernel.ball_arrays`` (in 3D, too);
     - for problems in 3D, and loaded for their proofs only: ``kernel.space``, the rows and branchings and the
-      exclusion inequality; ``kernel.leaves``, what a complete assignment holds and which leaves share a root;
-      ``kernel.space_closing``, the test that a whole problem has one solution only; ``sectors``, the ends of sectors;
-      ``condensation.space``, balls for S and g in the variables in which friction is isotropic; ``problem3d``,
-      ``body3d`` and ``friction``, the data and their checks;
+      exclusion inequality; ``kernel.leaves`` and ``kernel.turning``, what a complete assignment holds and which leaves
+      share a root; ``kernel.space_closing``, the test that a whole problem has one solution only; ``sectors``, the ends
+      of sectors; ``condensation.space``, balls for S and g in the variables in which friction is isotropic;
+      ``problem3d``, ``body3d`` and ``friction``, the data and their checks;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
       search whether it does at all (then there is no proof);
       ``condensation.affine``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a

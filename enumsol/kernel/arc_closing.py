@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Span = tuple[ArcSelection, float, float]
 
-#: How often an interval of alpha is halved.
-_HALVINGS = 8
+#: How often an interval of alpha is halved, and how many parts are expanded together.
+_HALVINGS, _TOGETHER = 8, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,19 +69,21 @@ def only_roots(asked: Sequence[Span], numbers: PieceNumbers, errors: float = 1.0
     found, waiting = [True] * len(asked), [(k, span, _HALVINGS) for k, span in enumerate(asked)]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         while waiting:
-            rest = []
-            known = expansions([span for _, span, _ in waiting], errors)
-            for expansion, (k, span, halvings) in zip(known, waiting, strict=True):
+            # the shortest first: where no shorter one will do, that is seen without all the others
+            waiting.sort(key=lambda part: -part[2])
+            taken, waiting = waiting[-_TOGETHER:], waiting[:-_TOGETHER]
+            known = expansions([span for _, span, _ in taken], errors)
+            for expansion, (k, span, halvings) in zip(known, taken, strict=True):
                 along = None if expansion is None else _Along(expansion, numbers)
-                if along is not None and along.alone(margin):
+                if not found[k] or (along is not None and along.alone(margin)):
                     continue
                 selection, low, high = span
                 middle = 0.5 * (low + high)
                 if not halvings or not low < middle < high or (along is not None and along.hopeless):
                     found[k] = False
                     continue
-                rest += [(k, (selection, *part), halvings - 1) for part in ((low, middle), (middle, high))]
-            waiting = [left for left in rest if found[left[0]]]
+                waiting += [(k, (selection, *part), halvings - 1) for part in ((low, middle), (middle, high))]
+            waiting = [part for part in waiting if found[part[0]]]
     return found
 
 

@@ -106,13 +106,19 @@ class Inverse:
             return None
         return cls(M, scale, approximate, defect, u, 1.0 - contraction)
 
-    def solve(self, B: Ball) -> Ball:
-        """All X with M X = B, columns of unknowns."""
-        R = Ball.exact(self.approximate)
-        first = self.approximate @ B.mid
+    def near(self, B: Array) -> Array:
+        """X for which M X is near B; no claim."""
+        return np.asarray(self._near(B) * self._scale[:, None])
+
+    def _near(self, B: Array) -> Array:
+        first = self.approximate @ B
         # One step of refinement, as in verified_solve: without it M X misses B by as much as the inverse is rounded,
         # and forces X leave a resultant that weak springs turn into a large displacement.
-        X = Ball.exact(first + self.approximate @ (B.mid - self._M.mid @ first))
+        return np.asarray(first + self.approximate @ (B - self._M.mid @ first))
+
+    def solve(self, B: Ball) -> Ball:
+        """All X with M X = B, columns of unknowns."""
+        R, X = Ball.exact(self.approximate), Ball.exact(self._near(B.mid))
         step = (R @ (B - self._M @ X)).size
         # |error| <= step + defect |error|; with step <= t u in every column |error| <= t u / (1 - contraction)
         u = self._weights

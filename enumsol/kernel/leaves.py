@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
-from enumsol.kernel.ball_arrays import Ball, determinant_sign, nearly_singular, rough_inverse, smaller, solution
+from enumsol.kernel.ball_arrays import Ball, determinant_sign, nearly_singular, rough_inverse
 from enumsol.kernel.space import OPEN, SLIP_PLUS, STICK
+from enumsol.kernel.turning import LIBRARY, Turning, turned_by
 from enumsol.sectors import SECTORS, direction, end_number
 
 if TYPE_CHECKING:
@@ -117,7 +118,6 @@ class _Leaf:
 
     def __init__(self, system: EnclosedSpace, codes: Sequence[int]) -> None:
         self.system = system
-        self.S, self.g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
         tau = system.tau
         self.open = [i for i, code in enumerate(codes) if code == OPEN]
         self.closed = [i for i, code in enumerate(codes) if code != OPEN]
@@ -128,16 +128,16 @@ class _Leaf:
         self.rows = [*self.closed, *(int(t) for i in self.stick for t in tau[i] if t >= 0)]
         self.column = [self.closed.index(i) for i in self.turning]
         self.t = tau[self.turning].reshape(-1, 2)
-        # tau = unit y and v = w / unit; slips as ``slips`` of FrictionUnits has them, which have the same directions
-        self.unit = system.unit[self.t]
-        self.slip_scale = system.slip_scale[self.turning][:, None] / self.unit
+        # v = w / unit; slips as ``slips`` of FrictionUnits has them, which have the same directions
+        self.slip_scale = system.slip_scale[self.turning][:, None] / system.unit[self.t]
         E = np.zeros((len(system.g), len(self.rows)))
         E[self.rows, np.arange(len(self.rows))] = 1.0
         for i, sign in self.sliding:
             along = int(np.max(tau[i]))
             E[along, self.closed.index(i)] = sign / system.unit[along]
-        self.E0 = E
+        self.E = E
         self.centre, self.half = self._boxes()
+        self._last: tuple[bytes, Turning | None] | None = None
 
     def _boxes(self) -> tuple[Array, Array]:
         """A direction in the middle of every sector, and an angle on both sides that covers it."""
@@ -240,13 +240,12 @@ class _Leaf:
             known = np.maximum(_NEGLIGIBLE, point[2].rad)[:, None]
             return np.where(np.any(state[3].size * radius > known, axis=0), self.half, 0.0)
         # the change of the linear system, where it keeps that from being regular
-        E, d, _ = self._directions(angle, radius)
-        left, sizes, right = np.linalg.svd(self.S.mid[self.rows] @ E.mid)
-        inverse = np.abs(right.T / np.maximum(sizes, UNIT * sizes[0]) @ left.T)
-        widths = zip(self.t, d.rad / self.unit, strict=True)
-        changes = [np.abs(self.S.mid[self.rows][:, t]) @ rad for t, rad in widths]
-        worth = np.array([np.max(inverse @ change) for change in changes])
-        return worth if np.max(changes[int(np.argmax(worth))]) > _SINGULAR else np.zeros_like(worth)
+        turning = self._turning(angle)
+        if turning is None:
+            sizes = np.max(np.abs(self.system.S[self.rows][:, self.t]), axis=0)
+            return np.asarray(np.max(sizes / self.system.unit[self.t], axis=1) * radius)
+        worth = np.max(turning.coupling(radius), axis=0)
+        return worth if np.max(worth) > _SINGULAR else np.zeros_like(worth)
 
     def _outside(self, angle: Array, radius: Array) -> NDArray[np.bool_]:
         """Which directions are outside of their sectors for certain; what lies there belongs to another leaf."""
@@ -255,8 +254,8 @@ class _Leaf:
     def _root(self, state: _State, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open:
         y, w, _, J = state
         slack = self._slacks(y, w, angle, radius)
-        E = self._directions(angle, radius)[0]
-        sign = determinant_sign(self.S[self.rows] @ E) * determinant_sign(J) if np.all(slack > 0) else 0
+        turning = self._turning(angle) if np.all(slack > 0) else None
+        sign = 0 if turning is None else turning.sign * determinant_sign(J)
         if not sign:
             return self._left_open(angle, radius, state)
         least = float(np.min(slack)) if len(slack) else np.inf
@@ -264,66 +263,37 @@ class _Leaf:
 
     # -- evaluation over a box -------------------------------------------------------------------------------------
 
-    def _directions(self, angle: Array, radius: Array) -> tuple[Ball, Ball, Ball]:
-        """E, d (q, 2) and d' (q, 2) over a box of angles."""
-        c, across = self.centre, np.stack([-self.centre[:, 1], self.centre[:, 0]], axis=1)
-        cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        mid_d, mid_turned = cos * c + sin * across, cos * across - sin * c
+    def _directions(self, angle: Array, radius: Array) -> tuple[Ball, Ball]:
+        """d (q, 2) and d' (q, 2) over a box of angles."""
+        mid_d, mid_turned = turned_by(self.centre, angle)
         # |d(psi + r) - d(psi)| <= min(|d'(psi)| r + r^2 / 2, r), and d' likewise; libraries are off by a few units
         r = np.minimum(radius, 2.0)[:, None]
         bent = 0.5 * r * r
-        d = Ball(mid_d, np.minimum(np.abs(mid_turned) * r + bent, r) * SAFE + 64 * UNIT)
-        turned = Ball(mid_turned, np.minimum(np.abs(mid_d) * r + bent, r) * SAFE + 64 * UNIT)
-        mid, rad = self.E0.copy(), np.zeros_like(self.E0)
-        for k, column in enumerate(self.column):
-            mid[self.t[k], column], rad[self.t[k], column] = d.mid[k] / self.unit[k], d.rad[k] / self.unit[k]
-        return Ball(mid, rad), d, turned
+        d = Ball(mid_d, np.minimum(np.abs(mid_turned) * r + bent, r) * SAFE + LIBRARY)
+        return d, Ball(mid_turned, np.minimum(np.abs(mid_d) * r + bent, r) * SAFE + LIBRARY)
+
+    def _turning(self, angle: Array) -> Turning | None:
+        """The linear equations with the directions at these angles in the middle; None if not proven regular there."""
+        key = angle.tobytes()
+        if self._last is None or self._last[0] != key:
+            directions = turned_by(self.centre, angle)
+            self._last = key, Turning.of(self.system, self.E, self.rows, self.column, self.t, directions)
+        return self._last[1]
 
     def _state(self, angle: Array, radius: Array) -> _State | None:
         """y, w, G and dG/dpsi over a box; None where the linear system is not proven regular in it."""
-        q, m = len(angle), len(self.g.mid)
-        E, d, turned = self._directions(angle, radius)
-        PS = self.S[self.rows]
-        x = solution(PS @ E, self.g[self.rows][:, None])
-        if x is None:
+        turning = self._turning(angle)
+        box = None if turning is None else turning.over(radius)
+        if box is None:
             return None
-        y = (E @ x)[:, 0]
-        w = self.g - (self.S @ y[:, None])[:, 0]
-        # w vanishes where the equations say so, exactly
-        w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
-        if not q:
-            return y, w, Ball.exact(np.zeros(0)), Ball.exact(np.zeros((0, 0)))
-        point = None
-        if np.any(radius):
-            point = self._state(angle, np.zeros(q))
-            if point is None:
-                return None
-        span = Ball(np.zeros((q, 1)), radius[:, None])
-        pushed = z = span
-        for _ in range(1 if point is None else 2):
-            pushed = self._pushed(x[self.column] * turned, m)
-            solved = solution(PS @ E, PS @ pushed)
-            if solved is None:
-                return None
-            z = solved
-            if point is not None:
-                # the mean value form: what the box adds to the values in its middle, dx = -z dpsi
-                x = smaller(x, point[0][self.rows][:, None] - z @ span)
-        dy = pushed - E @ z
-        change = self.S @ dy
-        dv = Ball(-change.mid, change.rad)
-        if point is not None:
-            y = smaller(smaller(y, (E @ x)[:, 0]), point[0] + (dy @ span)[:, 0])
-            w = smaller(w, point[1] + (dv @ span)[:, 0])
-        (v1, v2), (dv1, dv2) = self._slips(w), self._slips(dv)
+        (v1, v2), (dv1, dv2) = self._slips(box.w), self._slips(box.dw)
+        d, turned = self._directions(angle, radius)
         d1, d2 = d[:, 0], d[:, 1]
-        G = v1 * d2 - v2 * d1
         J = dv1 * d2[:, None] - dv2 * d1[:, None]
-        along = v1 * turned[:, 1] - v2 * turned[:, 0]
-        diagonal = np.arange(q)
-        corrected = J[diagonal, diagonal] + along
+        diagonal = np.arange(len(angle))
+        corrected = J[diagonal, diagonal] + (v1 * turned[:, 1] - v2 * turned[:, 0])
         J.mid[diagonal, diagonal], J.rad[diagonal, diagonal] = corrected.mid, corrected.rad
-        return y, w, G, J
+        return box.y, box.w, v1 * d2 - v2 * d1, J
 
     def _slips(self, w: Ball) -> tuple[Ball, Ball]:
         """Both components of v at the nodes in sectors, times ``slip_scale`` of FrictionUnits; ``w`` by rows."""
@@ -332,14 +302,6 @@ class _Leaf:
         pairs = zip((first, second), scales, strict=True)
         one, other = (Ball(part.mid * scale, part.rad * scale) for part, scale in pairs)
         return one, other
-
-    def _pushed(self, push: Ball, size: int) -> Ball:
-        """dE/dpsi x: what turning the directions alone does to y."""
-        q = len(self.turning)
-        pushed = Ball(np.zeros((size, q)), np.zeros((size, q)))
-        for k in range(q):
-            pushed.mid[self.t[k], k], pushed.rad[self.t[k], k] = push.mid[k] / self.unit[k], push.rad[k] / self.unit[k]
-        return pushed
 
     def _conditions(self, y: Ball, w: Ball) -> tuple[Array, Array]:
         """Conditions that a root has to satisfy but for directions, as midpoints and radii; stick by |tau| in both.
@@ -369,7 +331,7 @@ class _Leaf:
         Where G vanishes v = t d: none of the three is negative if t >= 0, and t > 0 if one is positive. A component
         alone tells where the rounding of the other would hide it, as its coefficient is much larger.
         """
-        _, d, _ = self._directions(angle, radius)
+        d, _ = self._directions(angle, radius)
         v1, v2 = self._slips(w)
         products = (v1 * d[:, 0] + v2 * d[:, 1], w[self.t[:, 0]] * d[:, 0], w[self.t[:, 1]] * d[:, 1])
         return np.array([product.mid for product in products]), np.array([product.rad for product in products])

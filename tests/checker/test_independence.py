@@ -20,6 +20,7 @@ IN_SPACE = {
     "enumsol.kernel.space",
     "enumsol.kernel.leaves",
     "enumsol.kernel.space_closing",
+    "enumsol.kernel.turning",
     "enumsol.condensation.space",
     "enumsol.sectors",
 }

@@ -137,12 +137,6 @@ def test_the_same_as_the_tree(part):
     assert not all(did)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("part", range(3))
-def test_the_same_as_the_tree_in_many_cases(part):
-    assert sum(compared(seed) for seed in range(1000 + 100 * part, 1100 + 100 * part)) > 50
-
-
 def test_one_node_against_the_closed_form():
     rng, count, several = np.random.default_rng(31), 0, 0
     for _ in range(150):

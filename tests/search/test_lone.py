@@ -57,7 +57,7 @@ def problems(seed):
     return from_condensed(S, random_load(rng, p) if g is None else g, F)
 
 
-@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 3))])
 def test_all_selections_find_the_same(part):
     lone = several = 0
     for seed in range(100 * part, 100 * part + 100):
@@ -79,7 +79,7 @@ def test_all_selections_find_the_same(part):
     assert several > 3
 
 
-@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 10))])
+@pytest.mark.parametrize("part", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_the_tree_without_them_finds_the_same(part):
     fewer = 0
     for seed in range(60 * part, 60 * part + 60):
