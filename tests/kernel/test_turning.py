@@ -125,16 +125,15 @@ def test_values_and_slopes_lie_in_their_balls(seed):
 def test_weak_springs_widen_nothing():
     """A motion of the whole body that hardly anything resists: balls over a box are as wide as without it."""
     wide = []
-    for spread in (0, 4, 8):
+    for spread in (0, 2, 4, 8):
         rng = np.random.default_rng(52)
         G = rng.normal(size=(9, 9))
-        motion = np.concatenate([np.ones(3), np.zeros(6)])
+        motion = rng.normal(size=9)
         S = G @ G.T / 9 + 0.1 * np.eye(9) + 10.0**spread * np.outer(motion, motion)
         # the load that the springs do not feel
         g = S @ np.array([1.0, 2.0, 1.5, 0.1, 0.2, 0.1, 0.0, 0.1, 0.2])
         system = SpaceSystem.scaled(S, g, np.full((3, 2), 0.25))
         leaf = _Leaf(EnclosedSpace.of_floats(system), (STICK, SECTORS + 64, SECTORS + 70))
         state = leaf._state(np.zeros(2), leaf.half)
-        wide.append(np.max(state[0].rad) / np.max(np.abs(state[0].mid)))
-    assert wide[0] > 0
-    assert max(wide) < 3 * wide[0]
+        wide.append([np.max(ball.rad) / np.max(np.abs(ball.mid)) for ball in state])
+    assert np.allclose(wide, wide[0], rtol=0.02)
