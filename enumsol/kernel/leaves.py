@@ -7,14 +7,14 @@ of slip directions. What is concluded here holds for all data in the balls.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
-from enumsol.kernel.ball_arrays import Ball, determinant_sign, nearly_singular, rough_inverse
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm, upper_sum
+from enumsol.kernel.ball_arrays import Ball, determinant_sign, nearly_singular, rough_inverse, smaller
 from enumsol.kernel.space import OPEN, SLIP_PLUS, STICK
-from enumsol.kernel.turning import LIBRARY, Turning, turned_by
+from enumsol.kernel.turning import LIBRARY, Box, Turning, turned_by
 from enumsol.sectors import SECTORS, direction, end_number
 
 if TYPE_CHECKING:
@@ -104,8 +104,14 @@ def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | No
         return _Leaf(system, codes).settle()
 
 
-#: y, w, G and dG/dpsi over a box.
-_State = tuple[Ball, Ball, Ball, Ball]
+class _State(NamedTuple):
+    """y, w, G and dG/dpsi over a box of angles, and what they are made of."""
+
+    y: Ball
+    w: Ball
+    G: Ball
+    J: Ball
+    box: Box
 
 
 class _Leaf:
@@ -162,12 +168,12 @@ class _Leaf:
             state = self._state(angle, radius) or state
             if state is None:
                 break
-            if self._broken(state[0], state[1], angle, radius) or np.any(self._outside(angle, radius)):
+            if self._broken(state.y, state.w, angle, radius) or np.any(self._outside(angle, radius)):
                 return None
             if not q:
                 return self._root(state, angle, radius, reach)
             new_angle, new_radius = angle, radius
-            move = self._move(angle, radius, state[3], rough=rough)
+            move = self._move(angle, radius, state, rough=rough)
             if move is not None:
                 if np.any(np.abs(move.mid) > (move.rad + radius) * SAFE):
                     return None
@@ -177,26 +183,33 @@ class _Leaf:
                     return self._refined(new_angle, new_radius, reach)
             if np.any(new_radius <= 0.9 * radius):
                 angle, radius = new_angle, new_radius
-            elif rough or (move is not None and not nearly_singular(state[3].mid)):
+            elif rough or (move is not None and not nearly_singular(state.J.mid)):
                 break
             else:
                 rough = True
         return self._left_open(angle, radius, state)
 
-    def _move(self, angle: Array, radius: Array, J: Ball, *, rough: bool = False) -> Ball | None:
-        """Krawczyk's operator: a ball of psi - angle for all zeros psi in a box over which J holds dG/dpsi.
+    def _move(self, angle: Array, radius: Array, state: _State, *, rough: bool = False) -> Ball | None:
+        """Krawczyk's operator: a ball of psi - angle for all zeros psi in a box over which the state is known.
 
-        ``rough``: only in the directions in which J is surely not singular, so that those of other nodes are cut.
+        ``rough``: only in the directions in which dG/dpsi is surely not singular, so that those of other nodes are cut.
         """
-        point = self._state(angle, np.zeros(len(angle)))
+        q = len(angle)
+        point = self._state(angle, np.zeros(q))
         if point is None:
             return None
         try:
-            Y = rough_inverse(J) if rough else np.linalg.inv(J.mid)
+            Y = rough_inverse(state.J) if rough else np.linalg.inv(point.J.mid)
         except np.linalg.LinAlgError:
             return None
-        inverse, span = Ball.exact(np.asarray(Y, dtype=np.float64)), Ball(np.zeros(len(angle)), radius)
-        return (Ball.exact(np.eye(len(angle))) - inverse @ J) @ span - inverse @ point[2]
+        inverse, span = Ball.exact(np.asarray(Y, dtype=np.float64)), Ball(np.zeros(q), radius)
+        # Y times the second derivatives first: they are large where Y is small
+        bends = self._bends(state, angle, radius)
+        wide = (inverse @ Ball(bends.mid.reshape(q, -1), bends.rad.reshape(q, -1))).size.reshape(q, q, q) * radius
+        slope = inverse @ point.J
+        slope = Ball(slope.mid, (slope.rad + upper_sum(wide, axis=2)) * SAFE)
+        slope = smaller(slope, inverse @ state.J)
+        return (Ball.exact(np.eye(q)) - slope) @ span - inverse @ point.G
 
     def _refined(self, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open | None:
         """The one zero of a box, enclosed as closely as floats can."""
@@ -204,7 +217,7 @@ class _Leaf:
             if np.any(self._outside(angle, radius)):
                 return None
             state = self._state(angle, radius)
-            move = None if state is None else self._move(angle, radius, state[3])
+            move = None if state is None else self._move(angle, radius, state)
             if move is None:
                 break
             new_angle, new_radius = _cut(angle, radius, reach, move)
@@ -217,7 +230,7 @@ class _Leaf:
         state = self._state(angle, radius)
         if state is None:
             return self._left_open(angle, radius, None)
-        if self._broken(state[0], state[1], angle, radius) or np.any(self._outside(angle, radius)):
+        if self._broken(state.y, state.w, angle, radius) or np.any(self._outside(angle, radius)):
             return None
         return self._root(state, angle, radius, reach)
 
@@ -228,17 +241,17 @@ class _Leaf:
         if len(angle) and (state is None or not np.all(radius < _POINT)):
             worth = self._worth_halving(angle, radius, state)
             node = self.turning[int(np.argmax(worth))] if np.any(worth) else None
-        y, w = (None, None) if state is None else state[:2]
+        y, w = (None, None) if state is None else (state.y, state.w)
         low, high = np.maximum(angle - radius, -self.half), np.minimum(angle + radius, self.half)
         return Open(node, y, w, self.centre, 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT)
 
     def _worth_halving(self, angle: Array, radius: Array, state: _State | None) -> Array:
         """What is expected of halving each sector; 0 where smaller ones would be left open, too."""
         point = self._state(angle, np.zeros(len(angle)))
-        if state is not None and point is not None and np.all(point[0].rad <= _POINT):
+        if state is not None and point is not None and np.all(point.y.rad <= _POINT):
             # the width, where it changes more than what is not known anyway
-            known = np.maximum(_NEGLIGIBLE, point[2].rad)[:, None]
-            return np.where(np.any(state[3].size * radius > known, axis=0), self.half, 0.0)
+            known = np.maximum(_NEGLIGIBLE, point.G.rad)[:, None]
+            return np.where(np.any(state.J.size * radius > known, axis=0), self.half, 0.0)
         # the change of the linear system, where it keeps that from being regular
         turning = self._turning(angle)
         if turning is None:
@@ -252,14 +265,13 @@ class _Leaf:
         return np.abs(angle) - radius > self.half * (1.0 + 1e-9)
 
     def _root(self, state: _State, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open:
-        y, w, _, J = state
-        slack = self._slacks(y, w, angle, radius)
+        slack = self._slacks(state.y, state.w, angle, radius)
         turning = self._turning(angle) if np.all(slack > 0) else None
-        sign = 0 if turning is None else turning.sign * determinant_sign(J)
+        sign = 0 if turning is None else turning.sign * determinant_sign(state.J)
         if not sign:
             return self._left_open(angle, radius, state)
         least = float(np.min(slack)) if len(slack) else np.inf
-        return SpaceRoot(y, w, self.centre, angle, radius, reach, sign, least)
+        return SpaceRoot(state.y, state.w, self.centre, angle, radius, reach, sign, least)
 
     # -- evaluation over a box -------------------------------------------------------------------------------------
 
@@ -293,7 +305,24 @@ class _Leaf:
         diagonal = np.arange(len(angle))
         corrected = J[diagonal, diagonal] + (v1 * turned[:, 1] - v2 * turned[:, 0])
         J.mid[diagonal, diagonal], J.rad[diagonal, diagonal] = corrected.mid, corrected.rad
-        return box.y, box.w, v1 * d2 - v2 * d1, J
+        return _State(box.y, box.w, v1 * d2 - v2 * d1, J, box)
+
+    def _bends(self, state: _State, angle: Array, radius: Array) -> Ball:
+        """Second derivatives of G over a box, (q, q, q)."""
+        box, (d, turned), own = state.box, self._directions(angle, radius), np.arange(len(angle))
+        (b1, b2), (dv1, dv2), (v1, v2) = (self._slips(part) for part in (box.bends(), box.dw, box.w))
+        d1, d2 = d[:, 0], d[:, 1]
+        bends = b1 * d2[:, None, None] - b2 * d1[:, None, None]
+        turn = dv1 * turned[:, 1][:, None] - dv2 * turned[:, 0][:, None]
+        # psi_i turns d_i itself, in both orders, and d_i'' = -d_i
+        for part, add in (
+            ((own, slice(None), own), turn),
+            ((own, own, slice(None)), turn),
+            ((own, own, own), v2 * d1 - v1 * d2),
+        ):
+            there = bends[part] + add
+            bends.mid[part], bends.rad[part] = there.mid, there.rad
+        return bends
 
     def _slips(self, w: Ball) -> tuple[Ball, Ball]:
         """Both components of v at the nodes in sectors, times ``slip_scale`` of FrictionUnits; ``w`` by rows."""

@@ -33,21 +33,42 @@ def turned_by(centre: Array, angle: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Box:
-    """Values over a box of angles and their derivatives with respect to these.
+    """Values over a box of angles, and their derivatives with respect to these.
 
     Attributes
     ----------
     y, w : Ball of shape (m,)
         w is zero, exactly, where the equations say so.
     dw : Ball of shape (m, q)
-    x : Ball of shape (q, 1)
+    x : Ball of shape (q,)
         The turning nodes' normal forces.
+    z : Ball of shape (q, q)
+        -dx_i / dpsi_j is z_ij x_j.
+    along : Ball of shape (m, q)
+        Change of w with forces of size one along d.
+    across : Ball of shape (m, q)
+        The same a quarter turn further, so that dw_j is across_j x_j.
     """
 
     y: Ball
     w: Ball
     dw: Ball
     x: Ball
+    z: Ball
+    along: Ball
+    across: Ball
+
+    def bends(self) -> Ball:
+        """Second derivatives of w with respect to the angles, (m, q, q)."""
+        across, q = self.across, len(self.x.mid)
+        # d^2 w / dpsi_j dpsi_k = -(across_k z_kj x_j + across_j z_jk x_k), and -along_j x_j more where j = k
+        moved = self.z * self.x
+        half = across[:, None, :] * Ball(moved.mid.T, moved.rad.T)
+        bends = half + Ball(half.mid.transpose(0, 2, 1), half.rad.transpose(0, 2, 1))
+        diagonal = np.arange(q)
+        own = bends[:, diagonal, diagonal] + self.along * self.x
+        bends.mid[:, diagonal, diagonal], bends.rad[:, diagonal, diagonal] = own.mid, own.rad
+        return Ball(-bends.mid, bends.rad)
 
 
 @dataclass(frozen=True)
@@ -120,7 +141,7 @@ class Turning:
             none, start = Ball.exact(np.zeros((0, 0))), Ball(system.g, system.g_rad)
             start = _stacked(Ball.exact(np.zeros_like(system.g)), start)
             change = Ball.exact(np.zeros((len(start.mid), 0)))
-            return cls(d, turned, Ball.exact(np.zeros((0, 1))), start, none, change, none, rows, np.zeros(0))
+            return cls(d, turned, Ball.exact(np.zeros(0)), start, none, change, none, rows, np.zeros(0))
         E = E.copy()
         E[t, np.asarray(column, dtype=np.intp)[:, None]] = d
         S, sparse, both = Ball(system.S, system.S_rad), Ball.exact(E), t.ravel()
@@ -146,7 +167,7 @@ class Turning:
         start, change = _stacked(y[:, 0], w[:, 0]), _stacked(Ball.exact(unit_forces) - y[:, 1:], w[:, 1:])
         change = Ball(np.where(np.arange(len(change.mid))[:, None] < len(y.mid), 1.0, -1.0) * change.mid, change.rad)
         x = x[list(column)]
-        return cls(d, turned, x[:, :1], start, x[:, 1:], change, matrix, rows, LIBRARY / np.min(units, axis=1))
+        return cls(d, turned, x[:, 0], start, x[:, 1:], change, matrix, rows, LIBRARY / np.min(units, axis=1))
 
     @property
     def sign(self) -> int:
@@ -167,8 +188,8 @@ class Turning:
         """Sizes of B_c D over a box, (q, q): nothing is singular in it while they are small."""
         return self._turned(self.B, radius)[0].size
 
-    def _turned(self, A: Ball, radius: Array) -> tuple[Ball, Ball]:
-        """A D and A dD/dpsi for changes D of the directions over a box; A has two columns for every turning node."""
+    def _turned(self, A: Ball, radius: Array) -> tuple[Ball, Ball, Ball]:
+        """A D, A dD/dpsi and A d for directions d and their changes D over a box; A has two columns for every node."""
         first, second = A[:, 0::2], A[:, 1::2]
         along, across = (first * Ball.exact(d[:, 0]) + second * Ball.exact(d[:, 1]) for d in (self.d, self.turned))
         rounding = Ball(np.zeros_like(along.mid), (first.size + second.size) * self.off * SAFE)
@@ -176,33 +197,37 @@ class Turning:
         sin = Ball(0.0 * radius, np.where(radius < 1.5, np.minimum(radius, np.sin(radius) * (1.0 + LIBRARY)), 1.0))
         half = np.minimum(0.25 * radius * radius * SAFE, 1.0)
         lost = Ball(half, half)
+        cos = Ball.exact(np.ones(len(half))) - lost
         return (
             across * sin - along * lost + rounding,
-            across * (Ball.exact(np.ones(len(half))) - lost) - along * sin + rounding,
+            across * cos - along * sin + rounding,
+            along * cos + across * sin + rounding,
         )
 
     def _over(self, radius: Array, point: Box | None) -> Box | None:
         q, m = len(radius), len(self.start.mid) // 2
-        moved, push = self._turned(self.change, radius)
-        B_moved, B_push = self._turned(self.B, radius)
-        x, z, span = self.x, Ball.exact(np.zeros((q, q))), Ball(np.zeros((q, 1)), radius[:, None])
+        moved, push, ahead = self._turned(self.change, radius)
+        B_moved, B_push, B_ahead = self._turned(self.B, radius)
+        x, z, straight = self.x, Ball.exact(np.zeros((q, q))), Ball.exact(np.zeros((q, q)))
         if q:
             inverse = Inverse.of(Ball.exact(np.eye(q)) + B_moved)
             if inverse is None:
                 return None
-            x = inverse.solve(self.x)
-            for _ in range(1 if point is None else 2):
-                z = inverse.solve(B_push * Ball(x.mid.T, x.rad.T))
-                if point is not None:
-                    # the mean value form: what the box adds to the values in its middle, dx = -z dpsi
-                    x = smaller(x, point.x - z @ span)
-        value, slope = self.start + (moved @ x)[:, 0], push * Ball(x.mid.T, x.rad.T) - moved @ z
+            both = Ball(np.hstack([B_push.mid, B_ahead.mid]), np.hstack([B_push.rad, B_ahead.rad]))
+            both, x = inverse.solve(both), inverse.solve(self.x[:, None])[:, 0]
+            z, straight = both[:, :q], both[:, q:]
+        span = Ball(np.zeros((q, 1)), radius[:, None])
+        if point is not None:
+            for _ in range(2):
+                # the mean value form: what the box adds to the values in its middle, dx = -z x dpsi
+                x = smaller(x, point.x - ((z * x) @ span)[:, 0])
+        across, along = push - moved @ z, ahead - moved @ straight
+        value, slope = self.start + (moved @ x[:, None])[:, 0], across * x
         if point is not None:
             value = smaller(value, _stacked(point.y, point.w) + (slope @ span)[:, 0])
-        w, dw = value[m:], slope[m:]
-        for part in (w, dw):
-            part.mid[self.rows], part.rad[self.rows] = 0.0, 0.0
-        return Box(value[:m], w, dw, x)
+        w = value[m:]
+        w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
+        return Box(value[:m], w, slope[m:], x, z, along[m:], across[m:])
 
 
 def _stacked(upper: Ball, lower: Ball) -> Ball:
