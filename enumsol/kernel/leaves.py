@@ -104,6 +104,12 @@ def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | No
         return _Leaf(system, codes).settle()
 
 
+def unsettled(system: EnclosedSpace, codes: Sequence[int]) -> Open:
+    """A leaf of which nothing is known but its sectors."""
+    leaf = _Leaf(system, codes)
+    return Open(None, None, None, leaf.centre, np.zeros(len(leaf.half)), leaf.half)
+
+
 class _State(NamedTuple):
     """y, w, G and dG/dpsi over a box of angles, and what they are made of."""
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
+from enumsol.deadlines import over
 from enumsol.kernel.ball_arrays import Ball, smaller, solution
-from enumsol.kernel.leaves import settle
+from enumsol.kernel.leaves import settle, unsettled
 from enumsol.sectors import SECTORS
 from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
@@ -67,7 +68,8 @@ def regions_of(system: EnclosedSpace, leaves: Sequence[Codes]) -> list[Region]:
     """Undecided leaves as regions, in the order of their first leaves.
 
     Two leaves touch if their bounds of forces and displacements meet and, at every node that slips in both, those of
-    its direction. Statuses may differ: at a border of two statuses the bounds of both leaves meet.
+    its direction. Statuses may differ: at a border of two statuses the bounds of both leaves meet. Leaves left
+    when the time is over get the bounds that all solutions have.
     """
     boxes = _boxes(system, leaves)
     left = np.arange(len(leaves))
@@ -139,7 +141,7 @@ def _boxes(system: EnclosedSpace, leaves: Sequence[Codes]) -> _Boxes:
     everywhere = _energy_bounds(system)
     S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
     for k, codes in enumerate(leaves):
-        leaf = settle(system, codes)
+        leaf = unsettled(system, codes) if over() else settle(system, codes)
         angle[k], radius[k] = slip_angles(system, codes, leaf)
         y = everywhere if leaf is None or leaf.y is None else smaller(leaf.y, everywhere)
         w = g - (S @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]

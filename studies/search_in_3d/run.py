@@ -6,6 +6,9 @@ check; one process, one problem after the other. A search is cut at a number of 
 Read ``nodes`` against ``slip``, the slipping nodes of the solution: every one of them has a direction to be found. The
 column ``leaves`` counts the leaves that were tested by Krawczyk's operator, ``check s`` is the checker's time.
 
+``wedges`` are held by weak springs, which all their contact nodes together hardly feel: they have several solutions,
+and S has eigenvalues far apart.
+
 ``degenerate`` are problems with three nodes whose search is long all the same: with small integers conditions hold with
 equality, and one region (``largest region``) may take hundreds of leaves; with much friction many selections come near
 to holding. They are kept to see what a change does to them.
@@ -27,16 +30,18 @@ if TYPE_CHECKING:
 #: Cells of the blocks, which have 4, 9, 12, 16 and 25 contact nodes.
 BLOCKS, SMOKE_BLOCKS = ((2, 1, 2), (3, 2, 2), (4, 2, 2), (4, 3, 2), (5, 4, 2)), ((2, 1, 2),)
 FRICTION = (0.3, 0.5, 1.0, 3.0)
-MAX_NODES = 20_000
+MAX_NODES, MOST_WEDGES = 20_000, 100_000
+#: Cells of the wedges, which have 8 and 12 contact nodes with multipliers at the nodes.
+WEDGES = (1, 1, 2), (2, 1, 2), (2, 2, 2)
+WEDGE_FRICTION = (1.0, 2.0, 3.0)
 
 
-def row(cells, F):
+def row(problem, F, **limits):
     """One search and the check of its proof."""
-    problem = enumsol.gallery.block3d(*cells)
     started = process_time()
     problem.enclosure  # noqa: B018 (made once, and timed apart)
     enclosed = process_time()
-    roots = enumsol.enumerate_roots(problem, F, max_nodes=MAX_NODES)
+    roots = enumsol.enumerate_roots(problem, F, **limits)
     searched = process_time()
     report = enumsol.verify(problem, roots.proof)
     checked = process_time()
@@ -58,7 +63,8 @@ def row(cells, F):
 
 
 def main(run: Run) -> None:
-    rows = [row(cells, F) for cells in (SMOKE_BLOCKS if run.smoke else BLOCKS) for F in FRICTION]
+    blocks = [enumsol.gallery.block3d(*cells) for cells in (SMOKE_BLOCKS if run.smoke else BLOCKS)]
+    rows = [row(block, F, max_nodes=MAX_NODES) for block in blocks for F in FRICTION]
     cut = [f"p = {r['p']}, F = {r['F']}" for r in rows if not r["complete"]]
     hardest = max((r for r in rows if r["complete"]), key=lambda r: r["nodes"])
     run.table(
@@ -69,7 +75,18 @@ def main(run: Run) -> None:
         f"{hardest['search s']:.1f} s, its proof checked in {hardest['check s']:.1f} s",
         f"every proof accepted: {all(r['accepted'] for r in rows)}",
     )
+    wedges(run)
     degenerate(run)
+
+
+def wedges(run: Run) -> None:
+    """The table of wedges on weak springs."""
+    rows, most = [], SMOKE_NODES if run.smoke else MOST_WEDGES
+    for cells in WEDGES:
+        for F in WEDGE_FRICTION:
+            problem = enumsol.gallery.wedge3d(*cells, friction=F, multipliers="nodes")
+            rows.append({"wedge": "x".join(map(str, cells)), **row(problem, 0, max_nodes=most), "F": F})
+    run.table("wedges", rows, f"every proof accepted: {all(r['accepted'] for r in rows)}")
 
 
 def degenerate(run: Run) -> None:

@@ -71,3 +71,24 @@ def test_a_wedge_pulled_straight_is_its_own_mirror_image():
     # it slides out of the notch on both walls, pressed together: along the first axis
     assert np.all(out.u_t[:, 0] > 0)
     assert np.all(np.abs(out.slip_angle) < 0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("size", "friction", "count"), [((1, 1, 2), 2, 5), ((2, 1, 2), 1, 3)], ids=str)
+def test_eight_nodes_on_weak_springs(size, friction, count):
+    """The wall hardly resists a motion of all nodes together: S has eigenvalues far apart."""
+    problem = enumsol.gallery.wedge3d(*size, friction=friction, multipliers="nodes")
+    roots = enumsol.enumerate_roots(problem, 0)
+    assert roots.complete
+    assert len(roots) == count
+    assert roots.index_sum == 1
+    condensed = problem.condensed
+    data = condensed.S, condensed.free_displacements(0), problem.friction_at(0)
+    for root in roots:
+        assert oracles3d.violation(*data, forces(root)) < 1e-9
+        assert oracles3d.index(*data, forces(root)) == root.index
+    missed, _ = unmatched(roots, oracles3d.newton_set(*data, 3000, np.random.default_rng(1)))
+    assert not missed
+    report = enumsol.verify(problem, roots.proof)
+    assert report.complete
+    assert report.roots == count
