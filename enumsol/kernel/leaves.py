@@ -7,6 +7,7 @@ of slip directions. What is concluded here holds for all data in the balls.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -75,6 +76,15 @@ class SpaceRoot:
     slack: float
 
 
+class Cause(Enum):
+    """Why a leaf is not settled."""
+
+    EQUALITY = "a condition holds with equality, or nearly so, at what may be a root"
+    DIRECTIONS = "slip directions are not isolated, or hardly so, at what may be a root: a fold or a continuum is near"
+    EQUATIONS = "the equations of its statuses are singular, or nearly so, for some slip directions: the body may wedge"
+    ROUNDING = "rounding leaves the forces there open: the body is almost free to move"
+
+
 @dataclass(frozen=True)
 class Open:
     """A leaf that is not settled, with bounds of all solutions in it.
@@ -88,6 +98,8 @@ class Open:
     centre : (q, 2) array
     angle, angle_rad : (q,) arrays
         As in SpaceRoot.
+    cause : Cause
+        What stands in the way, as computed in the middle of the box; no claim.
     """
 
     node: int | None
@@ -96,6 +108,7 @@ class Open:
     centre: Array
     angle: Array
     angle_rad: Array
+    cause: Cause
 
 
 def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | None:
@@ -107,7 +120,7 @@ def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | No
 def unsettled(system: EnclosedSpace, codes: Sequence[int]) -> Open:
     """A leaf of which nothing is known but its sectors."""
     leaf = _Leaf(system, codes)
-    return Open(None, None, None, leaf.centre, np.zeros(len(leaf.half)), leaf.half)
+    return Open(None, None, None, leaf.centre, np.zeros(len(leaf.half)), leaf.half, Cause.EQUALITY)
 
 
 class _State(NamedTuple):
@@ -249,7 +262,16 @@ class _Leaf:
             node = self.turning[int(np.argmax(worth))] if np.any(worth) else None
         y, w = (None, None) if state is None else (state.y, state.w)
         low, high = np.maximum(angle - radius, -self.half), np.minimum(angle + radius, self.half)
-        return Open(node, y, w, self.centre, 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT)
+        cause = self._cause(angle, state)
+        return Open(node, y, w, self.centre, 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT, cause)
+
+    def _cause(self, angle: Array, state: _State | None) -> Cause:
+        point = self._state(angle, np.zeros(len(angle)))
+        if state is None or point is None:
+            return Cause.EQUATIONS
+        if not np.all(point.y.rad <= _POINT):
+            return Cause.ROUNDING
+        return Cause.DIRECTIONS if len(angle) and nearly_singular(point.J.mid) else Cause.EQUALITY
 
     def _worth_halving(self, angle: Array, radius: Array, state: _State | None) -> Array:
         """What is expected of halving each sector; 0 where smaller ones would be left open, too."""

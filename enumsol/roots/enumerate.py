@@ -303,7 +303,7 @@ class _Enumeration(Enumeration[Solvers]):
             stopped=None if outcome.stopped is None else str(outcome.stopped),
             stats=self._stats(),
             node_ids=solvers.problem.node_ids,
-            at_least=None if whole else separate + int(joinable),
+            at_least=None if whole else self._at_least(separate + int(joinable)),
             certified_data=solvers.data,
             proof=self._proof(roots=len(roots), families=len(families)),
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -81,7 +82,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             stopped=None if outcome.stopped is None else str(outcome.stopped),
             stats=self._stats(),
             node_ids=self.problem.node_ids,
-            at_least=None if whole else max(len(roots) - len(doubtful), min(len(roots), 1)),
+            at_least=None if whole else self._at_least(len(roots) - len(doubtful)),
             proof=self._proof(roots=len(roots)),
         )
 
@@ -214,20 +215,22 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
     # -- what stayed undecided -------------------------------------------------------------------------------------
 
     def _undecided(self, parts: Sequence[UndecidedPart]) -> list[Undecided]:
-        """Leaves as regions, then the parts that were not searched."""
-        leaves = [part for part in parts if part.examined]
-        regions = regions_of(self.enclosed, [part.codes for part in leaves]) if leaves else []
-        found = [
-            Undecided(
-                statuses=_common([_names(codes) for codes in region.codes]),
-                reason=leaves[0].reason,
-                hint=leaves[0].hint,
-                leaves=len(region.codes),
-                slip_angle=region.slip_angle,
-                bounds=self._enclosure(region.y, region.w) if self.arithmetic == "verified" else None,
+        """Leaves as regions, with the reason that most of their leaves have, then the parts that were not searched."""
+        leaves = {part.codes: part for part in parts if part.examined}
+        found = []
+        for region in regions_of(self.enclosed, list(leaves)) if leaves else ():
+            reasons = Counter((leaves[codes].reason, leaves[codes].hint) for codes in region.codes)
+            ((reason, hint), _), *_ = reasons.most_common()
+            found.append(
+                Undecided(
+                    statuses=_common([_names(codes) for codes in region.codes]),
+                    reason=reason,
+                    hint=hint,
+                    leaves=len(region.codes),
+                    slip_angle=region.slip_angle,
+                    bounds=self._enclosure(region.y, region.w) if self.arithmetic == "verified" else None,
+                )
             )
-            for region in regions
-        ]
         rest = [part for part in parts if not part.examined]
         return found + [Undecided(_names(part.codes), part.reason, part.hint) for part in rest]
 

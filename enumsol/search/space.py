@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.kernel.leaves import Open, SpaceRoot, settle
+from enumsol.kernel.leaves import Cause, Open, SpaceRoot, settle
 from enumsol.kernel.space import exclusion_margin, row_terms
 from enumsol.kernel.space_closing import OnlySolution, only_root, only_solution
 from enumsol.proof.reading_space import multipliers_in_space
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 _PLACED = 1e-3
 #: Where all are smaller than this (scaled), relative to this.
 _SMALL_FORCE = 1e-6
-_DEGENERATE = "a condition holds with equality, or nearly so, at what may be a root"
+_PERTURB, _HOLD = "perturb the load, by 1e-4 of its largest entry, say", "hold the body by stiffer springs"
 
 
 class SpaceSplitting:
@@ -174,8 +174,9 @@ class SpaceCertifier:
         elif isinstance(answer, Open):
             if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
                 return Refine(answer.node)
-            self._leaf("u", _DEGENERATE)
-            return UndecidedPart(codes, _DEGENERATE, "perturb the load or the friction coefficients", examined=True)
+            self._leaf("u", answer.cause.value)
+            hint = _HOLD if answer.cause is Cause.ROUNDING else _PERTURB
+            return UndecidedPart(codes, answer.cause.value, hint, examined=True)
         else:
             self._roots[codes] = answer
             unit = self.enclosed.unit

@@ -1,5 +1,6 @@
 """Degenerate roots and continua in 3D: one undecided region each, which holds what is known by construction."""
 
+import dataclasses
 import json
 from concurrent.futures import ProcessPoolExecutor
 
@@ -8,10 +9,12 @@ import oracles3d
 import pytest
 import scipy.linalg
 from problems3d import from_compliance, random_coupled
+from roots.test_space_weak_springs import body
 
 import enumsol
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.cli import root_report
+from enumsol.kernel.leaves import Cause
 from enumsol.roots.space_regions import _hull, regions_of
 from enumsol.search.space_solvers import SpaceSolvers
 from enumsol.sectors import SECTORS
@@ -86,7 +89,7 @@ def test_one_region_that_holds_what_is_known(name):
     assert np.all(region.bounds.u_n[:, 1] <= 0)
     # nothing of it is claimed
     assert not roots.complete
-    assert (roots.at_least, roots.index_sum) == (0, None)
+    assert (roots.at_least, roots.index_sum) == (1, None)  # there is a solution, whatever the data
     text = repr(roots)
     assert f"undecided region 0: {', '.join(('1 ' if len(nodes) > 1 else '') + (s or 'any') for s in statuses)}" in (
         text.replace("2 contact", "1 contact, 1 contact")
@@ -232,3 +235,43 @@ def test_neighbouring_sectors_touch_and_others_do_not():
     assert groups(3, 4) == groups(15, 0) == groups(4, 2, 3) == groups(*range(16)) == 1
     assert groups(3, 5) == groups(0, 14) == 2
     assert groups(1, 5, 9, 13) == 4
+
+
+# -- reasons -----------------------------------------------------------------------------------------------------------
+
+
+def undecided_and_perturbed(problem):
+    """Reasons of a problem's regions, and whether the problem with a load that is a little different is complete."""
+    roots = enumerate_roots(problem, 0, max_nodes=400)
+    assert not roots.complete
+    assert "at least 1 in all" in repr(roots)
+    change = 1e-4 * np.max(np.abs(problem.f)) * np.random.default_rng(5).normal(size=problem.n)
+    near = enumerate_roots(dataclasses.replace(problem, f=problem.f + change), 0, max_nodes=400)
+    return {(region.reason, region.hint) for region in roots.undecided}, near.complete
+
+
+def integers(seed):
+    """A small integer stiffness, and a load in balance with tangential forces alone."""
+    rng = np.random.default_rng([seed, 10])
+    X = rng.integers(-2, 3, (9, 9))
+    A = (X @ X.T + np.eye(9)).astype(float)
+    rng.integers(0, 2, 3)
+    f, F = A @ np.concatenate([np.zeros(3), rng.integers(-1, 2, 6)]), rng.integers(1, 3, 3)
+    rows = np.eye(9)
+    return enumsol.ContactProblem3D(A, rows[:3], rows[3:6], rows[6:], f, friction=(F, F))
+
+
+def test_the_reason_is_what_stands_in_the_way_and_the_hint_helps():
+    perturb = "perturb the load, by 1e-4 of its largest entry, say"
+    wedging = from_compliance(*(np.array(part, dtype=float) for part in RAY), (np.ones(1), np.ones(1)))
+    assert undecided_and_perturbed(wedging) == ({(Cause.EQUATIONS.value, perturb)}, True)
+    stuck = from_compliance(np.eye(3), np.array([5.0, 4.0, 3.0]), (np.ones(1), np.ones(1)))
+    assert undecided_and_perturbed(stuck) == ({(Cause.EQUALITY.value, perturb)}, True)
+    assert undecided_and_perturbed(integers(8)) == ({(Cause.DIRECTIONS.value, perturb)}, True)
+
+
+def test_a_body_that_is_almost_free_to_move():
+    roots = enumerate_roots(body(1e-9, 0.1), 0, max_nodes=600)
+    reasons = {(region.reason, region.hint) for region in roots.undecided}
+    assert (Cause.ROUNDING.value, "hold the body by stiffer springs") in reasons
+    assert enumerate_roots(body(1e-8, 0.1), 0).complete
