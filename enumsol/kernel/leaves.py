@@ -281,12 +281,11 @@ class _Leaf:
             known = np.maximum(_NEGLIGIBLE, point.G.rad)[:, None]
             return np.where(np.any(state.J.size * radius > known, axis=0), self.half, 0.0)
         # the change of the linear system, where it keeps that from being regular
+        widths = self._directions(angle, radius)[0].rad / self.system.unit[self.t]
+        changes = np.max(np.sum(np.abs(self.system.S[self.rows][:, self.t]) * widths, axis=2), axis=0)
         turning = self._turning(angle)
-        if turning is None:
-            sizes = np.max(np.abs(self.system.S[self.rows][:, self.t]), axis=0)
-            return np.asarray(np.max(sizes / self.system.unit[self.t], axis=1) * radius)
-        worth = np.max(turning.coupling(radius), axis=0)
-        return worth if np.max(worth) > _SINGULAR else np.zeros_like(worth)
+        worth = changes if turning is None else np.max(turning.coupling(radius), axis=0)
+        return worth if changes[int(np.argmax(worth))] > _SINGULAR else np.zeros_like(worth)
 
     def _outside(self, angle: Array, radius: Array) -> NDArray[np.bool_]:
         """Which directions are outside of their sectors for certain; what lies there belongs to another leaf."""

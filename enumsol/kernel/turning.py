@@ -1,4 +1,4 @@
-"""The linear equations of a leaf in 3D over a box of slip directions, by what turning them changes (theory, 12.3)."""
+"""The linear equations of a leaf in 3D over a box of slip directions (theory, section 12.3)."""
 
 from __future__ import annotations
 
