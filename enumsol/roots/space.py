@@ -12,7 +12,7 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE, UNIT
 from enumsol.errors import InvalidArgumentError
 from enumsol.kernel.ball_arrays import Ball
-from enumsol.kernel.leaves import distinct_roots
+from enumsol.kernel.leaves import Cause, distinct_roots
 from enumsol.kernel.space_closing import OnlySolution
 from enumsol.roots.enumeration import Enumeration
 from enumsol.roots.root import Enclosure
@@ -215,12 +215,14 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
     # -- what stayed undecided -------------------------------------------------------------------------------------
 
     def _undecided(self, parts: Sequence[UndecidedPart]) -> list[Undecided]:
-        """Leaves as regions, with the reason that most of their leaves have, then the parts that were not searched."""
+        """Leaves as regions, with a reason that leaves of them have, then the parts that were not searched."""
         leaves = {part.codes: part for part in parts if part.examined}
         found = []
         for region in regions_of(self.enclosed, list(leaves)) if leaves else ():
-            reasons = Counter((leaves[codes].reason, leaves[codes].hint) for codes in region.codes)
-            ((reason, hint), _), *_ = reasons.most_common()
+            reasons = [(leaves[codes].reason, leaves[codes].hint) for codes in region.codes]
+            # at the borders of what is singular conditions hold with equality as well
+            telling = [each for each in reasons if each[0] != Cause.EQUALITY.value]
+            ((reason, hint), _), *_ = Counter(telling or reasons).most_common()
             found.append(
                 Undecided(
                     statuses=_common([_names(codes) for codes in region.codes]),
