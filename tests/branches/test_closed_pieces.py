@@ -137,6 +137,7 @@ def only_where_alone(seed, count):
     return yes, several
 
 
+@pytest.mark.slow
 def test_what_the_kernel_says_is_true():
     yes, several = only_where_alone(1, 20)
     assert yes > 25

@@ -60,6 +60,7 @@ def test_a_parallel_run_gives_the_same_table(square, pool):
     assert seen[-1] == (5, 5)
 
 
+@pytest.mark.slow
 def test_two_dask_workers_give_the_same_table(square):
     import distributed
 

@@ -63,6 +63,7 @@ def test_gallery_graphs_cut_short_claim_nothing_false(name):
         assert list(false_claims_of_graph(graph, full)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("calls", [1, 2, 3])
 def test_a_graph_cut_short_by_an_interruption_claims_nothing_false(calls):

@@ -157,6 +157,7 @@ def test_a_small_file_of_one_long_record(name, part, monkeypatch):
     assert effort.memory < 20e6
 
 
+@pytest.mark.slow
 def test_no_file_is_expanded_beyond_its_size(monkeypatch):
     problem = gallery.chain(8)
     header = {"format": "enumsol-proof", "version": 1, "problem": problem.fingerprint, "alpha": "5", "p": 8}

@@ -20,6 +20,7 @@ def test_every_root_is_a_fixed_point(name, alpha, count):
         assert fixed_point_residual(problem, root) < 1e-8
 
 
+@pytest.mark.slow
 def test_every_root_of_random_problems_is_a_fixed_point(rng):
     several = 0
     for k in range(120):

@@ -152,6 +152,7 @@ def test_what_is_changed_is_refused_or_true(part):
     assert accepted > 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", ["equations of free nodes", "narrow gaps"])
 def test_a_wrong_test_is_seen(wrong, monkeypatch):
     """Squares of what does not vanish, and gaps that are not bounds: roots are then said to be alone that are not."""
@@ -171,6 +172,7 @@ def test_a_wrong_test_is_seen(wrong, monkeypatch):
     assert false > 5
 
 
+@pytest.mark.slow
 def test_gaps_hold_at_all_roots():
     for _, case, codes, _selection, (_, _, rows, values) in cases(range(120)):
         bounds = gaps(case.system, codes, rows, values)

@@ -71,6 +71,7 @@ def check_claims(count, start=0):
     return made
 
 
+@pytest.mark.slow
 def test_claims_over_parts_are_true():
     made = check_claims(300)
     assert min(made.values()) > 20, made

@@ -87,6 +87,7 @@ def descend(rng, system, engine):
         node = node.child(*rows_of(codes, F, [i]), last=bool(rng.random() < 0.5))
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_values_agree_with_an_interior_point_solver(seed):

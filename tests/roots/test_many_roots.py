@@ -44,6 +44,7 @@ def test_memory_of_a_coupled_chain_grows_like_its_answer():
     assert large < 1.1 * 6 / 4 * small
 
 
+@pytest.mark.slow
 def test_chain_of_eight_with_coupling():
     roots = enumsol.enumerate_roots(gallery.chain(8, 0.01), 5.0, "fast")
     assert len(roots) == 6561

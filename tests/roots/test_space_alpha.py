@@ -66,6 +66,7 @@ def check(problem, alpha, roots, S, g, F, wanted):
     assert report.roots == len(wanted)
 
 
+@pytest.mark.slow
 @pytest.mark.few(1)
 @pytest.mark.parametrize("seed", [0, 3])
 def test_one_node_against_the_closed_form(seed):

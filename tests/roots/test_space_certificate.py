@@ -189,6 +189,7 @@ def random_numbers(rng, theta):
     return mu, kappa, rng.uniform(0, mu) * nu / np.linalg.norm(nu), theta
 
 
+@pytest.mark.slow
 def test_the_sum_over_two_solutions_is_not_negative():
     rng, pairs = np.random.default_rng(17), 0
     for _ in range(500):

@@ -168,6 +168,7 @@ def test_the_roots_are_those_of_all_selections(every_node, seed):
     assert [root.active for root in tree] == [root.active for root in exact]
 
 
+@pytest.mark.slow
 def test_the_roots_without_rationals(monkeypatch, every_node):
     complete = degenerate = 0
     for seed in range(60):

@@ -220,6 +220,7 @@ def test_a_graph_cut_short_says_what_it_found_and_no_more(name, nodes):
                 getattr(graph, question)
 
 
+@pytest.mark.slow
 @pytest.mark.few(2)
 @pytest.mark.parametrize("name", ["two-node-6.4", "chain-4", "one-node-6.3"])
 def test_a_selection_that_the_search_left_out_is_taken_in_and_told(name):

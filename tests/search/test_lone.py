@@ -21,6 +21,7 @@ def kinds(proof):
     return [record[0] for record in records_of(proof)[1:-1]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "traction", "alpha"),
     [
@@ -79,6 +80,7 @@ def test_all_selections_find_the_same(part):
     assert several > 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_the_tree_without_them_finds_the_same(part):
     fewer = 0
