@@ -9,25 +9,20 @@ if TYPE_CHECKING:
     from enumsol import arithmetic as arithmetic
     from enumsol import branches as branches
     from enumsol import checker as checker
-    from enumsol import checks as checks
     from enumsol import condensation as condensation
     from enumsol import continuation as continuation
-    from enumsol import equation as equation
     from enumsol import errors as errors
     from enumsol import fem as fem
     from enumsol import fixed_points as fixed_points
     from enumsol import gallery
     from enumsol import io as io
-    from enumsol import kernel as kernel
-    from enumsol import problem as problem
+    from enumsol import model as model
     from enumsol import proof as proof
     from enumsol import relaxation as relaxation
     from enumsol import roots as roots
     from enumsol import search as search
     from enumsol import selections as selections
-    from enumsol import statuses as statuses
-    from enumsol.body2d import PlaneMesh
-    from enumsol.body3d import BodyMesh, SlipMean
+    from enumsol import trusted as trusted
     from enumsol.branches import BranchGraph, branch_graph, link_samples, multiplicity_table
     from enumsol.checker.reports import VerificationReport
     from enumsol.checker.verify import verify
@@ -42,7 +37,7 @@ if TYPE_CHECKING:
         local_branch_test,
         newton,
     )
-    from enumsol.equation import PiecewiseSmoothEquation
+    from enumsol.continuation.equation import PiecewiseSmoothEquation
     from enumsol.errors import (
         EnumsolError,
         FrictionJumpWarning,
@@ -63,11 +58,14 @@ if TYPE_CHECKING:
         solve_tresca,
         successive_approximations,
     )
-    from enumsol.friction import FrictionTable
     from enumsol.io import read_problem, write_problem
     from enumsol.io.vtu import write_vtu
-    from enumsol.problem import ContactProblem
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.body2d import PlaneMesh
+    from enumsol.model.body3d import BodyMesh, SlipMean
+    from enumsol.model.friction import FrictionTable
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.statuses import ContactStatus, sign_array
     from enumsol.proof.proof_file import Proof, ProofFormatError
     from enumsol.report import write_report
     from enumsol.roots.enumerate import enumerate_roots
@@ -75,15 +73,14 @@ if TYPE_CHECKING:
     from enumsol.roots.root_set import RootSet, SearchStats, Undecided
     from enumsol.roots.unique import is_unique
     from enumsol.search.outcome import SearchProgress
-    from enumsol.statuses import ContactStatus, sign_array
 
     __version__: str
 
 #: Where the public names are at home. A module is loaded when a name of it is first used, so that a program loads what
 #: it works with and no more: sparse matrices come with a problem, networkx and rational arithmetic with a branch graph.
 _HOMES = {
-    "enumsol.body2d": ("PlaneMesh",),
-    "enumsol.body3d": ("BodyMesh", "SlipMean"),
+    "enumsol.model.body2d": ("PlaneMesh",),
+    "enumsol.model.body3d": ("BodyMesh", "SlipMean"),
     "enumsol.branches": ("BranchGraph", "branch_graph", "link_samples", "multiplicity_table"),
     "enumsol.checker.verify": ("verify",),
     "enumsol.proof.proof_file": ("Proof", "ProofFormatError"),
@@ -124,14 +121,14 @@ _HOMES = {
         "solve_tresca",
         "successive_approximations",
     ),
-    "enumsol.friction": ("FrictionTable",),
+    "enumsol.model.friction": ("FrictionTable",),
     "enumsol.report": ("write_report",),
-    "enumsol.problem": ("ContactProblem",),
-    "enumsol.problem3d": ("ContactProblem3D",),
+    "enumsol.model.problem": ("ContactProblem",),
+    "enumsol.model.problem3d": ("ContactProblem3D",),
     "enumsol.roots.root": ("Enclosure", "Polytope", "Root", "RootFamily"),
     "enumsol.roots.root_set": ("RootSet", "SearchStats", "Undecided"),
-    "enumsol.equation": ("PiecewiseSmoothEquation",),
-    "enumsol.statuses": ("ContactStatus", "sign_array"),
+    "enumsol.continuation.equation": ("PiecewiseSmoothEquation",),
+    "enumsol.model.statuses": ("ContactStatus", "sign_array"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 #: Modules that are reached as attributes without an import of their own.
@@ -140,23 +137,20 @@ _MODULES = frozenset(
         "arithmetic",
         "branches",
         "checker",
-        "checks",
         "condensation",
         "continuation",
-        "equation",
         "errors",
         "fem",
         "fixed_points",
         "gallery",
         "io",
-        "kernel",
-        "problem",
+        "model",
         "proof",
         "relaxation",
         "roots",
         "search",
         "selections",
-        "statuses",
+        "trusted",
     )
 )
 

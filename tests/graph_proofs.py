@@ -11,7 +11,8 @@ from proof_tools import copied, proof_of, records_of
 from rational_checker import Refused, check_records
 
 from enumsol import ContactProblem, branch_graph, gallery, verify
-from enumsol.search import forms, interval_tree
+from enumsol.search import form_policy as forms
+from enumsol.search.interval.subintervals import interval_tree
 
 
 def triangle(**data):

@@ -23,10 +23,10 @@ from enumsol import (
 from enumsol.arithmetic import balls
 from enumsol.condensation import enclosure
 from enumsol.continuation import NotConverged, start_tangents
-from enumsol.equation import PiecewiseSmoothEquation
-from enumsol.kernel.point import exclusion_margin
+from enumsol.continuation.equation import PiecewiseSmoothEquation
 from enumsol.search import solvers
 from enumsol.search.solvers import Solvers
+from enumsol.trusted.at_alpha import exclusion_margin
 
 
 def check(problem, alpha, *, exact=True, roots=None):

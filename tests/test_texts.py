@@ -3,7 +3,7 @@
 import pytest
 
 import enumsol
-from enumsol.texts import counted, shortened
+from enumsol.support.messages import counted, shortened
 
 
 @pytest.mark.parametrize(

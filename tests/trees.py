@@ -4,11 +4,11 @@ from contextlib import contextmanager
 
 import pytest
 
-from enumsol.branches.closed_pieces import ClosedPieces
-from enumsol.search import closing
-from enumsol.search.closing import Closer
+from enumsol.branches.enclosed.single_branches import ClosedPieces
+from enumsol.search import fathoming as closing
+from enumsol.search.fathoming import Closer
 from enumsol.search.numbers import Numbers
-from enumsol.search.space_closing import SpaceCloser
+from enumsol.search.space.space_fathoming import SpaceCloser
 
 
 @contextmanager

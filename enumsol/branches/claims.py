@@ -18,7 +18,7 @@ import numpy as np
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.lower_bounds import least_at, least_steps
-from enumsol.texts import counted
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,16 +12,29 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.closed_pieces import ClosedPieces
-from enumsol.branches.following import follow
-from enumsol.branches.gluing import glue
+from enumsol.branches.enclosed.following import follow
+from enumsol.branches.enclosed.make_traced import make_traced
+from enumsol.branches.enclosed.single_branches import ClosedPieces
+from enumsol.branches.enclosed.traced import TracedProblem
+from enumsol.branches.exact.gluing import glue
+from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphData, GraphStats
-from enumsol.branches.make_elements import make_arcs, make_vertices
-from enumsol.branches.make_traced import make_traced
 from enumsol.branches.proof_records import write_graph_proof
-from enumsol.branches.traced import TracedProblem
-from enumsol.checks import (
+from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite
+from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
+from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.model.problem import ContactProblem
+from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
+from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
+from enumsol.search.interval.interval_parallel import run_parallel
+from enumsol.search.interval.subintervals import FastIntervalCertifier, IntervalSearch
+from enumsol.search.stopping import Stop, StopReason
+from enumsol.support.arguments import (
     alpha_interval,
     instance_of,
     one_of,
@@ -30,32 +43,19 @@ from enumsol.checks import (
     optional_executor,
     optional_seconds,
 )
-from enumsol.condensation.affine import exactly_at
-from enumsol.condensation.data import EXACT_DOF_LIMIT
-from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite
-from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
-from enumsol.deadlines import Deadline, TimeOverError, over, within
-from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.problem import ContactProblem
-from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
-from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
-from enumsol.search.interval import FastIntervalCertifier, IntervalSearch
-from enumsol.search.interval_parallel import run_parallel
-from enumsol.search.stopping import Stop, StopReason
-from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.support.deadlines import Deadline, TimeOverError, over, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from concurrent.futures import Executor
 
     from enumsol.branches.elements import Arc, Vertex
-    from enumsol.branches.following import Followed
-    from enumsol.checks import AlphaLike
-    from enumsol.deadlines import Limited
+    from enumsol.branches.enclosed.following import Followed
     from enumsol.proof.proof_file import Proof
-    from enumsol.search.interval import IntervalCertifier, SearchedPiece
+    from enumsol.search.interval.subintervals import IntervalCertifier, SearchedPiece
     from enumsol.selections.solution import Codes
+    from enumsol.support.arguments import AlphaLike
+    from enumsol.support.deadlines import Limited
 
 Arithmetic = Literal["fast", "verified", "exact"]
 

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.checks import alpha_value
 from enumsol.errors import InvalidArgumentError
 from enumsol.roots.root import ContactState
+from enumsol.support.arguments import alpha_value
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.arithmetic.algebraic import CriticalAlpha
-    from enumsol.branches.arc_values import ArcValues
-    from enumsol.checks import AlphaLike
+    from enumsol.branches.enclosed.arc_values import ArcValues
+    from enumsol.model.statuses import ContactStatus
     from enumsol.roots.root import RootFamily
     from enumsol.selections.solution import Codes
-    from enumsol.statuses import ContactStatus
+    from enumsol.support.arguments import AlphaLike
 
 
 class VertexKind(enum.StrEnum):

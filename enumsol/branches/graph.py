@@ -13,12 +13,12 @@ from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps, uniqueness_bound
 from enumsol.branches.elements import VertexKind
+from enumsol.branches.exact.make_elements import make_branches, make_components, multigraph
 from enumsol.branches.graph_text import completeness, graph_html, graph_text
-from enumsol.branches.make_elements import make_branches, make_components, multigraph
 from enumsol.branches.roots_at import roots_of
-from enumsol.checks import alpha_value
 from enumsol.errors import IncompleteGraphError, InvalidArgumentError
-from enumsol.sealed import Immutable
+from enumsol.support.arguments import alpha_value
+from enumsol.support.immutable import Immutable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
     from enumsol.branches.elements import Arc, Branch, Component, Vertex
     from enumsol.branches.graph_data import GraphData
-    from enumsol.checks import AlphaLike
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.root import Root, RootFamily
     from enumsol.roots.root_set import RootSet
+    from enumsol.support.arguments import AlphaLike
 
 
 class BranchGraph(Immutable):
@@ -335,7 +335,7 @@ class BranchGraph(Immutable):
 
     def save(self, file: str | Path) -> None:
         """Write the graph with its problem to a JSON file, all numbers to the last bit; ``load`` reads it."""
-        from enumsol.branches.storage import save_graph
+        from enumsol.branches.graph_files import save_graph
 
         save_graph(self.data, file)
 
@@ -348,19 +348,19 @@ class BranchGraph(Immutable):
         InvalidArgumentError
             The file is not such a graph.
         """
-        from enumsol.branches.storage import load_graph
+        from enumsol.branches.graph_files import load_graph
 
         return cls(load_graph(file))
 
     def write_graphml(self, file: str | Path) -> None:
         """Write vertices and arcs as GraphML for other graph programs (values at the vertices, no functions)."""
-        from enumsol.branches.storage import write_graphml
+        from enumsol.branches.graph_files import write_graphml
 
         write_graphml(self.data, self.branch_of, file)
 
     def plot(self, quantity: str | None = None, nodes: Sequence[Any] | None = None, **options: Any) -> Any:
-        """A figure of alpha against an overview, or a quantity of chosen nodes; see enumsol.branches.plots."""
-        from enumsol.branches.plots import plot_graph  # as above
+        """A figure of alpha against an overview, or a quantity of chosen nodes; see enumsol.branches.figures.graph_plots."""
+        from enumsol.branches.figures.graph_plots import plot_graph  # as above
 
         return plot_graph(self, quantity, nodes, **options)
 

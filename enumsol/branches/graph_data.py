@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.condensation.exact import ExactCondensed
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
-    from enumsol.search.interval import SearchedPiece
+    from enumsol.search.interval.subintervals import SearchedPiece
 
 
 @dataclass(frozen=True)

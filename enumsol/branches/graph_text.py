@@ -6,7 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from enumsol.branches.elements import VertexKind
-from enumsol.texts import counted, html_lines, html_table
+from enumsol.support.messages import counted, html_lines, html_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The proof of a branch graph as a file (see enumsol.checker.graph and enumsol.checker.arcs for its records)."""
+"""The proof of a branch graph as a file (see enumsol.checker.graph_checker and enumsol.checker.arcs for its records)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.parts import PartKind
+from enumsol.branches.enclosed.arc_parts import PartKind
 from enumsol.proof.proof_file import Proof, packed
 from enumsol.proof.reading import fits
 from enumsol.proof.writer import ProofWriter
@@ -17,10 +17,10 @@ from enumsol.search.proof_header import unit_exponents
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from enumsol.branches.following import Followed
-    from enumsol.branches.parts import Part
-    from enumsol.problem import ContactProblem
-    from enumsol.search.interval import SearchedPiece
+    from enumsol.branches.enclosed.arc_parts import Part
+    from enumsol.branches.enclosed.following import Followed
+    from enumsol.model.problem import ContactProblem
+    from enumsol.search.interval.subintervals import SearchedPiece
     from enumsol.selections.solution import Codes
 
 

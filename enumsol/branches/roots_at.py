@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.affine import exactly_at
+from enumsol.model.statuses import FRICTIONLESS, OPEN
 from enumsol.roots.builder import RootBuilder, in_order, root_family
 from enumsol.roots.components import connected_components
 from enumsol.roots.enumerate import roots_of_selections
 from enumsol.roots.local_degree import local_degree
 from enumsol.roots.root_set import RootSet, SearchStats
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.selections.floats import FloatSelections
-from enumsol.selections.rationals import ExactSelections
-from enumsol.statuses import FRICTIONLESS, OPEN
+from enumsol.selections.float_selections import FloatSelections
+from enumsol.selections.rational_selections import ExactSelections
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.branches.graph_data import GraphData
-    from enumsol.checks import Alpha
     from enumsol.selections.solution import Codes, SelectionSolution
+    from enumsol.support.arguments import Alpha
 
 
 def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> RootSet:

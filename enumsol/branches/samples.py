@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 import networkx as nx
 
-from enumsol.checks import alpha_list, instance_of, optional_callable
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import ContactProblem
+from enumsol.model.problem import ContactProblem
+from enumsol.model.statuses import ContactStatus
 from enumsol.roots.enumerate import enumerate_roots
-from enumsol.statuses import ContactStatus
-from enumsol.texts import counted
+from enumsol.support.arguments import alpha_list, instance_of, optional_callable
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from enumsol.branches.graph import BranchGraph
-    from enumsol.checks import AlphaLike
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.roots.root import Root
     from enumsol.roots.root_set import RootSet
+    from enumsol.support.arguments import AlphaLike
 
 
 class LinkRule(enum.StrEnum):

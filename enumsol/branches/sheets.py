@@ -10,11 +10,11 @@ from flint import fmpq, fmpq_mat, fmpq_poly
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, integer_polynomial, merge, rational_between, real_roots
 from enumsol.arithmetic.number_field import exact_value
-from enumsol.branches.selection_arcs import Cell, Event, SelectionArcs
-from enumsol.deadlines import look
+from enumsol.branches.exact.selection_arcs import Cell, Event, SelectionArcs
 from enumsol.selections.functions import SelectionFunctions
 from enumsol.selections.ordered_field import FiberSelections, row_reduce
 from enumsol.selections.solution import MAX_BASES, VertexLimitError
+from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
     from enumsol.condensation.exact import ExactCondensed

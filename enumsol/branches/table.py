@@ -6,13 +6,13 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from enumsol.checks import alpha_list, instance_of, optional_callable, optional_executor
-from enumsol.contact_body import ContactBody
 from enumsol.errors import Interrupted
-from enumsol.executors import Crew
-from enumsol.problem import ContactProblem
+from enumsol.model.contact_body import ContactBody
+from enumsol.model.problem import ContactProblem
+from enumsol.model.statuses import STATUSES, ContactStatus
 from enumsol.roots.enumerate import enumerate_roots
-from enumsol.statuses import STATUSES, ContactStatus
+from enumsol.support.arguments import alpha_list, instance_of, optional_callable, optional_executor
+from enumsol.support.workers import Crew
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from enumsol.checks import Alpha, AlphaLike
-    from enumsol.executors import Job
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.roots.root_set import RootSet
+    from enumsol.support.arguments import Alpha, AlphaLike
+    from enumsol.support.workers import Job
 
 
 @dataclass

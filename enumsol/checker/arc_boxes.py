@@ -7,14 +7,14 @@ from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from enumsol.kernel.arcs import expansions, over_parts
 from enumsol.proof.reading import rational_from, shown
+from enumsol.trusted.arcs.over_parts import expansions, over_parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from enumsol.kernel.arc_selections import ArcSelection
-    from enumsol.kernel.arcs import OverInterval
+    from enumsol.trusted.arcs.over_parts import OverInterval
+    from enumsol.trusted.arcs.selection_balls import ArcSelection
 
     #: A part as it is in the proof, and both its ends.
     Said = tuple[list[Any], Any, Any]
@@ -41,7 +41,7 @@ class BoxSelection:
     @cached_property
     def precise(self) -> Any:
         """The selection in many digits."""
-        from enumsol.kernel.precise import PreciseSelection  # python-flint, not for all proofs
+        from enumsol.trusted.arcs.precise import PreciseSelection  # python-flint, not for all proofs
 
         system = self._owner.precise_system
         system = system.constant_load(float(self._side)) if self._side else system

@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.checker.arc_boxes import Boxes, BoxSelection, check_entries, inside, number
-from enumsol.checker.arc_closing import Arc, Event
-from enumsol.kernel.arc_selections import ArcSelection, ArcSystem
-from enumsol.kernel.rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.kernel.selection_rows import (
+from enumsol.checker.only_branches import Arc, Event
+from enumsol.proof.reading import RefusedError, codes_from, names_only, same, shown, units_from
+from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
+from enumsol.trusted.selection import (
     CONE_MINUS,
     CONE_PLUS,
     NORMAL_FORCE,
@@ -31,14 +31,14 @@ from enumsol.kernel.selection_rows import (
     SLIP_BACKWARD,
     SLIP_FORWARD,
 )
-from enumsol.proof.reading import RefusedError, codes_from, names_only, same, shown, units_from
+from enumsol.trusted.status_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from enumsol.checker.arc_closing import ClosedPiece
+    from enumsol.checker.only_branches import ClosedPiece
     from enumsol.condensation.enclosure import CondensedEnclosure
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
 
     Codes = tuple[int, ...]
     Span = tuple[Fraction, Fraction, int]
@@ -237,7 +237,7 @@ class ArcChecker:
     def precise_system(self) -> Any:
         """The problem in many digits."""
         from enumsol.condensation.data import EXACT_DOF_LIMIT
-        from enumsol.kernel.precise import PreciseSystem  # python-flint, not for all proofs
+        from enumsol.trusted.arcs.precise import PreciseSystem  # python-flint, not for all proofs
 
         if self._problem.n > EXACT_DOF_LIMIT:
             raise ValueError("a box in many digits belongs to a problem that is too large for it")

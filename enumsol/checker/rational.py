@@ -10,7 +10,7 @@ from enumsol.arithmetic.rationals import is_positive_definite, rational
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.free_displacements import exact_matrices, free_displacements, solved
-from enumsol.kernel.rows import CONDITIONS, FORBIDDEN, NONNEGATIVE
+from enumsol.trusted.status_rows import CONDITIONS, FORBIDDEN, NONNEGATIVE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
 
 Vector = list[Any]
 
@@ -53,7 +53,7 @@ class RationalSystem:
         self.zero = fmpq(0)
 
     def row(self, kind: int, node: int) -> tuple[Vector, Any]:
-        """A row of ``kernel.rows`` as an affine function of lambda: 2p coefficients, and what is added."""
+        """A row of ``trusted.status_rows`` as an affine function of lambda: 2p coefficients, and what is added."""
         p, form = self.p, [fmpq(0)] * (2 * self.p)
         if kind >= 4:
             k, sign = (node, -1) if kind == 4 else (p + node, 1 if kind == 5 else -1)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from enumsol.proof.reading import shown_alpha
-from enumsol.texts import counted, html_lines
+from enumsol.support.messages import counted, html_lines
 
 if TYPE_CHECKING:
     from fractions import Fraction

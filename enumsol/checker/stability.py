@@ -14,19 +14,19 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.verify import Checker, verify
-from enumsol.checks import instance_of
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
-from enumsol.kernel.lone import lone_root
-from enumsol.kernel.point import exclusion_margins, solve_selection
-from enumsol.problem import ContactProblem
-from enumsol.proof.lone import LoneRoot
+from enumsol.model.problem import ContactProblem
+from enumsol.proof.root_records import LoneRoot
+from enumsol.support.arguments import instance_of
+from enumsol.trusted.at_alpha import exclusion_margins, solve_selection
+from enumsol.trusted.uniqueness_in_contact import lone_root
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from enumsol.checker.forms import FormLeaves
+    from enumsol.checker.form_tables import FormLeaves
     from enumsol.proof.proof_file import Proof
 
 #: Largest radius that is tried; below 1 a positive friction coefficient stays positive.
@@ -175,7 +175,7 @@ class _WidenedChecker(Checker):
         return "it was proven for the given data alone"
 
     def _closed(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        from enumsol.checker.closing import one_regular_root
+        from enumsol.checker.fathomed_subtrees import one_regular_root
 
         reason = super()._closed(codes, record)
         if reason is None and not self._passes(lambda system: one_regular_root(system, record, self.force)):

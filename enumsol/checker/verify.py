@@ -15,17 +15,12 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
-from enumsol.checker.forms import FormLeaves
-from enumsol.checker.graph import GraphChecker
+from enumsol.checker.form_tables import FormLeaves
+from enumsol.checker.graph_checker import GraphChecker
 from enumsol.checker.reports import GraphVerificationReport, VerificationReport
-from enumsol.checker.tree import TreeChecker
-from enumsol.checks import instance_of, optional_callable
+from enumsol.checker.walk import TreeChecker
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
-from enumsol.kernel.lone import lone_root
-from enumsol.kernel.point import exclusion_margins, holds_no_root, solve_selection
-from enumsol.kernel.rows import FRICTIONLESS, ROW_KINDS, UNDECIDED, coverings_of, row_signs
-from enumsol.problem import ContactProblem
-from enumsol.proof.lone import LoneRoot
+from enumsol.model.problem import ContactProblem
 from enumsol.proof.proof_file import Proof, fraction_text
 from enumsol.proof.reading import (
     RefusedError,
@@ -37,6 +32,11 @@ from enumsol.proof.reading import (
     shown,
     units_from,
 )
+from enumsol.proof.root_records import LoneRoot
+from enumsol.support.arguments import instance_of, optional_callable
+from enumsol.trusted.at_alpha import exclusion_margins, holds_no_root, solve_selection
+from enumsol.trusted.status_rows import FRICTIONLESS, ROW_KINDS, UNDECIDED, coverings_of, row_signs
+from enumsol.trusted.uniqueness_in_contact import lone_root
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,9 +44,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.checker.rational import RationalSystem
-    from enumsol.kernel.closing import ClosedSolution
-    from enumsol.kernel.point import VerifiedSelection
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.trusted.at_alpha import VerifiedSelection
+    from enumsol.trusted.uniqueness import ClosedSolution
 
     #: codes of a selection, the vertices of its root set, and its dimension
     Polytope = tuple[tuple[int, ...], list[Any], int]
@@ -102,7 +102,7 @@ def verify(
     optional_callable(progress, "progress")
     proof.check_integrity()
     if in_space:
-        from enumsol.checker.space import SpaceChecker  # with its kernel, for problems in 3D only
+        from enumsol.checker.space_checker import SpaceChecker  # with its kernel, for problems in 3D only
 
         return SpaceChecker(problem, progress).run(proof)
     records = proof.records()
@@ -115,7 +115,7 @@ def verify(
 def _is_in_space(problem: object) -> bool:
     if isinstance(problem, ContactProblem):
         return False
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import ContactProblem3D
 
     return isinstance(problem, ContactProblem3D)
 
@@ -267,7 +267,7 @@ class Checker(TreeChecker):
         return None if type(index) is int and index == ball.det_sign else "its index is wrong"
 
     def _closed(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        from enumsol.checker.closing import closed_by_balls
+        from enumsol.checker.fathomed_subtrees import closed_by_balls
 
         reason, ball = closed_by_balls(self.system, codes, record, self.force)
         if ball is not None:
@@ -282,7 +282,7 @@ class Checker(TreeChecker):
         )
 
     def _closed_in_rationals(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        from enumsol.checker.closing import closed_in_rationals
+        from enumsol.checker.fathomed_subtrees import closed_in_rationals
 
         reason, selection, points = closed_in_rationals(self.system, self.rational, codes, record)
         self.polytopes += [(selection, points, 0)] if points else []
@@ -342,7 +342,7 @@ class Checker(TreeChecker):
         families = {group_of(k) for k, polytope in enumerate(self.polytopes) if polytope[2] > 0}
         apart = 0
         if self.closed:
-            from enumsol.checker.closing import count_apart
+            from enumsol.checker.fathomed_subtrees import count_apart
 
             apart, self._in_doubt = count_apart(self.closed, self.strict + [codes for codes, _, _ in self.polytopes])
         return len(found) - len(families) + apart, len(families)

@@ -12,15 +12,15 @@ from enumsol.cli.graph import build, read_graph
 from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, csv, file, number
 from enumsol.cli.output import as_json, check_outputs, deliver
 from enumsol.errors import InvalidArgumentError
-from enumsol.texts import counted
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.branches import BranchGraph
-    from enumsol.checks import Alpha
     from enumsol.continuation import AuditReport, PointRun
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
+    from enumsol.support.arguments import Alpha
 
 #: As of ``read_points``, which is not imported for --help.
 Columns = Literal["auto", "rows", "labels"]
@@ -83,7 +83,7 @@ def audit(
     when nobody read it any more.
     """
     from enumsol.continuation import audit as check  # numpy and scipy: not for --help
-    from enumsol.continuation.graph_map import checked_tolerance
+    from enumsol.continuation.audit.graph_map import checked_tolerance
 
     checked_tolerance(tolerance)
     check_outputs(json=json_file, csv=csv_file)

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from concurrent.futures import Executor
 
-    from enumsol.checks import Alpha
-    from enumsol.problem import ContactProblem
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.support.arguments import Alpha
 
 T = TypeVar("T")
 
@@ -55,8 +55,8 @@ def load_problem(name: str) -> ContactProblem:
         It cannot be read, the gallery has none of that name (the message gives names that are close), or it is one
         in 3D.
     """
-    from enumsol.checks import instance_of  # numpy: not for --help
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
+    from enumsol.support.arguments import instance_of  # numpy: not for --help
 
     return instance_of(load_any_problem(name), ContactProblem, name)
 
@@ -128,7 +128,7 @@ def parse_alpha(text: str, option: str = "--alpha") -> Alpha:
     InvalidArgumentError
         It is no number, or not finite.
     """
-    from enumsol.checks import alpha_value  # numpy: not for --help
+    from enumsol.support.arguments import alpha_value  # numpy: not for --help
 
     return alpha_value(text, option)
 

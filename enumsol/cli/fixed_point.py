@@ -12,17 +12,17 @@ from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, Quiet, coun
 from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
-from enumsol.texts import counted
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import pandas as pd
 
-    from enumsol.checks import Alpha
     from enumsol.fixed_points import FixedPoint, FixedPointProgress
-    from enumsol.problem import ContactProblem
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.support.arguments import Alpha
 
 
 def fixed_point(
@@ -99,7 +99,7 @@ def _alpha(text: str | None, name: str, body: ContactProblem | ContactProblem3D)
 
 
 def _in_2d(body: ContactProblem | ContactProblem3D, name: str) -> ContactProblem:
-    from enumsol.problem import ContactProblem  # as below
+    from enumsol.model.problem import ContactProblem  # as below
 
     if not isinstance(body, ContactProblem):
         raise InvalidArgumentError(f"--starts is given, but {name} is a problem in 3D; expected one in 2D")
@@ -122,7 +122,7 @@ def _approximate(
 def _vtu_writer(body: ContactProblem | ContactProblem3D, name: str, file: str) -> Callable[[FixedPoint, str], None]:
     """What writes a result, if there can be such a file at all."""
     from enumsol.io.vtu import write_vtu  # as above
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import ContactProblem3D
 
     if not isinstance(body, ContactProblem3D):
         raise InvalidArgumentError(f"--vtu is given, but {name} is a problem in 2D; expected one in 3D")

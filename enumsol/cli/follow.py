@@ -30,7 +30,7 @@ from enumsol.cli.options import (
 from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display, SearchDisplay
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.texts import counted
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,10 +38,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from enumsol.branches import BranchGraph
-    from enumsol.checks import Alpha
     from enumsol.continuation import ContinuationOptions, Path
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
     from enumsol.roots.root import Root
+    from enumsol.support.arguments import Alpha
 
 OneRoot = Annotated[
     int | None, typer.Option(min=0, metavar="K", help="Start from root K of enumsol roots; default: from all.")

@@ -30,8 +30,8 @@ from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
-    from enumsol.checks import Alpha
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
+    from enumsol.support.arguments import Alpha
 
 
 HowExact = Annotated[

@@ -19,7 +19,7 @@ import typer
 
 from enumsol.cli.quiet import is_quiet
 from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
-from enumsol.files import writing
+from enumsol.support.files import writing
 
 if TYPE_CHECKING:
     from collections.abc import Callable

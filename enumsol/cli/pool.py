@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class RenewedPool(Executor):
-    """A process pool that can be made anew (see ``enumsol.executors.Crew``).
+    """A process pool that can be made anew (see ``enumsol.support.workers.Crew``).
 
     Parameters
     ----------

@@ -24,13 +24,13 @@ from enumsol.cli.options import (
 from enumsol.cli.output import check_outputs, check_writable, deliver
 from enumsol.cli.progress import SearchDisplay
 from enumsol.errors import InvalidArgumentError
-from enumsol.texts import counted
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from enumsol.checks import Alpha
-    from enumsol.problem import ContactProblem
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.roots.root_set import RootSet
+    from enumsol.support.arguments import Alpha
 
 Method = Literal["tree", "exhaustive"]
 AtAlpha = Annotated[

@@ -22,8 +22,8 @@ from enumsol.cli.roots import (
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
-    from enumsol.problem import ContactProblem
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
 
 _BODY, _SUPPORT, _LOAD = "Body and contact", "Supports", "Loads"
 
@@ -185,10 +185,10 @@ def _problem(mesh: str, options: dict[str, Any]) -> ContactProblem | ContactProb
             raise InvalidArgumentError(f"--{name} is given beside {mesh}, which has all options; expected it there")
         return load_any_problem(mesh)
     from enumsol import fem  # numpy: not for --help
-    from enumsol.checks import file_path
     from enumsol.fem.mesh_problems import check_keys
-    from enumsol.files import unreadable
     from enumsol.io import SUFFIXES
+    from enumsol.support.arguments import file_path
+    from enumsol.support.files import unreadable
 
     place = file_path(mesh, "MESH", "the name of a mesh file")
     if place.suffix in SUFFIXES or mesh.startswith(GALLERY):

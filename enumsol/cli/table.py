@@ -16,9 +16,9 @@ from enumsol.errors import EnumsolError, InvalidArgumentError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from enumsol.checks import Alpha
-    from enumsol.problem import ContactProblem
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.support.arguments import Alpha
 
 #: Names of the columns on the terminal, explained by `_CAPTION` underneath.
 _NAMES = {

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from enumsol.checks import Alpha, alpha_value
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.sealed import Sealed, sealed
+from enumsol.support.arguments import Alpha, alpha_value
+from enumsol.support.immutable import Sealed, sealed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.checks import AlphaLike
     from enumsol.condensation.data import CondensableData, ProblemData
     from enumsol.condensation.products import WithProducts
+    from enumsol.support.arguments import AlphaLike
 
 #: Units of force and length lie between 2^-900 and 2^900; products and quotients of two of them and proofs need that.
 UNIT_EXPONENT = 900

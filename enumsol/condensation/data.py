@@ -1,4 +1,4 @@
-"""What condensing asks of a contact problem; ``enumsol.problem.ContactProblem`` is one."""
+"""What condensing asks of a contact problem; ``enumsol.model.problem.ContactProblem`` is one."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     import scipy.sparse as sp
     from numpy.typing import NDArray
 
-    from enumsol.checks import AlphaLike
     from enumsol.condensation.factorization import Factorization
+    from enumsol.support.arguments import AlphaLike
 
     Vector = NDArray[np.float64]
 

@@ -22,16 +22,16 @@ from enumsol.arithmetic.balls import (
     sparse_eigenvalue_bound,
     upper_norm,
 )
-from enumsol.checks import alpha_value
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.products import Products, scaled
 from enumsol.errors import EnumsolError
-from enumsol.sealed import Sealed
+from enumsol.support.arguments import alpha_value
+from enumsol.support.immutable import Sealed
 
 if TYPE_CHECKING:
     from enumsol.arithmetic.balls import Array
-    from enumsol.checks import AlphaLike
     from enumsol.condensation.data import CondensableData
+    from enumsol.support.arguments import AlphaLike
 
 
 class NotEnclosedError(EnumsolError):

@@ -18,9 +18,9 @@ from enumsol.errors import InvalidProblemError, TooLargeError
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from enumsol.checks import Alpha
     from enumsol.condensation.data import ProblemData
     from enumsol.condensation.unloaded import CondensedData
+    from enumsol.support.arguments import Alpha
 
 #: Most degrees of freedom for which "fast" condenses without rounding; beyond, S and g as computed in floats are used.
 FAST_EXACT_DOF = 24

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from enumsol.errors import InvalidProblemError
-from enumsol.sealed import Immutable, SealedMatrix, sealed
+from enumsol.support.immutable import Immutable, SealedMatrix, sealed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, residual, upper_norm
 from enumsol.condensation.data import CondensableData
-from enumsol.sealed import Sealed
+from enumsol.support.immutable import Sealed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

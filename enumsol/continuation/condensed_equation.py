@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.equation import pieces
-from enumsol.statuses import (
+from enumsol.continuation.equation import pieces
+from enumsol.model.statuses import (
     CONDITIONS,
     FRICTIONLESS,
     OPEN,
@@ -43,8 +43,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.continuation.parameter_path import ParameterPath, PathValues
-    from enumsol.problem import ContactProblem
-    from enumsol.statuses import ContactStatus
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.statuses import ContactStatus
 
     Vector = NDArray[np.float64]
     Codes = tuple[int, ...]

@@ -9,7 +9,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
-    from enumsol.continuation.options import ContinuationOptions
+    from enumsol.continuation.continuation_options import ContinuationOptions
 
 #: Smooth Newton iterations inside a selection; quadratic convergence needs about five.
 MAX_SMOOTH_ITERATIONS = 20

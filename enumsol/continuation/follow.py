@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from enumsol.checks import direction_value, row_number, shown
-from enumsol.continuation.errors import AmbiguousStart
 from enumsol.continuation.follower import Follower
+from enumsol.continuation.not_converged import AmbiguousStart
 from enumsol.continuation.path import Path, finished
 from enumsol.continuation.start import Start
 from enumsol.continuation.tangents import Tangent, admissible_tangents
 from enumsol.continuation.transitions import ACTIVE_TOLERANCE, CurvePoint
 from enumsol.errors import InvalidArgumentError
+from enumsol.support.arguments import direction_value, row_number, shown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-from enumsol.problem import ContactProblem
+from enumsol.model.problem import ContactProblem
 
 if TYPE_CHECKING:
-    from enumsol.checks import AlphaLike
-    from enumsol.continuation.options import ContinuationOptions
+    from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
+    from enumsol.support.arguments import AlphaLike
 
 
 def follow(

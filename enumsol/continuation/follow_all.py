@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checks import alpha_interval, instance_of, optional_callable, positive_integer, shown
-from enumsol.continuation.audit import DETOUR, POINT_TOLERANCE, audit_on
-from enumsol.continuation.audit_report import AuditReport
-from enumsol.continuation.errors import AmbiguousStart
+from enumsol.continuation.audit.audit_report import AuditReport
+from enumsol.continuation.audit.auditor import DETOUR, POINT_TOLERANCE, audit_on
+from enumsol.continuation.audit.graph_map import GraphMap, PlaceKind, checked_graph
+from enumsol.continuation.audit.points import read_points
 from enumsol.continuation.follow import follow, start_tangents
-from enumsol.continuation.graph_map import GraphMap, PlaceKind, checked_graph
+from enumsol.continuation.not_converged import AmbiguousStart
 from enumsol.continuation.path import Path
 from enumsol.continuation.path_data import PathStats, PathStatus
-from enumsol.continuation.points import read_points
 from enumsol.errors import InvalidArgumentError, TooLargeError
-from enumsol.problem import ContactProblem
+from enumsol.model.problem import ContactProblem
+from enumsol.support.arguments import alpha_interval, instance_of, optional_callable, positive_integer, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from enumsol.checks import AlphaLike
-    from enumsol.continuation.graph_map import GraphLike
-    from enumsol.continuation.options import ContinuationOptions
+    from enumsol.continuation.audit.graph_map import GraphLike
+    from enumsol.continuation.continuation_options import ContinuationOptions
+    from enumsol.support.arguments import AlphaLike
 
 #: Where on a missed arc it is started anew, as fractions of its interval; its ends are transition points.
 _SEEDS = (0.5, 0.25, 0.75)

@@ -24,13 +24,13 @@ from enumsol.continuation.transitions import (
     same_curve,
 )
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
-from enumsol.texts import counted
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
-    from enumsol.continuation.options import ContinuationOptions
+    from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.continuation.path_data import PathData
     from enumsol.continuation.tangents import Tangent

@@ -6,23 +6,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.array_checks import real_array
-from enumsol.checks import alpha_value, instance_of, positive_integer, positive_number
 from enumsol.continuation.condensed_equation import CondensedEquation
-from enumsol.continuation.errors import NewtonIteration, NotConverged
+from enumsol.continuation.not_converged import NewtonIteration, NotConverged
 from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import ContactProblem
+from enumsol.model.problem import ContactProblem
+from enumsol.model.statuses import FRICTIONLESS, STATUSES, STICK
 from enumsol.roots.root import Root
-from enumsol.statuses import FRICTIONLESS, STATUSES, STICK
-from enumsol.texts import counted
+from enumsol.support.arguments import alpha_value, instance_of, positive_integer, positive_number
+from enumsol.support.array_arguments import real_array
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.checks import Alpha, AlphaLike
     from enumsol.continuation.condensed_equation import Vector
     from enumsol.continuation.parameter_path import ParameterPath
+    from enumsol.support.arguments import Alpha, AlphaLike
 
 #: Norm of H, relative to the load, at which an iterate is a root: well above rounding for any conditioning seen.
 RESIDUAL_TOLERANCE = 1e-10
@@ -165,7 +165,7 @@ def build_root(problem: ContactProblem, alpha: Alpha, equation: CondensedEquatio
     # the enumeration is not needed to follow paths, and slow to import
     from enumsol.roots.builder import RootBuilder
     from enumsol.roots.components import connected_components
-    from enumsol.selections.floats import FloatSelections
+    from enumsol.selections.float_selections import FloatSelections
 
     floats = FloatSelections(problem.condensed.at(alpha).scaled)
     solution = floats.solve(equation.codes(x))

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.array_checks import real_array
-from enumsol.checks import alpha_value, instance_of, optional_callable
 from enumsol.condensation.condensed import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import ContactProblem
+from enumsol.model.problem import ContactProblem
+from enumsol.support.arguments import alpha_value, instance_of, optional_callable
+from enumsol.support.array_arguments import real_array
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.checks import AlphaLike
+    from enumsol.support.arguments import AlphaLike
 
 #: A user's derivative may differ from a central difference by this fraction of its size: wrong formulas differ by more.
 DERIVATIVE_TOLERANCE = 1e-4

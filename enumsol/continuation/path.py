@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.continuation.follower import Follower
 from enumsol.continuation.path_data import PathData, PathStatus
+from enumsol.continuation.path_files import load_path, save_path
 from enumsol.continuation.start import Start
-from enumsol.continuation.storage import load_path, save_path
 from enumsol.continuation.tangents import curve_tangent
 from enumsol.continuation.transitions import CurvePoint
 from enumsol.errors import Interrupted, InvalidArgumentError
@@ -16,10 +16,10 @@ from enumsol.errors import Interrupted, InvalidArgumentError
 if TYPE_CHECKING:
     import os
 
-    from enumsol.checks import AlphaLike
-    from enumsol.continuation.options import ContinuationOptions
+    from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
+    from enumsol.support.arguments import AlphaLike
 
 
 class Path(PathData):
@@ -98,7 +98,7 @@ class Path(PathData):
         InvalidArgumentError
             An argument is not one of those above.
         """
-        from enumsol.continuation.plots import draw_path  # matplotlib, slow to import
+        from enumsol.continuation.path_plots import draw_path  # matplotlib, slow to import
 
         return draw_path(self, graph, node, quantity, ax, graph_options)
 

@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.roots.root import summary
-from enumsol.sealed import Sealed
-from enumsol.texts import counted
+from enumsol.support.immutable import Sealed
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from enumsol.continuation.options import ContinuationOptions
+    from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.continuation.tangents import Tangent
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.statuses import ContactStatus
     from enumsol.roots.local_branch import LocalBranchTest
-    from enumsol.statuses import ContactStatus
 
 #: |d alpha / ds| below this is a vertical piece of the path: at a regular point it is well above rounding.
 VERTICAL_TOLERANCE = 1e-9

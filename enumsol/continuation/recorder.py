@@ -14,7 +14,7 @@ from enumsol.roots.local_branch import coherent_orientation
 
 if TYPE_CHECKING:
     from enumsol.continuation.condensed_equation import CondensedEquation, Vector
-    from enumsol.continuation.options import ContinuationOptions
+    from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.continuation.transitions import CurvePoint, Kink
     from enumsol.roots.local_branch import LocalBranchTest

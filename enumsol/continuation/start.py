@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.array_checks import real_array
-from enumsol.checks import alpha_value, instance_of, unbounded_interval
 from enumsol.continuation.condensed_equation import CondensedEquation
-from enumsol.continuation.options import ContinuationOptions
+from enumsol.continuation.continuation_options import ContinuationOptions
 from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
 from enumsol.continuation.path_data import PathData
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import ContactProblem
+from enumsol.model.problem import ContactProblem
+from enumsol.support.arguments import alpha_value, instance_of, unbounded_interval
+from enumsol.support.array_arguments import real_array
 
 if TYPE_CHECKING:
-    from enumsol.checks import AlphaLike
     from enumsol.continuation.condensed_equation import Vector
     from enumsol.continuation.parameter_path import ParameterPath
+    from enumsol.support.arguments import AlphaLike
 
 #: The default alpha scale is this fraction of the interval.
 ALPHA_FRACTION = 0.05

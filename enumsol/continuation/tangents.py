@@ -12,7 +12,7 @@ import numpy as np
 from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.errors import TooLargeError
 from enumsol.roots.local_branch import MAX_SELECTIONS
-from enumsol.sealed import Sealed
+from enumsol.support.immutable import Sealed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
-    from enumsol.statuses import ContactStatus
+    from enumsol.model.statuses import ContactStatus
 
 #: A singular value of a selection's balanced gradient below this fraction of the largest counts as zero.
 RANK_TOLERANCE = 1e-10

@@ -20,7 +20,7 @@ from enumsol.continuation.tangents import (
     admissible_tangents,
     curve_tangent,
 )
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from enumsol.fem.assembly import body_forces, contact_problem, edge_forces, stiffness, triangle_stiffness
 from enumsol.fem.mesh_checks import lame
 from enumsol.fem.meshes import Mesh, edges_along, rectangle, trapezoid
-from enumsol.fem.parts import PartedMesh
+from enumsol.fem.named_parts import PartedMesh
 
 if TYPE_CHECKING:
     from enumsol.fem.basis_problems import basis_contact_problem

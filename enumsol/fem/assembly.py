@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.body2d import PlaneMesh
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import FLAT, nodal_basis
 from enumsol.fem.mesh_checks import (
@@ -33,7 +32,8 @@ from enumsol.fem.mesh_checks import (
 )
 from enumsol.fem.numbering import gathered
 from enumsol.fem.restrained import ContactNodes, Supports, check_axes, movable, plain_dofs, restrained
-from enumsol.problem import ContactProblem
+from enumsol.model.body2d import PlaneMesh
+from enumsol.model.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.array_checks import plain_array, real_array, real_matrix
-from enumsol.checks import shown
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.assembly import plane_problem
 from enumsol.fem.bases import between_corners, facet_basis
 from enumsol.fem.mesh_checks import unit_vectors, vectors_of_all
 from enumsol.fem.restrained import ContactNodes, Supports, check_axes, movable, restrained
+from enumsol.support.arguments import shown
+from enumsol.support.array_arguments import plain_array, real_array, real_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.problem import ContactProblem
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
 
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
@@ -137,7 +137,7 @@ def space_problem(
 ) -> ContactProblem3D:
     """As `plane_problem`, in 3D; ``mesh`` may be a function of the degrees of freedom that are left."""
     from enumsol.fem.surfaces import default_axes  # not for problems in 2D
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import ContactProblem3D
 
     if tangents is None:
         axes = default_axes(contact.normals)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.facets import CELL_FACETS
+from enumsol.model.facets import CELL_FACETS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -13,16 +13,16 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from enumsol.array_checks import real_array, short_vector
-from enumsol.checks import finite_number, one_of, shown
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.restrained import Supports
+from enumsol.support.arguments import finite_number, one_of, shown
+from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.fem.bases import NodalBasis
-    from enumsol.fem.parts import PartedMesh
+    from enumsol.fem.named_parts import PartedMesh
 
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]

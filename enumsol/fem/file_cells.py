@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.body2d import as_quadrilaterals
 from enumsol.errors import InvalidArgumentError
-from enumsol.facets import CELL_FACETS, boundary_facets
 from enumsol.fem.cells import completed
+from enumsol.model.body2d import as_quadrilaterals
+from enumsol.model.facets import CELL_FACETS, boundary_facets
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from enumsol.array_checks import plain_array, real_array, short_vector
-from enumsol.checks import finite_number, one_of, positive_number, shown
 from enumsol.errors import InvalidArgumentError
+from enumsol.support.arguments import finite_number, one_of, positive_number, shown
+from enumsol.support.array_arguments import plain_array, real_array, short_vector
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

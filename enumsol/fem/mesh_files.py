@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from enumsol.checks import file_path, shown
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fem.file_cells import GROUPS_ONLY, body_cells, body_kinds, facets_of_sets, solid_cells, with_centres
 from enumsol.fem.mesh_checks import positions
-from enumsol.fem.parts import ALL, PartedMesh
-from enumsol.files import unreadable
-from enumsol.texts import shortened
+from enumsol.fem.named_parts import ALL, PartedMesh
+from enumsol.support.arguments import file_path, shown
+from enumsol.support.files import unreadable
+from enumsol.support.messages import shortened
 
 if TYPE_CHECKING:
     import os

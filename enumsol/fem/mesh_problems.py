@@ -10,9 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.array_checks import short_vector
-from enumsol.body2d import PlaneMesh
-from enumsol.checks import exact_number, file_path, finite_number, shown
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.assembly import plane_problem
 from enumsol.fem.bases import nodal_basis
@@ -21,10 +18,13 @@ from enumsol.fem.cells import contact_nodes
 from enumsol.fem.conditions import Held, Obstacle, by_part, check_held, names_of, part_forces, part_springs
 from enumsol.fem.mesh_checks import lame, unit_vectors
 from enumsol.fem.mesh_files import read_mesh
-from enumsol.fem.parts import PartedMesh
+from enumsol.fem.named_parts import PartedMesh
 from enumsol.fem.restrained import ContactNodes, movable, plain_dofs
-from enumsol.files import unreadable
-from enumsol.texts import shortened
+from enumsol.model.body2d import PlaneMesh
+from enumsol.support.arguments import exact_number, file_path, finite_number, shown
+from enumsol.support.array_arguments import short_vector
+from enumsol.support.files import unreadable
+from enumsol.support.messages import shortened
 
 if TYPE_CHECKING:
     import os
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from enumsol.fem.bases import NodalBasis
-    from enumsol.problem import ContactProblem
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
 
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
@@ -347,8 +347,8 @@ def _space_fields(
     body: NodalBasis, mesh: PartedMesh, facets: Integers, nodes: ContactNodes, *, displaced: bool
 ) -> dict[str, Any]:
     """Areas, and the mesh as a function of the degrees of freedom that are left."""
-    from enumsol.body3d import BodyMesh  # not for plane bodies
     from enumsol.fem.solid_geometry import outward
+    from enumsol.model.body3d import BodyMesh  # not for plane bodies
 
     areas = body.on_part(facets, "contact", lambda v, _: v[0], lumped=True)[:, 0]
     surface = outward(facets, mesh.cells)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.array_checks import plain_array
-from enumsol.checks import positive_integer, positive_number
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.parts import PartedMesh
+from enumsol.fem.named_parts import PartedMesh
+from enumsol.support.arguments import positive_integer, positive_number
+from enumsol.support.array_arguments import plain_array
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.array_checks import real_array
-from enumsol.checks import instance_of
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import nodal_basis
-from enumsol.problem3d import ContactProblem3D
+from enumsol.model.problem3d import ContactProblem3D
+from enumsol.support.arguments import instance_of
+from enumsol.support.array_arguments import real_array
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.facets import boundary_facets
 from enumsol.fem.bases import FLAT
 from enumsol.fem.cells import HEXAHEDRON, KINDS
 from enumsol.fem.mesh_checks import check_every_node_is_used, elements, positions
+from enumsol.model.facets import boundary_facets
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

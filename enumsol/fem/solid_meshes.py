@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from enumsol.array_checks import short_vector
-from enumsol.checks import one_of, positive_integer, shown
 from enumsol.errors import InvalidArgumentError
-from enumsol.facets import boundary_facets
 from enumsol.fem.cells import KINDS
 from enumsol.fem.mesh_checks import elements, positions
-from enumsol.fem.parts import PartedMesh
+from enumsol.fem.named_parts import PartedMesh
+from enumsol.model.facets import boundary_facets
+from enumsol.support.arguments import one_of, positive_integer, shown
+from enumsol.support.array_arguments import short_vector
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

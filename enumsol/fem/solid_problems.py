@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.array_checks import plain_array, real_array
-from enumsol.body3d import BodyMesh, SlipMean
-from enumsol.checks import one_of, positive_integer
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.mesh_checks import elements, held_mask, nodal_vectors, spring_stiffnesses
 from enumsol.fem.solid_geometry import outward, solid_mesh
 from enumsol.fem.solid_meshes import blocks
 from enumsol.fem.solids import solid_stiffness
 from enumsol.fem.surfaces import ContactSurface, Multipliers, local_axes, on_nodes, on_patches
-from enumsol.problem3d import ContactProblem3D
+from enumsol.model.body3d import BodyMesh, SlipMean
+from enumsol.model.problem3d import ContactProblem3D
+from enumsol.support.arguments import one_of, positive_integer
+from enumsol.support.array_arguments import plain_array, real_array
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.array_checks import plain_array, real_array
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.mesh_checks import unit_vectors, vectors_of_all
 from enumsol.fem.solid_geometry import facet_quadrature, facet_vectors
+from enumsol.support.array_arguments import plain_array, real_array
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.array_checks import plain_array, real_array
-from enumsol.checks import alpha_value, positive_integer, positive_number, shown
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.fixed_points.newton import TrescaData
 from enumsol.fixed_points.state import scaled_forces, slips_of
 from enumsol.fixed_points.successive import successive_approximations
 from enumsol.fixed_points.system import ContactSystem, contact_problem
 from enumsol.fixed_points.tresca import node_values, solve
+from enumsol.fixed_points.tresca_newton import TrescaData
+from enumsol.support.arguments import alpha_value, positive_integer, positive_number, shown
+from enumsol.support.array_arguments import plain_array, real_array
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.checks import Alpha
     from enumsol.fixed_points.system import Problem
+    from enumsol.support.arguments import Alpha
 
     Vector = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 if TYPE_CHECKING:
-    from enumsol.fixed_points.newton import TrescaData, Vector
+    from enumsol.fixed_points.tresca_newton import TrescaData, Vector
 
 #: Tolerance of Clarabel; Newton's method improves the result.
 TOLERANCE = 1e-11

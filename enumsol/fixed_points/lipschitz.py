@@ -9,20 +9,20 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import eigh
 
-from enumsol.checks import nonnegative_number
 from enumsol.condensation.condensed import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.system import ContactSystem, contact_problem
 from enumsol.fixed_points.tresca import node_values
-from enumsol.friction import FrictionTable
-from enumsol.problem3d import ContactProblem3D
+from enumsol.model.friction import FrictionTable
+from enumsol.model.problem3d import ContactProblem3D
+from enumsol.support.arguments import nonnegative_number
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.body3d import SlipMean
-    from enumsol.checks import Alpha, AlphaLike
     from enumsol.fixed_points.system import Problem
+    from enumsol.model.body3d import SlipMean
+    from enumsol.support.arguments import Alpha, AlphaLike
 
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]

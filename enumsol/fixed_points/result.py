@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.array_checks import real_array
-from enumsol.checks import alpha_value, file_path, optional_count, positive_integer, positive_number
 from enumsol.errors import InvalidArgumentError
-from enumsol.files import read_arrays, reading, write_arrays
 from enumsol.fixed_points.state import ContactState
 from enumsol.fixed_points.system import contact_problem
-from enumsol.texts import counted
+from enumsol.support.arguments import alpha_value, file_path, optional_count, positive_integer, positive_number
+from enumsol.support.array_arguments import real_array
+from enumsol.support.files import read_arrays, reading, write_arrays
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     import os

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from enumsol.array_checks import real_array
 from enumsol.errors import InvalidArgumentError
-from enumsol.sealed import Sealed, sealed
-from enumsol.statuses import ContactStatus
+from enumsol.model.statuses import ContactStatus
+from enumsol.support.array_arguments import real_array
+from enumsol.support.immutable import Sealed, sealed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from enumsol.checks import Alpha
-    from enumsol.fixed_points.newton import TrescaData
     from enumsol.fixed_points.system import ContactSystem, Problem
+    from enumsol.fixed_points.tresca_newton import TrescaData
+    from enumsol.support.arguments import Alpha
 
     Vector = NDArray[np.float64]
 

@@ -9,25 +9,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.array_checks import real_array
-from enumsol.checks import optional_callable, positive_integer, positive_number
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.fixed_points.anderson import AndersonMixing
-from enumsol.fixed_points.newton import TrescaData
 from enumsol.fixed_points.result import FixedPoint, Outcome
 from enumsol.fixed_points.state import scaled_forces, slips_of
 from enumsol.fixed_points.system import ContactSystem, contact_problem
 from enumsol.fixed_points.tresca import TrescaNotSolved, node_values, solve
-from enumsol.friction import warn_of_jumps
-from enumsol.problem3d import ContactProblem3D
+from enumsol.fixed_points.tresca_newton import TrescaData
+from enumsol.model.friction import warn_of_jumps
+from enumsol.model.problem3d import ContactProblem3D
+from enumsol.support.arguments import optional_callable, positive_integer, positive_number
+from enumsol.support.array_arguments import real_array
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from enumsol.checks import AlphaLike
     from enumsol.fixed_points.system import Problem
+    from enumsol.support.arguments import AlphaLike
 
     Vector = NDArray[np.float64]
 

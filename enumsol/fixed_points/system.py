@@ -10,11 +10,11 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
 from enumsol.arithmetic.balls import UNIT
-from enumsol.checks import Alpha, alpha_value
 from enumsol.condensation.condensed import cholesky_factor, load_unit, node_units
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import ContactProblem
-from enumsol.problem3d import ContactProblem3D
+from enumsol.model.problem import ContactProblem
+from enumsol.model.problem3d import ContactProblem3D
+from enumsol.support.arguments import Alpha, alpha_value
 
 if TYPE_CHECKING:
     from typing import Any

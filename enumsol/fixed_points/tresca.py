@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from enumsol.array_checks import real_array
-from enumsol.checks import one_of
 from enumsol.errors import EnumsolError, InvalidArgumentError
-from enumsol.fixed_points.newton import ACCEPTED, TrescaData
 from enumsol.fixed_points.state import ContactState, scaled_forces
 from enumsol.fixed_points.system import ContactSystem, contact_problem
-from enumsol.texts import counted
+from enumsol.fixed_points.tresca_newton import ACCEPTED, TrescaData
+from enumsol.support.arguments import one_of
+from enumsol.support.array_arguments import real_array
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.checks import AlphaLike
     from enumsol.fixed_points.system import Problem
+    from enumsol.support.arguments import AlphaLike
 
     Vector = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ there; `get` finds one by name.
 
 from enumsol.gallery.catalogue import GALLERY, GalleryEntry, close_names, get
 from enumsol.gallery.problems import chain, clamped_block, one_node_triangle, two_node_square, wedge
-from enumsol.gallery.solids import block3d, one_node_3d, wedge3d
+from enumsol.gallery.solid_gallery import block3d, one_node_3d, wedge3d
 
 __all__ = [
     "GALLERY",

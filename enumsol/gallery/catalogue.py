@@ -8,17 +8,17 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from enumsol.checks import shown
 from enumsol.errors import InvalidArgumentError
 from enumsol.gallery.problems import chain, clamped_block, one_node_triangle, two_node_square, wedge
-from enumsol.gallery.solids import block3d, one_node_3d, wedge3d
+from enumsol.gallery.solid_gallery import block3d, one_node_3d, wedge3d
+from enumsol.support.arguments import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from enumsol.gallery.problems import Pair
-    from enumsol.problem import ContactProblem
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
 
 
 @dataclass(frozen=True)

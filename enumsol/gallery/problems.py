@@ -9,12 +9,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol import fem
-from enumsol.array_checks import short_vector
-from enumsol.body2d import PlaneMesh
-from enumsol.checks import finite_number, nonnegative_number, positive_integer, positive_number, shown
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.mesh_checks import lame_coefficients
-from enumsol.problem import ContactProblem
+from enumsol.model.body2d import PlaneMesh
+from enumsol.model.problem import ContactProblem
+from enumsol.support.arguments import finite_number, nonnegative_number, positive_integer, positive_number, shown
+from enumsol.support.array_arguments import short_vector
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

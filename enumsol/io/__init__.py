@@ -51,18 +51,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from enumsol.checks import file_path, instance_of
-from enumsol.contact_body import ContactBody
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.files import writing
 from enumsol.io import fclib, matrix_market, npz
-from enumsol.problem import ContactProblem
+from enumsol.model.contact_body import ContactBody
+from enumsol.model.problem import ContactProblem
+from enumsol.support.arguments import file_path, instance_of
+from enumsol.support.files import writing
 
 if TYPE_CHECKING:
     import os
     from pathlib import Path
 
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import ContactProblem3D
 
 __all__ = ["read_problem", "write_problem"]
 

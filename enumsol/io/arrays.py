@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from enumsol.body2d import PlaneMesh
 from enumsol.errors import InvalidProblemError
 from enumsol.io.layouts import LAYOUT_2D, LAYOUT_3D, PLANE_MESH, Layout, constant_friction
-from enumsol.problem import ContactProblem
+from enumsol.model.body2d import PlaneMesh
+from enumsol.model.problem import ContactProblem
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import ContactProblem3D
 
 
 def problem_from_arrays(arrays: Mapping[str, Any], layout: Layout) -> ContactProblem | ContactProblem3D:

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.body3d import BodyMesh, SlipMean
 from enumsol.errors import InvalidProblemError
-from enumsol.friction import ConstantFriction, FrictionTable
 from enumsol.io.layouts import LAYOUT_3D, MEAN, MESH, SURFACE, TABLE, constant_friction
-from enumsol.problem3d import ContactProblem3D
+from enumsol.model.body3d import BodyMesh, SlipMean
+from enumsol.model.friction import ConstantFriction, FrictionTable
+from enumsol.model.problem3d import ContactProblem3D
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -22,14 +22,14 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidProblemError, MissingDependencyError
 from enumsol.io.layouts import refusing
-from enumsol.problem import ContactProblem
+from enumsol.model.problem import ContactProblem
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import ContactProblem3D
 
     Problem = ContactProblem | ContactProblem3D
 
@@ -143,7 +143,7 @@ def _problem(
     """The problem whose rows and offsets come contact by contact."""
     if dimension == 2:
         return ContactProblem(A, B[0::2], B[1::2], f, gap=w[0::2], friction=(mu, 0.0), slip_offset=w[1::2])
-    from enumsol.problem3d import ContactProblem3D  # not for problems in 2D
+    from enumsol.model.problem3d import ContactProblem3D  # not for problems in 2D
 
     offsets = w.reshape(-1, 3)
     return ContactProblem3D(

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.io.layouts import Layout
-    from enumsol.problem import ContactProblem
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
 
 #: Most entries of a vector, or of a table that is stored densely.
 _LARGEST_VECTOR = 50_000_000

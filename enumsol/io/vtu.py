@@ -6,22 +6,22 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.array_checks import real_array
-from enumsol.body2d import triangles_apart
-from enumsol.checks import file_path
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
-from enumsol.files import writing
-from enumsol.problem import ContactProblem
-from enumsol.problem3d import ContactProblem3D
-from enumsol.shapes import body_shape
-from enumsol.statuses import STATUSES
+from enumsol.model.body2d import triangles_apart
+from enumsol.model.problem import ContactProblem
+from enumsol.model.problem3d import ContactProblem3D
+from enumsol.model.shapes import body_shape
+from enumsol.model.statuses import STATUSES
+from enumsol.support.arguments import file_path
+from enumsol.support.array_arguments import real_array
+from enumsol.support.files import writing
 
 if TYPE_CHECKING:
     import os
 
     from numpy.typing import NDArray
 
-    from enumsol.body3d import BodyMesh
+    from enumsol.model.body3d import BodyMesh
 
     Floats = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 File layout: the line ``enumsol-proof 1``, a zlib stream, and the SHA-256 digest (32 bytes) of everything before it.
 The stream holds one JSON record a line, in ASCII: a header, the tree in preorder, and a footer. (Proofs of branch
-graphs have other records; see ``checker.graph``.)
+graphs have other records; see ``checker.graph_checker``.)
 
 Header
     ``{"format": "enumsol-proof", "version": 1, "problem": <fingerprint>, "alpha": "a/b", "p": p,
@@ -49,10 +49,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from enumsol.checks import file_path
 from enumsol.errors import EnumsolError, InvalidArgumentError
-from enumsol.files import writing
-from enumsol.texts import html_lines
+from enumsol.support.arguments import file_path
+from enumsol.support.files import writing
+from enumsol.support.messages import html_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -16,7 +16,7 @@ import numpy as np
 
 from enumsol.condensation.affine import exactly_at
 from enumsol.errors import InvalidArgumentError
-from enumsol.kernel.rows import UNDECIDED
+from enumsol.trusted.status_rows import UNDECIDED
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.data import Data
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
 
     Array = NDArray[np.float64]
 

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.kernel.space import FORCE, GAP, RIGHT
+from enumsol.model.sectors import DEEPEST
 from enumsol.proof.reading import bytes_from, shown
-from enumsol.sectors import DEEPEST
+from enumsol.trusted.space.sector_rows import FORCE, GAP, RIGHT
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.kernel.space import Row
+    from enumsol.trusted.space.sector_rows import Row
 
 #: Numbers of directions and sectors in rows are less: tangents may be two levels finer than the finest sector.
 _NUMBERS = 1 << (DEEPEST + 3)

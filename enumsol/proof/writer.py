@@ -9,9 +9,9 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from enumsol.files import writing
-from enumsol.proof.parts import BEGIN, Checksum, Part, encoded
+from enumsol.proof.compressed_parts import BEGIN, Checksum, Part, encoded
 from enumsol.proof.proof_file import MAGIC, Proof
+from enumsol.support.files import writing
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -16,7 +16,7 @@ from libc.string cimport memcpy, memmove, memset
 
 import numpy as np
 
-from enumsol.statuses import CONTACT, UNDECIDED
+from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE
 
 OPTIMAL = 0
@@ -179,7 +179,7 @@ cdef class BranchingRule:
         Friction coefficients.
     slip_rows, slip_modes : (2, p) int arrays
         The row, and its mode, that puts lambda_t on the slip bound in slip+ and in slip-. Other rows are numbered
-        kind * p + node as in enumsol.statuses.RowKind.
+        kind * p + node as in enumsol.model.statuses.RowKind.
     candidates : int
         How many nodes are looked at.
     """

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.model.statuses import UNDECIDED, RowKind
 from enumsol.relaxation.engine import BRANCHING_CANDIDATES, FEASIBILITY_TOLERANCE, PRUNE_MARGIN, Relaxation
-from enumsol.relaxation.rows import EQUALITY, INEQUALITY, row_terms
-from enumsol.statuses import UNDECIDED, RowKind
+from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY, row_terms
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import ScaledSystem
-    from enumsol.kernel.forms import EnclosedForm
     from enumsol.relaxation._active_set import BranchingRule, QPData, QPState
     from enumsol.selections.solution import Codes
+    from enumsol.trusted.quadratic_forms import EnclosedForm
 
 
 #: Rows that become equations when a node is open, or in contact.

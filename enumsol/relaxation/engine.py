@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from enumsol.statuses import CONTACT, UNDECIDED
+from enumsol.model.statuses import CONTACT, UNDECIDED
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.kernel.forms import EnclosedForm
     from enumsol.selections.solution import Codes
+    from enumsol.trusted.quadratic_forms import EnclosedForm
 
 #: The compiled module of the active-set method.
 COMPILED = "enumsol.relaxation._active_set"

@@ -9,14 +9,14 @@ import scipy.sparse as sp
 from scipy.linalg import solve_triangular
 
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation, largest_violation
-from enumsol.relaxation.rows import EQUALITY, row_terms
+from enumsol.relaxation.imposed_rows import EQUALITY, row_terms
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import ScaledSystem
-    from enumsol.kernel.forms import EnclosedForm
     from enumsol.selections.solution import Codes
+    from enumsol.trusted.quadratic_forms import EnclosedForm
 
 
 class InteriorPointEngine:

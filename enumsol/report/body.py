@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.body2d import OUTLINES
-from enumsol.shapes import BodyShape, body_shape
+from enumsol.model.body2d import OUTLINES
+from enumsol.model.shapes import BodyShape, body_shape
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
 
     Floats = NDArray[np.float64]
 

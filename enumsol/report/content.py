@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.curves import Curve, curves, side_by_side
 from enumsol.branches.elements import VertexKind
-from enumsol.branches.marks import colour_of
-from enumsol.branches.quantities import QUANTITIES, state_columns
+from enumsol.branches.figures.curves import Curve, curves, side_by_side
+from enumsol.branches.figures.marks import colour_of
+from enumsol.branches.figures.quantities import QUANTITIES, state_columns
+from enumsol.model.statuses import STATUSES
 from enumsol.report.body import body_record
-from enumsol.statuses import STATUSES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from enumsol.branches import BranchGraph
     from enumsol.branches.elements import Arc, Vertex
-    from enumsol.statuses import ContactStatus
+    from enumsol.model.statuses import ContactStatus
 
 #: Distance of drawn curves from the arcs, relative to the picture; coarser until the page is small enough.
 _TOLERANCE, _COARSEST = 1e-3, 2e-2
@@ -36,7 +36,7 @@ _COMPARED = 300
 def report_content(graph: BranchGraph) -> dict[str, Any]:
     """Everything that the script needs: nodes, quantities, arcs with points along them, vertices, steps, the body.
 
-    Statuses are texts of one digit a node, the codes of `enumsol.statuses`. ``f`` and ``w`` are forces and
+    Statuses are texts of one digit a node, the codes of `enumsol.model.statuses`. ``f`` and ``w`` are forces and
     displacements, normal ones first, at the points ``a`` of an arc.
     """
     drawn, tolerance = _sampled(graph)

@@ -14,12 +14,12 @@ import numpy as np
 
 from enumsol._version import find_version
 from enumsol.branches import BranchGraph
-from enumsol.branches.plots import checked_units
-from enumsol.checks import file_path, instance_of
+from enumsol.branches.figures.graph_plots import checked_units
 from enumsol.errors import MissingDependencyError
-from enumsol.files import writing
 from enumsol.report.content import listed, report_content
-from enumsol.texts import counted
+from enumsol.support.arguments import file_path, instance_of
+from enumsol.support.files import writing
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     import os

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.body2d import OUTLINES
-from enumsol.checks import positive_number
 from enumsol.errors import InvalidArgumentError
-from enumsol.facets import boundary_facets, outlines
-from enumsol.figures import axes_or_none, figure_of, new_figure
-from enumsol.shapes import BodyShape, arrow_scale, body_shape, round_scale
-from enumsol.statuses import ContactStatus
+from enumsol.model.body2d import OUTLINES
+from enumsol.model.facets import boundary_facets, outlines
+from enumsol.model.shapes import BodyShape, arrow_scale, body_shape, round_scale
+from enumsol.model.statuses import ContactStatus
+from enumsol.support.arguments import positive_number
+from enumsol.support.plotting import axes_or_none, figure_of, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,11 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.roots.linearisation import SelectionTangent
-from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
-from enumsol.roots.root_set import Undecided
-from enumsol.roots.slip_signs import SlipSigns, shown_status, sign_over
-from enumsol.statuses import (
+from enumsol.model.statuses import (
     CONTACT,
     FRICTIONLESS,
     OPEN,
@@ -20,19 +16,23 @@ from enumsol.statuses import (
     UNDECIDED,
     ContactStatus,
 )
+from enumsol.roots.linearisation import SelectionTangent
+from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
+from enumsol.roots.root_set import Undecided
+from enumsol.roots.slip_signs import SlipSigns, shown_status, sign_over
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from enumsol.checks import Alpha
-    from enumsol.kernel.point import VerifiedSelection
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
     from enumsol.roots.components import RootComponent
     from enumsol.search.certifiers.protocol import UndecidedPart
-    from enumsol.selections.floats import FloatSelections
+    from enumsol.selections.float_selections import FloatSelections
     from enumsol.selections.solution import Codes, PointValues, SelectionSolution, SelectionSolver
+    from enumsol.support.arguments import Alpha
+    from enumsol.trusted.at_alpha import VerifiedSelection
 
 
 class RootBuilder:

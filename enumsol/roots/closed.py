@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from enumsol.kernel.closing import same_solution
 from enumsol.roots.components import RootComponent
+from enumsol.trusted.uniqueness import same_solution
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

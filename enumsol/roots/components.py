@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.deadlines import look
 from enumsol.selections.solution import VertexLimitError
+from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

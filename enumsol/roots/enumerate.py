@@ -7,21 +7,9 @@ import time
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from enumsol.checks import (
-    alpha_value,
-    file_path,
-    instance_of,
-    one_of,
-    optional_callable,
-    optional_count,
-    optional_executor,
-    optional_seconds,
-    share,
-)
-from enumsol.contact_body import ContactBody
-from enumsol.deadlines import TimeOverError, within
 from enumsol.errors import InvalidArgumentError
-from enumsol.problem import ContactProblem
+from enumsol.model.contact_body import ContactBody
+from enumsol.model.problem import ContactProblem
 from enumsol.roots.at_rest import AtRest
 from enumsol.roots.builder import RootBuilder, in_order, named, root_family
 from enumsol.roots.closed import apart, closed_component
@@ -34,7 +22,19 @@ from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
 from enumsol.search.outcome import SearchLimits, SearchProgress
 from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.selections.floats import SIGN_TOLERANCE
+from enumsol.selections.float_selections import SIGN_TOLERANCE
+from enumsol.support.arguments import (
+    alpha_value,
+    file_path,
+    instance_of,
+    one_of,
+    optional_callable,
+    optional_count,
+    optional_executor,
+    optional_seconds,
+    share,
+)
+from enumsol.support.deadlines import TimeOverError, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -43,10 +43,10 @@ if TYPE_CHECKING:
 
     from typing_extensions import TypeIs
 
-    from enumsol.checks import Alpha, AlphaLike
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
     from enumsol.selections.solution import Codes, PointValues, SelectionSolution, SelectionSolver
+    from enumsol.support.arguments import Alpha, AlphaLike
 
 Method = Literal["tree", "exhaustive"]
 #: The exhaustive method reports progress this often [seconds].
@@ -104,7 +104,7 @@ def enumerate_roots(
         proven again; limits are about what is searched anew. The file is replaced as soon as the new one holds as much.
         Without such a file the search begins at its beginning.
     tolerance : float
-        For arithmetic "fast": see enumsol.selections.floats.SIGN_TOLERANCE.
+        For arithmetic "fast": see enumsol.selections.float_selections.SIGN_TOLERANCE.
     engine : {"active-set", "clarabel"}, optional
         Solver of the relaxations; by default the compiled active-set method with clarabel as its fallback.
 
@@ -147,8 +147,8 @@ def enumerate_roots(
     seconds, tolerance = optional_seconds(time_limit), share(tolerance)
     if _is_in_space(problem):
         # not for problems in 2D
-        from enumsol.roots.space import SpaceEnumeration, check_supported
-        from enumsol.search.space_solvers import SpaceSolvers
+        from enumsol.roots.space_roots import SpaceEnumeration, check_supported
+        from enumsol.search.space.space_setup import SpaceSolvers
 
         check_supported(arithmetic, method, engine)
         _check_proof(arithmetic, method, proof_path, resume)

@@ -7,7 +7,6 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from enumsol.deadlines import Deadline, within
 from enumsol.errors import Interrupted, OutputError
 from enumsol.proof.begun import begun_proof
 from enumsol.proof.writer import ProofWriter
@@ -17,7 +16,8 @@ from enumsol.search.outcome import SearchLimits, SearchOutcome
 from enumsol.search.parallel import Searchable, Spread
 from enumsol.search.resume import resume
 from enumsol.search.stopping import Stop, StopReason
-from enumsol.texts import counted
+from enumsol.support.deadlines import Deadline, within
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.sealed import Sealed
-from enumsol.statuses import FRICTIONLESS, SLIP_MINUS, SLIP_PLUS
+from enumsol.model.statuses import FRICTIONLESS, SLIP_MINUS, SLIP_PLUS
+from enumsol.support.immutable import Sealed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.selections.floats import FloatSelections
+    from enumsol.selections.float_selections import FloatSelections
     from enumsol.selections.solution import Codes
 
 

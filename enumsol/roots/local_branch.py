@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from enumsol.checks import instance_of
 from enumsol.errors import InvalidArgumentError, TooLargeError
-from enumsol.problem import ContactProblem
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, STATUSES, STICK, contact_status
-from enumsol.texts import counted
+from enumsol.model.problem import ContactProblem
+from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, STATUSES, STICK, contact_status
+from enumsol.support.arguments import instance_of
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence, Set
 
     from numpy.typing import NDArray
 
-    from enumsol.checks import Alpha
     from enumsol.condensation.condensed import CondensedProblem
+    from enumsol.model.statuses import ContactStatus
     from enumsol.selections.solution import Codes
-    from enumsol.statuses import ContactStatus
+    from enumsol.support.arguments import Alpha
 
 #: Selections examined at one point (paper, Remark 5.1); six nodes in a corner of three statuses have 729.
 MAX_SELECTIONS = 4096

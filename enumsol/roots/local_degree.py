@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.deadlines import current
-from enumsol.search.certifiers.floats import FastCertifier
+from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.outcome import SearchLimits
 from enumsol.search.reduction import Reduction
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import TreeSearch
-from enumsol.selections.floats import FloatSelections
+from enumsol.selections.float_selections import FloatSelections
+from enumsol.support.deadlines import current
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

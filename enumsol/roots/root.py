@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.model.statuses import ContactStatus, sign_array
 from enumsol.roots.local_branch import branch_test
-from enumsol.sealed import Sealed, sealed
-from enumsol.statuses import ContactStatus, sign_array
-from enumsol.texts import html_lines, html_table
+from enumsol.support.immutable import Sealed, sealed
+from enumsol.support.messages import html_lines, html_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from enumsol.checks import Alpha
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.roots.linearisation import SelectionTangent
     from enumsol.roots.local_branch import LocalBranchTest
     from enumsol.roots.slip_signs import SlipSigns
+    from enumsol.support.arguments import Alpha
 
 #: Contact nodes of a printed root; of larger ones the first are shown.
 _PRINTED_NODES = 20

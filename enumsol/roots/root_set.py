@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from enumsol.roots.root import Root, summary
-from enumsol.sealed import Immutable, Sealed
-from enumsol.texts import counted, html_lines, html_table
+from enumsol.support.immutable import Immutable, Sealed
+from enumsol.support.messages import counted, html_lines, html_table
 
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from enumsol.checks import Alpha
+    from enumsol.model.statuses import ContactStatus
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.root import Enclosure, RootFamily
     from enumsol.search.certifiers.protocol import Escalations
-    from enumsol.statuses import ContactStatus
+    from enumsol.support.arguments import Alpha
 
 _PRINTED_ROOTS, _PRINTED_REGIONS = 20, 5
 _HEADS = ("", "index", "regular", "margin", "max lambda_n", "contact")

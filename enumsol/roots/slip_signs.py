@@ -7,14 +7,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from enumsol.condensation.data import EXACT_DOF_LIMIT
-from enumsol.statuses import FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
+from enumsol.model.statuses import FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from enumsol.checks import Alpha
-    from enumsol.problem import ContactProblem
+    from enumsol.model.problem import ContactProblem
     from enumsol.selections.solution import Codes
+    from enumsol.support.arguments import Alpha
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class SlipSigns:
         if self.problem.n > EXACT_DOF_LIMIT:
             return None
         from enumsol.condensation.exact import ExactSystem  # python-flint, not for fast arithmetic
-        from enumsol.selections.rationals import ExactSelections
+        from enumsol.selections.rational_selections import ExactSelections
 
         solver = ExactSelections(ExactSystem.from_problem(self.problem, self.alpha))
         solution = solver.solve(self.codes)

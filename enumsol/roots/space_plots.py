@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.figures import axes_or_none, figure_of, new_figure
-from enumsol.statuses import ContactStatus
+from enumsol.model.statuses import ContactStatus
+from enumsol.support.plotting import axes_or_none, figure_of, new_figure
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import ContactProblem3D
 
 _MARKS = {
     ContactStatus.OPEN: ("o", "none"),

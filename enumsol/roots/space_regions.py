@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
-from enumsol.deadlines import over
-from enumsol.kernel.ball_arrays import Ball, smaller, solution
-from enumsol.kernel.leaves import settle, unsettled
-from enumsol.sectors import SECTORS
-from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.model.sectors import SECTORS
+from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.support.deadlines import over
+from enumsol.trusted.arcs.ball_arrays import Ball, smaller, solution
+from enumsol.trusted.space.leaves import settle, unsettled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from enumsol.condensation.space import EnclosedSpace
-    from enumsol.kernel.leaves import Open, SpaceRoot
-    from enumsol.kernel.space_closing import OnlySolution
+    from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.selections.solution import Codes
+    from enumsol.trusted.space.leaves import Open, SpaceRoot
+    from enumsol.trusted.space.space_uniqueness import OnlySolution
 
     Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 from enumsol.roots.enumerate import enumerate_roots
 
 if TYPE_CHECKING:
-    from enumsol.checks import AlphaLike
-    from enumsol.problem import ContactProblem
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.support.arguments import AlphaLike
 
 
 def is_unique(problem: ContactProblem | ContactProblem3D, alpha: AlphaLike, **options: Any) -> bool | None:

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.deadlines import look
-from enumsol.kernel.selection_rows import (
+from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.search.reduction import NEAR, Reduction
+from enumsol.support.deadlines import look
+from enumsol.trusted.selection import (
     CONE_MINUS,
     CONE_PLUS,
     NORMAL_FORCE,
@@ -20,8 +22,6 @@ from enumsol.kernel.selection_rows import (
     SLIP_FORWARD,
     SelectionRows,
 )
-from enumsol.search.reduction import NEAR, Reduction
-from enumsol.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.deadlines import look
+from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.deadlines import look
 from enumsol.errors import TooLargeError
-from enumsol.selections.floats import selection_systems
-from enumsol.statuses import FINAL, INEQUALITIES
+from enumsol.model.statuses import FINAL, INEQUALITIES
+from enumsol.selections.float_selections import selection_systems
+from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

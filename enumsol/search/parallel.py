@@ -15,23 +15,23 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from enumsol.executors import Crew
-from enumsol.proof.parts import Part, encoded
+from enumsol.proof.compressed_parts import Part, encoded
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.search.tree import TreeNode
+from enumsol.support.workers import Crew
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
     from concurrent.futures import Executor
 
-    from enumsol.executors import Job
-    from enumsol.kernel.forms import EnclosedForm
-    from enumsol.proof.parts import Recorder
+    from enumsol.proof.compressed_parts import Recorder
     from enumsol.search.certifiers.protocol import Certified, Certifier
     from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress
     from enumsol.search.resume import Reader
     from enumsol.search.tree import TreeSearch
     from enumsol.selections.solution import Codes
+    from enumsol.support.workers import Job
+    from enumsol.trusted.quadratic_forms import EnclosedForm
 
 #: Nodes of a task, and those that are examined here before there are any.
 NODES, FIRST = 512, 64

@@ -12,9 +12,9 @@ from enumsol.proof.reading import rational_text
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.checks import Alpha
-    from enumsol.problem import ContactProblem
-    from enumsol.problem3d import ContactProblem3D
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.support.arguments import Alpha
 
 
 def point_header(

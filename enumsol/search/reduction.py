@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.deadlines import look
+from enumsol.model.statuses import BACKWARD, FORWARD, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.definite import Nodes
 from enumsol.search.numbers import Numbers, weights_of
-from enumsol.statuses import BACKWARD, FORWARD, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.kernel.forms import EnclosedForm
-from enumsol.kernel.rows import ROW_KINDS
-from enumsol.proof.forms import DeclaredForm
-from enumsol.proof.lone import LoneRoot
+from enumsol.model.statuses import CONTACT, SLIDING, UNDECIDED
+from enumsol.proof.form_records import DeclaredForm
 from enumsol.proof.reading import multipliers_from
-from enumsol.search.lone import LoneProposal
+from enumsol.proof.root_records import LoneRoot
+from enumsol.search.fathoming_in_contact import LoneProposal
 from enumsol.search.tree import TreeNode
-from enumsol.statuses import CONTACT, SLIDING, UNDECIDED
+from enumsol.trusted.quadratic_forms import EnclosedForm
+from enumsol.trusted.status_rows import ROW_KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -12,29 +12,29 @@ from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError
-from enumsol.search.certifiers.floats import FastCertifier
+from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
-from enumsol.search.closing import Closer
-from enumsol.search.forms import Forms
+from enumsol.search.fathoming import Closer
+from enumsol.search.form_policy import Forms
 from enumsol.search.proof_header import point_header, unit_exponents
 from enumsol.search.resume import PlaneReader
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import TreeSearch, make_engine
-from enumsol.selections.floats import FloatSelections
+from enumsol.selections.float_selections import FloatSelections
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from enumsol.checks import Alpha
     from enumsol.condensation.condensed import ScaledSystem
-    from enumsol.problem import ContactProblem
-    from enumsol.proof.parts import Recorder
+    from enumsol.model.problem import ContactProblem
+    from enumsol.proof.compressed_parts import Recorder
     from enumsol.relaxation.engine import Engine
     from enumsol.search.certifiers.protocol import Certifier
-    from enumsol.search.certifiers.rationals import ExactCertifier
-    from enumsol.search.closing import Closing
+    from enumsol.search.certifiers.rational_certifier import ExactCertifier
+    from enumsol.search.fathoming import Closing
     from enumsol.search.outcome import SearchLimits, SearchProgress
-    from enumsol.selections.rationals import ExactSelections
+    from enumsol.selections.rational_selections import ExactSelections
+    from enumsol.support.arguments import Alpha
 
 Arithmetic = Literal["fast", "verified", "exact"]
 
@@ -94,7 +94,7 @@ class Solvers:
             S is not positive definite, exactly.
         """
         from enumsol.condensation.exact import ExactSystem, check_definite  # python-flint
-        from enumsol.selections.rationals import ExactSelections  # python-flint
+        from enumsol.selections.rational_selections import ExactSelections  # python-flint
 
         if self.arithmetic != "exact" and self.problem.n > EXACT_DOF_LIMIT:
             return None
@@ -110,7 +110,7 @@ class Solvers:
         """The certifier in rationals; None when the problem is too large, or only condensed data are certified."""
         if self.data == "condensed" or self.exact is None:
             return None
-        from enumsol.search.certifiers.rationals import ExactCertifier  # python-flint
+        from enumsol.search.certifiers.rational_certifier import ExactCertifier  # python-flint
 
         return ExactCertifier(self.exact, self.scaled, self.enclosed)
 
@@ -150,7 +150,7 @@ class Solvers:
         if self.arithmetic == "fast":
             return FastCertifier(self.floats)
         if self.arithmetic == "exact":
-            from enumsol.search.certifiers.rationals import ExactCertifier  # python-flint
+            from enumsol.search.certifiers.rational_certifier import ExactCertifier  # python-flint
 
             return ExactCertifier(_present(self.exact), self.scaled, self.enclosed)
         return VerifiedCertifier(

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from enumsol.kernel.rows import coverings_of, refines
-from enumsol.relaxation.rows import status_rows
-from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIDING, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIDING, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.relaxation.imposed_rows import status_rows
+from enumsol.trusted.status_rows import coverings_of, refines
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence

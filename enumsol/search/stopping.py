@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from enumsol.texts import counted
+from enumsol.support.messages import counted
 
 
 class StopReason(enum.Enum):

@@ -17,28 +17,28 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from enumsol.condensation.condensed import ScaledSystem
-from enumsol.deadlines import Deadline, TimeOverError, over, within
 from enumsol.errors import MissingDependencyError
+from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart
-from enumsol.search.forms import Forms, HeldRecords
+from enumsol.search.form_policy import Forms, HeldRecords
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting, branching_node
 from enumsol.search.stopping import Stop, StopReason
 from enumsol.selections.solution import Codes
-from enumsol.statuses import UNDECIDED
+from enumsol.support.deadlines import Deadline, TimeOverError, over, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from enumsol.condensation.space import SpaceSystem
-    from enumsol.kernel.forms import EnclosedForm
+    from enumsol.condensation.space_condensed import SpaceSystem
     from enumsol.search.certifiers.protocol import Bound, Certifier
-    from enumsol.search.closing import Closer
-    from enumsol.search.lone import LoneProposal
-    from enumsol.search.space_closing import SpaceCloser
+    from enumsol.search.fathoming import Closer
+    from enumsol.search.fathoming_in_contact import LoneProposal
+    from enumsol.search.space.space_fathoming import SpaceCloser
+    from enumsol.trusted.quadratic_forms import EnclosedForm
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
@@ -70,7 +70,7 @@ def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
     try:
         return ActiveSetEngine(system)
     except ImportError as error:
-        from enumsol.compiled import why_missing  # seldom needed
+        from enumsol.support.compiled import why_missing  # seldom needed
 
         missing = f"the compiled active-set solver is not available: {why_missing(COMPILED, error)}"
         if name is not None:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq, fmpq_mat, fmpz_mat, fmpz_poly
 
 from enumsol.arithmetic.algebraic import integer_polynomial
-from enumsol.deadlines import look
-from enumsol.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
+from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
+from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
     from enumsol.condensation.exact import ExactCondensed

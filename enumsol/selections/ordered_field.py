@@ -8,10 +8,10 @@ from flint import fmpq
 
 from enumsol.arithmetic.rationals import to_fraction
 from enumsol.condensation.exact import ExactSystem
-from enumsol.deadlines import look
+from enumsol.model.statuses import STICK, RowKind
 from enumsol.selections.polytopes import dot
-from enumsol.selections.rationals import ExactSelections
-from enumsol.statuses import STICK, RowKind
+from enumsol.selections.rational_selections import ExactSelections
+from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
     from enumsol.condensation.exact import ExactCondensed

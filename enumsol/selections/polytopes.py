@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq
 
-from enumsol.deadlines import look
 from enumsol.selections.solution import MAX_BASES, VertexLimitError
+from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -25,9 +25,9 @@ from unittest.mock import patch
 import numpy as np
 
 import enumsol
+from enumsol.model.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.search.numbers import Numbers, weights_of
 from enumsol.search.reduction import NEAR, Reduction
-from enumsol.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from grazing.run import SOFT, STIFF
 from shared.results import yes
 

@@ -54,7 +54,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import enumsol
-from enumsol.search import forms as policy
+from enumsol.search import form_policy as policy
 from shared.loads import DRAGGED, PRESSED, block, oblique_wedge, straight_wedge
 
 if TYPE_CHECKING:

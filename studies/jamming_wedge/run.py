@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import enumsol
 from enumsol import fem
-from enumsol.figures import new_figure
+from enumsol.support.plotting import new_figure
 from shared.results import series, yes
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ def row(name: str, problem: ContactProblem) -> dict[str, Any]:
     assert checked.complete
     by_tree: dict[str, Any] = {"tree nodes": "-", "tree s": "-"}
     if problem.p <= TREE_P:
-        with patch("enumsol.branches.closed_pieces.ClosedPieces.find", lambda self, traced: None):
+        with patch("enumsol.branches.enclosed.single_branches.ClosedPieces.find", lambda self, traced: None):
             tree, tree_taken = timed(enumsol.branch_graph, problem, (0.0, 3.0))
         assert [arc.statuses for arc in tree.arcs] == [arc.statuses for arc in graph.arcs]
         by_tree = {"tree nodes": tree.stats.nodes, "tree s": tree_taken}

@@ -45,9 +45,9 @@ from scipy.optimize import OptimizeResult
 import enumsol
 from enumsol import gallery
 from enumsol.branches.claims import uniqueness_bound
-from enumsol.search.closing import propose
+from enumsol.model.statuses import UNDECIDED
+from enumsol.search.fathoming import propose
 from enumsol.search.numbers import Numbers
-from enumsol.statuses import UNDECIDED
 from one_certificate.graphs import graphs
 from shared.clock import least_time, timed
 from shared.figures import BLUE, GREEN, GREY, ORANGE, RED, panels
@@ -129,9 +129,9 @@ def whole_by(numbers: Numbers | None) -> Iterator[None]:
         return found or propose(system, codes, None, exactly=exactly, sought=numbers)
 
     with ExitStack() as stack:
-        stack.enter_context(patch("enumsol.search.closing.propose", proposed))
+        stack.enter_context(patch("enumsol.search.fathoming.propose", proposed))
         if numbers is None:
-            stack.enter_context(patch("enumsol.search.space_closing.SpaceCloser.whole", lambda self: None))
+            stack.enter_context(patch("enumsol.search.space.space_fathoming.SpaceCloser.whole", lambda self: None))
         if numbers is Numbers.PLAIN:
             # what is sought in 3D are better numbers than those given
             stack.enter_context(patch("scipy.optimize.minimize", unchanged))

@@ -13,8 +13,8 @@ import numpy as np
 
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import PRUNE_MARGIN
+from enumsol.relaxation.imposed_rows import EQUALITY
 from enumsol.relaxation.interior_point import InteriorPointEngine
-from enumsol.relaxation.rows import EQUALITY
 
 INSTALLED = find_spec("daqp") is not None
 #: daqp's marks of a row: equality, active at its lower bound; and what it takes for no bound.

@@ -11,15 +11,15 @@ from unittest.mock import patch
 
 import numpy as np
 
-from enumsol.kernel.leaves import Open, SpaceRoot, distinct_roots, settle
-from enumsol.relaxation.space import SpaceEngine, SpaceRelaxation
-from enumsol.search import space
+from enumsol.model.sectors import DEEPEST, SECTORS, contains, direction, end_number, level_of, nearest
+from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.outcome import SearchLimits
-from enumsol.search.space import SpaceSplitting
-from enumsol.search.space_solvers import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSplitting
+from enumsol.search.space.space_search import space_search as space
+from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.search.tree import TreeSearch
-from enumsol.sectors import DEEPEST, SECTORS, contains, direction, end_number, level_of, nearest
-from enumsol.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle
 
 if TYPE_CHECKING:
     from shared.results import Run

@@ -44,17 +44,17 @@ from unittest.mock import patch
 import numpy as np
 
 from enumsol import ContactProblem3D, gallery
-from enumsol.kernel.leaves import distinct_roots
-from enumsol.kernel.space import LEFT, RIGHT, SLIP, row_terms
-from enumsol.relaxation import space
+from enumsol.model.sectors import DEEPEST, SECTORS, direction, end_number, level_of
+from enumsol.model.statuses import CONTACT, UNDECIDED
+from enumsol.relaxation import space_relaxation as space
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.relaxation.space import SpaceEngine, SpaceRelaxation
+from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import Refine, Unrecorded
 from enumsol.search.outcome import SearchLimits
-from enumsol.search.space import SpaceCertifier
-from enumsol.search.space_solvers import SpaceSolvers
-from enumsol.sectors import DEEPEST, SECTORS, direction, end_number, level_of
-from enumsol.statuses import CONTACT, UNDECIDED
+from enumsol.search.space.space_search import SpaceCertifier
+from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.trusted.space.leaves import distinct_roots
+from enumsol.trusted.space.sector_rows import LEFT, RIGHT, SLIP, row_terms
 from search_in_3d_choices.early import early
 
 if TYPE_CHECKING:

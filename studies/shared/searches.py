@@ -8,7 +8,7 @@ from enumsol.proof.writer import ProofWriter
 from enumsol.search.outcome import SearchLimits
 from enumsol.search.solvers import Solvers
 from enumsol.search.tree import TreeSearch
-from enumsol.selections.floats import SIGN_TOLERANCE
+from enumsol.selections.float_selections import SIGN_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,7 +7,7 @@ import pytest
 from branches.problems import assert_balanced, one_node
 
 from enumsol.branches import branch_graph
-from enumsol.statuses import ContactStatus
+from enumsol.model.statuses import ContactStatus
 
 OPEN, STICK, MINUS = ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP_MINUS
 BOTH = pytest.mark.parametrize("arithmetic", ["fast", "exact"])

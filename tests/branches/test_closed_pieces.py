@@ -10,20 +10,20 @@ from branches.test_lower_bounds import KINDS, case, padded
 from generators import through_the_unloaded_state
 from trees import by_the_tree
 
-import enumsol.branches.closed_pieces
+import enumsol.branches.enclosed.single_branches
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
-from enumsol.branches.closed_pieces import ClosedPieces
-from enumsol.branches.traced import TracedProblem
+from enumsol.branches.enclosed.single_branches import ClosedPieces
+from enumsol.branches.enclosed.traced import TracedProblem
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import Interrupted
-from enumsol.kernel.arc_closing import PieceNumbers, only_roots
+from enumsol.trusted.arcs.only_branch import PieceNumbers, only_roots
 
 
 @pytest.fixture(autouse=True, scope="module")
 def patient():
     """Small bodies are tried as often as large ones."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("enumsol.branches.closed_pieces._VAIN_TRIES", 100)
+        patch.setattr("enumsol.branches.enclosed.single_branches._VAIN_TRIES", 100)
         yield
 
 
@@ -178,7 +178,7 @@ def test_an_interruption_claims_nothing(monkeypatch):
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(enumsol.branches.closed_pieces, "only_roots", stop)
+    monkeypatch.setattr(enumsol.branches.enclosed.single_branches, "only_roots", stop)
     with pytest.raises(Interrupted) as caught:
         branch_graph(gallery.clamped_block(8, 4), (0, 3))
     assert not caught.value.partial.complete

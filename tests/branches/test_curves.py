@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from enumsol import InvalidArgumentError, branch_graph, gallery
-from enumsol.branches.curves import curves
+from enumsol.branches.figures.curves import curves
 
 GRAPHS = [("one-node-6.1", (0, 10)), ("two-node-6.7-minus", (-3, 3)), ("chain-2", (0, 10)), ("wedge-8-5", (1, 5))]
 

@@ -10,7 +10,7 @@ from branches.problems import assert_balanced, assert_same_roots, mirrored_probl
 
 from enumsol import ContactProblem, enumerate_roots
 from enumsol.branches import branch_graph
-from enumsol.statuses import ContactStatus
+from enumsol.model.statuses import ContactStatus
 
 A = np.array([[2.0, -1.0], [-1.0, 2.0]])
 

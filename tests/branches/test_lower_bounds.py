@@ -29,7 +29,7 @@ from trees import by_the_tree
 from enumsol import BranchGraph, ContactProblem, branch_graph, enumerate_roots, gallery
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.claims import Claims, Standing
-from enumsol.branches.gluing import glue
+from enumsol.branches.exact.gluing import glue
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError, Interrupted
 

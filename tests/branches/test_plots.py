@@ -8,11 +8,11 @@ import pytest
 
 from enumsol import ContactProblem, InvalidArgumentError, branch_graph, gallery
 from enumsol.branches.claims import MultiplicitySteps
-from enumsol.branches.curves import Curve, curves, side_by_side
-from enumsol.branches.marks import MARKERS, STATUS_STYLES
-from enumsol.branches.quantities import QUANTITIES
-from enumsol.branches.zooms import narrow_changes
-from enumsol.statuses import ContactStatus
+from enumsol.branches.figures.curves import Curve, curves, side_by_side
+from enumsol.branches.figures.marks import MARKERS, STATUS_STYLES
+from enumsol.branches.figures.quantities import QUANTITIES
+from enumsol.branches.figures.zooms import narrow_changes
+from enumsol.model.statuses import ContactStatus
 
 
 @pytest.fixture(scope="module")
@@ -198,7 +198,7 @@ def test_both_slips_have_styles_of_their_own():
 
 
 def test_title_units_and_other_axes(graphs):
-    from enumsol.figures import new_figure
+    from enumsol.support.plotting import new_figure
 
     figure = graphs["square"].plot("u_n", [1], title="square", units=("N", "mm"))
     title = figure.axes[0].get_title("left")
@@ -225,7 +225,7 @@ def test_title_units_and_other_axes(graphs):
     ],
 )
 def test_what_cannot_be_drawn_is_refused(graphs, options, message):
-    from enumsol.figures import new_figure
+    from enumsol.support.plotting import new_figure
 
     if options.get("ax") == "axes":
         options = {**options, "ax": new_figure().subplots()}

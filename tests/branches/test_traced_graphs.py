@@ -18,7 +18,8 @@ from branches.two_graphs import differences, steps, two_graphs
 from generators import through_the_unloaded_state, vanishing_problem
 
 from enumsol import ContactProblem, branch_graph, verify
-from enumsol.branches import construction, tracing
+from enumsol.branches import construction
+from enumsol.branches.enclosed import tracing
 
 KINDS = ("friction", "load", "both")
 

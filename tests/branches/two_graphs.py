@@ -5,15 +5,15 @@ from fractions import Fraction
 from itertools import pairwise
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.following import follow
-from enumsol.branches.gluing import glue
-from enumsol.branches.joining import PlaceKind
-from enumsol.branches.make_elements import make_arcs, make_vertices
-from enumsol.branches.make_traced import make_traced
-from enumsol.branches.traced import TracedProblem
+from enumsol.branches.enclosed.following import follow
+from enumsol.branches.enclosed.joining import PlaceKind
+from enumsol.branches.enclosed.make_traced import make_traced
+from enumsol.branches.enclosed.traced import TracedProblem
+from enumsol.branches.exact.gluing import glue
+from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
-from enumsol.search.interval import IntervalSearch
+from enumsol.search.interval.subintervals import IntervalSearch
 
 
 @dataclass

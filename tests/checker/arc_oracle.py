@@ -9,9 +9,9 @@ from flint import fmpq
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge, rational_between, real_roots
 from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.exact import ExactCondensed
-from enumsol.kernel.selection_rows import SelectionRows
+from enumsol.model.statuses import RowKind
 from enumsol.selections.functions import SelectionFunctions
-from enumsol.statuses import RowKind
+from enumsol.trusted.selection import SelectionRows
 
 
 class ArcOracle:

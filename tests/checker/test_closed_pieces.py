@@ -27,7 +27,7 @@ SIZE = 25
 def patient():
     """Small bodies are tried as often as large ones."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("enumsol.branches.closed_pieces._VAIN_TRIES", 100)
+        patch.setattr("enumsol.branches.enclosed.single_branches._VAIN_TRIES", 100)
         yield
 
 

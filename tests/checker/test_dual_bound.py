@@ -9,13 +9,13 @@ from generators import integer_problem
 
 from enumsol.checker.rational import RationalSystem
 from enumsol.condensation.exact import ExactCondensed, ExactSystem
-from enumsol.kernel.rows import row_signs
+from enumsol.relaxation.imposed_rows import INEQUALITY, imposed_rows, status_rows
 from enumsol.relaxation.interior_point import InteriorPointEngine
-from enumsol.relaxation.interval import IntervalSystem
-from enumsol.relaxation.rows import INEQUALITY, imposed_rows, status_rows
+from enumsol.relaxation.interval_relaxation import IntervalSystem
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
-from enumsol.search.certifiers.rationals import ExactCertifier
-from enumsol.selections.rationals import ExactSelections
+from enumsol.search.certifiers.rational_certifier import ExactCertifier
+from enumsol.selections.rational_selections import ExactSelections
+from enumsol.trusted.status_rows import row_signs
 
 ALPHA = Fraction(3, 2)
 

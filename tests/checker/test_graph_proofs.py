@@ -10,9 +10,9 @@ from generators import through_the_unloaded_state
 from proof_tools import multipliers, proof_of, records_of, with_multipliers
 
 from enumsol import branch_graph, enumerate_roots, gallery, verify
-from enumsol.checker.graph import covers
-from enumsol.kernel.rows import children_of
-from enumsol.problem import ContactProblem
+from enumsol.checker.graph_checker import covers
+from enumsol.model.problem import ContactProblem
+from enumsol.trusted.status_rows import children_of
 
 
 def loading_path():

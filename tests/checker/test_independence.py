@@ -14,15 +14,15 @@ import enumsol
 from enumsol import branch_graph, checker, enumerate_roots, write_problem
 
 ROOT = Path(enumsol.__file__).parent
-CHECKERS = ("enumsol.checker.verify", "enumsol.checker.graph")
+CHECKERS = ("enumsol.checker.verify", "enumsol.checker.graph_checker")
 IN_SPACE = {
-    "enumsol.checker.space",
-    "enumsol.kernel.space",
-    "enumsol.kernel.leaves",
-    "enumsol.kernel.space_closing",
-    "enumsol.kernel.turning",
-    "enumsol.condensation.space",
-    "enumsol.sectors",
+    "enumsol.checker.space_checker",
+    "enumsol.trusted.space.sector_rows",
+    "enumsol.trusted.space.leaves",
+    "enumsol.trusted.space.space_uniqueness",
+    "enumsol.trusted.space.turning",
+    "enumsol.condensation.space_condensed",
+    "enumsol.model.sectors",
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
 SEARCH = (
@@ -31,13 +31,13 @@ SEARCH = (
     "enumsol.branches",
     "enumsol.condensation.exact",
     "enumsol.continuation",
-    "enumsol.equation",
-    "enumsol.executors",
+    "enumsol.continuation.equation",
+    "enumsol.support.workers",
     "enumsol.relaxation",
     "enumsol.roots",
     "enumsol.search",
     "enumsol.selections",
-    "enumsol.statuses",
+    "enumsol.model.statuses",
 )
 #: What may write a false proof and accept it: of these modules the search uses no more than these names; None: all.
 SHARED = {
@@ -79,9 +79,9 @@ TRUSTED = (
     "enumsol.arithmetic.",
     "enumsol.checker.",
     "enumsol.condensation.",
-    "enumsol.kernel.",
+    "enumsol.trusted.",
     "enumsol.proof.",
-    "enumsol.sectors",
+    "enumsol.model.sectors",
 )
 #: Of these rooms what proves nothing: the data, and S and g as computed.
 DATA = {"condensation.condensed", "condensation.data", "condensation.factorization"}

@@ -12,7 +12,7 @@ from proof_tools import copied, leaves_of, proof_of
 from space_proofs import case, of_kind, values_of, with_values
 
 from enumsol import ContactProblem3D, verify
-from enumsol.checker.space import SpaceChecker
+from enumsol.checker.space_checker import SpaceChecker
 
 
 def solved(A, B):

@@ -9,8 +9,8 @@ from space_proofs import RANDOM, Truth, case, mutant, of_kind, random_problem, v
 import enumsol
 from enumsol import Proof, ProofFormatError, enumerate_roots, gallery, verify
 from enumsol.checker.stability import stability_radius
-from enumsol.kernel.space import OPEN, STICK
-from enumsol.sectors import DEEPEST, SECTORS
+from enumsol.model.sectors import DEEPEST, SECTORS
+from enumsol.trusted.space.sector_rows import OPEN, STICK
 
 BLOCKS = [("block", cells, alpha) for cells in ((2, 1, 2), (3, 2, 2)) for alpha in (0.5, 1.0, 3.0)]
 NAMES = [*RANDOM, "end", "one tangent", *BLOCKS]
@@ -57,7 +57,7 @@ def test_roots_that_cannot_be_told_apart_leave_the_count_open(monkeypatch):
     problem, _, records, _ = case("end")
     records = copied(records)
     records[-1]["roots"] = 2
-    monkeypatch.setattr("enumsol.kernel.leaves.same_root", lambda one, other: None)
+    monkeypatch.setattr("enumsol.trusted.space.leaves.same_root", lambda one, other: None)
     report = verify(problem, proof_of(records))
     assert report.ok
     assert not report.complete

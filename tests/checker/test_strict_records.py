@@ -23,7 +23,7 @@ from touching import beside_a_loaded_node
 from trees import by_the_tree
 
 from enumsol import InvalidArgumentError, Proof, ProofFormatError, branch_graph, enumerate_roots, gallery, verify
-from enumsol.search import forms
+from enumsol.search import form_policy as forms
 
 POINTS = {
     "roots": lambda: (triangle(), 5.0),

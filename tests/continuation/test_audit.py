@@ -8,7 +8,7 @@ import pytest
 import enumsol
 from enumsol import gallery
 from enumsol.continuation import ContinuationOptions, audit, follow, follow_all, follow_arc, newton
-from enumsol.continuation.graph_map import GraphMap
+from enumsol.continuation.audit.graph_map import GraphMap
 
 enumerate_roots = partial(enumsol.enumerate_roots, arithmetic="fast")
 

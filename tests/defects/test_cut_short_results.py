@@ -12,7 +12,8 @@ from generators import integer_problem as integer_data
 from generators import random_problem, singular_problem
 
 from enumsol import branch_graph, enumerate_roots, gallery, multiplicity_table
-from enumsol.branches import BranchGraph, construction, tracing
+from enumsol.branches import BranchGraph, construction
+from enumsol.branches.enclosed import tracing
 from enumsol.errors import Interrupted
 
 KINDS = ("friction", "load", "both")

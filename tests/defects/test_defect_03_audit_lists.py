@@ -10,7 +10,7 @@ from cli.test_cli import assert_refused, call, run
 import enumsol
 from enumsol import ContactProblem, audit, branch_graph, follow_all, gallery, write_problem
 from enumsol.continuation import read_points
-from enumsol.continuation.graph_map import GraphMap
+from enumsol.continuation.audit.graph_map import GraphMap
 
 EXAMPLE = "one-node-6.1"
 

@@ -21,7 +21,7 @@ from enumsol.cli import main
 from enumsol.condensation.factorization import Factorization
 from enumsol.errors import InvalidArgumentError
 from enumsol.proof import proof_file as proof_module
-from enumsol.proof.parts import Part
+from enumsol.proof.compressed_parts import Part
 
 BEFORE = {item["name"]: item for item in json.loads(Path(__file__).with_name("proofs_written_before.json").read_text())}
 POINTS = [name for name in BEFORE if not name.startswith("graph")]

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from enumsol import ContactProblem, EnumsolError, InvalidArgumentError, InvalidProblemError, fem, gallery, read_problem
-from enumsol.array_checks import real_array, real_matrix
+from enumsol.support.array_arguments import real_array, real_matrix
 
 A = np.array([[2.0, -0.5, 0.0, 0.0], [-0.5, 2.0, -0.5, 0.0], [0.0, -0.5, 2.0, -0.5], [0.0, 0.0, -0.5, 2.0]])
 BN, BT = np.eye(4)[[0, 2]], np.eye(4)[[1, 3]]

@@ -10,9 +10,9 @@ import pytest
 
 import enumsol
 from enumsol import InvalidArgumentError, gallery
-from enumsol.checks import MAX_BITS, alpha_interval, alpha_list, alpha_value, unbounded_interval
 from enumsol.cli import main
 from enumsol.continuation import start_tangents
+from enumsol.support.arguments import MAX_BITS, alpha_interval, alpha_list, alpha_value, unbounded_interval
 
 #: What is given, and the number that it is.
 NUMBERS = {

@@ -12,7 +12,7 @@ from read_only import assert_locked
 
 import enumsol
 from enumsol import ContactProblem, gallery
-from enumsol.sealed import SealedMatrix, sealed
+from enumsol.support.immutable import SealedMatrix, sealed
 
 A = np.array([[2.0, -0.5, 0.0, 0.0], [-0.5, 2.0, -0.5, 0.0], [0.0, -0.5, 2.0, -0.5], [0.0, 0.0, -0.5, 2.0]])
 DATA = {

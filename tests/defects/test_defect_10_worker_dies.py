@@ -17,8 +17,8 @@ from proof_tools import bytes_of
 import enumsol
 from enumsol import Proof, enumerate_roots, gallery, multiplicity_table, verify, write_problem
 from enumsol.cli.pool import RenewedPool
-from enumsol.executors import Crew
 from enumsol.search import parallel
+from enumsol.support.workers import Crew
 
 #: What takes a process down.
 DEATHS = {"os._exit": (os._exit, 1), "SIGKILL": (signal.raise_signal, signal.SIGKILL)}

@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 import enumsol
-from enumsol import MissingDependencyError, compiled, enumerate_roots, gallery
+from enumsol import MissingDependencyError, enumerate_roots, gallery
+from enumsol.support import compiled
 
 PACKAGE = Path(enumsol.__file__).parent
 MODULE = "enumsol.relaxation._active_set"

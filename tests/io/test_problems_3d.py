@@ -173,7 +173,7 @@ def test_a_problem_in_2d_loads_nothing_of_3d(tmp_path):
     code = (
         f"import sys, enumsol; enumsol.write_problem(enumsol.read_problem({str(tmp_path / 'p.npz')!r}), "
         f"{str(tmp_path / 'q.npz')!r}); "
-        "names = ('enumsol.problem3d', 'enumsol.friction', 'enumsol.io.arrays3d'); "
+        "names = ('enumsol.model.problem3d', 'enumsol.model.friction', 'enumsol.io.arrays3d'); "
         "sys.exit(any(name in sys.modules for name in names))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -6,11 +6,11 @@ from generators import dense_compliance, fe_compliance, friction, planted_load, 
 from oracles import brute_force
 
 from enumsol.condensation.condensed import CondensedSystem
+from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
+from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY, imposed_rows, status_rows
 from enumsol.relaxation.interior_point import InteriorPointEngine
-from enumsol.relaxation.rows import EQUALITY, INEQUALITY, imposed_rows, status_rows
-from enumsol.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 
 def random_system(rng, p):

@@ -12,9 +12,9 @@ import enumsol
 from enumsol import gallery
 from enumsol.relaxation import active_set
 from enumsol.relaxation import interior_point as fallback
-from enumsol.search.certifiers.floats import FastCertifier
+from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.tree import TreeSearch
-from enumsol.selections.floats import FloatSelections
+from enumsol.selections.float_selections import FloatSelections
 
 
 def problems():

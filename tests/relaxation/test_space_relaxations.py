@@ -3,11 +3,11 @@
 import numpy as np
 from problems3d import random_coupled
 
-from enumsol.condensation.space import EnclosedSpace, SpaceSystem
-from enumsol.kernel.space import exclusion_margin
-from enumsol.relaxation.space import SpaceEngine
-from enumsol.sectors import SECTORS, level_of
-from enumsol.statuses import CONTACT, UNDECIDED
+from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+from enumsol.model.sectors import SECTORS, level_of
+from enumsol.model.statuses import CONTACT, UNDECIDED
+from enumsol.relaxation.space_relaxation import SpaceEngine
+from enumsol.trusted.space.sector_rows import exclusion_margin
 
 
 def all_rows(engine, codes):

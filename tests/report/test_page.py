@@ -121,7 +121,7 @@ def test_bodies_move_as_the_roots_say(wedge, wedge_page):
         for force, acts in zip(forces, body["acts"], strict=True):
             for node, x, y in acts:
                 nodal[node] += force * np.array([x, y])
-        from enumsol.shapes import body_shape
+        from enumsol.model.shapes import body_shape
 
         expected = body_shape(wedge.problem).contact_forces(wedge.problem, root.lambda_n, root.lambda_t)
         np.testing.assert_allclose(nodal, expected, atol=1e-8 * max(np.max(np.abs(expected)), 1e-30))

@@ -7,8 +7,8 @@ from parted_solids import solid
 
 import enumsol
 from enumsol import InvalidArgumentError, PlaneMesh, fem
-from enumsol.facets import boundary_facets, outlines
-from enumsol.shapes import body_shape, round_scale
+from enumsol.model.facets import boundary_facets, outlines
+from enumsol.model.shapes import body_shape, round_scale
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,7 @@ def test_in_space():
     (ax,) = roots[0].plot_body().axes
     assert ax.name == "3d"
     assert len(roots.plot_bodies().axes) == len(roots)
-    from enumsol.figures import new_figure
+    from enumsol.support.plotting import new_figure
 
     with pytest.raises(InvalidArgumentError, match="projection '3d'"):
         roots[0].plot_body(new_figure().subplots())

@@ -10,10 +10,10 @@ from oracles import exact_condense, exact_solutions, perturbed_indices
 
 import enumsol
 from enumsol import ContactProblem, gallery
+from enumsol.model.statuses import OPEN, SLIP_PLUS, STICK
 from enumsol.roots.components import connected_components
-from enumsol.selections.floats import FloatSelections
+from enumsol.selections.float_selections import FloatSelections
 from enumsol.selections.solution import VertexLimitError
-from enumsol.statuses import OPEN, SLIP_PLUS, STICK
 
 
 def check(problem, rng, methods=METHODS):

@@ -6,7 +6,7 @@ import pytest
 
 import enumsol
 from enumsol import branch_graph, enumerate_roots, gallery
-from enumsol.texts import html_lines, html_table
+from enumsol.support.messages import html_lines, html_table
 
 
 class Cells(HTMLParser):

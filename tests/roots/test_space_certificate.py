@@ -19,10 +19,10 @@ from trees import by_the_tree
 
 import enumsol
 from enumsol import enumerate_roots, gallery, verify
-from enumsol.kernel.space_closing import is_complete, only_root, only_solution
-from enumsol.search.space_closing import SpaceCloser
-from enumsol.search.space_solvers import SpaceSolvers
-from enumsol.statuses import UNDECIDED
+from enumsol.model.statuses import UNDECIDED
+from enumsol.search.space.space_fathoming import SpaceCloser
+from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.trusted.space.space_uniqueness import is_complete, only_root, only_solution
 
 
 def closed(problem, alpha=0):

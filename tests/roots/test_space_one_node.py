@@ -7,7 +7,7 @@ from problems3d import bounds, forces, from_compliance, random_compliance, rando
 
 import enumsol
 from enumsol import ContactProblem3D, enumerate_roots
-from enumsol.sectors import start_of
+from enumsol.model.sectors import start_of
 
 
 def solutions(S, g, F):

@@ -14,10 +14,10 @@ from roots.test_space_weak_springs import body
 import enumsol
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.cli import root_report
-from enumsol.kernel.leaves import Cause
+from enumsol.model.sectors import SECTORS
 from enumsol.roots.space_regions import _hull, regions_of
-from enumsol.search.space_solvers import SpaceSolvers
-from enumsol.sectors import SECTORS
+from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.trusted.space.leaves import Cause
 
 pytestmark = pytest.mark.usefixtures("tree_only")
 LOADED = (np.eye(3), [1, 3, 2])

@@ -10,7 +10,7 @@ from enumsol import gallery
 from enumsol.search.certifiers.protocol import Certified, Escalations
 from enumsol.search.solvers import Solvers
 from enumsol.search.tree import TreeSearch
-from enumsol.selections.floats import SIGN_TOLERANCE
+from enumsol.selections.float_selections import SIGN_TOLERANCE
 
 
 class Records(list):

@@ -10,8 +10,9 @@ from rational_checker import check_records
 from touching import beside_a_loaded_node, row_of_discs, touching_problem
 
 from enumsol import ContactProblem, enumerate_roots, verify
-from enumsol.search import closing, solvers
-from enumsol.statuses import BACKWARD, FORWARD
+from enumsol.model.statuses import BACKWARD, FORWARD
+from enumsol.search import fathoming as closing
+from enumsol.search import solvers
 
 
 @pytest.mark.parametrize("slides", [False, True])

@@ -10,15 +10,15 @@ from defects.cut_short import false_claims_of_graph
 from graph_proofs import triangle
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
-from enumsol.branches import gluing
-from enumsol.branches.known_selections import KnownSelections
-from enumsol.branches.tracing import _Tracing
-from enumsol.deadlines import Deadline, TimeOverError, current, look, over, within
-from enumsol.relaxation.forms import FormAscent
-from enumsol.search import forms
-from enumsol.search.interval import IntervalSearch
+from enumsol.branches.enclosed.tracing import _Tracing
+from enumsol.branches.exact import gluing
+from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.relaxation.convex_forms import FormAscent
+from enumsol.search import form_policy as forms
+from enumsol.search.interval.subintervals import IntervalSearch
 from enumsol.search.solvers import Solvers
-from enumsol.selections.rationals import ExactSelections
+from enumsol.selections.rational_selections import ExactSelections
+from enumsol.support.deadlines import Deadline, TimeOverError, current, look, over, within
 
 
 @pytest.fixture

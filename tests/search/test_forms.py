@@ -13,10 +13,10 @@ from rational_forms import Data, Forms, _value
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.checker.stability import stability_radius
 from enumsol.condensation.enclosure import CondensedEnclosure
-from enumsol.kernel.forms import EnclosedForm, Equations, form_margin
-from enumsol.kernel.rows import row_signs
-from enumsol.search import forms as policy
+from enumsol.search import form_policy as policy
 from enumsol.search.solvers import Solvers, as_computed
+from enumsol.trusted.quadratic_forms import EnclosedForm, Equations, form_margin
+from enumsol.trusted.status_rows import row_signs
 
 pytestmark = pytest.mark.usefixtures("tree_only")
 

@@ -10,16 +10,16 @@ from flint import fmpq
 
 from enumsol import ContactProblem, gallery
 from enumsol.branches import branch_graph, construction
-from enumsol.branches.gluing import glue
+from enumsol.branches.exact.gluing import glue
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError, Interrupted, InvalidArgumentError, TooLargeError
-from enumsol.relaxation.interval import IntervalEngine, IntervalSystem
-from enumsol.search import interval as interval_search
+from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.relaxation.interval_relaxation import IntervalEngine, IntervalSystem
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
-from enumsol.search.interval import FastIntervalCertifier, IntervalSearch, Piece
-from enumsol.search.interval_tree import EmptyLeaf
-from enumsol.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.search.interval.interval_tree import EmptyLeaf
+from enumsol.search.interval.subintervals import FastIntervalCertifier, IntervalSearch, Piece
+from enumsol.search.interval.subintervals import subintervals as interval_search
 
 BELOW = {UNDECIDED: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), CONTACT: (STICK, SLIP_PLUS, SLIP_MINUS)}
 

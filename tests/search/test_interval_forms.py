@@ -12,10 +12,10 @@ from proof_tools import proof_of, records_of
 from rational_checker import check_records
 
 from enumsol import branch_graph, gallery, verify
-from enumsol.kernel.interval import EnclosedPiece, interval_form_margins, piece_forms
-from enumsol.relaxation.interval import IntervalEngine, IntervalSystem, PieceForm
-from enumsol.search import interval_tree
-from enumsol.search.interval_forms import PairedTerms, better_form
+from enumsol.relaxation.interval_relaxation import IntervalEngine, IntervalSystem, PieceForm
+from enumsol.search.interval.interval_forms import PairedTerms, better_form
+from enumsol.search.interval.subintervals import interval_tree
+from enumsol.trusted.over_interval import EnclosedPiece, interval_form_margins, piece_forms
 
 KINDS = ("friction", "load", "both")
 

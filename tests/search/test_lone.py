@@ -13,8 +13,9 @@ from trees import above_known_roots, by_the_tree
 
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.checker.stability import stability_radius
-from enumsol.search import closing, parallel
-from enumsol.search.lone import KnownRoot
+from enumsol.search import fathoming as closing
+from enumsol.search import parallel
+from enumsol.search.fathoming_in_contact import KnownRoot
 
 
 def kinds(proof):

@@ -12,11 +12,12 @@ from touching import touching_problem
 from trees import by_the_tree
 
 from enumsol import InvalidArgumentError, enumerate_roots, gallery, is_unique, verify
-from enumsol.deadlines import TimeOverError
-from enumsol.search import closing, descent, reduction
+from enumsol.model.statuses import UNDECIDED
+from enumsol.search import descent, reduction
+from enumsol.search import fathoming as closing
 from enumsol.search.definite import Nodes
 from enumsol.search.reduction import Reduction
-from enumsol.statuses import UNDECIDED
+from enumsol.support.deadlines import TimeOverError
 
 
 def scaled(problem, alpha):

@@ -35,7 +35,7 @@ from enumsol import (
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.proof.begun import BegunProof
 from enumsol.proof.writer import BESIDE, FLUSH_EVERY
-from enumsol.search import forms as policy
+from enumsol.search import form_policy as policy
 from enumsol.search.resume import Replay
 
 QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)

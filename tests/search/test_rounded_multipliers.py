@@ -7,7 +7,7 @@ from enumsol import enumerate_roots, gallery, verify
 from enumsol.proof.proof_file import shortened
 from enumsol.search.resume import RecordedBound
 from enumsol.search.solvers import Solvers
-from enumsol.selections.floats import SIGN_TOLERANCE
+from enumsol.selections.float_selections import SIGN_TOLERANCE
 
 
 def test_shortened():

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from enumsol.condensation.enclosure import EnclosedSystem
-from enumsol.kernel.forms import EnclosedForm
+from enumsol.trusted.quadratic_forms import EnclosedForm
 
 class Margins:
     def __init__(self, ends: Sequence[EnclosedSystem], low: NDArray[np.float64], high: NDArray[np.float64]) -> None: ...

@@ -1,5 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, initializedcheck=False
-"""The exclusion inequalities of enumsol.kernel's point, interval and forms in compiled loops, for the search.
+"""The exclusion inequalities of enumsol.trusted's point, interval and forms in compiled loops, for the search.
 
 Formulas and error bounds are those of ``margins`` there, which the checker uses; tests compare the two. Sums in double
 arithmetic: the a-priori bounds hold for any order of summation and for fused multiply-adds.
@@ -13,9 +13,9 @@ cdef extern from "_dense.h" nogil:
 import numpy as np
 
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma
-from enumsol.kernel.bounds import EnergyForm
-from enumsol.kernel.interval import interval_row_tables
-from enumsol.kernel.rows import FORBIDDEN, NONNEGATIVE
+from enumsol.trusted.energy_bounds import EnergyForm
+from enumsol.trusted.over_interval import interval_row_tables
+from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE
 
 
 cdef class Multipliers:
@@ -177,7 +177,7 @@ cdef class Margins(Multipliers):
 
 
 cdef class FormMargins(Multipliers):
-    """Exclusion margins of a form in place of the energy, as ``form_margins`` of enumsol.kernel.forms.
+    """Exclusion margins of a form in place of the energy, as ``form_margins`` of enumsol.trusted.quadratic_forms.
 
     Products with |S| and S_rad are bounded by one of rank one, and x is refined only as long as that helps.
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.relaxation.rows import INEQUALITY
-from enumsol.statuses import RowKind
+from enumsol.model.statuses import RowKind
+from enumsol.relaxation.imposed_rows import INEQUALITY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
-from enumsol.kernel.interval import (
+from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
+from enumsol.trusted.over_interval import (
     EnclosedPiece,
     as_computed,
     interval_exclusion_margin,
     interval_form_margins,
     piece_forms,
 )
-from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.exact import ExactCondensed
-    from enumsol.kernel.forms import EnclosedForm
-    from enumsol.problem import ContactProblem
-    from enumsol.relaxation.interval import IntervalSystem
-    from enumsol.search.interval import Piece
-    from enumsol.search.interval_tree import EmptyLeaf
+    from enumsol.model.problem import ContactProblem
+    from enumsol.relaxation.interval_relaxation import IntervalSystem
+    from enumsol.search.interval.interval_tree import EmptyLeaf
+    from enumsol.search.interval.subintervals import Piece
     from enumsol.selections.solution import Codes
+    from enumsol.trusted.quadratic_forms import EnclosedForm
 
     Margin = Callable[[Codes, NDArray[np.intp], NDArray[np.float64]], float]
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.exact import ExactSystem
-from enumsol.relaxation.interval import IntervalRowKind, interval_rows
-from enumsol.relaxation.rows import with_implied
+from enumsol.model.statuses import RowKind
+from enumsol.relaxation.imposed_rows import with_implied
+from enumsol.relaxation.interval_relaxation import IntervalRowKind, interval_rows
 from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
-from enumsol.selections.rationals import ExactSelections
-from enumsol.statuses import RowKind
+from enumsol.selections.rational_selections import ExactSelections
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.exact import ExactCondensed
-    from enumsol.relaxation.interval import IntervalSystem
-    from enumsol.search.interval import Piece
-    from enumsol.search.interval_tree import EmptyLeaf
+    from enumsol.relaxation.interval_relaxation import IntervalSystem
+    from enumsol.search.interval.interval_tree import EmptyLeaf
+    from enumsol.search.interval.subintervals import Piece
 
 _CONES: dict[int, RowKind] = {
     IntervalRowKind.SLIP_AT_LEAST_PLUS: RowKind.CONE_PLUS,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from enumsol.kernel.forms import form_margin
-from enumsol.kernel.point import exclusion_margin
+from enumsol.trusted.at_alpha import exclusion_margin
+from enumsol.trusted.quadratic_forms import form_margin
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.kernel.forms import EnclosedForm
     from enumsol.selections.solution import Codes
+    from enumsol.trusted.quadratic_forms import EnclosedForm
 
     #: A lower bound over a partial assignment, proven by the multipliers of its rows.
     Margin = Callable[[Codes, NDArray[np.intp], NDArray[np.float64]], float]

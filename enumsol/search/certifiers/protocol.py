@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from enumsol.kernel.forms import EnclosedForm
-    from enumsol.proof.parts import Part, Recorder
+    from enumsol.proof.compressed_parts import Part, Recorder
     from enumsol.selections.solution import Codes
+    from enumsol.trusted.quadratic_forms import EnclosedForm
 
 
 @dataclass(frozen=True)

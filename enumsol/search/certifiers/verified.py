@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.kernel.closing import ClosedSolution, closed_solution, same_solution
-from enumsol.kernel.lone import lone_root
-from enumsol.kernel.point import VerifiedSelection, holds_no_root, solve_selection
-from enumsol.kernel.rows import FREE, NONNEGATIVE, row_signs
+from enumsol.model.statuses import CONDITIONS, RowKind
 from enumsol.proof.proof_file import fraction_text, packed, shortened
 from enumsol.search.certifiers.margins import energy_margin, margin_of_form
 from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
-from enumsol.search.closing import propose, without_load
+from enumsol.search.fathoming import propose, without_load
 from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution
-from enumsol.statuses import CONDITIONS, RowKind
+from enumsol.trusted.at_alpha import VerifiedSelection, holds_no_root, solve_selection
+from enumsol.trusted.status_rows import FREE, NONNEGATIVE, row_signs
+from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, same_solution
+from enumsol.trusted.uniqueness_in_contact import lone_root
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.kernel.forms import EnclosedForm
-    from enumsol.proof.parts import Recorder
+    from enumsol.proof.compressed_parts import Recorder
     from enumsol.search.certifiers.margins import Margin
     from enumsol.search.certifiers.protocol import Bound
-    from enumsol.search.certifiers.rationals import ExactCertifier
-    from enumsol.search.closing import Point, Proposal
-    from enumsol.search.lone import LoneProposal
+    from enumsol.search.certifiers.rational_certifier import ExactCertifier
+    from enumsol.search.fathoming import Point, Proposal
+    from enumsol.search.fathoming_in_contact import LoneProposal
     from enumsol.selections.solution import Codes
+    from enumsol.trusted.quadratic_forms import EnclosedForm
 
     Array = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""The graph from arcs enclosed in balls."""

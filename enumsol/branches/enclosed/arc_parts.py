@@ -1,0 +1,142 @@
+"""What a selection does on an interval of alpha, part by part (theory, section 7.14)."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from enumsol.trusted.arcs.selection_balls import ArcSelection
+
+Number = float | Fraction
+Interval = tuple[Number, Number]
+
+
+class PartKind(enum.StrEnum):
+    """What a selection does on a part of an interval; as in proofs (docs/proof_format.md)."""
+
+    HOLDS = "h"
+    NONE = "n"
+    EVENT = "e"
+    OPEN = "u"
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part [low, high] of a box; another part with the same content is not the same.
+
+    Attributes
+    ----------
+    kind : PartKind
+    low, high : float or Fraction
+    condition : int
+        At an event the condition that changes its sign, as numbered by the selection; -1 elsewhere.
+    zero : (float, float)
+        At an event the bounds of the alpha where it vanishes.
+    rising : bool
+        At an event whether the selection holds above it, and not below.
+    index : int
+        Sign of the determinant where the selection holds, or at an event; 0 elsewhere.
+    doubtful : frozenset of int
+        At an open part the nodes whose conditions may vanish there.
+    """
+
+    kind: PartKind
+    low: Number
+    high: Number
+    condition: int = -1
+    zero: Interval = (np.nan, np.nan)
+    rising: bool = False
+    index: int = 0
+    doubtful: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True)
+class Box:
+    """An interval on which one expansion decides.
+
+    Attributes
+    ----------
+    low, high : float or Fraction
+        Those of the expansion; the parts may end before.
+    parts : tuple of Part
+        From left to right.
+    precise : bool
+        Decided in many digits.
+    """
+
+    low: Number
+    high: Number
+    parts: tuple[Part, ...]
+    precise: bool = False
+
+
+@dataclass
+class Trace:
+    """What a selection does on an interval.
+
+    Attributes
+    ----------
+    selection : ArcSelection
+    low, high : float
+    side : float
+        1 or -1 above or below an alpha at which g vanishes (see trusted.over_interval), else 0.
+    boxes : list of Box
+        Its parts, box by box from left to right. A box may reach beyond its parts.
+    """
+
+    selection: ArcSelection
+    low: float
+    high: float
+    side: float = 0.0
+    boxes: list[Box] = field(default_factory=list)
+
+    @property
+    def parts(self) -> Iterator[Part]:
+        """All parts, from left to right."""
+        return (part for box in self.boxes for part in box.parts)
+
+
+def inside(
+    trace: Trace, low: Fraction, high: Fraction, sharpen: Callable[[Trace, Part], tuple[Fraction, Fraction] | None]
+) -> Iterator[Part]:
+    """The parts of a trace between two alphas, beyond which it was rounded outward; no event lies beyond them.
+
+    ``sharpen`` gives narrower bounds of an event's zero, or None.
+    """
+    for part in trace.parts:
+        if low <= trace.low and trace.high <= high:
+            yield part
+        elif part.high < low or part.low > high:
+            continue
+        elif part.kind is PartKind.EVENT:
+            yield from _event_inside(trace, part, (low, high), sharpen(trace, part) or part.zero)
+        else:
+            yield part
+
+
+def _event_inside(trace: Trace, part: Part, ends: tuple[Fraction, Fraction], zero: Interval) -> Iterator[Part]:
+    """An event, or what the selection does inside where its zero lies outside, or cannot be told from an end."""
+    (low, high), (first, last) = ends, zero
+    below, above = (PartKind.NONE, PartKind.HOLDS) if part.rising else (PartKind.HOLDS, PartKind.NONE)
+    if not (trace.low < low and first <= low) and not (trace.high > high and last >= high):
+        yield part
+    elif last < low:
+        yield replace(part, kind=above)
+    elif first > high:
+        yield replace(part, kind=below)
+    else:
+        doubtful = frozenset((trace.selection.rows.conditions[part.condition][0],))
+        if first > low:
+            yield replace(part, kind=below, high=first)
+            yield Part(PartKind.OPEN, first, part.high, doubtful=doubtful)
+        else:
+            yield Part(PartKind.OPEN, part.low, last, doubtful=doubtful)
+            if last < min(part.high, high):
+                yield replace(part, kind=above, low=last)

@@ -1,0 +1,281 @@
+"""A box cut into parts, on each of which a selection holds, or nowhere, or has one event (theory, section 7.14).
+
+What is asked of an expansion is handed up, so that many selections are examined at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from enumsol.branches.enclosed.arc_parts import Box, Interval, Number, Part, PartKind
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    from enumsol.trusted.arcs.over_parts import OverInterval
+    from enumsol.trusted.selection import SelectionRows
+
+    Result = tuple[Box, list[Interval]]
+    Shared = frozenset[Any]
+
+#: Bounds of a zero that are wider, relative to alpha, are looked for anew at single alphas; the second where they are
+#: sharpened later.
+_NARROW, _NARROW_ENOUGH = 2.0**-44, 2.0**-16
+#: Halvings of a part that is not decided.
+_HALVINGS = 5
+
+
+class AlphaExpansion(Protocol):
+    """Conditions of a selection over an interval, as arcs.Expansion and precise.PreciseExpansion know them."""
+
+    low: Any
+    high: Any
+    apart: Any
+    final: bool
+
+    @property
+    def rough(self) -> bool:
+        """Whether shorter intervals give smaller errors."""
+
+    def over(self, low: Any, high: Any) -> OverInterval:
+        """What is known over a part."""
+
+    def near(self, condition: int, low: Any, high: Any) -> tuple[Any, Any]:
+        """What should be bounds of the only zero in a part, without proof."""
+
+    def split(self) -> Any:
+        """Where to cut first, so that nothing holds on either side; or None."""
+
+    def zeros(self, condition: int) -> list[Any]:
+        """Where a condition seems to vanish."""
+
+    def flat(self, condition: int) -> bool:
+        """Whether a condition cannot be told from zero."""
+
+    def zero_bounds(self, condition: int, slope: int, low: Any, high: Any) -> Any:
+        """Bounds of the only zero in a part."""
+
+
+class Cutting:
+    """One box cut into parts, from left to right until a part needs a box of its own.
+
+    Parameters
+    ----------
+    rows : SelectionRows
+    expansion : AlphaExpansion
+        That of the box.
+    whole : bool
+        The box is not to be cut further: what is not decided stays open.
+    flat : bool
+        Nor is it where a condition is flat.
+    sharpened : bool
+        Bounds of events will be made narrower.
+    """
+
+    def __init__(
+        self, rows: SelectionRows, expansion: AlphaExpansion, *, whole: bool, flat: bool, sharpened: bool
+    ) -> None:
+        self._narrow = _NARROW_ENOUGH if sharpened else _NARROW
+        self._rows, self._expansion, self._whole, self._keep_flat = rows, expansion, whole, flat
+        self.low: Number
+        self.high: Number
+        self.low, self.high = expansion.low, expansion.high
+        self._known: dict[Part, OverInterval] = {}  # of parts in which nothing holds
+
+    def run(self) -> Generator[list[Interval], list[OverInterval], Result]:
+        """Asks for what is known of parts; the box with its parts, and the intervals behind that need their own."""
+        (known,) = yield [(self.low, self.high)]
+        whole = self._decided(self.low, self.high, known)
+        if whole is None and self._expansion.rough and not self._whole:
+            return Box(self.low, self.high, ()), self._rest(self.low, self.high)
+        parts, rest = (yield from self._cut(known)) if whole is None or whole.kind is PartKind.EVENT else ([whole], [])
+        parts = yield from self._tidied(parts)
+        return Box(self.low, self.high, tuple(parts), self._expansion.final), rest
+
+    def _cut(
+        self, whole: OverInterval
+    ) -> Generator[list[Interval], list[OverInterval], tuple[list[Part], list[Interval]]]:
+        """Parts, and the intervals behind them."""
+        middle = self._expansion.split()
+        if middle is not None:
+            halves = [(self.low, middle), (middle, self.high)]
+            known = yield halves
+            decided = [self._decided(*half, found) for half, found in zip(halves, known, strict=True)]
+            if all(found.none for found in known):
+                return [part for part in decided if part is not None], []
+        doubtful = _in_doubt(whole)
+        self._flat = [k for k in doubtful if self._expansion.flat(k)]
+        # where the others seem to vanish
+        some = [k for k in doubtful if k not in self._flat]
+        self._zeros = sorted((zero, k) for k in some for zero in self._expansion.zeros(k))
+        parts: list[Part] = []
+        ends = list(pairwise(self._ends()))
+        known = [whole] if len(ends) == 1 else (yield ends)
+        cells = [(*cell, found, _HALVINGS) for cell, found in zip(ends, known, strict=True)]
+        cells.reverse()
+        while cells:
+            low, high, found, halvings = cells.pop()
+            part = self._decided(low, high, found)
+            if part is not None:
+                parts.append(part)
+            elif halvings and not self._tight(low, high, found) and low < (middle := between(low, high)) < high:
+                halves = [(low, middle), (middle, high)]
+                known = yield halves
+                pairs = [(*half, answer, halvings - 1) for half, answer in zip(halves, known, strict=True)]
+                cells += reversed(pairs)
+            elif self._whole or self._stays_open(low, high, found):
+                parts.append(self._open(low, high, found))
+            else:
+                return parts, self._rest(low, high)
+        return parts, []
+
+    def _tidied(self, parts: list[Part]) -> Generator[list[Interval], list[OverInterval], list[Part]]:
+        """Neighbouring parts that say the same joined, and events with bounds."""
+        runs: list[list[Part]] = []
+        shared: Shared = frozenset()
+        for part in parts:
+            reasons = self._reasons(part)
+            if runs and runs[-1][0].kind is part.kind and reasons & shared:
+                runs[-1].append(part)
+                shared &= reasons
+            else:
+                runs.append([part])
+                shared = reasons
+        asked = [self._questions(run[0], run[-1]) for run in runs]
+        everything = [part for questions in asked for part in questions]
+        answers = iter((yield everything) if everything else [])
+        tidied: list[Part] = []
+        for run, questions in zip(runs, asked, strict=True):
+            tidied += self._settled(run, questions, [next(answers) for _ in questions])
+        return tidied
+
+    def _reasons(self, part: Part) -> Shared:
+        """What neighbours of the same kind must have in common to be joined."""
+        if part.kind is PartKind.EVENT:
+            return frozenset()
+        known = self._known.get(part)
+        if part.kind is not PartKind.NONE or known is None:
+            return frozenset([part.index])
+        # conditions that are negative, or of opposite signs
+        signs = known.conditions
+        below = np.flatnonzero(signs < 0).tolist()
+        return frozenset(
+            below if known.regular else [(j, k) for j in below for k in np.flatnonzero(signs > 0).tolist()]
+        )
+
+    def _questions(self, first: Part, last: Part) -> list[Interval]:
+        """What has to be known to join neighbours, or about what should be an event's bounds."""
+        if first.kind is PartKind.EVENT:
+            low, high = self._expansion.near(first.condition, first.low, first.high)
+            narrow = first.low <= low < high <= first.high and high - low <= self._narrow * max(abs(low), abs(high))
+            return [(low, low), (high, high)] if narrow else []
+        return [(first.low, last.high)] if first is not last and first.kind is not PartKind.OPEN else []
+
+    def _settled(self, run: list[Part], questions: list[Interval], known: list[OverInterval]) -> list[Part]:
+        """Neighbours joined, or an event with its bounds, where that is known."""
+        first, last = run[0], run[-1]
+        if first.kind is PartKind.EVENT:
+            k, slope = first.condition, 1 if first.rising else -1
+            if [int(found.ends[0][k]) for found in known] == [-slope, slope]:
+                zero = questions[0][0], questions[1][0]
+            else:
+                zero = self._expansion.zero_bounds(k, slope, first.low, first.high)
+            return [replace(first, zero=zero)]
+        if first is last or (known and not (known[0].none or (known[0].holds and known[0].index == first.index))):
+            return run
+        doubtful = frozenset(node for part in run for node in part.doubtful)
+        return [Part(first.kind, first.low, last.high, index=first.index, doubtful=doubtful)]
+
+    def _rest(self, low: Number, high: Number) -> list[Interval]:
+        """What is left when a part cannot be decided: the part and what lies behind it, or two halves."""
+        middle = between(low, self.high)
+        # had the part come off the box's beginning, the rest would be as long as the box, again and again
+        if self._expansion.rough or low == self.low:
+            return [(low, middle), (middle, self.high)]
+        return [(low, high), *([(high, self.high)] if high < self.high else [])]
+
+    def _ends(self) -> list[Any]:
+        """Where the box is cut first: around groups of zeros."""
+        reach = self._expansion.apart
+        groups: list[list[Any]] = []
+        for zero, _ in self._zeros:
+            if groups and zero - groups[-1][1] <= reach:
+                groups[-1][1] = zero
+            else:
+                groups.append([zero, zero])
+        borders = [self.low, *(x for group in groups for x in group), self.high]
+        ends = [self.low]
+        for k, (first, last) in enumerate(groups):
+            before, after = (first - borders[2 * k]) / 4, (borders[2 * k + 3] - last) / 4
+            if first < last:
+                before, after = min(before, 4 * reach), min(after, 4 * reach)
+            ends += [_simple(first - before, first - before / 2), _simple(last + after / 2, last + after)]
+        ends.append(self.high)
+        return [x for k, x in enumerate(ends) if not k or x > ends[k - 1]]
+
+    def _tight(self, low: Number, high: Number, known: OverInterval) -> bool:
+        """Whether halving does not help: several zeros close together, or a condition that is flat."""
+        if self._is_flat(known):
+            return True
+        inside = [(zero, k) for zero, k in self._zeros if low < zero < high]
+        return len(inside) > 1 and inside[-1][0] - inside[0][0] <= self._expansion.apart
+
+    def _stays_open(self, low: Number, high: Number, known: OverInterval) -> bool:
+        """Whether a box of its own would not decide a part."""
+        return (self._expansion.final and self._tight(low, high, known)) or (self._keep_flat and self._is_flat(known))
+
+    def _is_flat(self, known: OverInterval) -> bool:
+        """Whether a condition cannot be told from zero."""
+        return any(k in self._flat for k in _in_doubt(known))
+
+    def _decided(self, low: Number, high: Number, known: OverInterval) -> Part | None:
+        if known.none:
+            nowhere = Part(PartKind.NONE, low, high)
+            self._known[nowhere] = known
+            return nowhere
+        doubtful = known.doubtful
+        if not known.regular or len(doubtful) > 1 or not known.index:
+            return None
+        if not len(doubtful):
+            return Part(PartKind.HOLDS, low, high, index=known.index)
+        condition = int(doubtful[0])
+        slope = int(known.slopes[condition])
+        if not slope or [int(end[condition]) for end in known.ends] != [-slope, slope]:
+            return None
+        return Part(PartKind.EVENT, low, high, condition, (low, high), slope > 0, known.index)
+
+    def _open(self, low: Number, high: Number, known: OverInterval) -> Part:
+        nodes = frozenset(range(len(self._rows.codes)))
+        if known.regular:
+            nodes = frozenset(self._rows.conditions[k][0] for k in known.doubtful)
+        return Part(PartKind.OPEN, low, high, doubtful=nodes)
+
+
+def _in_doubt(known: OverInterval) -> list[int]:
+    """Conditions that may vanish; their number stands for the determinant."""
+    return [*known.doubtful.tolist(), *([] if known.regular else [len(known.conditions)])]
+
+
+def between(low: Number, high: Number) -> Number:
+    """The middle; as a fraction where no float lies between, then only roughly."""
+    middle = (low + high) / 2
+    if isinstance(middle, float) and low < middle < high:
+        return middle
+    first, last = Fraction(low), Fraction(high)
+    roughly: Fraction = _simple((5 * first + 3 * last) / 8, (3 * first + 5 * last) / 8)
+    return roughly
+
+
+def _simple(low: Any, high: Any) -> Any:
+    """A fraction of few bits in [low, high]; of floats the first."""
+    if isinstance(low, float) or not low < high:
+        return low
+    # of the form k / 2^e or k 2^e, with 2^e nearly as large as the interval is long
+    length = high - low
+    unit = Fraction(2) ** (length.numerator.bit_length() - length.denominator.bit_length() - 1)
+    return -((-low) // unit) * unit

@@ -1,0 +1,398 @@
+"""Arcs from the traces of selections, joined where a condition of one vanishes with one of its neighbour's.
+
+Two neighbouring selections differ at one node. Where exactly one condition of a selection vanishes, its solution also
+solves the neighbour, whose own condition vanishes there; both have only one such zero in the parts that hold it, so
+that no numbers need be compared (theory, section 7.14).
+"""
+
+from __future__ import annotations
+
+import enum
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from networkx.utils import UnionFind
+
+from enumsol.branches.enclosed.arc_parts import PartKind, inside
+from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.trusted.selection import (
+    CONE_MINUS,
+    CONE_PLUS,
+    NORMAL_FORCE,
+    PENETRATION,
+    SLIP_BACKWARD,
+    SLIP_FORWARD,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from enumsol.branches.enclosed.arc_parts import Part, Trace
+    from enumsol.selections.solution import Codes
+
+    Bounds = tuple[Fraction, Fraction]
+
+#: The status on the other side of a condition, with the condition that vanishes there too.
+_ACROSS = {
+    (OPEN, PENETRATION): ((SLIP_PLUS, NORMAL_FORCE), (SLIP_MINUS, NORMAL_FORCE), (FRICTIONLESS, NORMAL_FORCE)),
+    (SLIP_PLUS, NORMAL_FORCE): ((OPEN, PENETRATION),),
+    (SLIP_MINUS, NORMAL_FORCE): ((OPEN, PENETRATION),),
+    (FRICTIONLESS, NORMAL_FORCE): ((OPEN, PENETRATION),),
+    (SLIP_PLUS, SLIP_FORWARD): ((STICK, CONE_PLUS),),
+    (SLIP_MINUS, SLIP_BACKWARD): ((STICK, CONE_MINUS),),
+    (STICK, CONE_PLUS): ((SLIP_PLUS, SLIP_FORWARD),),
+    (STICK, CONE_MINUS): ((SLIP_MINUS, SLIP_BACKWARD),),
+}
+
+
+class PlaceKind(enum.StrEnum):
+    """Where arcs end."""
+
+    #: The first or last alpha.
+    BORDER = "border"
+    #: Where g vanishes, and every selection holds.
+    ORIGIN = "origin"
+    #: A condition vanishes.
+    EVENT = "event"
+    #: Not decided.
+    OPEN = "open"
+
+
+@dataclass(eq=False)
+class Place:
+    """A point at which arcs end, or a short interval that was left open.
+
+    Attributes
+    ----------
+    kind : PlaceKind
+    low, high : Fraction
+        Bounds of its alpha.
+    members : list of codes
+        Selections that hold there, or at an open place may.
+    node : int
+        At an event the node whose status changes.
+    whole : bool
+        Every selection that holds there was examined (which open places leave undecided).
+    """
+
+    kind: PlaceKind
+    low: Fraction
+    high: Fraction
+    members: list[Codes]
+    node: int = -1
+    whole: bool = True
+
+
+@dataclass
+class JoinedArc:
+    """Where one selection holds between two places.
+
+    Attributes
+    ----------
+    trace : Trace
+    tail, head : Place
+    low, high : Fraction
+        It holds between them at least. Beside an open place, which may stand for many parts, that is more than between
+        the places.
+    index : int
+        Sign of the determinant.
+    """
+
+    trace: Trace
+    tail: Place
+    head: Place
+    low: Fraction
+    high: Fraction
+    index: int = 0
+
+    @property
+    def codes(self) -> Codes:
+        """The selection."""
+        return self.trace.selection.rows.codes
+
+
+@dataclass
+class Joined:
+    """Places in the order of alpha, and arcs between them.
+
+    Attributes
+    ----------
+    places : list of Place
+    arcs : list of JoinedArc
+    reasons : list of str
+        What contradicts completeness.
+    ordered : bool
+        The order of all places is known.
+    """
+
+    places: list[Place] = field(default_factory=list)
+    arcs: list[JoinedArc] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)
+    ordered: bool = True
+
+    @property
+    def open(self) -> list[Place]:
+        """Places that were left open."""
+        return [place for place in self.places if place.kind is PlaceKind.OPEN]
+
+
+@dataclass(eq=False)
+class _Found:
+    """An event or an open part of a trace."""
+
+    trace: Trace
+    part: Part
+    place: Place | None = None
+
+    @property
+    def codes(self) -> Codes:
+        return self.trace.selection.rows.codes
+
+    @property
+    def low(self) -> Fraction:
+        return Fraction(self.part.zero[0] if self.part.kind is PartKind.EVENT else self.part.low)
+
+    @property
+    def high(self) -> Fraction:
+        return Fraction(self.part.zero[1] if self.part.kind is PartKind.EVENT else self.part.high)
+
+    @property
+    def condition(self) -> tuple[int, int]:
+        return self.trace.selection.rows.conditions[self.part.condition]
+
+    @property
+    def doubtful(self) -> frozenset[int]:
+        return frozenset((self.condition[0],)) if self.part.kind is PartKind.EVENT else self.part.doubtful
+
+    def inside(self, other: _Found) -> bool:
+        """Whether the zero lies in the other's part."""
+        return Fraction(other.part.low) <= self.low and self.high <= Fraction(other.part.high)
+
+
+def join(
+    traces: Sequence[Trace],
+    interval: Bounds,
+    origin: Fraction | None,
+    sharpen: Callable[[Trace, Part], Bounds | None],
+    *,
+    cut_short: bool = False,
+) -> Joined:
+    """Arcs and the places at which they end.
+
+    Parameters
+    ----------
+    traces : sequence of Trace
+    interval : (Fraction, Fraction)
+    origin : Fraction or None
+        The alpha at which g vanishes, if it lies in the interval; no trace crosses it.
+    sharpen : gives narrower bounds of an event's zero, or None
+    cut_short : selections that hold somewhere may be missing, as all do at the origin
+    """
+    return _Joining(traces, interval, origin, sharpen, whole=not cut_short).run()
+
+
+class _Joining:
+    """Traces being joined."""
+
+    def __init__(
+        self,
+        traces: Sequence[Trace],
+        interval: Bounds,
+        origin: Fraction | None,
+        sharpen: Callable[[Trace, Part], Bounds | None],
+        *,
+        whole: bool,
+    ) -> None:
+        self._traces, self._interval, self._sharpen = traces, interval, sharpen
+        self._joined = Joined()
+        self._origin = None if origin is None else Place(PlaceKind.ORIGIN, origin, origin, [], whole=whole)
+        self._parts = []
+        for trace in traces:
+            low, high = interval
+            if origin is not None:
+                low, high = (origin, high) if trace.side > 0 else (low, origin)
+            self._parts.append(list(inside(trace, low, high, sharpen)))
+        self._found = {
+            part: _Found(trace, part)
+            for trace, parts in zip(traces, self._parts, strict=True)
+            for part in parts
+            if part.kind in (PartKind.EVENT, PartKind.OPEN)
+        }
+
+    def run(self) -> Joined:
+        """Places first, then the arcs between them."""
+        self._match()
+        self._gather()
+        for trace, parts in zip(self._traces, self._parts, strict=True):
+            self._follow(trace, parts)
+        places = self._joined.places
+        if self._origin is not None:
+            self._origin.members = sorted({trace.selection.rows.codes for trace in self._traces})
+            if any(place.low <= self._origin.low <= place.high for place in self._joined.open):
+                self._origin.kind = PlaceKind.OPEN  # unknown arcs may end there
+            places.append(self._origin)
+        places.sort(key=lambda place: (place.low, place.high, place.members))
+        self._check_order()
+        number = {place: k for k, place in enumerate(places)}
+        self._joined.arcs.sort(key=lambda arc: (number[arc.tail], number[arc.head], arc.codes))
+        return self._joined
+
+    # -- places ----------------------------------------------------------------------------------------------------
+
+    def _match(self) -> None:
+        """Pair events of neighbouring selections that are the same point."""
+        by_codes: dict[Codes, list[_Found]] = {}
+        for found in self._found.values():
+            if found.part.kind is PartKind.EVENT:
+                by_codes.setdefault(found.codes, []).append(found)
+        for codes, events in by_codes.items():
+            for event in events:
+                if event.place is not None:
+                    continue
+                partners = [
+                    other
+                    for other in self._neighbours(event, by_codes)
+                    if other.place is None and (event.inside(other) or other.inside(event))
+                ]
+                if len(partners) == 1:
+                    low, high = self._bounds(event, partners[0])
+                    members = sorted((codes, partners[0].codes))
+                    place = Place(PlaceKind.EVENT, low, high, members, event.condition[0])
+                    event.place = partners[0].place = place
+                    self._joined.places.append(place)
+
+    def _neighbours(self, event: _Found, by_codes: dict[Codes, list[_Found]]) -> Iterator[_Found]:
+        """Events at which the condition across the vanishing one vanishes."""
+        node, kind = event.condition
+        for code, across in _ACROSS.get((event.codes[node], kind), ()):
+            other = (*event.codes[:node], code, *event.codes[node + 1 :])
+            for found in by_codes.get(other, ()):
+                if found.condition == (node, across) and found.trace.side == event.trace.side:
+                    yield found
+
+    def _bounds(self, one: _Found, other: _Found) -> Bounds:
+        """Bounds of the zero that two events have in common."""
+        low, high = max(one.low, other.low), min(one.high, other.high)
+        for event in sorted((one, other), key=lambda event: event.codes):
+            sharper = self._sharpen(event.trace, event.part)
+            if sharper is not None:
+                return max(low, sharper[0]), min(high, sharper[1])
+        return low, high
+
+    def _gather(self) -> None:
+        """One place for what was left open and may be connected."""
+        left = sorted((found for found in self._found.values() if found.place is None), key=lambda f: (f.low, f.codes))
+        union: UnionFind = UnionFind(range(len(left)))
+        lows = [found.low for found in left]
+        for j, one in enumerate(left):
+            # in the order of their beginnings
+            for k in range(j + 1, bisect_right(lows, one.high)):
+                if _connected(one, left[k]):
+                    union.union(j, k)
+        groups: dict[int, list[_Found]] = {}
+        for k, found in enumerate(left):
+            groups.setdefault(union[k], []).append(found)
+        for group in groups.values():
+            members = sorted({found.codes for found in group})
+            low, high = min(found.low for found in group), max(found.high for found in group)
+            place = Place(PlaceKind.OPEN, low, high, members)
+            for found in group:
+                found.place = place
+            self._joined.places.append(place)
+
+    def _border(self, trace: Trace, alpha: float, *, upper: bool) -> Place | None:
+        """Where a trace that holds up to its end ends there; None inside the interval."""
+        origin = self._origin
+        towards = origin is not None and trace.side == (-1.0 if upper else 1.0)
+        if origin is not None and towards and ((alpha >= origin.low) if upper else (alpha <= origin.low)):
+            return origin
+        end = self._interval[int(upper)]
+        if (alpha < end) if upper else (alpha > end):
+            return None
+        place = Place(PlaceKind.BORDER, end, end, [trace.selection.rows.codes])
+        self._joined.places.append(place)
+        return place
+
+    def _check_order(self) -> None:
+        places = self._joined.places
+        last = None
+        for place in places:
+            if last is not None and place.low <= last.high and not place.low == place.high == last.low == last.high:
+                alpha = float(place.low)
+                self._joined.ordered = False
+                self._complain(f"the order of two critical alphas near {alpha:.17g} is not known")
+            if last is None or place.high > last.high:
+                last = place
+
+    # -- arcs ------------------------------------------------------------------------------------------------------
+
+    def _follow(self, trace: Trace, parts: Sequence[Part]) -> None:
+        """The arcs of one trace."""
+        arc: JoinedArc | None = None
+        before: Place | None = None  # what was left open directly before
+        first = True
+        for part in parts:
+            if part.kind is PartKind.OPEN:
+                place = self._found[part].place
+                if arc is not None and place is not None:
+                    self._end(arc, place, Fraction(part.low))
+                arc, before = None, place
+            elif part.kind is PartKind.NONE:
+                if arc is not None:
+                    self._contradiction(trace, part)
+                arc = before = None
+            else:
+                rises = part.kind is PartKind.EVENT and part.rising
+                if arc is None and not rises:
+                    start = self._border(trace, trace.low, upper=False) if first else before
+                    if start is None:
+                        self._contradiction(trace, part)
+                    else:
+                        arc = _begun(trace, start, part)
+                elif arc is not None and rises:
+                    self._contradiction(trace, part)
+                before = None
+                if part.kind is PartKind.EVENT:
+                    place = self._found[part].place
+                    assert place is not None
+                    if rises:
+                        arc = _begun(trace, place, part)
+                    elif arc is not None:
+                        unpaired = place.kind is PlaceKind.OPEN
+                        self._end(arc, place, Fraction(part.zero[0]) if unpaired else place.low)
+                        arc = None
+            first = False
+        if arc is not None:
+            end = self._border(trace, trace.high, upper=True)
+            if end is None:
+                self._contradiction(trace, part)
+            else:
+                self._end(arc, end, end.low)
+
+    def _end(self, arc: JoinedArc, place: Place, alpha: Fraction) -> None:
+        arc.head, arc.high = place, alpha
+        self._joined.arcs.append(arc)
+
+    def _contradiction(self, trace: Trace, part: Part) -> None:
+        codes = "".join(map(str, trace.selection.rows.codes))
+        self._complain(f"selection {codes} begins or ends near alpha = {float(part.low):.17g} for no reason")
+
+    def _complain(self, reason: str) -> None:
+        if reason not in self._joined.reasons:
+            self._joined.reasons.append(reason)
+
+
+def _begun(trace: Trace, place: Place, part: Part) -> JoinedArc:
+    """An arc that begins at a place, with this part."""
+    low = place.high
+    if place.kind is PlaceKind.OPEN:
+        low = Fraction(part.zero[1] if part.kind is PartKind.EVENT and part.rising else part.low)
+    return JoinedArc(trace, place, place, low, low, part.index)
+
+
+def _connected(one: _Found, other: _Found) -> bool:
+    """Whether two selections may have a solution in common: where they differ, conditions of both may vanish."""
+    differ = {i for i, (a, b) in enumerate(zip(one.codes, other.codes, strict=True)) if a != b}
+    return differ <= one.doubtful & other.doubtful

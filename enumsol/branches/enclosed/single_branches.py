@@ -1,0 +1,214 @@
+"""Pieces of the interval that need no tree: their one branch of solutions is proven to be all (theory, section 7.15).
+
+A branch is followed in floats, selection by selection, and the test of the kernel asked whether the root of each is the
+only solution where it holds. Then the selections are traced, and their arcs must join to one chain over the pieces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.branches.enclosed.joining import PlaceKind, join
+from enumsol.search.chains import Chains, LoadedSystem, SelectionCurve
+from enumsol.search.interval.subintervals import Piece, whole_pieces
+from enumsol.search.numbers import Numbers
+from enumsol.support.deadlines import look
+from enumsol.trusted.arcs.only_branch import PieceNumbers, only_roots
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from fractions import Fraction
+
+    from enumsol.branches.enclosed.arc_parts import Trace
+    from enumsol.branches.enclosed.joining import Joined
+    from enumsol.branches.enclosed.traced import TracedProblem
+    from enumsol.search.chains import Link
+    from enumsol.selections.solution import Codes
+    from enumsol.trusted.arcs.selection_balls import ArcSelection
+
+    Spans = list[tuple[Codes, float, float]]
+
+#: Selections of a piece: each is traced over the whole of it.
+_MOST_LINKS = 6
+#: Halvings of the interval, and of a piece some of whose arcs are not proven to hold all solutions.
+_HALVINGS, _VAIN_HALVINGS = 14, 4
+#: Alphas at which no numbers are found, after which they are sought no more: so many, and one for so many nodes.
+_VAIN, _NODES_FOR_ONE = 2, 16
+#: Pieces tried in vain after which none is halved any more: so many, and one for so many nodes. Trees of few nodes are
+#: fast, and where there are several solutions nothing comes of smaller pieces.
+_VAIN_TRIES = 3
+#: How far around a link the test goes, by the length of the interval: its ends are known in floats only.
+_AROUND = 1e-9
+#: Bounds of errors are multiplied by the first, and the form must be definite by the second, so that a checker that
+#: rounds otherwise agrees.
+_ERRORS, _MARGIN = 2.0, 1e-9
+
+
+@dataclass
+class ClosedPieces:
+    """Pieces that need no tree.
+
+    Attributes
+    ----------
+    pieces : mapping of Piece to (PieceNumbers, codes)
+        In order, with the selections that hold somewhere in them.
+    traces : list of Trace
+        Of these selections, where they were handed on.
+    """
+
+    pieces: dict[Piece, tuple[PieceNumbers, list[Codes]]] = field(default_factory=dict)
+    traces: list[Trace] = field(default_factory=list)
+
+    def find(self, traced: TracedProblem) -> None:
+        """Find those of a problem.
+
+        Raises
+        ------
+        TimeOverError
+            At the deadline; what was found by then is kept.
+        """
+        for whole in whole_pieces(*traced.interval, traced.origin):
+            for stretch in _stretches(_Proposals(traced, whole).run()):
+                look()
+                self._add_proven(traced, stretch)
+
+    def _add_proven(self, traced: TracedProblem, stretch: list[_Proposed]) -> None:
+        """Keep a stretch if the arcs of its selections are a chain over it, and were tested wherever they run."""
+        where: dict[Codes, list[tuple[Fraction, Fraction]]] = {}
+        for proposed in stretch:
+            for codes, _, _ in proposed.spans:
+                where.setdefault(codes, []).append((proposed.piece.a, proposed.piece.b))
+        traces: list[Trace] = []
+        traced.trace(where, traces)
+        ends = stretch[0].piece.a, stretch[-1].piece.b
+        joined = join(traces, ends, traced.origin if traced.origin in ends else None, traced.sharpen)
+        if _is_chain(joined) and all(_was_tested(joined, proposed) for proposed in stretch):
+            self.pieces |= {p.piece: (p.numbers, [codes for codes, _, _ in p.spans]) for p in stretch}
+            self.traces += traces
+
+
+@dataclass
+class _Proposed:
+    """A piece, its selections and where each was tested."""
+
+    piece: Piece
+    numbers: PieceNumbers
+    spans: Spans
+
+
+def _stretches(proposals: Sequence[_Proposed]) -> list[list[_Proposed]]:
+    """Proposed pieces that touch."""
+    found: list[list[_Proposed]] = []
+    for proposed in proposals:
+        if found and found[-1][-1].piece.b == proposed.piece.a:
+            found[-1].append(proposed)
+        else:
+            found.append([proposed])
+    return found
+
+
+def _is_chain(joined: Joined) -> bool:
+    """Whether the arcs follow each other from one end to the other."""
+    if joined.reasons or joined.open or not joined.arcs or len(joined.places) != len(joined.arcs) + 1:
+        return False
+    ends = joined.arcs[0].tail.kind, joined.arcs[-1].head.kind
+    inner = (one.head is other.tail and one.head.kind is PlaceKind.EVENT for one, other in pairwise(joined.arcs))
+    return PlaceKind.EVENT not in ends and all(inner)
+
+
+def _was_tested(joined: Joined, proposed: _Proposed) -> bool:
+    """Whether every arc was tested wherever it may run in a piece."""
+    a, b = proposed.piece.a, proposed.piece.b
+    spans = {codes: (low, high) for codes, low, high in proposed.spans}
+    for arc in joined.arcs:
+        low, high = max(a, arc.tail.low), min(b, arc.head.high)
+        tested = spans.get(arc.codes)
+        if low <= high and (tested is None or not tested[0] <= low <= high <= tested[1]):
+            return False
+    return True
+
+
+class _Proposals:
+    """What is proposed for one side of an alpha at which g vanishes, or for the whole interval.
+
+    Parameters
+    ----------
+    traced : TracedProblem
+    whole : Piece
+    """
+
+    def __init__(self, traced: TracedProblem, whole: Piece) -> None:
+        self._traced, self._whole = traced, whole
+        self._side = traced.spans([(whole.a, whole.b)])[0][2]
+        self._system = LoadedSystem(traced.problem.condensed, traced.units, self._side)
+        self._chains = Chains(self._system, float(whole.b))
+        self._around = _AROUND * float(whole.b - whole.a)
+        ones = np.ones(self._system.p)
+        self._numbers = [PieceNumbers(ones, ones, 0.0 * ones)]
+        self._vain = _VAIN + self._system.p // _NODES_FOR_ONE
+
+    def run(self) -> list[_Proposed]:
+        """Pieces in order."""
+        waiting, found = [(self._whole, _HALVINGS, _VAIN_HALVINGS)], list[_Proposed]()
+        tries = _VAIN_TRIES + self._system.p // _NODES_FOR_ONE
+        while waiting:
+            look()
+            piece, halvings, vain = waiting.pop()
+            links = self._chains.over(float(piece.a), float(piece.b))
+            many = links is not None and len(links) > _MOST_LINKS and halvings > 0
+            proposed, some = (None, True) if links is None or many else self._tried(piece, links)
+            if proposed is not None:
+                found.append(proposed)
+                continue
+            tries -= not many
+            if halvings and (many or (vain and some and tries > 0)):
+                halves = Piece(piece.a, piece.middle), Piece(piece.middle, piece.b)
+                waiting += [(half, halvings - 1, vain if many else vain - 1) for half in halves[::-1]]
+        return found
+
+    def _tried(self, piece: Piece, links: Sequence[Link]) -> tuple[_Proposed | None, bool]:
+        """A piece with numbers that serve all its arcs; or None, and whether they serve some of them."""
+        ends = float(piece.a) - self._around, float(piece.b) + self._around
+        spans = [
+            (link.codes, max(link.low - self._around, ends[0]), min(link.high + self._around, ends[1]))
+            for link in links
+        ]
+        asked = [(self._traced.selection(codes, self._side), low, high) for codes, low, high in spans]
+        alone = list[bool]()
+        for numbers in self._numbers:
+            alone = self._only(asked, numbers)
+            if all(alone):
+                return _Proposed(piece, numbers, spans), True
+        link, some = links[alone.index(False)], any(alone)
+        low, high = max(link.low, ends[0]), min(link.high, ends[1])
+        for alpha in (0.5 * (low + high), low, high):
+            if self._vain == 0:
+                break
+            found = self._sought(link, alpha)
+            self._vain -= found is None
+            some = some or found is not None
+            if found is not None and np.any(found.nu):
+                self._numbers = [*self._numbers[:1], found]
+                return (_Proposed(piece, found, spans) if all(self._only(asked, found)) else None), True
+        beside = [(asked[0][0], ends[0], ends[0] + self._around), (asked[-1][0], ends[1] - self._around, ends[1])]
+        return None, some or any(self._only(beside, self._numbers[0]))
+
+    def _only(self, asked: Sequence[tuple[ArcSelection, float, float]], numbers: PieceNumbers) -> list[bool]:
+        return only_roots(asked, numbers, _ERRORS, _MARGIN)
+
+    def _sought(self, link: Link, alpha: float) -> PieceNumbers | None:
+        """Numbers that serve at one alpha."""
+        p, system = self._system.p, self._system.at(alpha)
+        force, w, *_ = SelectionCurve(self._system, link.codes).at(alpha)
+        reduction = self._system.reduction(alpha)
+        found = reduction.weights(force[reduction.places], w[reduction.places], exactly=False, sought=Numbers.DESCENT)
+        rubbing = np.flatnonzero(system.F > 0)
+        if found is None or np.any(found[p + 3 * len(rubbing) :] > 0):
+            return None
+        kappa, nu = np.ones(p), np.zeros(p)
+        kappa[rubbing], nu[rubbing] = found[p : p + 2 * len(rubbing)].reshape(2, -1)
+        return PieceNumbers(found[:p], kappa, nu)

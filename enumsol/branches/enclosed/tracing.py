@@ -1,0 +1,186 @@
+"""Where selections hold over intervals of alpha, found by the polynomials of the kernel (theory, section 7.14).
+
+An interval is cut into boxes, on each of which the conditions are known with bounds of their errors, and the boxes into
+parts: the selection holds throughout, or nowhere, or exactly one condition changes its sign. What is left stays open.
+Many selections are followed side by side, so that the kernel examines them together.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.branches.enclosed.arc_parts import Box, Part, PartKind, Trace
+from enumsol.branches.enclosed.cutting import Cutting, between
+from enumsol.support.deadlines import TimeOverError, look
+from enumsol.trusted.arcs.over_parts import Expansion, expansions, over_parts
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Sequence
+
+    from enumsol.branches.enclosed.arc_parts import Interval, Number
+    from enumsol.branches.enclosed.cutting import AlphaExpansion
+    from enumsol.trusted.arcs.precise import PreciseSelection
+    from enumsol.trusted.arcs.selection_balls import ArcSelection
+
+    #: Asks for expansions (a selection and both ends) or for what is known over parts (an expansion and both ends).
+    Question = tuple[Any, Any, Any]
+    Asking = Generator[list[Question], list[Any], Any]
+    #: Gives a selection in balls of many digits, or None.
+    Precise = Callable[[], PreciseSelection | None]
+
+#: Bounds of errors are multiplied by this, so that a checker that rounds otherwise agrees.
+ERRORS = 2.0
+#: Boxes are not cut below so many units in the last place of alpha, or in many digits below this share of the interval.
+_SMALLEST_UNITS, _SMALLEST_PRECISE = 64.0, 2.0**-60
+#: Boxes shorter than this share of the interval are traced in many digits.
+_PRECISE_BOX, _PRECISE_ANYWHERE = 2.0**-10, 2.0**-40
+#: Boxes on which a selection seems to be singular are not cut below this share.
+_SINGULAR = 2.0**-26
+#: Expansions of one selection, after which what is left stays open.
+_MOST_BOXES = 200
+#: Boxes shorter than this share of the interval are not cut because of a condition that cannot be told from zero.
+_FLAT_BOX = 2.0**-12
+
+
+def trace(
+    asked: Sequence[tuple[ArcSelection, float, float, Precise, float]],
+    found: list[Trace],
+    *,
+    sharpened: bool = False,
+) -> None:
+    """Cut intervals into boxes and parts, of every selection its own.
+
+    Parameters
+    ----------
+    asked : sequence of (selection, low, high, precise, side)
+        ``precise`` gives the same selection in balls of many digits, for short boxes, or None where there is none;
+        ``side`` is that of the selection's system.
+    found : list of Trace
+        Takes the traces; on Ctrl-C, or once the time is over, those of the selections that are finished.
+    sharpened : bounds of events will be made narrower
+    """
+    traces = [Trace(selection, low, high, side) for selection, low, high, _, side in asked]
+    tracings = [_Tracing(one, part[3], sharpened=sharpened) for one, part in zip(traces, asked, strict=True)]
+    try:
+        _answer([tracing.run() for tracing in tracings])
+    except (KeyboardInterrupt, TimeOverError):
+        pairs = list(zip(traces, tracings, strict=True))
+        waiting = {one.selection.rows.codes for one, tracing in pairs if not tracing.finished}
+        found += [one for one in traces if one.selection.rows.codes not in waiting]
+        raise
+    found += traces
+
+
+def _answer(running: list[Asking]) -> None:
+    """Run generators side by side, answering all that they ask for together."""
+    asking = [(one, questions) for one in running if (questions := next(one, None)) is not None]
+    while asking:
+        answers = iter(_answers([question for _, questions in asking for question in questions]))
+        after = []
+        for one, questions in asking:
+            known = [next(answers) for _ in questions]
+            with suppress(StopIteration):
+                after.append((one, one.send(known)))
+        asking = after
+
+
+def _answers(questions: list[Question]) -> list[Any]:
+    """Expansions of selections, and what is known of expansions."""
+    found: list[Any] = [None] * len(questions)
+    over = [k for k, (of, _, _) in enumerate(questions) if isinstance(of, Expansion)]
+    for k, known in zip(over, over_parts([questions[k] for k in over]), strict=True):
+        found[k] = known
+    expand = [k for k, (of, _, _) in enumerate(questions) if not isinstance(of, Expansion)]
+    for k, expansion in zip(expand, expansions([questions[k] for k in expand], ERRORS), strict=True):
+        found[k] = expansion
+    return found
+
+
+class _Tracing:
+    """One selection being traced."""
+
+    def __init__(self, found: Trace, precise: Precise, *, sharpened: bool) -> None:
+        self._sharpened = sharpened
+        self._found, self._selection, self._precise = found, found.selection, precise
+        self._length = found.high - found.low
+        self._spacing = _SMALLEST_UNITS * float(np.spacing(max(abs(found.low), abs(found.high))))
+        self._count = 0
+        self.finished = False
+
+    def run(self) -> Asking:
+        """Box by box, from left to right."""
+        waiting: list[Interval] = [(self._found.low, self._found.high)]
+        while waiting:
+            look()
+            first, last = waiting.pop()
+            self._count += 1
+            rest = yield from self._box(_as_float(first), _as_float(last))
+            waiting += reversed(rest)
+        self._selection.forget()
+        self.finished = True
+
+    def _box(self, first: Number, last: Number) -> Generator[list[Question], list[Any], list[Interval]]:
+        """Add a box, or as much of it as is decided; what is left."""
+        share = float(last - first) / self._length
+        # short beside alpha too, or so short that this does not matter
+        beside = float(last - first) / max(abs(float(first)), abs(float(last)))
+        short, tiny = (
+            share < limit and (share < _PRECISE_ANYWHERE or beside < limit) for limit in (_PRECISE_BOX, _SINGULAR)
+        )
+        precise = self._precise() if short and self._count <= _MOST_BOXES else None
+        smallest = share < _SMALLEST_PRECISE if precise is not None else float(last - first) <= self._spacing
+        whole = self._count > _MOST_BOXES or smallest
+        tried: list[tuple[Box, list[Interval]]] = []
+        if self._count <= _MOST_BOXES and isinstance(first, float) and isinstance(last, float):
+            (expansion,) = yield [(self._selection, first, last)]
+            if expansion is not None:
+                flat = short and share < _FLAT_BOX and precise is None
+                tried.append((yield from self._cut(expansion, whole=whole, flat=flat)))
+        if precise is not None and not (tried and _decides(*tried[0])):
+            found = precise.expansion(first, last)
+            if found is not None:
+                tried.insert(0, (yield from self._cut(found, whole=whole, flat=share < _PRECISE_BOX)))
+        if tried:
+            box, rest = tried[0]
+            if box.parts:
+                self._found.boxes.append(box)
+            return rest
+        if whole or tiny:
+            everywhere = frozenset(range(len(self._selection.rows.codes)))
+            part = Part(PartKind.OPEN, first, last, doubtful=everywhere)
+            fine = not isinstance(first, float) or not isinstance(last, float)
+            self._found.boxes.append(Box(first, last, (part,), fine))
+            return []
+        middle = between(first, last)
+        return [(first, middle), (middle, last)]
+
+    def _cut(
+        self, expansion: AlphaExpansion, *, whole: bool, flat: bool
+    ) -> Generator[list[Question], list[Any], tuple[Box, list[Interval]]]:
+        """The box of an expansion, and what is left of it."""
+        cutting = Cutting(self._selection.rows, expansion, whole=whole, flat=flat, sharpened=self._sharpened).run()
+        parts = next(cutting)
+        while True:
+            if isinstance(expansion, Expansion):
+                known = yield [(expansion, *part) for part in parts]
+            else:
+                known = [expansion.over(*part) for part in parts]
+            try:
+                parts = cutting.send(known)
+            except StopIteration as end:
+                result: tuple[Box, list[Interval]] = end.value
+                return result
+
+
+def _decides(box: Box, rest: list[Interval]) -> bool:
+    """Whether nothing stays open."""
+    return not rest and all(part.kind is not PartKind.OPEN for part in box.parts)
+
+
+def _as_float(alpha: Number) -> Number:
+    """A float where the number is one."""
+    value = float(alpha)
+    return value if value == alpha else alpha

@@ -1,0 +1,1 @@
+"""The graph from exact algebra in alpha."""

@@ -1,0 +1,334 @@
+"""Ends of arcs glued into vertices by the statuses that hold there, never by distance (theory, section 7.6).
+
+Two selections share a point at a critical alpha when both hold there; the signs at one of them decide this exactly.
+An isolated point needs only the functions of its own selection; where a selection is singular its polytope of
+solutions is computed in exact arithmetic at that alpha.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+from networkx.utils import UnionFind
+
+from enumsol.arithmetic.algebraic import CriticalAlpha, merge
+from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.roots.components import connected_components
+from enumsol.search.stopping import Stop, StopReason
+from enumsol.selections.ordered_field import FiberSelections
+from enumsol.support.deadlines import Deadline, TimeOverError, look, within
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from enumsol.branches.exact.selection_arcs import Event, SelectionArcs
+    from enumsol.condensation.exact import ExactCondensed
+    from enumsol.roots.components import RootComponent
+    from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
+    from enumsol.support.deadlines import Limited
+
+
+@dataclass
+class GluedVertex:
+    """A connected set of solutions at one critical alpha.
+
+    Attributes
+    ----------
+    alpha : CriticalAlpha
+    members : codes of the selections that hold there
+    active : per node all codes that hold somewhere on it
+    solutions : polytopes of the singular selections (empty at an isolated point)
+    solver : FiberSelections of those polytopes, or None
+    settled : every selection that holds there is known, and with it every arc that ends there
+    """
+
+    alpha: CriticalAlpha
+    members: list[Codes]
+    active: ActiveSets
+    solutions: list[SelectionSolution] = field(default_factory=list)
+    solver: FiberSelections | None = None
+    settled: bool = True
+
+    @property
+    def dimension(self) -> int:
+        """0 for an isolated point."""
+        return max((s.dimension for s in self.solutions), default=0)
+
+
+@dataclass(frozen=True)
+class GluedArc:
+    """A set of solutions over an open interval of alpha: an arc, or a sheet.
+
+    Attributes
+    ----------
+    codes : the selection that represents it (of a sheet: one of its largest polytopes)
+    selections : all selections that coincide on it
+    sample : fmpq inside the interval
+    tail, head : vertices at its lower and upper end
+    index : int or None
+    dimension : 0 for an arc
+    """
+
+    codes: Codes
+    selections: tuple[Codes, ...]
+    sample: Any
+    tail: int
+    head: int
+    index: int | None
+    dimension: int
+
+
+@dataclass(frozen=True)
+class Gluing:
+    """Vertices and arcs of the graph over [a, b].
+
+    Attributes
+    ----------
+    exact : ExactCondensed
+    a, b : fmpq
+    arcs : dict of SelectionArcs by codes, those that hold somewhere
+    vertices : list of GluedVertex in the order of alpha
+    edges : list of GluedArc
+    stopped : Stop or None
+        How far it got, if Ctrl-C was pressed while arcs were computed, or the time was over.
+    reasons : list of str
+        What stayed undecided or contradicts completeness; empty when nothing does.
+    """
+
+    exact: ExactCondensed
+    a: Any
+    b: Any
+    arcs: dict[Codes, SelectionArcs]
+    vertices: list[GluedVertex]
+    edges: list[GluedArc]
+    stopped: Stop | None
+    reasons: list[str]
+
+
+def glue(
+    exact: ExactCondensed,
+    candidates: Iterable[Codes],
+    a: Any,
+    b: Any,
+    tick: Callable[[float], object] | None = None,
+    *,
+    cut_short: bool = False,
+    most: int | None = None,
+    limits: Limited | None = None,
+) -> Gluing:
+    """Vertices and arcs of the graph, from the selections that the search found.
+
+    Parameters
+    ----------
+    exact : ExactCondensed
+    candidates : codes of the selections that may hold somewhere in [a, b]; all do if g vanishes at every alpha
+    a, b : fmpq
+    tick : called with the share of the candidates done
+    cut_short : the search was stopped: selections it did not find are left out, and arcs may end without neighbours
+    most : int, optional
+        No further candidates are worked out after so many, as if Ctrl-C had been pressed.
+    limits : Limited, optional
+        Candidates that are not worked out by this deadline are left out. What is not joined by the one that holds where
+        this is called is unsettled.
+    """
+    known = KnownSelections(exact, a, b, cut_short=cut_short)
+    # where all selections hold, with lambda = 0, one arc stands for them
+    waiting = [(OPEN,) * exact.p] if exact.unloaded else sorted(set(candidates))
+    stopped = _work_out(known, waiting, tick, most, limits or Deadline())
+    for codes in list(known.arcs):
+        try:
+            known.close(codes)
+        except TimeOverError:
+            del known.arcs[codes]
+            known.late = known.cut_short = True
+    vertices = _vertices(_joined(known))
+    edges = _edges(known, vertices)  # may unsettle vertices and add reasons
+    if known.late and stopped is None:
+        stopped = Stop(StopReason.TIME_LIMIT)
+    return Gluing(exact, a, b, known.arcs, vertices, edges, stopped, known.reasons)
+
+
+def _work_out(
+    known: KnownSelections,
+    candidates: Sequence[Codes],
+    tick: Callable[[float], object] | None,
+    most: int | None,
+    limits: Limited,
+) -> Stop | None:
+    """Where the candidates hold; after Ctrl-C or the deadline the rest is left out, as if it had not been found."""
+    for k, codes in enumerate(candidates):
+        reason = StopReason.INTERRUPTED if k == most else None
+        try:
+            if reason is None:
+                with within(limits):
+                    look()
+                    known.add(codes)
+                if tick is not None:
+                    tick((k + 1) / len(candidates))
+        except KeyboardInterrupt:
+            reason = StopReason.INTERRUPTED
+        except TimeOverError:
+            reason = StopReason.TIME_LIMIT
+        if reason is not None:
+            known.cut_short = True
+            return Stop(reason, k, arcs_of=len(candidates))
+    return None
+
+
+# -- joining events ----------------------------------------------------------------------------------------------------
+
+
+def _joined(known: KnownSelections) -> list[list[Event]]:
+    """Events at which selections hold, grouped by connected sets of solutions."""
+    exact, union, waiting = known.exact, UnionFind(), known.waiting
+    seen: dict[Event, None] = {}
+    waiting += [event for arcs in known.arcs.values() for event in arcs.events if event.holds]
+    origin = exact.origin
+    if origin is not None and known.a <= origin <= known.b:
+        waiting += _hold_everywhere(known, CriticalAlpha.rational(origin), union)
+    everything = tuple(
+        frozenset((OPEN, FRICTIONLESS) if without else (OPEN, STICK, SLIP_PLUS, SLIP_MINUS))
+        for without in exact.frictionless
+    )
+    while waiting:
+        event = waiting.pop()
+        seen[event] = None
+        if exact.unloaded or (origin is not None and event.alpha.is_rational and event.alpha.lo == origin):
+            event.active = everything
+            event.settled = event.settled and not known.gaps
+            continue
+        event.active = tuple(frozenset((code,)) for code in event.codes)
+        try:
+            look()
+            for active in known.active_at(event):
+                _join_members(known, event, active, union)
+        except TimeOverError:
+            event.settled, known.late = False, True
+    _join_polytopes(known, seen, union)
+    groups: dict[Event, list[Event]] = {}
+    for event in seen:
+        groups.setdefault(union[event], []).append(event)
+    return list(groups.values())
+
+
+def _hold_everywhere(known: KnownSelections, alpha: CriticalAlpha, union: UnionFind) -> list[Event]:
+    """Join all selections at the alpha where g vanishes; the events that are new."""
+    events = [arcs.event_at(alpha) for arcs in known.arcs.values()]
+    for event, _ in events:
+        event.holds = True
+        union.union(events[0][0], event)
+    return [event for event, new in events if new]
+
+
+def _join_members(known: KnownSelections, event: Event, active: ActiveSets, union: UnionFind) -> None:
+    """Join an event with those of all selections that hold at a point of it."""
+    members, whole = known.members(active)
+    event.settled = event.settled and whole
+    for codes in members:
+        arcs = known.arcs[codes]
+        other, new = arcs.event_at(event.alpha)
+        if not other.holds:
+            known.complain(f"selection {codes} should hold at alpha = {float(event.alpha):.17g} and does not")
+            event.settled = False
+            continue
+        if new:
+            known.waiting.append(other)
+            other.singular = arcs.functions.singular
+            if other.singular:
+                known.solve(other)
+        union.union(event, other)
+
+
+def _join_polytopes(known: KnownSelections, events: Iterable[Event], union: UnionFind) -> None:
+    """Join polytopes at one alpha that meet away from the vertices of both."""
+    by_solver: dict[FiberSelections, list[tuple[Event, SelectionSolution]]] = {}
+    for event in events:
+        if event.polytope is not None and event.polytope[1].dimension > 0:
+            by_solver.setdefault(event.polytope[0], []).append((event, event.polytope[1]))
+    for solver, found in by_solver.items():
+        try:
+            for (first, a), (second, b) in combinations(found, 2):
+                look()
+                if union[first] != union[second] and solver.meet(a, b):
+                    union.union(first, second)
+        except TimeOverError:
+            known.late = True
+            for event, _ in found:
+                event.settled = False
+
+
+# -- the graph ---------------------------------------------------------------------------------------------------------
+
+
+def _vertices(groups: Sequence[list[Event]]) -> list[GluedVertex]:
+    """One vertex a group of events, in the order of alpha."""
+    by_alpha: dict[CriticalAlpha, list[list[Event]]] = {}
+    for events in groups:
+        by_alpha.setdefault(events[0].alpha, []).append(events)
+    vertices: list[GluedVertex] = []
+    for equal in merge(by_alpha):
+        alike = [events for alpha in equal for events in by_alpha[alpha]]
+        for events in sorted(alike, key=lambda events: min(event.codes for event in events)):
+            active = tuple(frozenset().union(*sets) for sets in zip(*(event.active for event in events), strict=True))
+            settled = all(event.settled for event in events)
+            vertex = GluedVertex(equal[0], sorted(event.codes for event in events), active, settled=settled)
+            for event in events:
+                event.vertex = len(vertices)
+                if event.polytope is not None:
+                    vertex.solver, solution = event.polytope
+                    vertex.solutions.append(solution)
+            vertices.append(vertex)
+    return vertices
+
+
+def _edges(known: KnownSelections, vertices: list[GluedVertex]) -> list[GluedArc]:
+    """One arc a cell in which a selection holds; of selections that coincide there, one for all."""
+    found: dict[tuple[int, int, tuple[Codes, ...]], GluedArc] = {}
+    for codes, arcs in known.arcs.items():
+        for k, cell in enumerate(arcs.cells):
+            if not cell.holds:
+                continue
+            tail, head = arcs.events[k].vertex, arcs.events[k + 1].vertex
+            first, dimension = codes, 0
+            selections: tuple[Codes, ...] = (codes,)
+            index: int | None = cell.det_sign
+            if arcs.grazing and known.exact.unloaded:
+                index = 1
+            elif arcs.grazing:
+                try:
+                    component = _component(known, codes, cell.sample)
+                except TimeOverError:
+                    component, known.late = None, True
+                # unknown selections that coincide here may have critical points that cut the arc further
+                if component is None or (known.cut_short and not _all_known(known, component)):
+                    vertices[tail].settled = vertices[head].settled = False
+                    continue
+                selections = tuple(sorted(s.codes for s in component.solutions))
+                # a search that was cut short may not have found the others
+                first = next(s.codes for s in component.solutions if s.codes in known.arcs)
+                index, dimension = component.index, component.dimension
+            arc = GluedArc(first, selections, cell.sample, tail, head, index, dimension)
+            found.setdefault((tail, head, selections), arc)
+    return sorted(found.values(), key=lambda arc: (arc.tail, arc.head, arc.codes))
+
+
+def _all_known(known: KnownSelections, component: RootComponent) -> bool:
+    """Whether all selections that hold on a component were found."""
+    return component.whole and all(solution.codes in known.arcs for solution in component.solutions)
+
+
+def _component(known: KnownSelections, codes: Codes, sample: Any) -> RootComponent | None:
+    """The connected set of solutions that a degenerate selection belongs to at a point of its cell."""
+    look()
+    solver = FiberSelections(known.exact, sample)
+    solution = solver.solve(codes)
+    if solution is None:
+        known.complain(f"selection {codes} should hold at alpha = {sample} and does not")
+        return None
+    component = connected_components([solution], solver)[0]
+    if component.index is None:
+        known.complain(f"the degree of a degenerate arc near alpha = {sample} could not be found")
+    return component

@@ -1,0 +1,343 @@
+"""Figures of branch graphs: alpha against a quantity, the number of solutions as steps underneath."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from enumsol.branches.figures.curves import Curve, Place, curves, side_by_side
+from enumsol.branches.figures.marks import GREY, MARKERS, STATUS_STYLES, colour_of, handles, index_style
+from enumsol.branches.figures.panels import draw_numbers, draw_steps, drawn_range, family_range, sheet_range
+from enumsol.branches.figures.quantities import Quantity, quantity_of, state_columns
+from enumsol.branches.figures.zooms import narrow_changes
+from enumsol.errors import InvalidArgumentError
+from enumsol.support.arguments import alpha_interval, positive_number, shown
+from enumsol.support.messages import counted
+from enumsol.support.plotting import axes_or_none, figure_of, new_figure
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from enumsol.branches.claims import Claims
+    from enumsol.branches.elements import Arc, Branch, Vertex
+    from enumsol.model.problem import ContactProblem
+    from enumsol.roots.root_set import RootSet
+
+
+class DrawnGraph(Protocol):
+    """What a figure shows of a BranchGraph."""
+
+    problem: ContactProblem
+    interval: tuple[float, float]
+    vertices: tuple[Vertex, ...]
+    arcs: tuple[Arc, ...]
+
+    @property
+    def branches(self) -> tuple[Branch, ...]:
+        """Paths and closed loops of arcs, and sheets."""
+
+    @property
+    def branch_of(self) -> Mapping[int, int]:
+        """Number of the branch of every arc."""
+
+    @property
+    def claims(self) -> Claims:
+        """What is known about the number of solutions."""
+
+    def completeness(self) -> str:
+        """One sentence about it."""
+
+    def roots_at(self, alpha: float) -> RootSet:
+        """All solutions at one alpha."""
+
+
+#: Panels drawn when no nodes are named.
+_MAX_PANELS = 3
+#: A third of a pixel of a large panel; and what no eye can tell from none.
+_TOLERANCE, _LEAST_TOLERANCE = 5e-4, 1e-6
+#: Arcs that coincide are drawn so far apart, and all of them no wider than that [points].
+_BESIDE, _WIDEST = 2.6, 6.0
+
+
+@dataclass(frozen=True)
+class _Style:
+    """What all panels of a figure share."""
+
+    quantity: Quantity
+    units: tuple[str, str] | None
+    tolerance: float
+
+
+def plot_graph(
+    graph: DrawnGraph,
+    quantity: str | None = None,
+    nodes: Sequence[Any] | None = None,
+    *,
+    multiplicity: bool = True,
+    zoom: bool | tuple[float, float] = True,
+    units: tuple[str, str] | None = None,
+    title: str | None = None,
+    tolerance: float = _TOLERANCE,
+    ax: Any = None,
+    file: Any = None,
+    figsize: tuple[float, float] | None = None,
+) -> Any:
+    """A matplotlib figure of the branches: one panel of an overview, or one a node.
+
+    Branches that coincide in the quantity shown are drawn side by side, which a note says. In overviews the line style
+    tells the index, in panels of nodes the status of the node.
+
+    Parameters
+    ----------
+    graph : BranchGraph
+    quantity : {"norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"}, optional
+        The first three are overviews: norm of all contact forces (the default), sums of normal and of tangential
+        forces. The others are of single nodes; default "lambda_n" if nodes are named.
+    nodes : sequence of node labels, optional
+        Default: all of up to three nodes, otherwise the three on which branches differ most.
+    multiplicity : bool
+        Draw the number of solutions as steps underneath.
+    zoom : bool or (float, float)
+        Panels beside the first for parts too narrow to be seen in which the number of solutions changes, up to two of
+        them, or for the given interval of alpha.
+    units : (str, str), optional
+        Of forces and of lengths, for the axes.
+    title : str, optional
+        What the problem is; the figure adds the interval and whether the graph is complete.
+    tolerance : float
+        Distance of drawn curves from the branches, relative to a panel's width and height.
+    ax : matplotlib Axes, optional
+        Draw one panel there, without steps and zooms.
+    file : path, optional
+        Save the figure there.
+    figsize : (float, float), optional
+        Inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Notebooks show it.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An unknown quantity or node, an interval that is none, nodes of an overview, or several panels and ``ax``.
+    MissingDependencyError
+        matplotlib is not installed.
+    """
+    chosen = quantity_of(("norm" if nodes is None else "lambda_n") if quantity is None else quantity)
+    style = _Style(chosen, checked_units(units), max(positive_number(tolerance, "tolerance"), _LEAST_TOLERANCE))
+    rows = _rows(graph, chosen, nodes, one=axes_or_none(ax) is not None)
+    windows = [] if ax is not None else _windows(graph, zoom)
+    if ax is None:
+        figure, axes = _grid(len(rows), multiplicity, len(windows), figsize)
+    else:
+        figure, axes = figure_of(ax), [[ax]]
+    columns = [graph.interval, *windows]
+    panels, dots = [], False
+    for column, window in zip(axes, columns, strict=True):
+        drawn = _drawn(graph, style, None if column is axes[0] else window)
+        panels += [_panel(axis, graph, style, row, drawn, window) for axis, row in zip(column, rows, strict=False)]
+        if multiplicity and ax is None:
+            dots |= draw_steps(column[-1], graph.claims.steps(), window)
+        column[-1].set_xlabel("alpha")
+    _mark_windows(axes, windows)
+    _words(figure, axes[0][0], graph, chosen, title, {"dots"} if dots else set(), alone=ax is not None)
+    draw_numbers(figure, panels, None if ax is None else ax)
+    if file is not None:
+        figure.savefig(file, dpi=150)
+    return figure
+
+
+def checked_units(units: Any) -> tuple[str, str] | None:
+    """Units of forces and lengths, or None.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is something else.
+    """
+    if units is None:
+        return None
+    if not isinstance(units, (tuple, list)) or len(units) != 2 or not all(isinstance(unit, str) for unit in units):
+        raise InvalidArgumentError(f"units is {shown(units)}; expected two texts, of forces and of lengths")
+    return units[0], units[1]
+
+
+def _rows(graph: DrawnGraph, quantity: Quantity, nodes: Sequence[Any] | None, *, one: bool) -> list[int]:
+    """Columns of the values, one a panel: contact nodes, or the only column of an overview."""
+    ids = list(graph.problem.node_ids)
+    if nodes is not None:
+        if not quantity.by_node:
+            raise InvalidArgumentError(f"nodes are given with the quantity {quantity.name!r}; expected one of nodes")
+        row = {label: k for k, label in enumerate(ids)}
+        try:
+            chosen = [row[node] for node in nodes]
+        except (KeyError, TypeError):
+            chosen = []
+        if not chosen:
+            raise InvalidArgumentError(f"nodes is {shown(nodes)}; expected labels among {shown(ids)}")
+        if one and len(chosen) > 1:
+            raise InvalidArgumentError(f"nodes is {shown(nodes)} with one ax; expected one label")
+        return chosen
+    if not quantity.by_node:
+        return [0]
+    most = 1 if one else _MAX_PANELS
+    if len(ids) <= most or not graph.arcs:
+        return list(range(min(len(ids), most)))
+    spread = drawn_range(graph.vertices, quantity)
+    return sorted(np.argsort(-spread, kind="stable")[:most].tolist())
+
+
+def _windows(graph: DrawnGraph, zoom: Any) -> list[tuple[float, float]]:
+    if isinstance(zoom, (bool, np.bool_)):
+        return narrow_changes(graph.claims.steps(), graph.interval) if zoom else []
+    low, high = (float(end) for end in alpha_interval(zoom, "zoom"))
+    a, b = graph.interval
+    if high <= a or low >= b:
+        raise InvalidArgumentError(f"zoom is {shown(zoom)}; expected an interval that overlaps [{a:g}, {b:g}]")
+    return [(max(low, a), min(high, b))]
+
+
+def _grid(rows: int, multiplicity: bool, zooms: int, figsize: Any) -> tuple[Any, list[list[Any]]]:
+    """A figure and its axes, column by column; those of the whole interval come first in figure.axes."""
+    heights = [3.6 if rows == 1 else 2.7] * rows + [1.1] * int(multiplicity)
+    size = figsize or (7.5 + 3.0 * zooms, sum(heights) + 1.0)
+    figure = new_figure(figsize=size)
+    grid = figure.add_gridspec(len(heights), 1 + zooms, height_ratios=heights, width_ratios=[7.0] + [3.6] * zooms)
+    axes: list[list[Any]] = []
+    for column in range(1 + zooms):
+        axes.append([])
+        for row in range(len(heights)):
+            share = axes[-1][0] if row else None
+            axis = figure.add_subplot(grid[row, column], sharex=share)
+            if row + 1 < len(heights):
+                axis.tick_params(labelbottom=False)
+            axes[-1].append(axis)
+    return figure, axes
+
+
+def _drawn(graph: DrawnGraph, style: _Style, window: tuple[float, float] | None) -> dict[int, Curve]:
+    lo, hi = window or graph.interval
+    arcs = [arc for arc in graph.arcs if not arc.dimension]
+    changing = [arc for arc in arcs if window is not None and (lo < arc.lo < hi or lo < arc.hi < hi)]
+    # a zoom is as high as the arcs that end in it, so that these are drawn to a tolerance of their own
+    parts = (changing, [arc for arc in arcs if arc not in changing])
+    return {
+        number: curve
+        for part in parts
+        for number, curve in curves(part, style.quantity.name, hi - lo, style.tolerance, window).items()
+    }
+
+
+def _panel(
+    axis: Any,
+    graph: DrawnGraph,
+    style: _Style,
+    row: int,
+    drawn: dict[int, Curve],
+    window: tuple[float, float],
+) -> tuple[Any, dict[int, Curve], dict[int, Place], Mapping[int, int], int]:
+    """Draw one panel; returns what numbers beside its curves need."""
+    from matplotlib.transforms import ScaledTranslation
+
+    quantity, height = style.quantity, None if window == graph.interval else _ending(graph, drawn, row, window)
+    places = side_by_side(drawn, graph.branch_of, row, None if height is None else height[1] - height[0])
+    for arc in graph.arcs:
+        if arc.dimension:
+            sides = graph.vertices[arc.tail], graph.vertices[arc.head]
+            band = sheet_range(graph.problem, graph.roots_at, arc, sides, quantity, row)
+            if band is not None:
+                axis.fill_between(*band, color=GREY, alpha=0.25, linewidth=0)
+        elif arc.number in drawn:
+            curve, place = drawn[arc.number], places[arc.number]
+            line = STATUS_STYLES[arc.statuses[row]] if quantity.by_node else index_style(arc.index)
+            colour = colour_of(graph.branch_of[arc.number])
+            (artist,) = axis.plot(curve.alphas, curve.values[:, row], linestyle=line, color=colour, linewidth=1.6)
+            if place.among > 1:
+                step = min(_BESIDE, _WIDEST / (place.among - 1))
+                away = (place.rank - (place.among - 1) / 2) * step / 72.0
+                artist.set_transform(axis.transData + ScaledTranslation(-0.4 * away, away, axis.figure.dpi_scale_trans))
+                artist.set_linewidth(min(1.6, max(0.5, 0.8 * step)))
+    for v in graph.vertices:
+        if not window[0] <= v.alpha <= window[1]:
+            continue
+        if v.family is not None:
+            ends = family_range(graph.problem, v, quantity, row)
+            axis.plot([v.alpha] * 2, ends, color=GREY, linewidth=2.4, solid_capstyle="butt", zorder=3)
+        if (mark := MARKERS.get(v.kind)) is not None:
+            value = float(state_columns(quantity, v)[row])
+            axis.plot([v.alpha], [value], marker=mark[0], ms=4.5, color=GREY, markerfacecolor=mark[1], zorder=4)
+    _dress(axis, graph, style, row, window)
+    if height is not None:
+        axis.set_ylim(*height)
+    return axis, drawn, places, graph.branch_of, row
+
+
+def _ending(
+    graph: DrawnGraph, drawn: dict[int, Curve], row: int, window: tuple[float, float]
+) -> tuple[float, float] | None:
+    """The range of the arcs that end inside a window, with room above and below; None where it has no height."""
+    lo, hi = window
+    inside = [drawn[arc.number] for arc in graph.arcs if arc.number in drawn and (lo < arc.lo < hi or lo < arc.hi < hi)]
+    if not inside:
+        return None
+    values = np.concatenate([curve.values[:, row] for curve in inside])
+    low, high = float(values.min()), float(values.max())
+    room = 0.15 * (high - low)
+    return (low - room, high + room) if room > 1e-12 * max(abs(low), abs(high)) else None
+
+
+def _dress(axis: Any, graph: DrawnGraph, style: _Style, row: int, window: tuple[float, float]) -> None:
+    quantity = style.quantity
+    name = f"{quantity.name} of node {graph.problem.node_ids[row]}" if quantity.by_node else quantity.words
+    if style.units is not None:
+        name += f" [{style.units[0 if quantity.dimension == 'force' else 1]}]"
+    axis.set_ylabel(name)
+    axis.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
+    axis.grid(visible=True, color="#e4e4e4", linewidth=0.6)
+    axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.margins(y=0.12)
+    axis.set_xlim(*window)
+
+
+def _mark_windows(axes: list[list[Any]], windows: list[tuple[float, float]]) -> None:
+    """Name the parts that are drawn larger, in both places."""
+    for letter, column, (lo, hi) in zip("AB", axes[1:], windows, strict=False):
+        for axis in axes[0]:
+            axis.axvspan(lo, hi, color="#f2c14e", alpha=0.45, linewidth=0.8, zorder=0.5)
+        axes[0][0].annotate(
+            letter, ((lo + hi) / 2, 0.99), xycoords=("data", "axes fraction"), fontsize=8, ha="center", va="top"
+        )
+        words = f"{letter}: alpha from {lo:.8g}, width {hi - lo:.3g};\nas high as the arcs that end here"
+        column[0].set_title(words, fontsize=8, loc="left")
+        column[-1].tick_params(axis="x", rotation=30)
+        for axis in column:
+            axis.xaxis.get_major_locator().set_params(nbins=4)
+
+
+def _words(
+    figure: Any, first: Any, graph: DrawnGraph, quantity: Quantity, title: str | None, others: set[str], *, alone: bool
+) -> None:
+    """The title and the legend."""
+    problem, (a, b) = graph.problem, graph.interval
+    name = counted(problem.p, "contact node") if title is None else title
+    first.set_title(f"{name}, alpha in [{a:g}, {b:g}]; {graph.completeness()}", fontsize=9, loc="left", wrap=True)
+    arcs = [arc for arc in graph.arcs if not arc.dimension]
+    others |= {"continuum"} if any(v.family is not None for v in graph.vertices) else set()
+    others |= {"sheet"} if len(arcs) < len(graph.arcs) and quantity.dimension == "force" else set()
+    entries = handles(
+        {v.kind for v in graph.vertices},
+        {s for arc in arcs for s in arc.statuses} if quantity.by_node else (),
+        () if quantity.by_node else {arc.index for arc in arcs},
+        others,
+    )
+    if alone:
+        first.legend(handles=entries, frameon=False, fontsize=7)
+    else:
+        rows = -(-len(entries) // 6) or 1
+        across = -(-len(entries) // rows) or 1
+        figure.legend(handles=entries, loc="outside upper center", ncols=across, frameon=False, fontsize=8)

@@ -1,0 +1,323 @@
+"""Branch graphs as JSON files, read back to the last bit, and as GraphML for other programs."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import asdict
+from fractions import Fraction
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import networkx as nx
+import numpy as np
+import scipy.sparse as sp
+from flint import fmpq, fmpz, fmpz_poly
+
+from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
+from enumsol.branches.elements import Arc, Vertex, VertexKind
+from enumsol.branches.enclosed.arc_values import ExactArcValues, TracedArcValues
+from enumsol.branches.enclosed.traced import TracedProblem
+from enumsol.branches.graph_data import GraphData, GraphStats
+from enumsol.condensation.exact import ExactCondensed
+from enumsol.condensation.unloaded import vanishing_alpha
+from enumsol.errors import InvalidArgumentError
+from enumsol.model.body2d import PlaneMesh
+from enumsol.model.problem import ContactProblem
+from enumsol.model.statuses import ContactStatus
+from enumsol.roots.root import Polytope, RootFamily
+from enumsol.support.arguments import file_path
+from enumsol.support.files import writing
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from enumsol.branches.enclosed.arc_values import ArcValues
+    from enumsol.selections.solution import Codes
+
+FORMAT, VERSION = "enumsol-branch-graph", 3
+#: Version 1 gave kinds to the vertices of graphs that were not complete; only its complete graphs are read. Before
+#: version 3 every vertex with a single arc was "broken".
+_READ = (1, 2, 3)
+#: Arrays of a vertex.
+_VALUES = ("lambda_n", "lambda_t", "u_n", "u_t")
+_FRACTION = re.compile(r"-?\d+(/\d+)?", re.ASCII)
+
+
+def save_graph(data: GraphData, file: str | Path) -> None:
+    """Write a graph and its problem as JSON (see BranchGraph.save)."""
+    record = {
+        "format": FORMAT,
+        "version": VERSION,
+        "problem": _problem_record(data.problem),
+        "arcs_by": data.arcs_by,
+        "condensed_exactly": data.certified_data == "problem",
+        "interval": [str(end) for end in data.interval],
+        "arithmetic": data.arithmetic,
+        "reasons": list(data.reasons),
+        "stats": asdict(data.stats),
+        "vertices": [_vertex_record(v) for v in data.vertices],
+        "arcs": [_arc_record(arc, data.vertices) for arc in data.arcs],
+    }
+    place = file_path(file, "file")
+    with writing(place, "file"):
+        place.write_text(json.dumps(record), encoding="utf-8")
+
+
+def load_graph(file: str | Path) -> GraphData:
+    """Read a graph that save_graph wrote (see BranchGraph.load).
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file cannot be read or is not such a graph.
+    """
+    place = file_path(file, "file")
+    try:
+        record = json.loads(place.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidArgumentError(f"graph {file} cannot be read ({error.strerror}); expected a saved graph") from error
+    except ValueError as error:
+        raise InvalidArgumentError(f"graph {file} is not a JSON file ({error}); expected a saved graph") from error
+    if not isinstance(record, dict) or record.get("format") != FORMAT or record.get("version") not in _READ:
+        raise InvalidArgumentError(f"graph {file} has another format; expected {FORMAT}, version {VERSION}")
+    try:
+        if record["version"] == 1 and record["reasons"]:
+            raise InvalidArgumentError(
+                f"graph {file} is not complete and was saved by an earlier version, which claimed more about such "
+                "graphs than is known; expected a complete one, or one saved by this version"
+            )
+        return _from_record(record)
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise InvalidArgumentError(f"graph {file} is damaged (at {error}); expected a saved graph") from error
+
+
+def _from_record(record: dict[str, Any]) -> GraphData:
+    problem = _problem(record["problem"])
+    first, last = (_fraction(end) for end in record["interval"])
+    exact, values = _values(problem, record, (first, last))
+    balls = exact is None
+    vertices = tuple(_vertex(k, item, balls=balls) for k, item in enumerate(record["vertices"]))
+    arcs = tuple(_arc(k, item, vertices, values) for k, item in enumerate(record["arcs"]))
+    reasons, stats = tuple(record["reasons"]), GraphStats(**record["stats"])
+    return GraphData(problem, exact, (first, last), record["arithmetic"], vertices, arcs, reasons, stats)
+
+
+def _values(
+    problem: ContactProblem, record: dict[str, Any], interval: tuple[Fraction, Fraction]
+) -> tuple[ExactCondensed | None, Callable[[Codes, Fraction], ArcValues]]:
+    """The condensed problem in rationals, if arcs rest on it, and what gives an arc its values."""
+    if record.get("arcs_by", "exact") == "balls":
+        traced = TracedProblem(problem, interval, vanishing_alpha(problem, "problem"))
+        return None, partial(TracedArcValues, traced)
+    exactly = record["condensed_exactly"]
+    exact = ExactCondensed.from_problem(problem) if exactly else ExactCondensed.from_condensed(problem)
+    return exact, partial(ExactArcValues, exact)
+
+
+# -- the problem -------------------------------------------------------------------------------------------------------
+
+
+def _problem_record(problem: ContactProblem) -> dict[str, Any]:
+    return {
+        **{name: _matrix_record(getattr(problem, name)) for name in ("A", "Bn", "Bt")},
+        **{name: getattr(problem, name).tolist() for name in ("f", "gap", "slip_offset")},
+        "friction": [part.tolist() for part in problem.friction],
+        "load_slope": None if problem.load_slope is None else problem.load_slope.tolist(),
+        "node_ids": list(problem.node_ids),
+        "coordinates": None if problem.coordinates is None else problem.coordinates.tolist(),
+        "mesh": _mesh_record(problem.mesh),
+    }
+
+
+def _mesh_record(mesh: PlaneMesh | None) -> dict[str, Any] | None:
+    if mesh is None:
+        return None
+    offset = None if mesh.offset is None else mesh.offset.tolist()
+    points, cells = mesh.points.tolist(), mesh.cells.tolist()
+    return {"points": points, "cells": cells, "motion": _matrix_record(mesh.motion), "offset": offset}
+
+
+def _matrix_record(matrix: Any) -> dict[str, Any]:
+    coo = sp.coo_array(matrix)
+    rows, columns = coo.coords
+    return {"shape": list(coo.shape), "row": rows.tolist(), "col": columns.tolist(), "value": coo.data.tolist()}
+
+
+def _problem(record: dict[str, Any]) -> ContactProblem:
+    def matrix(item: dict[str, Any]) -> sp.csc_array:
+        return sp.csc_array(sp.coo_array((item["value"], (item["row"], item["col"])), shape=tuple(item["shape"])))
+
+    friction = tuple(np.array(part, dtype=np.float64) for part in record["friction"])
+    return ContactProblem(
+        matrix(record["A"]),
+        matrix(record["Bn"]),
+        matrix(record["Bt"]),
+        record["f"],
+        gap=record["gap"],
+        friction=(friction[0], friction[1]),
+        load_slope=record["load_slope"],
+        slip_offset=record["slip_offset"],
+        node_ids=record["node_ids"],
+        coordinates=record["coordinates"],
+        mesh=None
+        if (mesh := record.get("mesh")) is None
+        else PlaneMesh(mesh["points"], mesh["cells"], matrix(mesh["motion"]), mesh["offset"]),
+    )
+
+
+# -- vertices and arcs -------------------------------------------------------------------------------------------------
+
+
+def _names(statuses: Sequence[ContactStatus]) -> list[str]:
+    return [status.value for status in statuses]
+
+
+def _statuses(names: Sequence[str]) -> tuple[ContactStatus, ...]:
+    return tuple(ContactStatus(name) for name in names)
+
+
+def _vertex_record(v: Vertex) -> dict[str, Any]:
+    lo, hi = v.enclosure
+    family = None
+    if v.family is not None:
+        family = [
+            {"statuses": _names(part.statuses), "vertices": part.vertices.tolist(), "dimension": part.dimension}
+            for part in v.family.polytopes
+        ]
+    return {
+        "alpha": v.alpha,
+        "lo": str(lo),
+        "hi": str(hi),
+        "polynomial": None if v.exact.poly is None else [str(c) for c in v.exact.poly.coeffs()],
+        "kind": v.kind.value,
+        "border": v.border,
+        "statuses": _names(v.statuses),
+        "active": [sorted(_names(tuple(names))) for names in v.active],
+        **{name: getattr(v, name).tolist() for name in _VALUES},
+        "family": family,
+        "family_index": None if v.family is None else v.family.index,
+        "index_left": v.index_left,
+        "index_right": v.index_right,
+        "selections": [list(codes) for codes in v.selections],
+    }
+
+
+def _fraction(text: str) -> Fraction:
+    """The fraction written like "-8/3"; other texts are refused, such as numbers with an exponent."""
+    if _FRACTION.fullmatch(text) is None:
+        raise ValueError(f"{text[:20]!r}, which is no fraction")
+    return Fraction(text)
+
+
+def _kind(item: dict[str, Any]) -> VertexKind:
+    """The kind of a vertex, by its name of today."""
+    kind, degrees = VertexKind(item["kind"]), (item["index_left"], item["index_right"])
+    return VertexKind.TERMINAL if kind is VertexKind.BROKEN and degrees[0] == degrees[1] else kind
+
+
+def _vertex(number: int, item: dict[str, Any], *, balls: bool) -> Vertex:
+    lo, hi = (fmpq(*_fraction(item[end]).as_integer_ratio()) for end in ("lo", "hi"))
+    coefficients = item["polynomial"]
+    poly = None if coefficients is None else fmpz_poly([fmpz(c) for c in coefficients])
+    family = None
+    if item["family"] is not None:
+        parts = [
+            Polytope(_statuses(part["statuses"]), np.array(part["vertices"]), part["dimension"])
+            for part in item["family"]
+        ]
+        family = RootFamily(item["alpha"], tuple(parts), item["family_index"], vertices_proven=True)
+    return Vertex(
+        number=number,
+        alpha=item["alpha"],
+        kind=_kind(item),
+        border=item["border"],
+        statuses=_statuses(item["statuses"]),
+        active=tuple(frozenset(_statuses(names)) for names in item["active"]),
+        **{name: np.array(item[name]) for name in _VALUES},
+        family=family,
+        index_left=item["index_left"],
+        index_right=item["index_right"],
+        selections=tuple(tuple(codes) for codes in item["selections"]),
+        exact=EnclosedAlpha(lo, hi) if balls else CriticalAlpha(poly, lo, hi),
+    )
+
+
+def _arc_record(arc: Arc, vertices: Sequence[Vertex]) -> dict[str, Any]:
+    return {
+        "statuses": _names(arc.statuses),
+        "tail": arc.tail,
+        "head": arc.head,
+        "index": arc.index,
+        "dimension": arc.dimension,
+        "grazing": arc.grazing,
+        "selections": [list(codes) for codes in arc.selections],
+        "sample": str(arc.sample),
+        # beside a place that was left open; elsewhere an arc reaches up to its vertices
+        **{
+            name: str(end.enclosure()[0])
+            for name, end, number in (("from", arc.begin, arc.tail), ("to", arc.end, arc.head))
+            if end is not vertices[number].exact
+        },
+    }
+
+
+def _arc(
+    number: int, item: dict[str, Any], vertices: Sequence[Vertex], values: Callable[[Codes, Fraction], ArcValues]
+) -> Arc:
+    selections = tuple(tuple(codes) for codes in item["selections"])
+    sample = _fraction(item["sample"])
+    lo, begin = _arc_end(item.get("from"), vertices[item["tail"]])
+    hi, end = _arc_end(item.get("to"), vertices[item["head"]])
+    return Arc(
+        number=number,
+        statuses=_statuses(item["statuses"]),
+        lo=lo,
+        hi=hi,
+        **{name: item[name] for name in ("tail", "head", "index", "dimension", "grazing")},
+        selections=selections,
+        begin=begin,
+        end=end,
+        sample=sample,
+        _values=values(selections[0], sample),
+    )
+
+
+def _arc_end(known: str | None, vertex: Vertex) -> tuple[float, CriticalAlpha]:
+    """Where an arc ends: at its vertex, or beside it as far as it is known to hold."""
+    if known is None:
+        return vertex.alpha, vertex.exact
+    value = fmpq(*_fraction(known).as_integer_ratio())
+    return float(Fraction(known)), EnclosedAlpha(value, value)
+
+
+# -- other programs ----------------------------------------------------------------------------------------------------
+
+
+def write_graphml(data: GraphData, branch_of: Mapping[int, int], file: str | Path) -> None:
+    """Write vertices and arcs as GraphML, arrays as text."""
+    plain = nx.MultiGraph(complete=data.complete, standing=data.claims.standing.value)
+    for v in data.vertices:
+        plain.add_node(
+            v.number,
+            alpha=v.alpha,
+            kind=v.kind.value,
+            statuses=" ".join(_names(v.statuses)),
+            **{name: " ".join(map(repr, getattr(v, name).tolist())) for name in _VALUES},
+        )
+    for arc in data.arcs:
+        plain.add_edge(
+            arc.tail,
+            arc.head,
+            key=arc.number,
+            alpha_from=arc.lo,
+            alpha_to=arc.hi,
+            statuses=" ".join(_names(arc.statuses)),
+            index="" if arc.index is None else str(arc.index),
+            dimension=arc.dimension,
+            branch=branch_of[arc.number],
+        )
+    place = file_path(file, "file")
+    with writing(place, "file"):
+        nx.write_graphml(plain, place)

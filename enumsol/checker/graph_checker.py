@@ -1,0 +1,405 @@
+"""Checker of a branch graph: every solution in the interval lies in one of the selections handed on, or on its arcs.
+
+Records (see enumsol.proof.proof_file for the file and the reader): a header ``{"format": "enumsol-proof",
+"version": 1, "kind": "graph", "problem": <fingerprint>, "interval": [a, b], "p": p, "data": "problem" | "condensed"}``;
+for every piece ``{"piece": [a, b], "force", "length", "roots"}``, then its leaves ``["x", codes, rows, multipliers]``
+(no solution anywhere in the piece), ``["f", codes, rows, multipliers]`` (the same by the form declared last, ``["q",
+mu, nu, alpha, beta]``), ``["s", codes]`` (a selection handed on) and ``["c", codes]`` (left to both halves of the
+piece), or ``["m", mu, kappa, nu]`` (all solutions lie on the arcs of the selections handed on); then, if the proof
+holds them, arcs (see enumsol.checker.arcs); at the end ``{"pieces", "leaves", "selections"}``, with arcs ``"traces"``
+and ``"arcs"``, too. Codes are strings of p digits; ends of pieces are fractions ``"a/b"`` in decimal digits.
+
+What is checked: pieces partition the interval (it is cut first where g vanishes, see ``condensation.unloaded``), with
+the subtrees left by a piece searched in both its halves; the leaves of every piece cover all selections of its roots;
+every exclusion is proven at both ends of the piece. Where the selections handed on hold, and how their arcs are joined,
+is checked by ``enumsol.checker.arcs``, if the proof says it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.checker.arcs import ArcChecker, ArcCount
+from enumsol.checker.only_branches import ClosedPiece
+from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
+from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.condensation.unloaded import vanishing_alpha
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.proof.reading import (
+    RefusedError,
+    codes_from,
+    data_of,
+    friction_at,
+    multipliers_from,
+    names_only,
+    numbers_from,
+    rational_from,
+    same,
+    shown,
+    units_from,
+)
+from enumsol.trusted.over_interval import (
+    KINDS,
+    EnclosedPiece,
+    as_computed,
+    interval_exclusion_margins,
+    interval_form_margins,
+    piece_forms,
+)
+from enumsol.trusted.status_rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, STICK, UNDECIDED, children_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from fractions import Fraction
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.data import Data
+    from enumsol.model.problem import ContactProblem
+    from enumsol.trusted.quadratic_forms import EnclosedForm
+
+    Array = NDArray[np.float64]
+    Codes = NDArray[np.uint8]
+
+#: Leaves read and checked together.
+_BATCH = 256
+#: Leaves of a piece after which repetitions are first looked for; then whenever their number has doubled.
+_LOOK = 1024
+#: Entries of a leaf's record, by its kind, and those of a form's.
+_ENTRIES = {"x": 4, "f": 4, "s": 2, "c": 2}
+_FORM, _FORM_ENTRIES = "q", 5
+#: Begins the record of a piece without a tree.
+_CLOSED = "m"
+_END = object()
+
+
+@dataclass
+class _Piece:
+    """A piece whose leaves are being read."""
+
+    a: Fraction
+    b: Fraction
+    force: Array
+    length: Array
+    roots: Codes
+    #: of every leaf its kind, and its p codes as bytes
+    kinds: bytearray = field(default_factory=bytearray)
+    codes: bytearray = field(default_factory=bytearray)
+    look: int = _LOOK
+    #: made when there is something to exclude
+    enclosed: EnclosedPiece | None = None
+    #: multipliers of the form declared last, and the form
+    declared: Array | None = None
+    forms: tuple[EnclosedForm, ...] | None = None
+    closed: ClosedPiece | None = None
+
+    def declare(self, record: list[Any]) -> None:
+        """Read a form."""
+        if len(record) != _FORM_ENTRIES:
+            raise ValueError(f"a form has {len(record)} entries; expected {_FORM_ENTRIES}")
+        declared = np.array([numbers_from(values, self.roots.shape[1]) for values in record[1:]])
+        if np.any(declared[2:] < 0):
+            raise ValueError("a multiplier of a form is negative and must not be")
+        self.declared, self.forms = declared, None
+
+    def leaves(self, *kinds: str) -> Codes:
+        """Codes of the leaves of these kinds, shape (k, p); all without a kind."""
+        codes = np.frombuffer(bytes(self.codes), dtype=np.uint8).reshape(-1, self.roots.shape[1])
+        of_kind = np.isin(np.frombuffer(bytes(self.kinds), dtype=np.uint8), [ord(kind) for kind in kinds])
+        return codes[of_kind] if kinds else codes
+
+
+class GraphChecker:
+    """Checks the records of a graph's proof.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    header : the proof's first record
+    progress : callable, optional
+        Called with the number of leaves checked after every piece.
+    """
+
+    def __init__(
+        self, problem: ContactProblem, header: dict[str, Any], progress: Callable[[int], object] | None
+    ) -> None:
+        self.problem, self.header, self.progress = problem, header, progress
+        self.failures: list[str] = []
+        self.pieces = self.leaves = 0
+        self.selections: set[bytes] = set()
+        self._handed: dict[tuple[int, ...], list[tuple[Fraction, Fraction]]] = {}
+        self._closed: list[ClosedPiece] = []
+        self.interval: tuple[Fraction, Fraction] | None = None
+        self.data: Data = "problem"
+        self.arcs: ArcCount | None = None
+        self._friction: list[bool] = []
+        self._zero: Fraction | None = None
+
+    def run(self, records: Iterator[Any]) -> GraphVerificationReport:
+        """Check all records after the header."""
+        try:
+            self._check(self._read_header(), records)
+        except RefusedError as refusal:
+            self.failures.append(str(refusal))
+        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
+            self.failures.append(f"the problem's data cannot be enclosed: {error}")
+        failures = tuple(self.failures)
+        selections = frozenset() if failures else frozenset(map(tuple, self.selections))
+        return GraphVerificationReport(
+            not failures,
+            failures,
+            self.interval,
+            self.pieces,
+            self.leaves,
+            selections,
+            self.data,
+            None if self.arcs is None else self.arcs.arcs,
+            0 if self.arcs is None else self.arcs.open,
+            len(self._closed),
+        )
+
+    def _check(self, interval: tuple[Fraction, Fraction], records: Iterator[Any]) -> None:
+        a, b = interval
+        self._zero = vanishing_alpha(self.problem, self.data)
+        ends = [a, self._zero, b] if self._zero is not None and a < self._zero < b else [a, b]
+        everything = np.full((1, self.problem.p), UNDECIDED, dtype=np.uint8)
+        # pieces in the order in which they are searched, the next one last: halves come directly after what was cut
+        waiting = [(x, y, everything) for x, y in pairwise(ends)][::-1]
+        record = next(records, _END)
+        while waiting:
+            x, y, roots = waiting.pop()
+            cut, record = self._piece(record, records, (x, y, roots))
+            if len(cut):
+                waiting += [((x + y) / 2, y, cut), (x, (x + y) / 2, cut)]
+        claim = {"pieces": self.pieces, "leaves": self.leaves, "selections": len(self.selections)}
+        if self.data == "problem" and isinstance(record, dict) and "force" in record and "piece" not in record:
+            origin = self._zero if self._zero is not None and a <= self._zero <= b else None
+            checker = ArcChecker(self.problem, self.enclosure, (a, b), origin, self._handed, self._closed, self._fail)
+            self.arcs, record = checker.run(record, records)
+            claim |= {"traces": checker.traces, "arcs": self.arcs.arcs}
+        elif self._closed:
+            self._fail("pieces are said to be decided by their arcs, but there are none")
+        if not same(record, claim):
+            found = shown(record) if isinstance(record, (dict, list)) else "missing"
+            self._fail(f"the counts at the end are {found}; the pieces give {claim!r}")
+        if next(records, _END) is not _END:
+            self._fail("records follow after the end of the proof")
+
+    @cached_property
+    def enclosure(self) -> CondensedEnclosure:
+        """Balls for what is certified; only exclusions need them."""
+        return as_computed(self.problem) if self.data == "condensed" else CondensedEnclosure.from_problem(self.problem)
+
+    def _read_header(self) -> tuple[Fraction, Fraction]:
+        self.data = data_of(self.header, self.problem, "graph")
+        try:
+            a, b = _interval_from(self.header.get("interval"))
+            ends = [friction_at(self.problem, end) for end in (a, b)]
+        except ValueError as error:
+            raise RefusedError(f"the header cannot be read: {error}") from None
+        self.interval = (a, b)
+        self._friction = [max(pair) > 0 for pair in zip(*ends, strict=True)]
+        return a, b
+
+    def _fail(self, message: str) -> None:
+        self.failures.append(message)
+        if len(self.failures) == MAX_FAILURES:
+            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
+
+    # -- pieces ----------------------------------------------------------------------------------------------------
+
+    def _piece(self, record: Any, records: Iterator[Any], due: tuple[Fraction, Fraction, Codes]) -> tuple[Codes, Any]:
+        """Check the piece that begins with this record; gives what it leaves to its halves, and the record after it."""
+        number = self.pieces + 1
+        try:
+            piece = self._begin(record)
+        except ValueError as error:
+            raise RefusedError(f"piece {number} is missing or cannot be read: {error}") from None
+        if (piece.a, piece.b) != due[:2] or not np.array_equal(_sorted(piece.roots), _sorted(due[2])):
+            raise RefusedError(f"piece {number} is not the next one: the interval is not covered")
+        self.pieces = number
+        record = next(records, _END)
+        while isinstance(record, list):
+            batch: list[list[Any]] = []
+            while (
+                isinstance(record, list) and len(batch) < _BATCH and not (batch and record[:1] in ([_FORM], [_CLOSED]))
+            ):
+                batch.append(record)
+                record = next(records, _END)
+            try:
+                self._read_leaves(piece, batch)
+            except ValueError as error:
+                raise RefusedError(f"a leaf of piece {number} cannot be read: {error}") from None
+        _check_repetitions(piece)
+        handed = piece.leaves("s")
+        if np.any(handed >= CONTACT):
+            self._fail(f"piece {number}: a selection handed on is not complete")
+        elif np.any((handed != OPEN) & ((handed == FRICTIONLESS) == np.array(self._friction))):
+            self._fail(f"piece {number}: a selection handed on has a status that a node cannot have")
+        if piece.closed is not None:
+            if np.any(piece.roots != UNDECIDED) or len(handed) < len(piece.leaves()) or piece.declared is not None:
+                self._fail(f"piece {number}: it is decided by its arcs, but not whole, or has other leaves")
+            self._closed.append(piece.closed)
+        elif not covers(piece.roots, piece.leaves(), self._friction):
+            self._fail(f"piece {number}: its leaves do not cover all selections")
+        self.selections.update(row.tobytes() for row in handed)
+        for row in handed.tolist():
+            self._handed.setdefault(tuple(row), []).append((piece.a, piece.b))
+        if self.progress is not None:
+            self.progress(self.leaves)
+        return piece.leaves("c"), record
+
+    def _begin(self, record: Any) -> _Piece:
+        if not isinstance(record, dict):
+            raise ValueError("no piece begins here")  # noqa: TRY004 (as in reading)
+        names_only(record, ("piece", "force", "length", "roots"))
+        a, b = _interval_from(record["piece"])
+        units = units_from(record, self.problem.p)
+        return _Piece(a, b, *units, codes_from(record["roots"], self.problem.p))
+
+    def _read_leaves(self, piece: _Piece, batch: list[list[Any]]) -> None:
+        """Record some leaves, the first perhaps a form or the piece's numbers, and check those claimed to be empty."""
+        if batch[0][:1] == [_FORM]:
+            piece.declare(batch[0])
+            batch = batch[1:]
+        elif batch[0][:1] == [_CLOSED]:
+            if piece.closed is not None:
+                raise ValueError("it is decided by its arcs twice")
+            piece.closed = ClosedPiece.read(piece.a, piece.b, batch[0], self.problem.p)
+            batch = batch[1:]
+        for record in batch:
+            kind = record[0] if record else None
+            if not isinstance(kind, str) or kind not in _ENTRIES:
+                raise ValueError(f"unknown kind of record {shown(kind)}")
+            if len(record) != _ENTRIES[kind]:
+                raise ValueError(f"a record of kind {kind!r} has {len(record)} entries; expected {_ENTRIES[kind]}")
+        if not batch:
+            return
+        codes = codes_from([record[1] for record in batch], self.problem.p)
+        piece.codes += codes.tobytes()
+        piece.kinds += "".join(record[0] for record in batch).encode()
+        if len(piece.kinds) >= piece.look:
+            _check_repetitions(piece)
+            piece.look = 2 * len(piece.kinds)
+        for kind in ("x", "f"):
+            empty = [k for k, record in enumerate(batch) if record[0] == kind]
+            if empty:
+                margins = partial(interval_exclusion_margins, self._enclosed(piece))
+                if kind == "f":
+                    margins = partial(interval_form_margins, self._enclosed(piece), self._forms(piece))
+                texts = (batch[k][2:] for k in empty)
+                pairs = [multipliers_from(text, KINDS * self.problem.p) for text in texts]
+                self._exclusions(margins, codes[empty].astype(np.intp), pairs)
+
+    def _exclusions(
+        self,
+        margins_of: Callable[..., Array],
+        codes: NDArray[np.intp],
+        pairs: list[tuple[NDArray[np.intp], Array]],
+    ) -> None:
+        rows, values = zip(*pairs, strict=True)
+        leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
+        margins = margins_of(codes, leaf, np.concatenate(rows), np.concatenate(values))
+        for number in np.flatnonzero(~(margins > 0)):
+            # alone it is summed in the order of the search, which may matter for a nearly singular S
+            alone = codes[number : number + 1], np.zeros(len(rows[number]), dtype=np.intp)
+            if not margins_of(*alone, rows[number], values[number])[0] > 0:
+                self._fail(f"leaf {self.leaves + number + 1}: its multipliers do not exclude it")
+        self.leaves += len(rows)
+
+    def _forms(self, piece: _Piece) -> tuple[EnclosedForm, ...]:
+        """The form declared last at both ends of the piece."""
+        if piece.declared is None:
+            raise ValueError("its form was not declared")
+        if piece.forms is None:
+            piece.forms = piece_forms(self._enclosed(piece), piece.declared)
+        return piece.forms
+
+    def _enclosed(self, piece: _Piece) -> EnclosedPiece:
+        """The data at both ends of the piece, with S proven positive definite."""
+        if piece.enclosed is None:
+            origin = self._zero if self._zero in (piece.a, piece.b) else None
+            piece.enclosed = EnclosedPiece.from_enclosure(
+                self.enclosure, piece.a, piece.b, piece.force, piece.length, origin
+            )
+            if not all(end.smallest_eigenvalue > 0 for end in piece.enclosed.ends):
+                raise RefusedError("S is not proven positive definite")
+        return piece.enclosed
+
+
+def _interval_from(ends: Any) -> tuple[Fraction, Fraction]:
+    if not isinstance(ends, list) or len(ends) != 2:
+        raise ValueError(f"{shown(ends)} is no interval")
+    a, b = (rational_from(end) for end in ends)
+    if not a < b:
+        raise ValueError("an interval is empty")
+    return a, b
+
+
+def _check_repetitions(piece: _Piece) -> None:
+    """Refuse a piece that gives a leaf twice: the leaves of a tree are different, and so bounded in number."""
+    leaves = piece.leaves()
+    if len(np.unique(leaves, axis=0)) < len(leaves):
+        raise RefusedError("a piece has a leaf twice")
+
+
+def _sorted(codes: Codes) -> Codes:
+    return codes[np.lexsort(codes.T)]
+
+
+def covers(roots: Codes, leaves: Codes, friction: Sequence[bool]) -> bool:
+    """Whether the leaves that refine one of the roots together cover every selection in the roots.
+
+    Both are sets of partial assignments, (k, p) arrays of codes. They come from trees, so that in every cell that holds
+    some of them there is a node at which all of them refine it; splitting there gives smaller cells. A list that is not
+    a tree is refused even if it covers.
+    """
+    cell = np.full(len(friction), UNDECIDED, dtype=np.uint8)
+    # a cell, the roots in it (None: the whole cell is to be covered), and the leaves in it
+    cells: list[tuple[Codes, Codes | None, Codes]] = [(cell, np.unique(roots, axis=0), np.unique(leaves, axis=0))]
+    while cells:
+        cell, targets, found = cells.pop()
+        if targets is not None and len(targets) == 1:
+            cell, found, targets = targets[0], found[_within(found, targets[0])], None
+        elif targets is not None and np.any(np.all(targets == cell, axis=1)):
+            targets = None
+        if targets is None and np.any(np.all(found == cell, axis=1)):
+            continue
+        node = _split(cell, found if targets is None else targets, friction)
+        if node is None:
+            return False
+        for child in children_of(int(cell[node]), friction=friction[node]):
+            smaller = cell.copy()
+            smaller[node] = child
+            part = found[_refines(found[:, node], child)]
+            inside = None if targets is None else targets[_refines(targets[:, node], child)]
+            if inside is None or len(inside):
+                cells.append((smaller, inside, part))
+    return True
+
+
+def _split(cell: Codes, refinements: Codes, friction: Sequence[bool]) -> int | None:
+    """A node of the cell with alternatives at which all of its refinements are finer than the cell itself."""
+    if not len(refinements):
+        return None
+    for node in np.flatnonzero(np.all(refinements != cell, axis=0)).tolist():
+        if children_of(int(cell[node]), friction=friction[node]):
+            return int(node)
+    return None
+
+
+def _within(leaves: Codes, root: Codes) -> NDArray[np.bool_]:
+    """Which assignments are ``root`` or refine it."""
+    held = (root == CONTACT) & (leaves >= STICK) & (leaves <= SLIP_MINUS)
+    return np.asarray(np.all((leaves == root) | (root == UNDECIDED) | held, axis=1))
+
+
+def _refines(codes: Codes, child: int) -> NDArray[np.bool_]:
+    """Which codes of a node are ``child`` or refine it, where none is coarser."""
+    held = (codes >= STICK) & (codes <= SLIP_MINUS) & (child == CONTACT)
+    return np.asarray((codes == child) | held)

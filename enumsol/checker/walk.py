@@ -1,0 +1,171 @@
+"""What the checkers of root sets share: the walk through a proof's tree, whose leaves cover all selections."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from enumsol.checker.reports import MAX_FAILURES, VerificationReport
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.proof.reading import RefusedError, same, shown
+from enumsol.trusted.status_rows import UNDECIDED
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from fractions import Fraction
+
+    from enumsol.condensation.data import Data
+    from enumsol.proof.proof_file import Proof
+
+_REPORT_EVERY = 256
+_END = object()
+
+
+@dataclass
+class TreeChecker:
+    """Checks one proof: its header, then the tree alone, then every leaf.
+
+    Whatever does not fit together is found before anything is computed, which may take long.
+    """
+
+    problem: Any  # in 2D or 3D
+    progress: Callable[[int], object] | None
+    alpha: Fraction = field(init=False)
+    failures: list[str] = field(default_factory=list)
+    regular: int = 0
+    undecided: int = 0
+    leaves: int = 0
+    data: Data = "problem"
+
+    def run(self, proof: Proof) -> VerificationReport:
+        """Check all records.
+
+        Raises
+        ------
+        ProofFormatError
+            The content is not a sequence of records.
+        """
+        families = isolated = 0
+        try:
+            records = proof.records()
+            self._read_header(next(records, None))
+            footer = self._survey(records)
+            records = proof.records()
+            next(records, None)
+            self._walk(records)
+            isolated, families = self._count()
+            claim = self._claim(isolated, families)
+            if not same(footer, claim):
+                self.fail(f"the counts at the end are {shown(footer)}; the leaves give {claim}")
+        except RefusedError as refusal:
+            self.failures.append(str(refusal))
+        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
+            self.failures.append(f"the problem's data cannot be enclosed: {error}")
+        return VerificationReport(
+            not self.failures,
+            tuple(self.failures),
+            self.regular + isolated,
+            families,
+            self.undecided + self._doubtful,
+            self.leaves,
+            self.data,
+            getattr(self, "alpha", None),
+        )
+
+    @property
+    def _doubtful(self) -> int:
+        """Undecided parts besides undecided leaves."""
+        return 0
+
+    # -- what a checker adds ---------------------------------------------------------------------------------------
+
+    def _read_header(self, header: Any) -> None:
+        raise NotImplementedError
+
+    def _coverings(self, code: int, node: int) -> tuple[tuple[int, ...], ...]:
+        """All ways to cover a partial code by others; none for a final one."""
+        raise NotImplementedError
+
+    def _leaf(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+        """Check one leaf; the reason when it proves nothing."""
+        raise NotImplementedError
+
+    def _declare(self, record: list[Any]) -> None:
+        """Take note of what later leaves refer to."""
+        raise RefusedError(f"a record {shown(record)} that no leaf of this proof can refer to")
+
+    def _flush(self, *, last: bool) -> None:
+        """Check what waits, at the end or when it has become much."""
+
+    def _count(self) -> tuple[int, int]:
+        """Isolated roots besides ``regular``, and families."""
+        raise NotImplementedError
+
+    def _claim(self, isolated: int, families: int) -> dict[str, int]:
+        """The footer that fits the leaves."""
+        raise NotImplementedError
+
+    # -- the tree --------------------------------------------------------------------------------------------------
+
+    def _leaves(self, records: Iterator[Any], *, survey: bool = False) -> Iterator[tuple[tuple[int, ...], list[Any]]]:
+        """The tree's leaves with the assignments that they stand for, which together cover all selections."""
+        stack: list[tuple[int, ...]] = [(UNDECIDED,) * self.problem.p]
+        while stack:
+            codes = stack.pop()
+            record = next(records, _END)
+            if not isinstance(record, list) or not record:
+                raise RefusedError(f"{len(stack) + 1} subtrees are not accounted for: the tree breaks off")
+            if record[0] == "b":
+                stack.extend(reversed(self._children(codes, record)))
+            elif record[0] == "q":
+                if not survey:
+                    self._declare(record)
+                stack.append(codes)
+            else:
+                yield codes, record
+
+    def _survey(self, records: Iterator[Any]) -> Any:
+        """Walk the tree without a look at its leaves; gives the counts at the end."""
+        leaves = sum(1 for _ in self._leaves(records, survey=True))
+        footer = next(records, _END)
+        if not isinstance(footer, dict) or footer.get("leaves") != leaves:
+            found = "missing" if footer is _END else shown(footer)
+            raise RefusedError(f"the counts at the end are {found}; the tree has {leaves} leaves")
+        if next(records, _END) is not _END:
+            raise RefusedError("records follow after the end of the proof")
+        return footer
+
+    def _walk(self, records: Iterator[Any]) -> None:
+        for codes, record in self._leaves(records):
+            self.leaves += 1
+            try:
+                problem = self._leaf(codes, record)
+            except ValueError as error:
+                problem = f"its record cannot be followed ({error})"
+            if problem is not None:
+                self.fail(f"leaf {self.leaves}: {problem}")
+            self._flush(last=False)
+            if self.progress is not None and self.leaves % _REPORT_EVERY == 0:
+                self.progress(self.leaves)
+        self._flush(last=True)
+
+    def _children(self, codes: tuple[int, ...], record: list[Any]) -> list[tuple[int, ...]]:
+        _, node, children = record if len(record) == 3 else (None, None, None)
+        if type(node) is int and 0 <= node < self.problem.p and isinstance(children, list):
+            coverings = map(sorted, self._coverings(codes[node], node))
+            if all(type(code) is int for code in children) and sorted(children) in coverings:
+                return [(*codes[:node], code, *codes[node + 1 :]) for code in children]
+        raise RefusedError(f"a branching {shown(record)} does not cover the assignment that it splits")
+
+    def fail(self, message: str) -> None:
+        """Take note of a failure.
+
+        Raises
+        ------
+        RefusedError
+            There have been MAX_FAILURES: whoever wrote this may have written any number of such leaves.
+        """
+        self.failures.append(message)
+        if len(self.failures) == MAX_FAILURES:
+            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")

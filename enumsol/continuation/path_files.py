@@ -1,0 +1,89 @@
+"""Files of paths: arrays and a JSON text in one .npz."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from enumsol.continuation.continuation_options import ContinuationOptions
+from enumsol.continuation.path_data import ARRAYS, PathData, PathStats, PathStatus, PointKind, Transition
+from enumsol.model.statuses import ContactStatus
+from enumsol.roots.local_branch import LocalBranchTest
+from enumsol.support.arguments import file_path
+from enumsol.support.files import read_arrays, reading, write_arrays
+
+if TYPE_CHECKING:
+    import os
+
+_FORMAT = 1
+
+
+def save_path(path: PathData, file: str | os.PathLike[str]) -> None:
+    """Write a path; see Path.save."""
+    report = {
+        "kinds": path.kinds,
+        "transitions": [_pack(item) for item in path.transitions],
+        "status": path.status,
+        "message": path.message,
+        "orientation": path.orientation,
+        "interval": path.interval,
+        "options": path.options.to_dict(),
+        "next_step": path.next_step,
+        "stats": path.stats.__dict__,
+        "node_ids": path.node_ids,
+        "names": [[status.value for status in point.statuses] for point in path],
+    }
+    write_arrays(file_path(file, "path"), _FORMAT, report, {name: getattr(path, name) for name in ARRAYS})
+
+
+def load_path(file: str | os.PathLike[str]) -> PathData:
+    """Read a path; see Path.load."""
+    place = file_path(file, "path")
+    with reading(place, "a path", "Path.save"):
+        return _unpacked(*read_arrays(place, _FORMAT, ARRAYS))
+
+
+def _unpacked(report: dict[str, Any], arrays: dict[str, Any]) -> PathData:
+    low, high = report["interval"]
+    return PathData(
+        **arrays,
+        kinds=tuple(PointKind(kind) for kind in report["kinds"]),
+        transitions=tuple(_unpack(item) for item in report["transitions"]),
+        status=PathStatus(report["status"]),
+        message=report["message"],
+        orientation=report["orientation"],
+        interval=(float(low), float(high)),
+        options=ContinuationOptions.from_dict(report["options"]),
+        next_step=report["next_step"],
+        stats=PathStats(**report["stats"]),
+        node_ids=tuple(report["node_ids"]),
+        _names=tuple(tuple(ContactStatus(value) for value in names) for names in report["names"]),
+    )
+
+
+def _pack(item: Transition) -> dict[str, Any]:
+    test = item.local_test
+    packed = None
+    if test is not None:
+        signs = [[[s.value for s in statuses], sign] for statuses, sign in test.signs]
+        packed = {"exists": test.exists, "premise": test.premise, "signs": signs}
+    return {
+        "point": item.point,
+        "alpha": item.alpha,
+        "before": [s.value for s in item.before],
+        "after": [s.value for s in item.after],
+        "nodes": item.nodes,
+        "dalpha": [item.dalpha_before, item.dalpha_after],
+        "local_test": packed,
+    }
+
+
+def _unpack(data: dict[str, Any]) -> Transition:
+    test, packed = None, data["local_test"]
+    if packed is not None:
+        signs = tuple((tuple(ContactStatus(s) for s in statuses), sign) for statuses, sign in packed["signs"])
+        test = LocalBranchTest.from_signs(signs, premise=packed["premise"])
+    left, right = data["dalpha"]
+    before, after = (tuple(ContactStatus(s) for s in data[name]) for name in ("before", "after"))
+    return Transition(
+        data["point"], data["alpha"], before, after, tuple(data["nodes"]), float(left), float(right), test
+    )

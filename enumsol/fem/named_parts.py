@@ -1,0 +1,106 @@
+"""Meshes with named parts, in two and in three dimensions."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem.cells import KINDS
+from enumsol.model.facets import by_kind
+from enumsol.support.arguments import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+
+#: The name of all facets where nothing names groups of them.
+ALL = "boundary"
+
+
+@dataclass(frozen=True)
+class PartedMesh:
+    """A mesh with named parts: sets of facets, and sets of nodes. In 3D it is a `SolidMesh`.
+
+    Attributes
+    ----------
+    points : (N, d) array
+        Positions of the nodes [length].
+    cells : (M, k) int array
+        Nodes of each cell, in the order of VTK: its corners, then those on its edges, on its facets, and inside. In 2D
+        3 or 6 nodes of triangles, 4, 8 or 9 of quadrilaterals; in 3D 4 or 10 of tetrahedra, 8 or 27 of hexahedra. Among
+        quadrilaterals a triangle is one whose last corner is named twice (a, b, c, c), in second order with this corner
+        for the node between the two and for that inside, too.
+    facets : mapping of names to (k, m) int arrays
+        Nodes of the facets of parts of the boundary: corners, then, in second order, the nodes between them, then that
+        inside.
+    node_sets : mapping of names to (k,) int arrays
+        Nodes of parts that are given by nodes.
+    """
+
+    points: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    facets: Mapping[str, NDArray[np.int64]]
+    node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=lambda: MappingProxyType({}))
+
+    def part(self, name: str) -> NDArray[np.int64]:
+        """Facets of this name.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There are none.
+        """
+        if name not in self.facets:
+            raise self._unknown(name, "facets", self.facets)
+        return self.facets[name]
+
+    def nodes(self, name: str) -> NDArray[np.int64]:
+        """Nodes of this name, or of the facets of this name, in order.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There are none.
+        """
+        if name in self.node_sets:
+            return np.unique(self.node_sets[name])
+        if name not in self.facets:
+            raise self._unknown(
+                name, "facets or nodes" if self.node_sets else "facets", {**self.facets, **self.node_sets}
+            )
+        return np.unique(self.facets[name])
+
+    def _unknown(self, name: str, what: str, known: Mapping[str, object]) -> InvalidArgumentError:
+        close = difflib.get_close_matches(str(name), known, n=1)
+        several = [part for part in re.split(r"[\s,;]+", str(name)) if part]
+        hint = f" (did you mean {close[0]}?)" if close else ""
+        if len(several) > 1 and all(part in known for part in several):
+            hint = f" (give {' and '.join(several)} one by one)"
+        elif [*known] == [ALL]:
+            hint = " (the file names no parts of its boundary; in gmsh physical groups do)"
+        return InvalidArgumentError(
+            f"the mesh has no {what} named {shown(name)}; expected one of {', '.join(known) or 'none'}{hint}"
+        )
+
+    def __repr__(self) -> str:
+        parts = ", ".join(f"{name} ({len(part)})" for name, part in self.facets.items()) or "none"
+        dimension = self.points.shape[1]
+        kinds = [
+            f"{len(rows)} {KINDS[dimension, cells.shape[1]].name}" for rows, cells in by_kind(dimension, self.cells)
+        ]
+        lines = [
+            f"{type(self).__name__} with {len(self.points)} nodes",
+            f"  cells   {', '.join(kinds)}",
+            f"  facets  {parts}",
+        ]
+        if self.node_sets:
+            lines.append("  nodes   " + ", ".join(f"{name} ({len(part)})" for name, part in self.node_sets.items()))
+        return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""The problem in two and three dimensions: data, validation, statuses, meshes, friction."""

@@ -1,0 +1,289 @@
+"""What contact problems in 2D and 3D share: stiffness, contact rows, gap, load path, labels, and their validation."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import inspect
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.condensation.affine import exactly_at
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.support.arguments import alpha_value, shown
+from enumsol.support.array_arguments import real_array, real_matrix
+from enumsol.support.immutable import Immutable, SealedMatrix, sealed
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from enumsol.condensation.factorization import Factorization
+    from enumsol.condensation.products import Products
+    from enumsol.support.arguments import AlphaLike
+
+#: An asymmetry of A up to this fraction of max|A| is rounding of the user's assembly and is averaged away.
+ASYMMETRY_TOLERANCE = 1e-12
+#: Singular values of the row-normalised contact rows below this fraction of the largest mean dependent rows.
+ROW_RANK_TOLERANCE = 1e-12
+
+
+class ContactBody(Immutable):
+    """A linear elastic body with p contact nodes: A, Bn and one or two tangents, f(alpha), gap and slip offset.
+
+    ``dataclasses.replace(problem, f=...)`` makes a problem of the same data but for those named: every argument of a
+    subclass is the name of an attribute that it takes back.
+
+    Parameters
+    ----------
+    A : (n, n) array_like or sparse
+    rows : mapping of names to (p, n) array_like or sparse
+        Contact rows, Bn first; together of full rank.
+    f, load_slope : (n,) array_like; the second may be None
+    gap : float or (p,) array_like
+    node_ids : sequence of length p or None
+    coordinates : (p, dimension) array_like or None
+    """
+
+    _instead = "build a new problem, or one with other data by dataclasses.replace"
+    slip_offset: NDArray[np.float64]
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        arguments = list(inspect.signature(cls).parameters)
+        # neither a constructor nor comparison or text of a dataclass, only what dataclasses.replace asks for
+        like = dataclasses.make_dataclass(cls.__name__, arguments, init=False, repr=False, eq=False)
+        for name in ("__dataclass_fields__", "__dataclass_params__"):
+            setattr(cls, name, getattr(like, name))
+
+    def __init__(
+        self,
+        A: ArrayLike | sp.sparray | sp.spmatrix,
+        rows: Mapping[str, ArrayLike | sp.sparray | sp.spmatrix],
+        f: ArrayLike,
+        gap: ArrayLike,
+        load_slope: ArrayLike | None,
+        node_ids: Any,
+        coordinates: ArrayLike | None,
+    ) -> None:
+        stiffness = real_matrix(A, "A")
+        n = stiffness.shape[0]
+        if stiffness.shape != (n, n) or n == 0:
+            raise InvalidProblemError(f"A has shape {stiffness.shape}; expected a square matrix (n, n) with n >= 1")
+        contact = {name: real_matrix(value, name) for name, value in rows.items()}
+        p = contact["Bn"].shape[0]
+        if p == 0:
+            raise InvalidProblemError("Bn has no rows (p = 0 contact nodes); expected at least one contact node")
+        for name, matrix in contact.items():
+            if matrix.shape != (p, n):
+                raise InvalidProblemError(f"{name} has shape {matrix.shape}; expected (p, n) = ({p}, {n})")
+        self._A = SealedMatrix.of(_symmetric(stiffness))
+        self._rows = {name: SealedMatrix.of(sp.csr_array(matrix)) for name, matrix in contact.items()}
+        _check_row_rank({name: matrix.matrix() for name, matrix in self._rows.items()})
+        self.f = vector(f, "f", n)
+        self.gap = vector(gap, "gap", p, broadcast=True)
+        self.load_slope = None if load_slope is None else vector(load_slope, "load_slope", n)
+        self.node_ids = _node_ids(node_ids, p)
+        self.coordinates = None if coordinates is None else _coordinates(coordinates, p, len(rows))
+
+    @property
+    def A(self) -> sp.csc_array:  # noqa: N802 (the field's letter)
+        """Stiffness, sparse (n, n); a new object at every access, whose parts are read-only."""
+        return self._A.matrix()
+
+    @property
+    def Bn(self) -> sp.csr_array:  # noqa: N802 (as above)
+        """Normal displacement of the contact nodes, sparse (p, n); a new object as A is."""
+        return self._rows["Bn"].matrix()
+
+    @property
+    def contact_rows(self) -> sp.csr_array:
+        """Bn and the tangents one above the other, sparse (2p, n) or (3p, n); a new object as A is."""
+        return sp.csr_array(sp.vstack([matrix.matrix() for matrix in self._rows.values()], format="csr"))
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+        return self._A.shape[0]
+
+    @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+        return self._rows["Bn"].shape[0]
+
+    @cached_property
+    def factorization(self) -> Factorization:
+        """One sparse factorization of A, shared by everything that solves with it."""
+        from enumsol.condensation.factorization import Factorization  # scipy's solvers come with the first use
+
+        return Factorization(self.A)
+
+    @cached_property
+    def products(self) -> Products:
+        """What condensation and enclosure have in common."""
+        from enumsol.condensation.products import Products  # as above
+
+        return Products.of(self)
+
+    def is_unloaded(self, alpha: AlphaLike) -> bool:
+        """Whether load, gap and slip offset are exactly zero at alpha: then only lambda = 0, w = 0 solves."""
+        a = Fraction(alpha_value(alpha))
+        if np.any(self.gap) or np.any(self.slip_offset):
+            return False
+        if self.load_slope is None:
+            return not np.any(self.f)
+        return not any(exactly_at(a, self.f, self.load_slope))
+
+    def load_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
+        """Load f(alpha) = f + alpha load_slope, shape (n,) [force].
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is not finite.
+        """
+        value = float(alpha_value(alpha))
+        return self.f.copy() if self.load_slope is None else self.f + value * self.load_slope
+
+    def _digest(self, kind: bytes, vectors: Sequence[NDArray[np.float64]]) -> str:
+        """SHA-256 of the matrices and of ``vectors``, as 64 hexadecimal digits."""
+        digest = hashlib.sha256(kind)
+        parts: list[Any] = [np.array([self.n, self.p])]
+        rows = (sp.csc_array(matrix.matrix()).sorted_indices() for matrix in self._rows.values())
+        for matrix in (self.A, *rows):
+            parts += [matrix.indptr, matrix.indices, matrix.data]
+        for part in (*parts, *vectors):
+            numbers = "<f8" if part.dtype.kind == "f" else "<i8"
+            digest.update(np.ascontiguousarray(part, dtype=numbers).tobytes())
+            digest.update(b"|")
+        return digest.hexdigest()
+
+    def __getstate__(self) -> dict[str, Any]:
+        # the factorization (SuperLU) cannot be pickled; workers that need it compute it again
+        return {key: value for key, value in self.__dict__.items() if key != "factorization"}
+
+
+def friction_values(alpha: Fraction, first: NDArray[np.float64], slope: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coefficients first + alpha slope, rounded once from the exact values: zero and the sign are decided exactly.
+
+    Raises
+    ------
+    InvalidArgumentError
+        One is too large for float64.
+    """
+    try:
+        return np.array([float(x) for x in exactly_at(alpha, first, slope)])
+    except OverflowError:
+        raise InvalidArgumentError(
+            f"friction at alpha = {float(alpha):g} is too large for float64; expected a finite value"
+        ) from None
+
+
+def span(values: NDArray[np.float64]) -> str:
+    """The range of some numbers, in words."""
+    low, high = float(np.min(values)), float(np.max(values))
+    return f"{low:g}" if low == high else f"[{low:g}, {high:g}]"
+
+
+def vector(value: object, name: str, size: int, *, broadcast: bool = False) -> NDArray[np.float64]:
+    """Value as a sealed array of that size; one number stands for all entries if ``broadcast``.
+
+    Raises
+    ------
+    InvalidProblemError
+        It is not that.
+    """
+    array = real_array(value, name)
+    if array.ndim == 0 and broadcast:
+        array = np.full(size, float(array))
+    if array.shape != (size,):
+        scalar = " or a single number" if broadcast else ""
+        raise InvalidProblemError(f"{name} has shape {array.shape}; expected ({size},){scalar}")
+    # -0.0 becomes 0.0: not every file format keeps the sign of zero, and equal problems are to have equal fingerprints
+    return sealed(array + 0.0)
+
+
+def _symmetric(A: sp.csc_array) -> sp.csc_array:
+    scale = float(np.max(np.abs(A.data))) if A.nnz else 0.0
+    difference = sp.csc_array(A - A.T)
+    worst = float(np.max(np.abs(difference.data))) if difference.nnz else 0.0
+    if worst > ASYMMETRY_TOLERANCE * scale:
+        raise InvalidProblemError(
+            f"A is not symmetric: max|A - A'| = {worst:.3g} where max|A| = {scale:.3g}; "
+            f"expected an asymmetry of at most {ASYMMETRY_TOLERANCE:g} max|A|"
+        )
+    if worst > 0.0:
+        # halve before adding, so that entries near the largest float do not overflow
+        A = sp.csc_array(0.5 * A + 0.5 * A.T)
+    A.sort_indices()
+    return A
+
+
+def _check_row_rank(contact: Mapping[str, sp.csr_array]) -> None:
+    rows = sp.csr_array(sp.vstack(list(contact.values()), format="csr"))
+    p = rows.shape[0] // len(contact)
+    names = [f"{name} row {row}" for name in contact for row in range(p)]
+    stack = f"[{'; '.join(contact)}]"
+    norms = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
+    if np.any(norms == 0):
+        row = int(np.argmin(norms))
+        raise InvalidProblemError(f"{names[row]} is zero; expected linearly independent rows of {stack}")
+    from scipy.sparse.csgraph import connected_components  # with it come scipy's solvers
+
+    unit = sp.csr_array(sp.diags_array(1.0 / norms) @ rows)
+    gram = sp.csr_array(unit @ unit.T)
+    # rows that share no degree of freedom, directly or through others, are independent of each other
+    count, block = connected_components(gram, directed=False)
+    order = np.argsort(block, kind="stable")
+    for members in np.split(order, np.cumsum(np.bincount(block, minlength=count))[:-1]):
+        involved = _dependent_rows(unit[members], gram[members][:, members].toarray())
+        if len(involved):
+            some = ", ".join(names[row] for row in members[involved][:6])
+            raise InvalidProblemError(
+                f"{stack} has linearly dependent rows ({some}); expected full rank {len(contact)}p = {len(names)} "
+                "(is a contact node listed twice, or held fixed?)"
+            )
+
+
+def _dependent_rows(unit: sp.csr_array, gram: NDArray[np.float64]) -> NDArray[np.intp]:
+    """The rows (of length one) that take part in a linear dependence; empty where there is none."""
+    values, vectors = np.linalg.eigh(gram)
+    # the Gram matrix squares the singular values: below sqrt(eps) decide by the singular values themselves
+    if values[0] > 1e-7 * values[-1]:
+        return np.empty(0, dtype=np.intp)
+    used = np.unique(unit.indices)
+    singular = np.linalg.svd(unit[:, used].toarray(), compute_uv=False)
+    if len(used) >= len(gram) and singular[-1] > ROW_RANK_TOLERANCE * singular[0]:
+        return np.empty(0, dtype=np.intp)
+    return np.flatnonzero(np.abs(vectors[:, 0]) > 0.1 * np.max(np.abs(vectors[:, 0])))
+
+
+def _node_ids(value: Any, p: int) -> tuple[Any, ...]:
+    if value is None:
+        return tuple(range(p))
+    wanted = f"expected a sequence of {p} distinct labels"
+    if isinstance(value, (str, bytes, bytearray, set, frozenset, dict)):
+        raise InvalidProblemError(f"node_ids is {shown(value)}; {wanted}")
+    try:
+        ids = tuple(v.item() if isinstance(v, np.generic) else v for v in value)
+        distinct = len(set(ids))
+    except TypeError:
+        raise InvalidProblemError(f"node_ids is {shown(value)}; {wanted}") from None
+    if len(ids) != p or distinct != p:
+        raise InvalidProblemError(f"node_ids has {len(ids)} entries, {distinct} distinct; expected {p} distinct labels")
+    return ids
+
+
+def _coordinates(value: ArrayLike, p: int, dimension: int) -> NDArray[np.float64]:
+    array = real_array(value, "coordinates")
+    if array.shape != (p, dimension):
+        raise InvalidProblemError(
+            f"coordinates has shape {array.shape}; expected (p, {dimension}) = ({p}, {dimension})"
+        )
+    return sealed(array)

@@ -1,0 +1,187 @@
+"""The discrete contact problem: data, validation and the paths of friction and load over alpha."""
+
+from __future__ import annotations
+
+import numbers
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.model.body2d import PlaneMesh
+from enumsol.model.contact_body import ContactBody, friction_values, span, vector
+from enumsol.support.arguments import alpha_value, exact_number, instance_of, shown
+from enumsol.support.messages import counted
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+    from numpy.typing import ArrayLike, NDArray
+
+    from enumsol.condensation.condensed import CondensedProblem
+    from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.support.arguments import AlphaLike
+
+
+class ContactProblem(ContactBody):
+    """A linear elastic body on a rigid foundation with Coulomb friction (theory, section 1.1).
+
+    Find u, lambda_n, lambda_t with::
+
+        A u + Bn' lambda_n + Bt' lambda_t = f(alpha)
+        lambda_n >= 0,  u_n = Bn u - gap <= 0,  lambda_n u_n = 0
+        |lambda_t| <= F lambda_n,  u_t = Bt u - slip_offset
+        u_t > 0 => lambda_t = F lambda_n;  u_t < 0 => lambda_t = -F lambda_n
+
+    with F(alpha) = F0 + alpha F1 and f(alpha) = f + alpha load_slope. The object is immutable: its arrays are
+    read-only, and every access to A, Bn or Bt gives a new sparse matrix, made in O(1) on read-only parts.
+    ``dataclasses.replace(problem, f=2 * problem.f)`` makes another one, the same but for what is named.
+
+    Data are taken exactly as given: what float64 cannot hold (an integer above 2^53, digits of a longdouble) is
+    refused. Sparse matrices may have any format of scipy.sparse; arrays of bool count as 0 and 1.
+
+    Parameters
+    ----------
+    A : (n, n) array_like or sparse
+        Stiffness, symmetric positive definite [force / length]. An asymmetry within 1e-12 max|A| is averaged away.
+    Bn, Bt : (p, n) array_like or sparse
+        Normal and tangential displacement of the p contact nodes as rows; [Bn; Bt] of full rank.
+    f : (n,) array_like
+        Load at alpha = 0 [force].
+    gap : float or (p,) array_like
+        Initial normal gap [length]; negative is a press fit.
+    friction : float or tuple (F0, F1)
+        Coulomb coefficient [-]. A number is constant; otherwise exactly two entries, each a number or a (p,) array.
+    load_slope : (n,) array_like or None
+        Derivative of the load with respect to alpha [force / unit of alpha].
+    slip_offset : float or (p,) array_like
+        Tangential position from which slip is counted [length].
+    node_ids : sequence of length p or None
+        Labels of the contact nodes for frames and messages; default 0 .. p-1.
+    coordinates : (p, 2) array_like or None
+        Positions of the contact nodes, for plots [length].
+    mesh : PlaneMesh or None
+        The mesh the problem was made of, for pictures of deformed bodies; no part of the fingerprint.
+
+    Raises
+    ------
+    InvalidProblemError
+        The data cannot be used; the message names the argument, what was found and what was expected.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> A, Bn, Bt, f = [[2, -1], [-1, 2]], [[1, 0]], [[0, 1]], [1.5, -4]
+    >>> enumsol.ContactProblem(A, Bn, Bt, f, friction=(0.5, 1))
+    ContactProblem with 1 contact node
+      degrees of freedom  2  (A: 4 nonzeros)
+      friction            F0 + alpha F1,  F0 in 0.5, F1 in 1
+      load                constant,  max |f| = 4
+      gap                 0
+    """
+
+    def __init__(
+        self,
+        A: ArrayLike | sp.sparray | sp.spmatrix,
+        Bn: ArrayLike | sp.sparray | sp.spmatrix,
+        Bt: ArrayLike | sp.sparray | sp.spmatrix,
+        f: ArrayLike,
+        gap: ArrayLike = 0.0,
+        friction: float | tuple[ArrayLike, ArrayLike] = (0.0, 1.0),
+        load_slope: ArrayLike | None = None,
+        slip_offset: ArrayLike = 0.0,
+        node_ids: Any = None,
+        coordinates: ArrayLike | None = None,
+        mesh: PlaneMesh | None = None,
+    ) -> None:
+        super().__init__(A, {"Bn": Bn, "Bt": Bt}, f, gap, load_slope, node_ids, coordinates)
+        self.friction = _friction(friction, self.p)
+        self.slip_offset = vector(slip_offset, "slip_offset", self.p, broadcast=True)
+        self.mesh = None if mesh is None else instance_of(mesh, PlaneMesh, "mesh").check(self.n)
+        self._freeze()
+        self.factorization.check_positive_definite()
+
+    @property
+    def Bt(self) -> sp.csr_array:  # noqa: N802 (the field's letter)
+        """Tangential displacement of the contact nodes, sparse (p, n); a new object as A is."""
+        return self._rows["Bt"].matrix()
+
+    @property
+    def depends_on_alpha(self) -> bool:
+        """Whether friction or load change with alpha."""
+        return self.load_slope is not None or bool(np.any(self.friction[1]))
+
+    @cached_property
+    def condensed(self) -> CondensedProblem:
+        """The problem condensed to its 2p contact forces (theory, section 4.1)."""
+        from enumsol.condensation.condensed import CondensedProblem  # as above
+
+        return CondensedProblem.from_problem(self)
+
+    @cached_property
+    def enclosure(self) -> CondensedEnclosure:
+        """Rigorous enclosure of the condensed problem.
+
+        Raises
+        ------
+        NotEnclosedError
+            A is positive definite only within rounding.
+        """
+        from enumsol.condensation.enclosure import CondensedEnclosure  # as above
+
+        return CondensedEnclosure.from_problem(self, self.products)
+
+    def friction_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
+        """Coefficients F(alpha) = F0 + alpha F1, shape (p,).
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is not finite, or a coefficient is negative there (the node and its value are named).
+        """
+        a = Fraction(alpha_value(alpha))
+        F = friction_values(a, *self.friction)
+        if np.any(F < 0):
+            node = int(np.argmin(F))
+            where = f"at alpha = {float(a):g} is {F[node]:g} at contact node {self.node_ids[node]}"
+            raise InvalidArgumentError(f"friction {where}; expected F >= 0")
+        return F
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of all data, as 64 hexadecimal digits; proofs are bound to it."""
+        slope = np.zeros(self.n) if self.load_slope is None else self.load_slope
+        return self._digest(b"enumsol problem 1", (self.f, self.gap, *self.friction, slope, self.slip_offset))
+
+    def __repr__(self) -> str:
+        F0, F1 = self.friction
+        path = f"F0 in {span(F0)}, F1 in {span(F1)}"
+        load = "constant" if self.load_slope is None else "f + alpha load_slope"
+        return (
+            f"ContactProblem with {counted(self.p, 'contact node')}\n"
+            f"  degrees of freedom  {self.n}  (A: {self.A.nnz} nonzeros)\n"
+            f"  friction            F0 + alpha F1,  {path}\n"
+            f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"
+            f"  gap                 {span(self.gap)}"
+        )
+
+
+def _friction(value: Any, p: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    hint = "expected a number, or a tuple (F0, F1) of exactly two, each a number or an array of shape (p,)"
+    if isinstance(value, tuple):
+        if len(value) != 2:
+            raise InvalidProblemError(f"friction is a tuple of {len(value)} entries; {hint}")
+        first, second = value
+    elif exact_number(value) is not None:
+        first, second = value, 0.0
+    elif isinstance(value, (str, bytes, bool, np.generic, numbers.Number)) or getattr(value, "ndim", 1) == 0:
+        raise InvalidProblemError(f"friction is {shown(value)}; {hint}")
+    else:
+        raise InvalidProblemError(f"friction is a bare {type(value).__name__}, which is ambiguous; {hint}")
+    F0 = vector(first, "friction F0", p, broadcast=True)
+    F1 = vector(second, "friction F1", p, broadcast=True)
+    if not np.any(F1) and np.any(F0 < 0):
+        node = int(np.argmin(F0))
+        raise InvalidProblemError(f"friction is {F0[node]:g} at contact node {node}; expected F >= 0")
+    return F0, F1

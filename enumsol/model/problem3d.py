@@ -1,0 +1,273 @@
+"""The discrete contact problem in three dimensions with orthotropic Coulomb friction."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.model.body3d import BodyMesh, SlipMean
+from enumsol.model.contact_body import ContactBody, friction_values, span, vector
+from enumsol.model.friction import ConstantFriction, friction_law, friction_pair
+from enumsol.support.arguments import alpha_value, instance_of
+from enumsol.support.array_arguments import real_array
+from enumsol.support.immutable import sealed
+from enumsol.support.messages import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import scipy.sparse as sp
+    from numpy.typing import ArrayLike, NDArray
+
+    from enumsol.condensation.condensed import CondensedProblem3D
+    from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.model.friction import FrictionTable
+    from enumsol.support.arguments import AlphaLike
+
+
+class ContactProblem3D(ContactBody):
+    """A linear elastic body in 3D on a rigid foundation with orthotropic Coulomb friction (theory, section 11.1).
+
+    Find u, lambda_n (p,) and lambda_t (p, 2) with::
+
+        A u + Bn' lambda_n + Bt1' lambda_t1 + Bt2' lambda_t2 = f(alpha)
+        lambda_n >= 0,  u_n = Bn u - gap <= 0,  lambda_n u_n = 0
+        lambda_t = F tau,  |tau| <= lambda_n,  F = diag(F1, F2) at every node
+        u_t = (Bt1 u, Bt2 u) - slip_offset;  F u_t = 0  or  tau = lambda_n F u_t / |F u_t|
+
+    with F_k(alpha) = F_k + alpha friction_slope_k and f(alpha) = f + alpha load_slope. The axes (t1, t2) of Bt1, Bt2
+    are those of the orthotropy; with the normal they are orthonormal, and may vary from node to node. The object is
+    immutable, as `ContactProblem` is, and data are taken exactly as given.
+
+    Parameters
+    ----------
+    A : (n, n) array_like or sparse
+        Stiffness, symmetric positive definite [force / length]. An asymmetry within 1e-12 max|A| is averaged away.
+    Bn, Bt1, Bt2 : (p, n) array_like or sparse
+        Normal displacement of the p contact nodes and the displacements along t1 and t2 as rows; together of full rank.
+    f : (n,) array_like
+        Load at alpha = 0 [force].
+    gap : float or (p,) array_like
+        Initial normal gap [length]; negative is a press fit.
+    friction : float, pair, FrictionTable or callable
+        Coefficients [-]: one number; a pair (F1, F2), each a number or a (p,) array; or, for successive approximations
+        only, Lipschitz functions of the slip ``|u_t|``: a `FrictionTable`, or a callable F(node, slip) of the row
+        number and the slip that returns one coefficient or two.
+    friction_slope : float or pair
+        Derivatives of F1 and F2 with respect to alpha [1 / unit of alpha].
+    load_slope : (n,) array_like or None
+        Derivative of the load with respect to alpha [force / unit of alpha].
+    slip_offset : 0 or (p, 2) array_like
+        Tangential positions from which slip is counted [length].
+    node_ids : sequence of length p or None
+        Labels of the contact nodes for frames and messages; default 0 .. p-1.
+    coordinates : (p, 3) array_like or None
+        Positions of the contact nodes, for plots and files [length].
+    areas : (p,) array_like or None
+        Area of the contact surface that each contact row stands for, for pressures and norms [length^2].
+    mesh : BodyMesh or None
+        The mesh the problem was made of.
+    slip_mean : SlipMean or None
+        The slip that friction depends on, where it is not ``|u_t|`` of the node itself.
+
+    Raises
+    ------
+    InvalidProblemError
+        The data cannot be used; the message names the argument, what was found and what was expected.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> import numpy as np
+    >>> rows = np.eye(3)
+    >>> enumsol.ContactProblem3D(np.diag([2, 1, 1]), rows[:1], rows[1:2], rows[2:], [1, 3, 4], friction=(0.5, 0.3))
+    ContactProblem3D with 1 contact node
+      degrees of freedom  3  (A: 3 nonzeros)
+      friction            F1 in 0.5, F2 in 0.3
+      load                constant,  max |f| = 4
+      gap                 0
+    """
+
+    taken_by: ClassVar[str] = (
+        " (problems in 3D are taken by enumerate_roots, successive_approximations and solve_tresca so far)"
+    )
+
+    def __init__(
+        self,
+        A: ArrayLike | sp.sparray | sp.spmatrix,
+        Bn: ArrayLike | sp.sparray | sp.spmatrix,
+        Bt1: ArrayLike | sp.sparray | sp.spmatrix,
+        Bt2: ArrayLike | sp.sparray | sp.spmatrix,
+        f: ArrayLike,
+        gap: ArrayLike = 0.0,
+        friction: float
+        | tuple[ArrayLike, ArrayLike]
+        | FrictionTable
+        | Callable[[int, float], float | tuple[float, float]] = 0.5,
+        friction_slope: float | tuple[ArrayLike, ArrayLike] = 0.0,
+        load_slope: ArrayLike | None = None,
+        slip_offset: ArrayLike = 0.0,
+        node_ids: Any = None,
+        coordinates: ArrayLike | None = None,
+        areas: ArrayLike | None = None,
+        mesh: BodyMesh | None = None,
+        slip_mean: SlipMean | None = None,
+    ) -> None:
+        super().__init__(A, {"Bn": Bn, "Bt1": Bt1, "Bt2": Bt2}, f, gap, load_slope, node_ids, coordinates)
+        p = self.p
+        self.law = friction_law(friction, p, self.node_ids)
+        self._slope = sealed(friction_pair(friction_slope, "friction_slope", p))
+        self.slip_offset = _slip_offset(slip_offset, p)
+        self.areas = None if areas is None else _areas(areas, p)
+        self.mesh = None if mesh is None else instance_of(mesh, BodyMesh, "mesh").check(self.n, p)
+        self.slip_mean = None if slip_mean is None else instance_of(slip_mean, SlipMean, "slip_mean").check(self.n, p)
+        if isinstance(self.law, ConstantFriction) and not np.any(self._slope):
+            _check_signs(self.law.values, self.node_ids, "")
+        self._freeze()
+        self.factorization.check_positive_definite()
+
+    @property
+    def Bt1(self) -> sp.csr_array:  # noqa: N802 (the field's letter)
+        """Displacement of the contact nodes along t1, sparse (p, n); a new object as A is."""
+        return self._rows["Bt1"].matrix()
+
+    @property
+    def Bt2(self) -> sp.csr_array:  # noqa: N802 (as above)
+        """Displacement of the contact nodes along t2, sparse (p, n); a new object as A is."""
+        return self._rows["Bt2"].matrix()
+
+    @property
+    def friction(self) -> Any:
+        """Coefficients at alpha = 0: a pair (F1, F2) of (p,) arrays, or the table or callable that was given."""
+        if isinstance(self.law, ConstantFriction):
+            return tuple(sealed(column) for column in self.law.values.T)
+        return getattr(self.law, "function", self.law)
+
+    @property
+    def friction_slope(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Derivatives of F1 and F2 with respect to alpha, two (p,) arrays."""
+        return sealed(self._slope[:, 0]), sealed(self._slope[:, 1])
+
+    @property
+    def depends_on_solution(self) -> bool:
+        """Whether the coefficients are functions of the slip: then only successive approximations are offered."""
+        return self.law.depends_on_slip
+
+    @property
+    def depends_on_alpha(self) -> bool:
+        """Whether friction or load change with alpha."""
+        return self.load_slope is not None or bool(np.any(self._slope))
+
+    @cached_property
+    def condensed(self) -> CondensedProblem3D:
+        """The problem condensed to its 3p contact forces."""
+        from enumsol.condensation.condensed import CondensedProblem3D  # scipy's solvers come with the first use
+
+        return CondensedProblem3D.from_problem(self)
+
+    @cached_property
+    def enclosure(self) -> CondensedEnclosure:
+        """Rigorous enclosure of the condensed problem.
+
+        Raises
+        ------
+        NotEnclosedError
+            A is positive definite only within rounding.
+        """
+        from enumsol.condensation.enclosure import CondensedEnclosure  # as above
+
+        return CondensedEnclosure.from_problem(self, self.products)
+
+    def coefficients(self, alpha: AlphaLike, slip: ArrayLike) -> NDArray[np.float64]:
+        """Coefficients F1, F2 at alpha for slips of shape (p,) [length], shape (p, 2).
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is not finite, slip has another shape, or a coefficient is negative there (the node and its value
+            are named).
+        InvalidProblemError
+            A callable returns something else than finite numbers >= 0.
+        """
+        exact = Fraction(alpha_value(alpha))
+        slip = real_array(slip, "slip", error=InvalidArgumentError)
+        if slip.shape != (self.p,):
+            raise InvalidArgumentError(f"slip has shape {slip.shape}; expected (p,) = ({self.p},)")
+        F = friction_values(exact, self.law.at(slip).ravel(), self._slope.ravel()).reshape(self.p, 2)
+        _check_signs(F, self.node_ids, f" at alpha = {float(exact):g}", error=InvalidArgumentError)
+        return F
+
+    def friction_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
+        """Coefficients F1, F2 at alpha, shape (p, 2).
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is not finite, a coefficient is negative there, or the coefficients depend on the solution.
+        """
+        if self.depends_on_solution:
+            raise self._no_constants()
+        return self.coefficients(alpha, np.zeros(self.p))
+
+    def _no_constants(self) -> InvalidArgumentError:
+        return InvalidArgumentError(
+            f"friction is {self.law}, which depends on the solution; expected constant coefficients here "
+            "(successive_approximations takes both)"
+        )
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of all data, as 64 hexadecimal digits; proofs are bound to it.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The coefficients depend on the solution.
+        """
+        if self.depends_on_solution:
+            raise self._no_constants()
+        slope = np.zeros(self.n) if self.load_slope is None else self.load_slope
+        numbers = (self.f, self.gap, *self.friction, *self.friction_slope, slope, self.slip_offset.ravel())
+        return self._digest(b"enumsol problem in 3D, 1", numbers)
+
+    def __repr__(self) -> str:
+        slope = "" if not np.any(self._slope) else f" + alpha [{span(self._slope[:, 0])}, {span(self._slope[:, 1])}]"
+        load = "constant" if self.load_slope is None else "f + alpha load_slope"
+        return (
+            f"ContactProblem3D with {counted(self.p, 'contact node')}\n"
+            f"  degrees of freedom  {self.n}  (A: {self.A.nnz} nonzeros)\n"
+            f"  friction            {self.law}{slope}\n"
+            f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"
+            f"  gap                 {span(self.gap)}"
+        )
+
+
+def _check_signs(
+    F: NDArray[np.float64],
+    labels: tuple[Any, ...],
+    where: str,
+    error: type[InvalidProblemError | InvalidArgumentError] = InvalidProblemError,
+) -> None:
+    if np.any(F < 0):
+        node, axis = np.unravel_index(int(np.argmin(F)), F.shape)
+        raise error(f"friction F{axis + 1}{where} is {F[node, axis]:g} at contact node {labels[node]}; expected F >= 0")
+
+
+def _slip_offset(value: ArrayLike, p: int) -> NDArray[np.float64]:
+    array = real_array(value, "slip_offset")
+    if array.ndim == 0 and array == 0:
+        array = np.zeros((p, 2))
+    if array.shape != (p, 2):
+        raise InvalidProblemError(f"slip_offset has shape {array.shape}; expected (p, 2) = ({p}, 2), or 0")
+    return sealed(array + 0.0)
+
+
+def _areas(value: ArrayLike, p: int) -> NDArray[np.float64]:
+    array = vector(value, "areas", p)
+    if np.min(array) <= 0:
+        raise InvalidProblemError(f"areas has the value {np.min(array):g}; expected areas > 0")
+    return array

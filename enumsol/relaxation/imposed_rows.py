@@ -1,0 +1,85 @@
+"""Rows of the relaxation: what a (partial) status of a contact node imposes, as linear rows (theory, section 5)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.model.statuses import CONDITIONS, FRICTIONLESS, OPEN, UNDECIDED, RowKind
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+
+INEQUALITY, EQUALITY = 1, 2
+_R = RowKind
+
+
+def status_rows(code: int, *, friction: bool) -> tuple[tuple[RowKind, int], ...]:
+    """(kind, mode) of the rows that a node of this code imposes; those of a child extend its parent's."""
+    if not friction and code == UNDECIDED:
+        return (_R.PENETRATION, INEQUALITY), (_R.NORMAL_FORCE, INEQUALITY), (_R.TANGENTIAL_FORCE, EQUALITY)
+    return _STATUS_ROWS[code]
+
+
+def _rows_of(code: int) -> tuple[tuple[RowKind, int], ...]:
+    """The rows of a status; in contact with friction the cone of its parent stands for lambda_n >= 0."""
+    equations, inequalities = CONDITIONS[code]
+    parent = (_R.PENETRATION,) if code in (OPEN, FRICTIONLESS) else CONDITIONS[UNDECIDED].inequalities
+    rows = dict.fromkeys(parent, INEQUALITY)
+    rows |= dict.fromkeys(inequalities, INEQUALITY) | dict.fromkeys(equations, EQUALITY)
+    if rows.keys() >= {_R.CONE_PLUS, _R.CONE_MINUS}:
+        rows.pop(_R.NORMAL_FORCE, None)
+    return tuple(rows.items())
+
+
+_STATUS_ROWS = {code: _rows_of(code) for code in CONDITIONS}
+
+
+def row_terms(p: int, F: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+    """All rows as sparse combinations of y = (lambda, w), w of shape (2p,): start, index and value arrays."""
+    nodes, one = np.arange(p), np.ones(p)
+    cones = np.stack([nodes, p + nodes], axis=1).ravel()
+    plus, minus = (np.stack([F, sign * one], axis=1).ravel() for sign in (-1.0, 1.0))
+    # lambda_n, lambda_t, both cones, -w_n, w_t, -w_t
+    index = np.concatenate([nodes, p + nodes, cones, cones, 2 * p + nodes, 3 * p + nodes, 3 * p + nodes])
+    value = np.concatenate([one, one, plus, minus, -one, one, -one])
+    lengths = np.repeat([1, 1, 2, 2, 1, 1, 1], p)
+    start = np.concatenate([[0], np.cumsum(lengths)])
+    return start.astype(np.intp), index.astype(np.intp), value
+
+
+def row_normals(
+    p: int, F: NDArray[np.float64], S: NDArray[np.float64], numbers: NDArray[np.intp]
+) -> NDArray[np.float64]:
+    """Gradients by lambda of some rows, up to sign, one below the other; w = g - S lambda."""
+    kind, node = np.divmod(numbers, p)
+    normals = np.zeros((len(numbers), 2 * p))
+    for k, i, normal in zip(kind.tolist(), node.tolist(), normals, strict=True):
+        if k >= _R.PENETRATION:
+            normal[:] = S[i if k == _R.PENETRATION else p + i]
+        elif k in (_R.CONE_PLUS, _R.CONE_MINUS):
+            normal[i], normal[p + i] = F[i], -1.0 if k == _R.CONE_PLUS else 1.0
+        else:
+            normal[i if k == _R.NORMAL_FORCE else p + i] = 1.0
+    return normals
+
+
+def imposed_rows(code: int, *, friction: bool) -> dict[int, int]:
+    """Mode of every row that holds in a (partial) status, those implied by others included (see with_implied)."""
+    return with_implied(code, status_rows(code, friction=friction))
+
+
+def with_implied(code: int, rows: Iterable[tuple[int, int]]) -> dict[int, int]:
+    """Mode of every row that holds in a (partial) status of these rows, those implied by others included.
+
+    A multiplier of an INEQUALITY must be nonnegative, one of an EQUALITY is free; any other row proves nothing.
+    """
+    imposed: dict[int, int] = dict.fromkeys((_R.NORMAL_FORCE, _R.CONE_PLUS, _R.CONE_MINUS, _R.PENETRATION), INEQUALITY)
+    imposed |= dict(rows)
+    if code == OPEN:
+        imposed |= dict.fromkeys((_R.CONE_PLUS, _R.CONE_MINUS), EQUALITY)
+    return imposed

@@ -1,0 +1,317 @@
+"""Relaxations in 3D: rows for slip directions in sectors, made when they are first needed (theory, section 12.2)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.model.sectors import SECTORS, end_number, level_of, nearest
+from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
+from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY
+from enumsol.trusted.space.sector_rows import (
+    ALONG,
+    CHORD,
+    END,
+    FORCE,
+    GAP,
+    LEFT,
+    RIGHT,
+    SLIP,
+    TANGENT,
+    TAU,
+    children_of,
+    row_terms,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space_condensed import SpaceSystem
+    from enumsol.relaxation._active_set import QPState
+    from enumsol.selections.solution import Codes
+    from enumsol.trusted.quadratic_forms import EnclosedForm
+    from enumsol.trusted.space.sector_rows import Row
+
+    Array = NDArray[np.float64]
+    Children = dict[tuple[int, ...], "SpaceRelaxation"]
+
+#: Level of the directions on which tangents are put where the minimiser leaves the disc, and of those put anyway.
+_FINE, COARSE = 10, 3
+#: Rounds of tangents, and how far outside the disc the minimiser must lie.
+ROUNDS, _OUTSIDE = 4, 1e-3
+#: Sectors of this level and below are halved only where nothing else helps.
+_DEEP = 12
+#: Violations of maximum dissipation below this do not tell which sector to halve.
+_DISSIPATION = 1e-7
+#: How much a violation, and a child's share of the gap to the pruning bound, count in the choice of a node.
+_WEIGHT, _CLOSED = 0.3, 4.0
+#: Rows of a program, and entries of a row.
+_ROWS, _ENTRIES = 24576, 3
+
+
+class SpaceEngine:
+    """Convex quadratic programs of a tree in 3D.
+
+    Every node has slots for rows; row number ``slot * p + node`` belongs to a node, as elsewhere.
+
+    Parameters
+    ----------
+    system : SpaceSystem
+
+    Attributes
+    ----------
+    tangents : list of int
+        Number of directions with friction of each node, 0 to 2.
+
+    Raises
+    ------
+    ImportError
+        The compiled solver is not available.
+    """
+
+    name = "active-set"
+
+    def __init__(self, system: SpaceSystem) -> None:
+        from enumsol.relaxation import _active_set  # compiled
+
+        self.system = system
+        p = system.p
+        self.slots = _ROWS // p
+        rows = self.slots * p
+        start = np.arange(rows + 1, dtype=np.intp) * _ENTRIES
+        zeros = np.zeros(rows * _ENTRIES)
+        self._state = _active_set.QPState
+        self.data = _active_set.QPData(
+            system.S,
+            system.g,
+            -system.S,
+            system.g,
+            start,
+            np.zeros(rows * _ENTRIES, dtype=np.intp),
+            zeros,
+            zeros[:rows],
+        )
+        self._known: list[dict[tuple[int, int], int]] = [{} for _ in range(p)]
+        self._imposed: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
+        self.tangents = np.sum(system.tau >= 0, axis=1).tolist()
+        #: Row by number, for multipliers, and what the program's row is of it.
+        self.rows: dict[int, Row] = {}
+        self.scale = np.ones(rows)
+        self.limit = 400 + 20 * len(system.g)
+        self.full = False
+
+    def slot(self, row: Row) -> int | None:
+        """The slot of a row among those of its node; None when there is no room for it."""
+        kind, node, number = row
+        known = self._known[node]
+        if (kind, number) not in known:
+            if len(known) == self.slots:
+                self.full = True
+                return None
+            slot = known[kind, number] = len(known)
+            self.rows[slot * self.system.p + node] = row
+            self._put(slot * self.system.p + node, row)
+        return known[kind, number]
+
+    def _put(self, place: int, row: Row) -> None:
+        """Store a row in the units of y and w, scaled so that its largest coefficient stays of size one."""
+        indices, coefficients = row_terms(row, self.system.tau, len(self.system.g))
+        units = self.system.row_unit[indices]
+        self.scale[place] = 1.0 / np.max(units)
+        self.data.put_row(place, indices, (coefficients * (units * self.scale[place])).tolist())
+
+    def imposed(self, node: int, code: int) -> tuple[list[int], list[int]]:
+        """Numbers and modes of the rows that a node imposes in a (partial) status."""
+        found = self._imposed.get((node, code))
+        if found is None:
+            pairs = [(self.slot(row), mode) for row, mode in imposed(self.system.tau, node, code)]
+            kept = [(slot * self.system.p + node, mode) for slot, mode in pairs if slot is not None]
+            found = self._imposed[node, code] = [row for row, _ in kept], [mode for _, mode in kept]
+        return found
+
+    def children(self, node: int, code: int) -> tuple[int, ...]:
+        """Codes that together cover a partial status of a node."""
+        return children_of(code, self.tangents[node])
+
+    def root(self, rows: list[int], modes: list[int]) -> SpaceRelaxation:
+        """The relaxation with the given rows on."""
+        return SpaceRelaxation(self, self._state(self.data), rows, modes)
+
+
+def imposed(tau: NDArray[np.intp], node: int, code: int) -> list[tuple[Row, int]]:
+    """Rows that a (partial) status of a node imposes, and their modes; those of a child extend its parent's."""
+    axes = [k for k in range(2) if tau[node, k] >= 0]
+    inequalities: list[Row] = [(FORCE, node, 0)]
+    equations: list[Row] = []
+    (inequalities if code in (OPEN, UNDECIDED) else equations).append((GAP, node, 0))
+    if code == OPEN:
+        return [
+            *_with(inequalities[1:], INEQUALITY),
+            *_with([(FORCE, node, 0), *((TAU, node, k) for k in axes)], EQUALITY),
+        ]
+    if len(axes) == 2:
+        inequalities += [(TANGENT, node, (1 << COARSE) + k) for k in range(1 << COARSE)]
+    elif axes:
+        forward = 1 if code == SLIP_PLUS else -1 if code == SLIP_MINUS else 0
+        inequalities += [(END, node, sign) for sign in (1, -1) if sign != forward]
+        if forward:
+            equations.append((END, node, forward))
+            inequalities.append((ALONG, node, forward))
+    if code == STICK:
+        equations += [(SLIP, node, k) for k in axes]
+    if code > SECTORS:
+        number = code - SECTORS
+        inequalities += [(TANGENT, node, n) for n in (number, 2 * number + 1, end_number(number))]
+        inequalities += [(kind, node, number) for kind in (CHORD, LEFT, RIGHT)]
+    return [*_with(inequalities, INEQUALITY), *_with(equations, EQUALITY)]
+
+
+def _with(rows: Iterable[Row], mode: int) -> list[tuple[Row, int]]:
+    return [(row, mode) for row in rows]
+
+
+class SpaceRelaxation:
+    """A solved relaxation, with tangents put where its minimiser left the disc."""
+
+    __slots__ = ("_engine", "_found", "_kept", "_state", "bound", "pruned", "stalled")
+
+    form: EnclosedForm | None = None
+
+    def __init__(self, engine: SpaceEngine, state: QPState, rows: list[int], modes: list[int]) -> None:
+        self._engine, self._state = engine, state
+        #: Children solved already, by their rows.
+        self._found: Children = {}
+        self._kept: tuple[Array, Array, tuple[NDArray[np.intp], Array]] | None = None
+        self._solve(rows, modes)
+        for _ in range(ROUNDS):
+            if self.pruned or self.stalled:
+                break
+            rows = self._cuts()
+            if not rows:
+                break
+            self._solve(rows, [INEQUALITY] * len(rows))
+
+    def _solve(self, rows: list[int], modes: list[int]) -> None:
+        state = self._state
+        state.switch(rows, modes)
+        status = state.solve(PRUNE_MARGIN, FEASIBILITY_TOLERANCE, self._engine.limit)
+        self.bound: float = state.bound
+        self.pruned, self.stalled = status == 1, status == 2
+
+    def _cuts(self) -> list[int]:
+        """Rows of tangents at nodes whose tau is outside the disc of radius lambda_n."""
+        system = self._engine.system
+        y = self.forces
+        tau, p = system.taus(y), system.p
+        size, radius = np.linalg.norm(tau, axis=1), y[:p] * system.disc_scale
+        outside = np.flatnonzero(np.all(system.tau >= 0, axis=1) & (size > radius * (1.0 + _OUTSIDE) + 1e-9))
+        rows = []
+        for node in outside:
+            slot = self._engine.slot((TANGENT, int(node), nearest(float(tau[node, 0]), float(tau[node, 1]), _FINE)))
+            if slot is not None and not self._state.mode_of(slot * p + int(node)):
+                rows.append(slot * p + int(node))
+        return rows
+
+    @property
+    def forces(self) -> Array:
+        """y at the minimiser, shape (m,), scaled."""
+        return self._state.x_array if self._kept is None else self._kept[0]
+
+    @property
+    def displacements(self) -> Array:
+        """w at the minimiser, shape (m,), scaled."""
+        return self._state.w_array if self._kept is None else self._kept[1]
+
+    def at(self, i: int) -> tuple[float, float]:
+        """Number i of the forces and of the displacements."""
+        return float(self.forces[i]), float(self.displacements[i])
+
+    def multipliers(self) -> tuple[NDArray[np.intp], Array]:
+        """Rows and their multipliers, which prove ``bound``."""
+        if self._kept is not None:
+            return self._kept[2]
+        numbers, values = self._state.multipliers()
+        return numbers, values * self._engine.scale[numbers]
+
+    def _released(self) -> SpaceRelaxation:
+        """Give away the state that children would start from; what was found is kept."""
+        self._kept = self.forces, self.displacements, self.multipliers()
+        del self._state
+        return self
+
+    def choose(self, codes: Codes) -> int:
+        """The node to branch on; -1 when all are decided and no sector is worth halving before the leaf is tested.
+
+        All children of a candidate are solved, where complementarity is violated most first. The first candidate with
+        at most one child that is not excluded is taken, or else the one that promises the smallest tree. Where none is
+        violated, sectors wider than others are halved if that excludes one half.
+        """
+        score = self.violations(codes)
+        best, most = -1, 0.0
+        for node in np.argsort(-score, kind="stable").tolist():
+            if not score[node] > 0.0:
+                break
+            children = self.solved_children(node, codes[node])
+            left = np.array([child.bound for child in children.values() if not child.pruned])
+            if len(left) <= 1:
+                return self._chosen(node, children)
+            closed = np.clip((left - self.bound) / max(PRUNE_MARGIN - self.bound, 1e-300), 0.0, 1.0)
+            promise = float(score[node] ** _WEIGHT / np.sum(np.exp(-_CLOSED * closed)))
+            if not most >= promise:
+                best, most = node, promise
+                self._found = {rows: child._released() for rows, child in children.items() if child.pruned}
+        return best if best >= 0 else self.contracted(codes)
+
+    def contracted(self, codes: Codes) -> int:
+        """A node whose sector is wider than another's and of which one half is excluded, or -1."""
+        levels = {node: level_of(code - SECTORS) for node, code in enumerate(codes) if code > SECTORS}
+        deepest = min(max(levels.values(), default=0), _DEEP)
+        for node in sorted((node for node, level in levels.items() if level < deepest), key=levels.__getitem__):
+            children = self.solved_children(node, codes[node])
+            if sum(not child.pruned for child in children.values()) <= 1:
+                return self._chosen(node, children)
+        return -1
+
+    def _chosen(self, node: int, children: Children) -> int:
+        """Keep the children of a node with at most one that is not excluded."""
+        self._found = {rows: child._released() if child.pruned else child for rows, child in children.items()}
+        return node
+
+    def solved_children(self, node: int, code: int) -> Children:
+        """The relaxations of all children of a node, by their rows."""
+        parts = [self._engine.imposed(node, child) for child in self._engine.children(node, code)]
+        return {tuple(rows): self.child(rows, modes, last=False) for rows, modes in parts}
+
+    def violations(self, codes: Codes) -> Array:
+        """How much complementarity is violated at every node that can be branched on; -inf at the others."""
+        system, y, w = self._engine.system, self.forces, self.displacements
+        array, p = np.array(codes), system.p
+        slip = self._dissipation()
+        # an undecided node's slip counts double: deciding it now saves the slack that it leaves in the energy
+        score = slip + np.where(array == UNDECIDED, slip - y[:p] * w[:p], 0.0)
+        wide = (array > SECTORS) & (array < SECTORS + (1 << _DEEP)) & (slip > _DISSIPATION)
+        undecided = (array == CONTACT) | (array == UNDECIDED)
+        return np.where(undecided, np.maximum(score, _DISSIPATION * _DISSIPATION), np.where(wide, score, -np.inf))
+
+    def _dissipation(self) -> Array:
+        """By how much maximum dissipation is violated at every node: lambda_n |v| - tau . v."""
+        system, y = self._engine.system, self.forces
+        w = self.displacements
+        size = np.linalg.norm(system.slips(w), axis=1) / system.slip_scale
+        # the units of tau and v cancel
+        return np.asarray(y[: system.p] * size - np.sum(system.tangential(y) * system.tangential(w), axis=1))
+
+    def forced(self, codes: Codes) -> tuple[int, ...]:
+        """No node is forced here."""
+        return ()
+
+    def child(self, rows: list[int], modes: list[int], *, last: bool) -> SpaceRelaxation:
+        """The relaxation with further rows switched on; ``last``: this object is not used again."""
+        found = self._found.pop(tuple(rows), None)
+        if found is not None:
+            return found
+        return type(self)(self._engine, self._state if last else self._state.copy(), rows, modes)

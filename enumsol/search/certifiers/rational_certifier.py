@@ -1,0 +1,117 @@
+"""The certifier of arithmetic "exact": every conclusion in rationals (theory, section 6.5)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from enumsol.model.statuses import OPEN, SLIDING, RowKind
+from enumsol.relaxation.imposed_rows import imposed_rows
+from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
+from enumsol.search.certifiers.float_certifier import solve_or_open
+from enumsol.search.certifiers.protocol import WithoutProof
+from enumsol.search.fathoming import holds_below, propose
+from enumsol.selections.solution import SelectionSolution
+from enumsol.support.deadlines import look
+from enumsol.trusted.uniqueness import only_solution
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.search.certifiers.protocol import Bound, UndecidedPart
+    from enumsol.search.fathoming import Point, Proposal
+    from enumsol.selections.rational_selections import ExactSelections
+    from enumsol.selections.solution import Codes
+
+    Array = NDArray[np.float64]
+
+
+_NEWTON_STEPS = 8
+
+
+class ExactCertifier(WithoutProof):
+    """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, (6.1))."""
+
+    hard = False
+    exactly, plain, lone = True, False, False
+
+    def __init__(
+        self, selections: ExactSelections, scaled: ScaledSystem, enclosed: EnclosedSystem | None = None
+    ) -> None:
+        self._selections = selections
+        self._scaled = scaled
+        self._enclosed = enclosed
+        super().__init__()
+        self._inverse: Any = None
+
+    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
+        """All roots in the selection."""
+        return solve_or_open(self._selections, codes)
+
+    def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
+        """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
+        del near
+        found = self._closing(codes, proposal)
+        return None if found is None else found[1]
+
+    def closing(self, codes: Codes, near: Point) -> tuple[Proposal, list[SelectionSolution]] | None:
+        """What closes a subtree, and the solutions in it, sought near a point (theory, section 6.11)."""
+        return self._closing(codes, propose(self._scaled, codes, near, exactly=True))
+
+    def _closing(self, codes: Codes, proposal: Proposal | None) -> tuple[Proposal, list[SelectionSolution]] | None:
+        if self._enclosed is None or proposal is None or proposal.weights is None:
+            return None
+        solver, selection = self._selections, proposal.selection
+        solved = solver.solve_equations(selection, solver.system.g)
+        if solved is None:
+            return None
+        point, determinant = solved
+        active, moved = solver.active(point), solver.moved(point)
+        if not all(selection[i] in active[i] for i in proposal.free):
+            return None
+        if any(moved[i] > 0 if selection[i] == OPEN else point[i] < 0 for i in proposal.sliding):
+            return None
+        sign = only_solution(self._enclosed, proposal.named, proposal.free, proposal.weights, point, moved)
+        if not sign:
+            return None
+        if not holds_below(codes, active):
+            return proposal, []
+        fixed = [i for i in range(solver.p) if i not in proposal.free]
+        sides = {i: SLIDING[code] for i, code in proposal.sliding.items()}
+        index = sign if all(active[i] <= set(sides.get(i, (selection[i],))) for i in fixed) else None
+        strict = all(len(held) == 1 for held in active)
+        solution = SelectionSolution(proposal.selection, (point,), 0, determinant, strict, exact=True, index=index)
+        return proposal, [solution]
+
+    def solution_near(self, proposal: Proposal) -> SelectionSolution | None:
+        """The root of what is proposed with the statuses that hold exactly, by Newton's method; None if not found."""
+        solver, free, codes = self._selections, {*proposal.free, *proposal.sliding}, proposal.selection
+        units = self._scaled.force / self._scaled.length
+        for _ in range(_NEWTON_STEPS):
+            look()
+            solved = solver.solve_equations(codes, solver.system.g)
+            if solved is None:
+                return None
+            point, determinant = solved
+            active = solver.active(point)
+            if all(code in held for code, held in zip(codes, active, strict=True)):
+                strict = all(len(held) == 1 for held in active)
+                return SelectionSolution(codes, (point,), 0, determinant, strict, exact=True)
+            moved = solver.statuses_by_test_functions(point, units)
+            codes = tuple(moved[i] if i in free else code for i, code in enumerate(codes))
+        return None
+
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
+        """Whether the multipliers prove a positive lower bound on the energy."""
+        solver = self._selections
+
+        def imposed(node: int) -> dict[int, int]:
+            return imposed_rows(codes[node], friction=solver.F_positive[node])
+
+        if self._inverse is None:
+            self._inverse = solver.system.S.inv()
+        terms = accepted(*relaxation.multipliers(), imposed, self._scaled)
+        forms = ((u, solver.form(RowKind(kind), node)) for kind, node, u in terms)
+        return energy_bound_positive(solver.system.g, self._inverse, forms)

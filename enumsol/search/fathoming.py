@@ -1,0 +1,371 @@
+"""When a subtree may be closed by its only possible solution, and what is proposed for it (theory, section 6.11).
+
+Nothing here is trusted: the certifier proves what is proposed, or the subtree is branched on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from enumsol.model.statuses import (
+    BACKWARD,
+    CONTACT,
+    FORWARD,
+    FRICTIONLESS,
+    OPEN,
+    SLIDING,
+    SLIP_MINUS,
+    SLIP_PLUS,
+    STICK,
+    UNDECIDED,
+)
+from enumsol.search.fathoming_in_contact import KnownRoot, Lone
+from enumsol.search.numbers import Numbers
+from enumsol.search.reduction import NEAR, Reduction
+from enumsol.selections.solution import SelectionSolution
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.protocol import Bound
+    from enumsol.search.fathoming_in_contact import LoneProposal
+    from enumsol.selections.solution import ActiveSets, Codes
+
+    Array = NDArray[np.float64]
+    #: lambda and w, (2p,) arrays each.
+    Point = tuple[Array, Array]
+
+#: So many nodes that slide without load make a search begin again.
+_MANY = 3
+#: With fewer contact nodes other numbers than plain ones are sought only once the tree has so many nodes.
+_FEW, _LONG = 48, 512
+#: Assignments above a known root are tried once the tree has so many nodes: a try costs as much as some of them.
+_TALL = 256
+#: After a try above a known root the next one comes when something is told of one more in so many nodes, or the
+#: relaxation's bound is so much nearer to zero.
+_TRIES, _NEARER = 4, 0.5
+#: With so many the solution is sought along a path, too, before there is a tree.
+_PATH = 24
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """The only solution that a subtree may have, as far as floats tell.
+
+    Attributes
+    ----------
+    selection : final codes, of a selection that holds there up to rounding
+    sliding : FORWARD or BACKWARD for nodes that in the proof are open or slip that way
+    free : ascending nodes that have no status in the proof
+    force : (2p,) array, lambda
+    weights : numbers for which the form of theory, (6.9), is definite, or None
+    hopeless : nor would a proof in rationals find any, which frees no nodes and need not serve all theta of one
+    strict : every status in the proof holds strictly
+    least : least slack of the conditions of the fixed nodes
+    reduction : Reduction
+    """
+
+    selection: Codes
+    sliding: dict[int, int]
+    free: tuple[int, ...]
+    force: Array
+    weights: Array | None
+    hopeless: bool
+    strict: bool
+    least: float
+    reduction: Reduction
+
+    @property
+    def numbers(self) -> list[float]:
+        """The weights as a proof has them."""
+        return [] if self.weights is None else self.weights.tolist()
+
+    @property
+    def named(self) -> Codes:
+        """The selection with the codes of the sliding nodes."""
+        return tuple(self.sliding.get(i, code) for i, code in enumerate(self.selection))
+
+
+class Closing(Protocol):
+    """A certifier that can close a subtree.
+
+    Attributes
+    ----------
+    hard : bool
+        A complete selection was met that is degenerate, or nearly so.
+    sliding : dict
+        FORWARD or BACKWARD for nodes that touch without load and slide at a solution met.
+    exactly : bool
+        It knows a solution exactly, so that statuses need not hold strictly.
+    plain : bool
+        It takes mu = kappa = 1 and nu = 0 only.
+    lone : bool
+        It can prove that a regular root is alone.
+    """
+
+    hard: bool
+    sliding: dict[int, int]
+    exactly: bool
+    plain: bool
+    lone: bool
+
+    def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[SelectionSolution] | None:
+        """The root of what is proposed, if it is proven to be the only one below a partial assignment; else None."""
+
+    def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
+        """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven.
+
+        Parameters
+        ----------
+        codes : of the assignment
+        proposal : what may close it, if anything was found
+        near : lambda and w from which its solution was sought
+        """
+
+
+class Closer:
+    """Which nodes of the tree are worth a try: all where tries succeed, fewer and fewer where they fail.
+
+    The whole problem comes first, before there is a tree. Where plain numbers fail and nodes are few, numbers are
+    sought only when the tree has turned out to be long: that costs as much as many of its nodes.
+
+    Parameters
+    ----------
+    system : ScaledSystem
+    certifier : Closing
+    """
+
+    def __init__(self, system: ScaledSystem, certifier: Closing) -> None:
+        self._system, self._certifier = system, certifier
+        self._alert = self._began_again = False
+        self._touching = 0
+        self._wait = self._pause = 0
+        #: Tries of the whole problem that are left, by the number of nodes after which they are due.
+        self._tries = [(0, Numbers.DESCENT)]
+        if certifier.plain or system.p < _FEW:
+            self._tries = [(0, Numbers.PLAIN), (_LONG, Numbers.DESCENT)][: 1 if certifier.plain else 2]
+        self._whole: Proposal | None = None
+        #: The regular solution that was found for the whole problem, and the same where it is worth a try in the tree.
+        self._regular: KnownRoot | None = None
+        self.known: KnownRoot | None = None
+        self._told, self._bound = 1, 0.0
+        #: The relaxation of an assignment with the energy, if it is solved; a search tells it.
+        self.relaxed: Callable[[Codes], Relaxation | None] = lambda _: None
+
+    @property
+    def sliding(self) -> dict[int, int]:
+        """Those of the certifier."""
+        return self._certifier.sliding
+
+    def whole(self) -> list[SelectionSolution] | None:
+        """All solutions of the problem, if one certificate proves that there is one only."""
+        codes, lone = (UNDECIDED,) * self._system.p, self._certifier.lone and self._system.p >= _FEW
+        proposal, self._whole = self._whole, None
+        if proposal is None and self._due(0):
+            sought = self._tries.pop(0)[1]
+            # a regular solution is tried with the same numbers below, and what is left out of the form besides
+            proposal = self._proposed(Numbers.PLAIN if lone else sought)
+            if proposal is not None and proposal.weights is None and lone and self._regular is None:
+                proposal = self._proposed(sought)
+        found = None
+        if proposal is not None and proposal.weights is not None:
+            found = self._certifier.closed(codes, proposal, self._near(proposal))
+        if found is None and lone and self._regular is not None:
+            found = self._alone(codes, self._regular, self.relaxed(codes), descent=True)
+        return found
+
+    def begins_again(self, nodes: int) -> bool:
+        """Whether so much has become known after some nodes that a search had better begin again."""
+        if nodes >= _TALL and self._system.p >= _FEW:
+            self.known = self._regular
+        if self._due(nodes):
+            self._whole = self._proposed(self._tries.pop(0)[1])
+            if self._whole is not None and self._whole.weights is not None:
+                return True
+        if self._began_again or (self._touching < _MANY and len(self._certifier.sliding) < _MANY):
+            return False
+        self._began_again = True
+        self._wait = self._pause = 0
+        return True
+
+    def _due(self, nodes: int) -> bool:
+        return bool(self._tries) and nodes >= self._tries[0][0]
+
+    def _proposed(self, sought: Numbers) -> Proposal | None:
+        """What may be the only solution of the whole problem; takes note of where it is degenerate."""
+        system, p = self._system, self._system.p
+        codes, exactly = (UNDECIDED,) * p, self._certifier.exactly
+        proposal = propose(system, codes, (np.zeros(2 * p), system.g), exactly=exactly, sought=sought)
+        if proposal is None and (p >= _PATH or sought is Numbers.DESCENT):
+            proposal = propose(system, codes, None, exactly=exactly, sought=sought)
+        if proposal is None:
+            return None
+        force, w = self._near(proposal)
+        self._regular = KnownRoot(proposal.selection, force, w) if proposal.strict and self._certifier.lone else None
+        self._touching = int(np.count_nonzero((np.abs(force[:p]) <= NEAR) & (np.abs(w[:p]) <= NEAR)))
+        self._alert = self._alert or self._touching > 0
+        self._certifier.sliding |= without_load(system, force, w)
+        return proposal
+
+    def _near(self, proposal: Proposal) -> Point:
+        return proposal.force, self._system.g - self._system.S @ proposal.force
+
+    def met(self, answer: object) -> None:
+        """Take note of what a complete selection holds: a degenerate solution makes every node worth a try."""
+        strict = answer is None or (isinstance(answer, SelectionSolution) and answer.strict)
+        self._alert = self._alert or not strict or self._certifier.hard
+
+    def again(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        """The solutions of a subtree that was closed in an earlier search."""
+        if all(code == UNDECIDED for code in codes):
+            self._whole = self._proposed(Numbers.PLAIN if self._certifier.plain else Numbers.DESCENT)
+            return self.whole()
+        return self._tried(codes, relaxation)
+
+    def _tried(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        system, certifier = self._system, self._certifier
+        near = (np.zeros(2 * system.p), system.g)
+        if relaxation is not None:
+            near = relaxation.forces, relaxation.displacements
+        sought = Numbers.PLAIN if certifier.plain else Numbers.CENTRES
+        proposal = propose(system, codes, near, exactly=certifier.exactly, sought=sought)
+        return certifier.closed(codes, proposal, near)
+
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        """The solutions of a subtree that can be closed, None where it has to be searched."""
+        if self.known is not None and (found := self._above_known(codes, relaxation)) is not None:
+            return found
+        # at a solution without slip the energy is zero, and that is its minimum
+        alert = self._alert or bool(self._certifier.sliding)
+        if not alert and (relaxation is None or abs(relaxation.bound) > NEAR):
+            return None
+        if max(codes) < CONTACT or not (alert or _touches(codes, relaxation)):
+            return None
+        if self._wait > 0 and (CONTACT in codes or UNDECIDED in codes):
+            self._wait -= 1
+            return None
+        found = self._tried(codes, relaxation)
+        self._pause = 2 * self._pause + 1 if found is None else 0
+        self._wait = self._pause
+        return found
+
+    def _above_known(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        """The known root, if it is proven to be the only one; a few tries between the whole problem and its leaf."""
+        p, known = self._system.p, self.known
+        if known is None or relaxation is None:
+            return None
+        told = sum(code != UNDECIDED for code in codes)
+        if (told < self._told and relaxation.bound < self._bound) or not known.below(codes):
+            return None
+        self._told, self._bound = told + max(1, p // _TRIES), _NEARER * relaxation.bound
+        return self._alone(codes, known, relaxation if relaxation.form is None else self.relaxed(codes))
+
+    def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[SelectionSolution] | None:
+        """The root of what an earlier search proposed, if it is proven to be the only one; None if not."""
+        return self._certifier.alone(codes, proposal, bound) if self._certifier.lone else None
+
+    def _alone(
+        self, codes: Codes, known: KnownRoot, relaxation: Relaxation | None, *, descent: bool = False
+    ) -> list[SelectionSolution] | None:
+        if relaxation is None:
+            return None
+        proposal = Lone(self._system, codes, known, relaxation).proposal(descent=descent)
+        return None if proposal is None else self._certifier.alone(codes, proposal, relaxation)
+
+
+def _touches(codes: Codes, relaxation: Relaxation | None) -> bool:
+    """Whether undecided nodes touch without load at the minimiser."""
+    if relaxation is None:
+        return False
+    p = len(codes)
+    forces, w = relaxation.forces[:p], relaxation.displacements[:p]
+    return any(code >= CONTACT and forces[i] <= NEAR and w[i] >= -NEAR for i, code in enumerate(codes))
+
+
+def holds_below(codes: Codes, active: ActiveSets) -> bool:
+    """Whether a solution lies below an assignment: at every node a final code holds that refines its code."""
+    return all(
+        bool(held - {OPEN}) if code == CONTACT else bool(held) if code > FRICTIONLESS else code in held
+        for code, held in zip(codes, active, strict=True)
+    )
+
+
+def propose(
+    system: ScaledSystem,
+    codes: Codes,
+    near: Point | None,
+    *,
+    exactly: bool,
+    sought: Numbers = Numbers.CENTRES,
+) -> Proposal | None:
+    """What may close a subtree, or None.
+
+    Parameters
+    ----------
+    system : ScaledSystem
+    codes : of the subtree
+    near : (2p,) arrays, lambda and w near its solution; None where nothing is known of it
+    exactly : for a proof in rationals, in which statuses need not hold strictly; otherwise nodes whose status does not
+        hold strictly are freed, or slide
+    sought : as for ``weights_of``
+    """
+    free = tuple(i for i, code in enumerate(codes) if code not in _FINAL and code not in SLIDING)
+    sliding = {i: code for i, code in enumerate(codes) if code in SLIDING}
+    for _ in range(2):
+        try:
+            reduction = Reduction(system, codes, free, sliding)
+        except np.linalg.LinAlgError:
+            return None
+        found = reduction.sought() if near is None else reduction.solution(*near)
+        if found is None:
+            return None
+        x, named = found
+        force = reduction.forces(x)
+        w = system.g - system.S @ force
+        near = force, w
+        selection = list(codes)
+        for i, code in zip(reduction.free, named, strict=True):
+            selection[i] = code
+            if i in sliding and code == FRICTIONLESS:
+                selection[i] = SLIDING[sliding[i]][1]
+        slack = _slack(system, selection, force, w)
+        fixed = np.array([i for i in range(system.p) if i not in set(reduction.free)], dtype=np.intp)
+        loose = [int(i) for i in fixed if abs(slack[i]) <= NEAR]
+        if exactly or not loose or np.min(slack[fixed]) < -NEAR:
+            break
+        resting = without_load(system, force, w)
+        sliding |= {i: resting[i] for i in loose if codes[i] in SLIDING.get(resting.get(i, 0), ())}
+        free = tuple(sorted({*free, *loose} - sliding.keys()))
+    v = reduction.h - reduction.R @ x
+    weights = reduction.weights(x, v, exactly=exactly, sought=sought)
+    least = float(np.min(slack[fixed], initial=np.inf))
+    strict = bool(np.all(np.abs(slack) > NEAR))
+    hopeless = weights is None and len(reduction.nodes) == sum(code not in _FINAL for code in codes)
+    hopeless = hopeless and not np.any(reduction.resting(x, v))
+    return Proposal(tuple(selection), sliding, free, force, weights, hopeless, strict, least, reduction)
+
+
+def without_load(system: ScaledSystem, force: Array, w: Array) -> dict[int, int]:
+    """FORWARD or BACKWARD for the nodes with friction that touch without load and slide."""
+    p = system.p
+    rests = (np.abs(force[:p]) <= NEAR) & (np.abs(w[:p]) <= NEAR) & (np.abs(w[p:]) > NEAR) & (system.F > 0)
+    return {int(i): FORWARD if w[p + i] > 0 else BACKWARD for i in np.flatnonzero(rests)}
+
+
+_FINAL = (OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS)
+
+
+def _slack(system: ScaledSystem, selection: list[int], force: Array, w: Array) -> Array:
+    """Every node's least slack of the conditions of its status."""
+    p = system.p
+    n, t, u, v = force[:p], force[p:], -w[:p], w[p:]
+    cone = system.F * n - np.abs(t)
+    slack = {OPEN: u, STICK: cone, SLIP_PLUS: np.minimum(n, v), SLIP_MINUS: np.minimum(n, -v), FRICTIONLESS: n}
+    return np.array([slack[code][i] for i, code in enumerate(selection)])

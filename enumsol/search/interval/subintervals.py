@@ -1,0 +1,341 @@
+"""Which selections may hold somewhere in an interval of alpha: the tree search on pieces of it (theory, section 7.8).
+
+Every piece is searched by trees whose leaves cover all selections: a leaf is either proven empty on the whole piece or
+a complete selection that is handed on, or it is left to both halves of the piece. What was proven for the whole piece
+is proven for them too.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import partial
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from enumsol.model.statuses import UNDECIDED
+from enumsol.relaxation.interval_relaxation import IntervalSystem
+from enumsol.search.interval.interval_tree import LARGEST_TREE, EmptyLeaf, PieceTree, Subtree, TreeResult
+from enumsol.search.stopping import Stop, StopReason
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.condensed import CondensedProblem
+    from enumsol.selections.solution import Codes
+    from enumsol.trusted.arcs.only_branch import PieceNumbers
+
+#: Pieces are not cut below this part of the interval.
+SMALLEST_PIECE = 2.0**-40
+#: Trees are given up over pieces longer than this part of the interval, which only have to be cut, where friction
+#: varies: a block with p = 64 takes a quarter of the nodes then, and under a varying load 1.6 times as many.
+LONG_PIECE = 2.0**-9
+#: Into how many trees what a tree of the largest size left is divided.
+FURTHER_TREES = 8
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A closed part [a, b] of the interval of alpha; exact, since its ends are floats or halves of them."""
+
+    a: Fraction
+    b: Fraction
+
+    @property
+    def middle(self) -> Fraction:
+        """(a + b) / 2."""
+        return (self.a + self.b) / 2
+
+
+@dataclass
+class SearchedPiece:
+    """What the trees over one piece left: together the leaves cover all selections below ``roots``.
+
+    Attributes
+    ----------
+    piece : Piece
+    system : IntervalSystem or None
+        None where there was no tree.
+    roots : list of codes
+        Partial assignments whose subtrees were searched.
+    empty : list of EmptyLeaf
+        Leaves proven empty on the whole piece.
+    selections : list of codes
+        Complete selections, handed on.
+    cut : list of codes
+        Subtrees that both halves of the piece take over as their roots; or that a search stopped early left.
+    numbers : PieceNumbers or None
+        Numbers with which the arcs of its selections hold all solutions: no tree was searched (theory, section 7.15).
+    """
+
+    piece: Piece
+    system: IntervalSystem | None
+    roots: list[Codes]
+    empty: list[EmptyLeaf] = field(default_factory=list)
+    selections: list[Codes] = field(default_factory=list)
+    cut: list[Codes] = field(default_factory=list)
+    numbers: PieceNumbers | None = None
+
+
+class IntervalCertifier(Protocol):
+    """Decides in one arithmetic whether multipliers prove a leaf empty on the whole piece."""
+
+    #: Whether leaves may be excluded by forms other than the energy.
+    forms: bool
+
+    @property
+    def rational(self) -> bool:
+        """Whether rationals decide what is left open, so that floats only propose."""
+
+    @property
+    def checkable(self) -> bool:
+        """Whether a checker can repeat what was accepted so far, so that it makes a proof."""
+
+    def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
+        """Whether the dual bounds at both ends of the piece are positive."""
+
+    def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
+        """Whether the form of these multipliers is proven convex on the piece."""
+
+
+class FastIntervalCertifier:
+    """Floats: the result of the engine is trusted."""
+
+    checkable = forms = rational = False
+
+    def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
+        """Accept the pruning."""
+        del piece, system, leaf
+        return True
+
+    def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
+        """Floats prove nothing."""
+        del piece, system, form
+        return False
+
+
+@dataclass(frozen=True)
+class Task:
+    """One tree: what it comes to depends on nothing but this and the problem.
+
+    Attributes
+    ----------
+    piece : Piece
+    roots : tuple of Subtree
+    """
+
+    piece: Piece
+    roots: tuple[Subtree, ...]
+
+    def further(self, result: TreeResult) -> list[Task]:
+        """The trees over the same piece for what this one did not examine."""
+        size = -(-len(result.rest) // FURTHER_TREES) or 1
+        return [Task(self.piece, tuple(result.rest[k : k + size])) for k in range(0, len(result.rest), size)]
+
+    @staticmethod
+    def halves(piece: Piece, cut: Sequence[Subtree]) -> list[Task]:
+        """Both halves of a piece with what its trees left to them; none if that is nothing."""
+        ends = (piece.a, piece.middle, piece.b)
+        return [Task(Piece(*half), tuple(cut)) for half in itertools.pairwise(ends)] if cut else []
+
+
+class Worker:
+    """Searches trees over pieces of an interval.
+
+    Parameters
+    ----------
+    condensed : CondensedProblem
+    interval : (Fraction, Fraction)
+    origin : Fraction or None
+        The alpha at which g vanishes.
+    leaves : IntervalCertifier
+    """
+
+    def __init__(
+        self,
+        condensed: CondensedProblem,
+        interval: tuple[Fraction, Fraction],
+        origin: Fraction | None,
+        leaves: IntervalCertifier,
+    ) -> None:
+        self._condensed, self._origin, self.leaves = condensed, origin, leaves
+        self._length = float(interval[1] - interval[0])
+        self._trees: tuple[Piece, IntervalSystem, PieceTree] | None = None
+
+    def run(self, task: Task, max_nodes: int | None = None, deadline: float | None = None) -> TreeResult:
+        """Search the tree of a task."""
+        trees = self._on(task.piece)[2]
+        result = trees.run(task.roots, LARGEST_TREE if max_nodes is None else min(LARGEST_TREE, max_nodes), deadline)
+        result.checkable = self.leaves.checkable
+        return result
+
+    def system(self, piece: Piece) -> IntervalSystem:
+        """The system of a piece."""
+        return self._on(piece)[1]
+
+    def _on(self, piece: Piece) -> tuple[Piece, IntervalSystem, PieceTree]:
+        if self._trees is None or self._trees[0] != piece:
+            system, middle = self._make(piece), None
+            share = float(piece.b - piece.a) / self._length
+            if share > SMALLEST_PIECE:
+                middle = self._make(Piece(piece.middle, piece.middle))
+            convex = partial(self.leaves.convex, piece, system) if self.leaves.forms else None
+            long = share > LONG_PIECE and bool(np.any(system.F_lo != system.F))
+            trees = PieceTree(system, middle, partial(self.leaves.excluded, piece, system), convex, long=long)
+            self._trees = (piece, system, trees)
+        return self._trees
+
+    def _make(self, piece: Piece) -> IntervalSystem:
+        origin = self._origin if self._origin in (piece.a, piece.b) else None
+        ends = piece.a, piece.b
+        return IntervalSystem.from_problem(self._condensed, *ends, origin, proposals=self.leaves.rational)
+
+
+def whole_pieces(a: Fraction, b: Fraction, origin: Fraction | None) -> list[Piece]:
+    """The interval, or its parts on both sides of the alpha at which g vanishes."""
+    ends = [a, origin, b] if origin is not None and a < origin < b else [a, b]
+    return [Piece(x, y) for x, y in itertools.pairwise(ends)]
+
+
+class IntervalSearch:
+    """The search over the whole interval.
+
+    Parameters
+    ----------
+    condensed : CondensedProblem
+    interval : (Fraction, Fraction)
+    origin : Fraction or None
+        The alpha at which g vanishes.
+    leaves : IntervalCertifier
+    max_nodes : int or None
+        Stop after so many nodes of all trees.
+    deadline : time.perf_counter() value or None
+    progress : called with the share of the interval that is done
+
+    Attributes
+    ----------
+    interval : (Fraction, Fraction)
+    worker : Worker
+    pieces : list of SearchedPiece
+        In the order of their trees: the halves come directly after what was cut.
+    nodes : int
+    stopped : Stop or None
+    selections : set of codes
+        All complete selections that the trees could not exclude.
+    closed : mapping of Piece to (PieceNumbers, codes)
+        Pieces that need no tree: all their solutions lie on the arcs of these selections.
+    checkable : bool
+        Whether a checker can repeat what was excluded.
+    """
+
+    def __init__(
+        self,
+        condensed: CondensedProblem,
+        interval: tuple[Fraction, Fraction],
+        origin: Fraction | None,
+        leaves: IntervalCertifier,
+        *,
+        max_nodes: int | None = None,
+        deadline: float | None = None,
+        progress: Callable[[float], object] | None = None,
+    ) -> None:
+        self.worker = Worker(condensed, interval, origin, leaves)
+        self._p, self._origin = len(condensed.F0), origin
+        self.interval, self.progress = interval, progress
+        self.max_nodes, self.deadline = max_nodes, deadline
+        self.pieces: list[SearchedPiece] = []
+        self.nodes = 0
+        self.stopped: Stop | None = None
+        self.selections: set[Codes] = set()
+        self.closed: Mapping[Piece, tuple[PieceNumbers, Sequence[Codes]]] = {}
+        self.checkable = leaves.checkable
+
+    def first(self) -> list[Task]:
+        """The whole tree over the whole interval, or over both sides of the alpha at which g vanishes."""
+        everything = (Subtree((UNDECIDED,) * self._p),)
+        return [Task(piece, everything) for piece in whole_pieces(*self.interval, self._origin)]
+
+    def trees(self) -> list[Task]:
+        """The trees with which the search begins, where a tree is needed."""
+        waiting, found = self.first()[::-1], []
+        while waiting:
+            task = waiting.pop()
+            if task.piece not in self.closed:
+                halves = self._in_halves(task)
+                waiting += halves[::-1]
+                found += [] if halves else [task]
+        return found
+
+    def _in_halves(self, task: Task) -> list[Task]:
+        """Both halves at once, where a part of the piece needs no tree."""
+        a, b = task.piece.a, task.piece.b
+        inside = any(a <= piece.a and piece.b <= b for piece in self.closed if piece != task.piece)
+        return Task.halves(task.piece, task.roots) if inside else []
+
+    def run(self, known: Mapping[Task, TreeResult] | None = None) -> None:
+        """Search all pieces; ``known`` holds the results of tasks that were searched elsewhere.
+
+        With ``stopped`` set before, nothing but these results counts.
+        """
+        known = {} if known is None else known
+        go_on = self.stopped is not None
+        waiting = self.first()[::-1]
+        while waiting:
+            task = waiting.pop()
+            found = SearchedPiece(task.piece, None, [root.codes for root in task.roots])
+            self.pieces.append(found)
+            halves = self._in_halves(task)
+            if task.piece in self.closed:
+                found.numbers, found.selections[:] = self.closed[task.piece]
+                self.selections.update(found.selections)
+                cut = []
+            elif halves:
+                cut = list(task.roots)
+            else:
+                found.system = self.worker.system(task.piece)
+                cut = self._search(task, found, known)
+            if self.stopped is not None and found.cut:
+                if not go_on:
+                    return
+                continue
+            found.cut = [subtree.codes for subtree in cut]
+            waiting += Task.halves(task.piece, cut)[::-1]
+            if not cut and not known and self.progress is not None:
+                a, b = self.interval
+                self.progress(float((task.piece.b - a) / (b - a)))
+
+    def _search(self, first: Task, found: SearchedPiece, known: Mapping[Task, TreeResult]) -> list[Subtree]:
+        """All trees over a piece; gives what they leave to its halves. A limit leaves the rest in ``found.cut``."""
+        waiting, cut = [first], list[Subtree]()
+        while waiting:
+            task = waiting.pop()
+            result = self._result(task, known.get(task))
+            if result is None:
+                left = [*cut, *(root for other in [task, *waiting[::-1]] for root in other.roots)]
+                found.cut = [subtree.codes for subtree in left]
+                return []
+            self.nodes += result.nodes
+            self.checkable = self.checkable and result.checkable
+            found.empty += result.empty
+            found.selections += result.selections
+            self.selections.update(result.selections)
+            cut += result.cut
+            waiting += task.further(result)[::-1]
+        return cut
+
+    def _result(self, task: Task, known: TreeResult | None) -> TreeResult | None:
+        """What the tree of a task comes to; None once a limit is reached."""
+        rest = None if self.max_nodes is None else self.max_nodes - self.nodes
+        # near the limit a tree is smaller than it was without it
+        if known is not None and (rest is None or rest >= LARGEST_TREE):
+            return known
+        if self.stopped is None and rest is not None and rest <= 0:
+            self.stopped = Stop(StopReason.NODE_LIMIT, self.max_nodes)
+        elif self.stopped is None and self.deadline is not None and time.perf_counter() > self.deadline:
+            self.stopped = Stop(StopReason.TIME_LIMIT)
+        return None if self.stopped is not None else self.worker.run(task, rest, self.deadline)

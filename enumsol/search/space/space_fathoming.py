@@ -1,0 +1,323 @@
+"""In 3D: one certificate before the tree, that the problem has one solution only (theory, section 12.6).
+
+Nothing here is trusted: the certifier proves what is proposed, or the tree is searched.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import scipy.linalg
+
+from enumsol.model.sectors import SECTORS, nearest, start_of
+from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.search.space.space_newton import Isotropic
+from enumsol.support.deadlines import look
+from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space_condensed import SpaceSystem
+    from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.fathoming_in_contact import KnownRoot
+    from enumsol.selections.solution import Codes
+
+    Array = NDArray[np.float64]
+
+#: A condition of a scaled problem within this of zero may hold as an equation; only what is tried rests on it.
+_NEAR = 1e-9
+#: Level of the sectors in which a regular solution is sought.
+_LEVEL = 20
+#: Smallest eigenvalue of Q relative to S below which it counts as not definite, at which numbers are good enough, and
+#: below which plain numbers leave no hope of better ones.
+_DEFINITE, _GOOD, _HOPELESS = 1e-9, 1e-2, -0.5
+#: Slack and smallest eigenvalue that fast arithmetic asks for.
+_CLEAR = 1e-6
+#: Contact nodes from which better numbers than the plain ones are sought; evaluations for that, in rounds of so many.
+_MANY, _EVALUATIONS, _ROUND = 8, 60, 20
+#: How sharply the smallest eigenvalue counts in each round.
+_HARDNESS = 10.0, 20.0, 40.0
+#: Of the gap of an open node, what may serve for its slip.
+_SHARED = 0.5
+
+
+class SpaceClosing(Protocol):
+    """A certifier that can close the whole tree."""
+
+    def close(self, numbers: Array, codes: Codes | None, normal: Array) -> list[Any] | None:
+        """The only solution, as a list; None if not proven.
+
+        Parameters
+        ----------
+        numbers : of the form, as ``trusted.space.space_uniqueness.Numbers.of`` takes them
+        codes : of a leaf that holds the solution, if it is regular
+        normal : (p,) array, lambda_n near the solution
+        """
+
+
+class SpaceCloser:
+    """Tries once, before the tree, and never below its root.
+
+    Parameters
+    ----------
+    system : SpaceSystem
+    certifier : SpaceClosing
+    regular : bool
+        Plain numbers and regular solutions only.
+    """
+
+    def __init__(self, system: SpaceSystem, certifier: SpaceClosing, *, regular: bool = False) -> None:
+        self._system, self._certifier, self._regular = system, certifier, regular
+        #: No node slides without load in a part of the tree, and no root is tried there.
+        self.sliding: dict[int, int] = {}
+        self.known: KnownRoot | None = None
+        self.relaxed: object = None
+
+    def whole(self) -> list[Any] | None:
+        """The only solution, as a list; None where that is not proven."""
+        with np.errstate(all="ignore"):
+            return self._tried()
+
+    def again(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
+        """The only solution, proven again where an earlier search has proven it."""
+        del relaxation
+        return self.whole() if all(code == UNDECIDED for code in codes) else None
+
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> None:
+        """No partial assignment is closed."""
+
+    def alone(self, codes: Codes, proposal: object, bound: object) -> None:
+        """Nor by a root that is alone below it."""
+
+    def met(self, answer: object) -> None:
+        """Nothing follows from what a leaf holds."""
+
+    def begins_again(self, nodes: int) -> bool:
+        """A search in 3D does not begin again."""
+        del nodes
+        return False
+
+    def _tried(self) -> list[Any] | None:
+        system = self._system
+        if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
+            return None
+        problem = Isotropic.of(system)
+        y = problem.solution()
+        if y is None:
+            return None
+        point = _Point.of(system, problem, y)
+        if self._regular and point.slack < _CLEAR:
+            return None
+        numbers = point.numbers(_CLEAR if self._regular else _DEFINITE, better=not self._regular and system.p >= _MANY)
+        if numbers is None:
+            return None
+        found = self._certifier.close(numbers, point.codes, point.n) if point.slack > 0 else None
+        if found is None and not self._regular:
+            found = self._certifier.close(numbers, None, point.n)
+        return found
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A solution in floats.
+
+    Attributes
+    ----------
+    n : (p,) array
+        lambda_n, 0 where it is within rounding of that.
+    gap, slip : (p,) and (p, 2) arrays
+        -w_n of open nodes, 0 elsewhere, and v.
+    theta : (p, 2) array
+        A theta that serves the solution; at open nodes that of length one.
+    wide : (p,) bool array
+        Nodes that touch without load and rest.
+    codes : codes of a leaf that holds it
+    slack : float
+        The least slack of its conditions.
+    """
+
+    system: SpaceSystem
+    n: Array
+    gap: Array
+    slip: Array
+    theta: Array
+    wide: NDArray[np.bool_]
+    codes: Codes
+    slack: float
+
+    @classmethod
+    def of(cls, system: SpaceSystem, problem: Isotropic, y: Array) -> _Point:
+        w = problem.displacements(y)
+        n, gap, tau, v = np.maximum(y[:, 0], 0.0), np.maximum(-w[:, 0], 0.0), y[:, 1:], w[:, 1:]
+        rubs, size, length = np.any(system.tau >= 0, axis=1), np.linalg.norm(v, axis=1), np.linalg.norm(tau, axis=1)
+        loaded, slip, room = n > _NEAR, size * system.slip_scale, (n - length) * system.disc_scale
+        slides = rubs & (slip > _NEAR)
+        # exactly on the border of the disc, or clearly inside
+        border = loaded & rubs & (slides | (length > (1.0 - _NEAR) * n))
+        divisor = np.where(loaded, np.where(border, length, n), np.where(slides, size, np.inf))
+        theta = np.where(loaded[:, None], tau, v) / divisor[:, None]
+        held = rubs & (slip <= room)
+        slack = np.where(n < gap, gap, np.where(rubs, np.minimum(n, np.where(held, room, slip)), n))
+        codes = tuple(cls._code(system, i, tau[i], bool(n[i] >= gap[i]), bool(held[i])) for i in range(len(n)))
+        apart = ~loaded & (gap > _NEAR)
+        wide = rubs & ~loaded & ~apart & ~slides
+        open_gap = np.where(apart, gap, 0.0)
+        return cls(system, np.where(loaded, n, 0.0), open_gap, v, theta, wide, codes, float(np.min(slack)))
+
+    @staticmethod
+    def _code(system: SpaceSystem, i: int, direction: Array, loaded: bool, held: bool) -> int:
+        axes = np.flatnonzero(system.tau[i] >= 0)
+        if not loaded:
+            return OPEN
+        if held or not len(axes):
+            return STICK if len(axes) else FRICTIONLESS
+        if len(axes) == 1:
+            return SLIP_PLUS if direction[axes[0]] > 0 else SLIP_MINUS
+        return SECTORS + _sector(direction, _LEVEL)
+
+    # -- numbers ---------------------------------------------------------------------------------------------------
+
+    def numbers(self, enough: float, *, better: bool) -> Array | None:
+        """Numbers for which Q is definite, as a proof has them; plain ones, or better ones if these are asked for.
+
+        ``enough``: the smallest eigenvalue relative to S from which Q counts as definite.
+        """
+        form = _Definite(self)
+        logs, shares = form.plain
+        least = form.least(logs, shares)
+        if least <= enough and better and least > _HOPELESS:
+            logs, shares, least = form.improved(logs, shares, least)
+        return form.values(logs, shares) if least > enough else None
+
+
+def _sector(direction: Array, level: int) -> int:
+    """The sector of a level that holds a direction."""
+    x, y = direction.tolist()
+    number = nearest(x, y, level)
+    a, b = map(float, start_of(number))
+    if a * y - b * x >= 0:
+        return number
+    first = 1 << level
+    return first + (number - first - 1) % first
+
+
+class _Definite:
+    """Q = (D'S + S D) / 2 of a solution, as a function of logarithms of mu and kappa, and of nu.
+
+    Where a node is open mu = kappa and nu = 0, so that the same theta serves whatever they are. Elsewhere nu = mu z /
+    (1 + |z|^2)^(1/2) for a z in the plane.
+    """
+
+    def __init__(self, point: _Point) -> None:
+        system = point.system
+        self._system, self._S, self._point = system, system.S, point
+        tau, p = system.tau, system.p
+        self._open = point.gap > 0
+        size = np.linalg.norm(point.slip, axis=1)
+        need = 1.0 - _SHARED * point.gap / np.where(size > 0, size, 1.0)
+        theta = np.where(self._open[:, None], point.theta * np.maximum(need, 0.0)[:, None], point.theta)
+        self._theta = np.where((tau >= 0) & ~point.wide[:, None], theta, 0.0)
+        self._unit = np.where(tau >= 0, system.unit[tau], 1.0)
+        self._turn = self._theta / self._unit
+        rows = [np.where((tau[:, k] >= 0)[:, None], system.S[tau[:, k]] / self._unit[:, k, None], 0.0) for k in (0, 1)]
+        self._rows = np.stack(rows, axis=1)
+        self._reach = np.where(point.wide, np.sqrt(np.sum(self._rows**2, axis=(1, 2))), 0.0)
+        self._pushes = (tau >= 0) & ~self._open[:, None]
+        self.plain = np.zeros((2, p)), np.zeros((p, 2))
+
+    def values(self, logs: Array, shares: Array) -> Array:
+        """The numbers as a proof has them."""
+        mu, kappa, nu = self._numbers(logs, shares)
+        places = self._system.tau >= 0
+        wide = np.where(self._point.wide, kappa * np.maximum(self._reach, _NEAR), 0.0)
+        return np.concatenate([mu, kappa, wide, nu[places], self._theta[places]])
+
+    def least(self, logs: Array, shares: Array) -> float:
+        """The smallest eigenvalue of Q relative to S."""
+        Q = self._matrix(*self._numbers(logs, shares))
+        try:
+            return float(scipy.linalg.eigh(Q, self._S, eigvals_only=True, subset_by_index=[0, 0])[0])
+        except (np.linalg.LinAlgError, ValueError):
+            return -np.inf
+
+    def improved(self, logs: Array, shares: Array, least: float) -> tuple[Array, Array, float]:
+        """Better numbers: those with the largest soft minimum of the eigenvalues of Q relative to S."""
+        from scipy.optimize import minimize  # seldom needed
+
+        x, left = np.concatenate([logs.ravel(), shares.ravel()]), _EVALUATIONS
+        # columns in which S is the unit matrix
+        columns = np.linalg.inv(np.linalg.cholesky(self._S)).T
+        for hardness in _HARDNESS:
+            if left <= 0 or least > _GOOD:
+                break
+            look()
+            options = {"maxfun": min(_ROUND, left), "maxiter": _ROUND}
+            given = columns, hardness
+            found = minimize(self._value, x, given, method="L-BFGS-B", jac=True, options=options)
+            left -= max(int(found.nfev), 1)
+            x, least = found.x, self.least(*self._split(found.x))
+        return *self._split(x), least
+
+    def _split(self, x: Array) -> tuple[Array, Array]:
+        p = self._system.p
+        return x[: 2 * p].reshape(2, p), x[2 * p :].reshape(p, 2)
+
+    def _numbers(self, logs: Array, shares: Array) -> tuple[Array, Array, Array]:
+        logs = np.where(self._open, np.mean(logs, axis=0), logs)
+        mu, kappa = np.exp(logs - np.mean(logs))
+        return mu, kappa, np.where(self._pushes, mu[:, None] * self._disc(shares)[0] * (1.0 - _NEAR), 0.0)
+
+    @staticmethod
+    def _disc(shares: Array) -> tuple[Array, Array]:
+        root = np.sqrt(1.0 + np.sum(shares * shares, axis=1, keepdims=True))
+        return shares / root, root
+
+    def _matrix(self, mu: Array, kappa: Array, nu: Array) -> Array:
+        S, tau, p = self._S, self._system.tau, self._system.p
+        form = S.copy()
+        form[:p] = mu[:, None] * S[:p]
+        for k in range(2):
+            has = tau[:, k] >= 0
+            t = tau[has, k]
+            form[:p][has] -= (kappa[has] * self._turn[has, k])[:, None] * S[t]
+            form[t] = kappa[has, None] * S[t] + (nu[has, k] * self._unit[has, k])[:, None] * S[:p][has]
+        wide = np.flatnonzero(self._point.wide)
+        reach = np.maximum(self._reach[wide], _NEAR)
+        for k in range(2):
+            rows = self._rows[wide, k] * np.sqrt(kappa[wide] / reach)[:, None]
+            form -= 0.5 * rows.T @ rows
+        form[wide, wide] -= 0.5 * kappa[wide] * reach
+        return 0.5 * (form + form.T)
+
+    def _value(self, x: Array, columns: Array, hardness: float) -> tuple[float, Array]:
+        """The logarithm of sum exp(-hardness e) over the eigenvalues e, by the hardness, and its gradient."""
+        logs, shares = self._split(x)
+        mu, kappa, nu = self._numbers(logs, shares)
+        sizes, vectors = np.linalg.eigh(columns.T @ self._matrix(mu, kappa, nu) @ columns)
+        parts = np.exp(-hardness * (sizes - sizes[0]))
+        vectors = columns @ vectors
+        P = (vectors * (parts / np.sum(parts))) @ vectors.T
+        return float(np.log(np.sum(parts)) / hardness - sizes[0]), self._gradient(P, mu, kappa, nu, shares)
+
+    def _gradient(self, P: Array, mu: Array, kappa: Array, nu: Array, shares: Array) -> Array:
+        tau, p, SP = self._system.tau, self._system.p, self._S @ P
+        node = np.arange(p)
+        by_mu, by_kappa, by_nu = np.diagonal(SP)[:p].copy(), np.zeros(p), np.zeros((p, 2))
+        for k in range(2):
+            has = tau[:, k] >= 0
+            t = tau[has, k]
+            by_kappa[has] += SP[t, t] - self._turn[has, k] * SP[t, node[has]]
+            by_nu[has, k] = SP[node[has], t] * self._unit[has, k]
+        for i in np.flatnonzero(self._point.wide):
+            reach, rows = max(self._reach[i], _NEAR), self._rows[i]
+            by_kappa[i] -= 0.5 * (reach * P[i, i] + float(np.sum((rows @ P) * rows)) / reach)
+        by_nu = np.where(self._pushes, by_nu, 0.0)
+        logs = np.stack([by_mu * mu + np.sum(by_nu * nu, axis=1), by_kappa * kappa])
+        logs = np.where(self._open, np.mean(logs, axis=0), logs)
+        z, root = self._disc(shares)
+        pulled = by_nu * mu[:, None] * (1.0 - _NEAR)
+        pulled = (pulled - z * np.sum(z * pulled, axis=1, keepdims=True)) / root
+        return -np.concatenate([(logs - np.mean(logs)).ravel(), pulled.ravel()])

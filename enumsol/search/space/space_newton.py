@@ -1,0 +1,143 @@
+"""A solution in 3D by Newton's method in isotropic variables (theory, section 12.6), in floats."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.support.deadlines import look
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space_condensed import SpaceSystem
+
+    Array = NDArray[np.float64]
+
+#: Steps of Newton's method, halvings of one, and steps that may pass without a merit half as large.
+_STEPS, _HALVINGS, _PATIENCE = 40, 7, 12
+#: Residual at which a point counts as a solution, relative to forces of size one.
+_SOLVED = 1e-10
+#: First step of the homotopy in the radius of the discs, the smallest one, and their number at most.
+_FIRST, _SMALLEST, _RADII = 0.25, 0.02, 24
+
+
+@dataclass(frozen=True)
+class Isotropic:
+    """w = g - S y for y (p, 3): lambda_n and both tau, those that do not occur with equations tau = 0 of their own.
+
+    Attributes
+    ----------
+    S : (3 p, 3 p) array
+    g : (3 p,) array
+    unit : (3 p,) array
+        Powers of two: S is scaled back by them before a system is solved.
+    rho : (3 p,) array
+        Steps of the natural map y - P(y + rho w), one for lambda_n and one for tau of every node.
+    """
+
+    S: Array
+    g: Array
+    unit: Array
+    rho: Array
+
+    @classmethod
+    def of(cls, system: SpaceSystem) -> Isotropic:
+        """Of a scaled system."""
+        p, tau = system.p, system.tau
+        places = np.column_stack([np.arange(p), tau]).ravel()
+        occurs = places >= 0
+        unit = np.where(occurs, system.unit[places], 1.0)
+        both = occurs[:, None] & occurs[None, :]
+        S = np.where(both, system.S[np.ix_(places, places)] / np.outer(unit, unit), 0.0)
+        S[~occurs, ~occurs] = 1.0
+        rho = 1.0 / np.diagonal(S).reshape(p, 3)
+        friction = np.min(np.where(occurs.reshape(p, 3)[:, 1:], rho[:, 1:], np.inf), axis=1, keepdims=True)
+        rho[:, 1:] = np.where(np.isfinite(friction), friction, 1.0)
+        return cls(S, np.where(occurs, system.g[places] / unit, 0.0), unit, rho.ravel())
+
+    def displacements(self, y: Array) -> Array:
+        """w, (p, 3)."""
+        return (self.g - self.S @ y.ravel()).reshape(-1, 3)
+
+    def solution(self) -> Array | None:
+        """A solution y, (p, 3), or None: by Newton's method from 0, else with discs that grow from nothing."""
+        found = self._newton(np.zeros_like(self.g), 1.0)
+        if found is None:
+            found = self._grown()
+        return None if found is None else found.reshape(-1, 3)
+
+    def _grown(self) -> Array | None:
+        y = self._newton(np.zeros_like(self.g), 0.0)
+        radius, step = 0.0, _FIRST
+        for _ in range(_RADII):
+            if y is None or radius >= 1.0:
+                break
+            further = min(radius + step, 1.0)
+            found = self._newton(y, further)
+            if found is None:
+                step *= 0.5
+                if step < _SMALLEST:
+                    return None
+            else:
+                y, radius, step = found, further, 1.5 * step
+        return y if radius >= 1.0 else None
+
+    def _newton(self, y: Array, radius: float) -> Array | None:
+        """A solution for discs |tau| <= radius lambda_n from a point near it, (3 p,)."""
+        H, J = self._natural(y, radius)
+        size, best, waited = self._merit(H), np.inf, 0
+        for _ in range(_STEPS):
+            if size <= _SOLVED:
+                return y
+            best, waited = (size, 0) if size < 0.5 * best else (best, waited + 1)
+            if waited > _PATIENCE:
+                return None
+            look()
+            try:
+                # in the units of the system, in which no row is small
+                step = np.linalg.solve(J / self.unit[:, None] * self.unit, H / self.unit) * self.unit
+            except np.linalg.LinAlgError:
+                return None
+            if not np.all(np.isfinite(step)):
+                return None
+            share = 1.0
+            for _ in range(_HALVINGS):
+                trial = y - share * step
+                found = self._natural(trial, radius)
+                if self._merit(found[0]) < size:
+                    break
+                share *= 0.5
+            y, (H, J) = trial, found
+            size = self._merit(H)
+        return y if size <= _SOLVED else None
+
+    def _merit(self, H: Array) -> float:
+        return float(np.linalg.norm(H / self.unit))
+
+    def _natural(self, y: Array, radius: float) -> tuple[Array, Array]:
+        """The natural map y - P(y + rho w), with discs as large as y + rho w has lambda_n, and its Jacobian."""
+        m = len(y)
+        z, dz = y + self.rho * (self.g - self.S @ y), np.eye(m) - self.rho[:, None] * self.S
+        H, J = y.copy(), np.eye(m)
+        normal = np.arange(0, m, 3)
+        closed = z[normal] > 0
+        most = radius * np.where(closed, z[normal], 0.0)
+        slope = radius * np.where(closed[:, None], dz[normal], 0.0)
+        H[normal[closed]] -= z[normal[closed]]
+        J[normal[closed]] -= dz[normal[closed]]
+        pair = z.reshape(-1, 3)[:, 1:]
+        length = np.linalg.norm(pair, axis=1)
+        inside = length <= most
+        safe = np.where(inside, 1.0, length)
+        e = pair / safe[:, None]
+        first, second = normal + 1, normal + 2
+        along = e[:, :1] * dz[first] + e[:, 1:] * dz[second]
+        bend = (most / safe)[:, None]
+        for k, t in enumerate((first, second)):
+            H[t] -= np.where(inside, pair[:, k], most * e[:, k])
+            across = slope * e[:, k, None] + bend * (dz[t] - e[:, k, None] * along)
+            J[t] -= np.where(inside[:, None], dz[t], across)
+        return H, J

@@ -1,0 +1,226 @@
+"""The tree in three dimensions: slip directions in sectors of the circle (theory, section 12)."""
+
+from __future__ import annotations
+
+import base64
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.model.sectors import DEEPEST, SECTORS, direction, end_number, level_of
+from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.proof.reading_space import multipliers_in_space
+from enumsol.relaxation.engine import PRUNE_MARGIN
+from enumsol.relaxation.space_relaxation import SpaceEngine
+from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart
+from enumsol.search.resume import RecordedBound
+from enumsol.trusted.space.leaves import Cause, Open, SpaceRoot, settle
+from enumsol.trusted.space.sector_rows import exclusion_margin, row_terms
+from enumsol.trusted.space.space_uniqueness import OnlySolution, only_root, only_solution
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.proof.compressed_parts import Recorder
+    from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.protocol import Bound
+    from enumsol.search.fathoming_in_contact import LoneProposal
+    from enumsol.selections.solution import Codes
+
+    Array = NDArray[np.float64]
+
+#: Forces that are known no better than this, relative to the largest one, are left to the tree.
+_PLACED = 1e-3
+#: Where all are smaller than this (scaled), relative to this.
+_SMALL_FORCE = 1e-6
+_PERTURB, _HOLD = "perturb the load, by 1e-4 of its largest entry, say", "hold the body by stiffer springs"
+
+
+class SpaceSplitting:
+    """Open or in contact; then stick, or slip in one of four sectors; a sector is halved."""
+
+    def __init__(self, engine: SpaceEngine) -> None:
+        self._engine, self._system = engine, engine.system
+
+    def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
+        """(slot, mode) of the rows that a contact node imposes in a status."""
+        rows, modes = self._engine.imposed(node, code)
+        return [(row // self._system.p, mode) for row, mode in zip(rows, modes, strict=True)]
+
+    def children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
+        """Codes of the children, the one nearest to the minimiser first."""
+        children = list(self._engine.children(node, codes[node]))
+        if relaxation is None:
+            return children
+        if codes[node] == UNDECIDED:
+            force, w = relaxation.at(node)
+            return children[:: -1 if force > -w else 1]
+        if codes[node] == CONTACT and self._engine.tangents[node] == 1:
+            return children
+        tau, v = self._system.taus(relaxation.forces)[node], self._system.slips(relaxation.displacements)[node]
+        towards = tau / (np.linalg.norm(tau) + 1e-300) + v / (np.linalg.norm(v) + 1e-300)
+        return sorted(children, key=lambda code: -_towards(code, towards) if code > SECTORS else -10.0)
+
+    def coverings(self, node: int, code: int) -> Sequence[Sequence[int]]:
+        """All ways to cover a partial status of a node by codes, in any order; none for a final one."""
+        children = () if code > SECTORS and level_of(code - SECTORS) >= DEEPEST else self._engine.children(node, code)
+        return (children,) if children else ()
+
+    def above(self, code: int, deeper: Iterable[int]) -> int:
+        """The code of which this one is a child."""
+        del deeper
+        if code > SECTORS and level_of(code - SECTORS) > 2:
+            return SECTORS + (code - SECTORS) // 2
+        return CONTACT if code > SECTORS or code in (STICK, SLIP_PLUS, SLIP_MINUS) else UNDECIDED
+
+
+class SpaceReader:
+    """Understands the records of a proof in 3D (see ``search.resume``).
+
+    Parameters
+    ----------
+    engine : SpaceEngine
+    """
+
+    def __init__(self, engine: SpaceEngine) -> None:
+        self._engine = engine
+
+    def declare(self, record: list[Any]) -> None:
+        """There are no forms in 3D."""
+        del record
+        raise ValueError("a form in a proof in 3D")
+
+    def form_over(self, codes: Codes) -> None:
+        """No form."""
+
+    def lone(self, codes: Codes, record: list[Any]) -> tuple[LoneProposal, Bound]:
+        """No root is proven to be alone so in 3D."""
+        del codes, record
+        raise ValueError("a lone root in a proof in 3D")
+
+    def bound(self, codes: Codes, record: list[Any]) -> Bound:
+        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
+        engine, p = self._engine, len(codes)
+        if len(record) != 3:
+            raise ValueError("no three entries")
+        rows, values = multipliers_in_space(record[1], record[2], p)
+        for row in rows:
+            row_terms(row, engine.system.tau, len(engine.system.g))  # there is such a row
+        slots = [engine.slot(row) for row in rows]
+        numbers = [slot * p + row[1] for slot, row in zip(slots, rows, strict=True) if slot is not None]
+        if len(numbers) < len(rows):
+            raise ValueError("no room for its rows")
+        return RecordedBound(np.array(numbers, dtype=np.intp), values)
+
+
+def _towards(code: int, vector: np.ndarray) -> float:
+    """How much a vector points into the middle of a sector."""
+    number = code - SECTORS
+    middle = np.add(direction(number), direction(end_number(number)))
+    return float(middle @ vector / np.linalg.norm(middle))
+
+
+class SpaceCertifier:
+    """Proves prunings and leaves by the kernel, and writes the proof.
+
+    Parameters
+    ----------
+    engine : SpaceEngine
+    enclosed : EnclosedSpace
+        Balls for its system; without radii in fast arithmetic.
+    recorder : Recorder
+    """
+
+    def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, recorder: Recorder) -> None:
+        self._engine, self.enclosed, self.recorder = engine, enclosed, recorder
+        self._roots: dict[Codes, SpaceRoot | OnlySolution] = {}
+        self.sliding: dict[int, int] = {}
+        self._leaves = 0
+
+    @property
+    def certified(self) -> Certified:
+        """What was proven so far."""
+        return Certified(self._roots, None, self._leaves)
+
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
+        """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
+        if not relaxation.bound > PRUNE_MARGIN:
+            return False
+        numbers, values = relaxation.multipliers()
+        rows = [self._engine.rows[number] for number in numbers.tolist()]
+        if not exclusion_margin(self.enclosed, codes, rows, values, errors=2.0) > 0:
+            return False
+        self._leaf("x", [list(row) for row in rows], base64.b64encode(values.astype("<f8").tobytes()).decode())
+        return True
+
+    def branching(self, node: int, children: Sequence[int]) -> None:
+        """Write a branching of the tree."""
+        self.recorder.write(["b", node, list(children)])
+
+    def skipped(self, codes: Codes, reason: str) -> None:
+        """Write a subtree that was not examined."""
+        del codes
+        self._leaf("u", reason)
+
+    def selection(self, codes: Codes) -> SpaceRoot | UndecidedPart | Refine | None:
+        """The root of a leaf, a sector to halve, or why the leaf stays open."""
+        answer = settle(self.enclosed, codes)
+        if answer is None:
+            self._leaf("n")
+        elif isinstance(answer, Open):
+            if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
+                return Refine(answer.node)
+            self._leaf("u", answer.cause.value)
+            hint = _HOLD if answer.cause is Cause.ROUNDING else _PERTURB
+            return UndecidedPart(codes, answer.cause.value, hint, examined=True)
+        else:
+            self._roots[codes] = answer
+            unit = self.enclosed.unit
+            self._leaf("r", (answer.y.mid * unit).tolist(), (4.0 * answer.y.rad * unit).tolist(), answer.index)
+        return answer
+
+    def close(self, numbers: Array, codes: Codes | None, normal: Array) -> list[SpaceRoot | OnlySolution] | None:
+        """The only solution of the whole problem, as a list, and its leaf written; None if that is not proven.
+
+        Parameters
+        ----------
+        numbers : of the form, as ``trusted.space.space_uniqueness.Numbers.of`` takes them
+        codes : of a leaf that holds the solution; None: its statuses need not hold strictly
+        normal : (p,) array, lambda_n near the solution
+        """
+        found: SpaceRoot | OnlySolution | None
+        try:
+            if codes is None:
+                found = only_solution(self.enclosed, numbers, normal, errors=2.0)
+            else:
+                found = only_root(self.enclosed, numbers, codes, errors=2.0)
+        except NotEnclosedError:
+            return None
+        if found is None or not np.max(found.y.rad) <= _PLACED * np.max(np.abs(found.y.mid), initial=_SMALL_FORCE):
+            return None
+        self._roots[codes or (UNDECIDED,) * len(normal)] = found
+        unit = self.enclosed.unit
+        ball = (found.y.mid * unit).tolist(), (4.0 * found.y.rad * unit).tolist()
+        self._leaf("m", numbers.tolist(), list(codes or ()), *ball, found.index)
+        return [found]
+
+    def unloaded(self) -> None:
+        """Write the proof of the unloaded body."""
+        self._leaf("z")
+
+    def add(self, part: Certified) -> None:
+        """Take over what the certifier of a subtree has proven."""
+        self._roots |= part.verified
+        self._leaves += part.leaves
+
+    def forget(self) -> None:
+        """Forget what was proven."""
+        self._roots, self._leaves = {}, 0
+
+    def _leaf(self, kind: str, *record: object) -> None:
+        self._leaves += 1
+        self.recorder.write([kind, *record])

@@ -1,0 +1,130 @@
+"""One problem in 3D at one alpha in one arithmetic: what a search needs (theory, section 12)."""
+
+from __future__ import annotations
+
+import copy
+from fractions import Fraction
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, cast
+
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+from enumsol.relaxation.space_relaxation import SpaceEngine
+from enumsol.search.certifiers.protocol import Unrecorded
+from enumsol.search.proof_header import point_header, unit_exponents
+from enumsol.search.space.space_fathoming import SpaceCloser
+from enumsol.search.space.space_search import SpaceCertifier, SpaceReader, SpaceSplitting
+from enumsol.search.tree import TreeSearch
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.proof.compressed_parts import Recorder
+    from enumsol.search.certifiers.protocol import Certifier
+    from enumsol.search.outcome import SearchLimits, SearchProgress
+    from enumsol.search.space.space_fathoming import SpaceClosing
+    from enumsol.support.arguments import Alpha
+
+
+class SpaceSolvers:
+    """System, balls, engine and certifier for one problem in 3D at one alpha.
+
+    Parameters
+    ----------
+    problem : ContactProblem3D
+    alpha : float or Fraction
+    arithmetic : {"fast", "verified"}
+
+    Raises
+    ------
+    InvalidArgumentError, InvalidProblemError
+        Of ``problem.friction_at`` and of the condensation.
+    """
+
+    def __init__(self, problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> None:
+        self.problem, self.alpha, self.arithmetic = problem, alpha, arithmetic
+        friction = problem.friction_at(alpha)  # refuses what cannot be enumerated before anything is computed
+        condensed = problem.condensed
+        self.system = SpaceSystem.scaled(condensed.S, condensed.free_displacements(alpha), friction)
+
+    @cached_property
+    def _engine(self) -> SpaceEngine:
+        """Its rows are numbered in the order in which certifier, splitting and relaxations ask for them."""
+        return SpaceEngine(self.system)
+
+    @cached_property
+    def _enclosed(self) -> tuple[EnclosedSpace, str | None]:
+        floats = EnclosedSpace.of_floats(self.system)
+        if self.arithmetic == "fast":
+            return floats, None
+        try:
+            units = self.system.force, self.system.length
+            enclosed = EnclosedSpace.of_problem(self.problem.enclosure, Fraction(self.alpha), *units)
+            _ = enclosed.smallest_eigenvalue  # proven positive, or refused
+        except NotEnclosedError as error:
+            return floats, str(error)
+        return enclosed, None
+
+    @property
+    def enclosed(self) -> EnclosedSpace:
+        """Balls for the scaled system; in fast arithmetic, or where nothing can be proven, without radii."""
+        return self._enclosed[0]
+
+    @property
+    def undecidable(self) -> str | None:
+        """Why verified arithmetic cannot prove anything about this problem, or None."""
+        return self._enclosed[1]
+
+    def certifier(self, recorder: Recorder | None) -> SpaceCertifier:
+        """The certifier of this arithmetic."""
+        if recorder is None or self.arithmetic == "fast":
+            recorder = Unrecorded()
+        return SpaceCertifier(self._engine, self.enclosed, recorder)
+
+    def search(
+        self,
+        certifier: Certifier,
+        limits: SearchLimits | None = None,
+        progress: Callable[[SearchProgress], object] | None = None,
+    ) -> TreeSearch:
+        """A search of the tree with a certifier made here."""
+        engine, closing = self._engine, cast("SpaceClosing", certifier)
+        return TreeSearch(
+            self.system,
+            certifier,
+            engine=engine,
+            splitting=SpaceSplitting(engine),
+            limits=limits,
+            progress=progress,
+            closer=SpaceCloser(self.system, closing, regular=self.arithmetic == "fast"),
+        )
+
+    def remake(self) -> Callable[[], SpaceSolvers]:
+        """Makes the same again, also in another process."""
+        return partial(SpaceSolvers, self.problem, self.alpha, self.arithmetic)
+
+    def fresh(self) -> SpaceSolvers:
+        """The same with an engine of its own: which rows it has already changes what it finds."""
+        other = copy.copy(self)
+        other.__dict__.pop("_engine", None)
+        return other
+
+    def unloaded(self) -> bool:
+        """Whether g = 0 for the data as given, so that only lambda = 0 solves."""
+        return self.problem.is_unloaded(self.alpha)
+
+    def reader(self) -> SpaceReader:
+        """Understands the records of an earlier proof."""
+        return SpaceReader(self._engine)
+
+    def proof_header(self) -> dict[str, Any]:
+        """First record of a proof (see enumsol.proof.proof_file).
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is a fraction of more digits than a proof may hold.
+        """
+        units = unit_exponents(self.system.force, self.system.length)
+        return point_header(self.problem, self.alpha, "problem", units, kind="space")

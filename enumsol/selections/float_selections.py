@@ -1,0 +1,276 @@
+"""Selections solved in float64 with named, scaled tolerances (arithmetic "fast")."""
+
+from __future__ import annotations
+
+from itertools import combinations, islice
+from math import comb
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import cho_solve
+
+from enumsol.model.statuses import CONDITIONS, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind, active_within
+from enumsol.selections.solution import MAX_BASES, ActiveSets, Codes, SelectionSolution, VertexLimitError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.condensed import ScaledSystem
+
+#: Default of arithmetic "fast": a condition within this of zero counts as zero. It is relative to the energy norm of
+#: the load: forces are measured by sqrt((S^-1)_ii) and displacements by sqrt(S_ii), the bounds that hold at roots.
+SIGN_TOLERANCE = 1e-9
+#: A singular value of a selection's scaled matrix (entries at most one) below this counts as zero.
+RANK_TOLERANCE = 1e-12
+
+
+class FloatSelections:
+    """Solver of selections in float64 for one scaled system (a SelectionSolver; points are scaled lambda arrays).
+
+    Parameters
+    ----------
+    system : ScaledSystem
+    tolerance : float
+        See SIGN_TOLERANCE.
+    """
+
+    def __init__(self, system: ScaledSystem, tolerance: float = SIGN_TOLERANCE) -> None:
+        self.system = system
+        self.tolerance = tolerance
+        self.p = p = system.p
+        self.F_positive = tuple(bool(f > 0) for f in system.F)
+        S, F = system.S, system.F
+        inverse = cho_solve((system.cholesky, True), np.eye(2 * p))
+        inverse = 0.5 * (inverse + inverse.T)
+        self._force_scale = np.sqrt(np.diagonal(inverse))
+        self._length_scale = np.sqrt(np.diagonal(S))
+        nn, tt, nt = np.diagonal(inverse)[:p], np.diagonal(inverse)[p:], np.diagonal(inverse, p)
+        turn = np.array([[1.0], [-1.0]])
+        # F = size * f: the square of F may overflow
+        size = np.maximum(F, 1.0)
+        f, one = F / size, 1.0 / size
+        cone = size * np.sqrt(np.maximum(f**2 * nn + one**2 * tt - 2 * f * one * nt * turn, 0.0))
+        length = self._length_scale.reshape(2, p)
+        self._norms = np.concatenate([self._force_scale.reshape(2, p), cone, length[[0, 1, 1]]])
+        snn, stt, snt = np.diagonal(S)[:p], np.diagonal(S)[p:], np.diagonal(S, p)
+        # energy norm of the force direction (1, +F) or (1, -F) of a slipping node
+        self._slip_scale = size * np.sqrt(np.maximum(one**2 * snn + f**2 * stt + 2 * f * one * snt * turn, 0.0))
+
+    def row_norms(self) -> NDArray[np.float64]:
+        """Norms by which the rows of relaxations are measured, in the order of their numbers kind * p + node."""
+        return self._norms.ravel()
+
+    # -- solving ---------------------------------------------------------------------------------------------------
+
+    def reduced(self, codes: Codes) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Rows of S that vanish in the selection, and E with lambda = E y, columns of unit energy norm."""
+        p, F = self.p, self.system.F
+        closed = [i for i in range(p) if codes[i] != OPEN]
+        stuck = [i for i in range(p) if codes[i] == STICK]
+        rows = np.array(closed + [p + i for i in stuck], dtype=np.intp)
+        E = np.zeros((2 * p, len(rows)))
+        for k, i in enumerate(closed):
+            if codes[i] in (SLIP_PLUS, SLIP_MINUS):
+                minus = codes[i] == SLIP_MINUS
+                scale = 1.0 / self._slip_scale[int(minus), i]
+                E[i, k] = scale
+                E[p + i, k] = (-F[i] if minus else F[i]) * scale
+            else:
+                E[i, k] = 1.0 / self._length_scale[i]
+        for k, i in enumerate(stuck, start=len(closed)):
+            E[p + i, k] = 1.0 / self._length_scale[p + i]
+        return rows, E
+
+    def matrix(self, codes: Codes) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Scaled matrix and right-hand side of the reduced selection system, and E."""
+        rows, E = self.reduced(codes)
+        scale = 1.0 / self._length_scale[rows]
+        return scale[:, None] * (self.system.S[rows] @ E), scale * self.system.g[rows], E
+
+    def condition(self, codes: Codes) -> float:
+        """Condition number of the scaled matrix."""
+        M, b, _ = self.matrix(codes)
+        return float(np.linalg.cond(M)) if len(b) else 1.0
+
+    def solve(self, codes: Codes) -> SelectionSolution | None:
+        """All roots in the selection, or None."""
+        M, b, E = self.matrix(codes)
+        if len(b) == 0:
+            return self._accept(codes, np.zeros(2 * self.p), 1)
+        U, sigma, Vt = np.linalg.svd(M)
+        rank = int(np.sum(sigma > RANK_TOLERANCE))
+        if rank == len(b):
+            # the LU solve is backward stable per row; the SVD serves the rank decision only
+            y = np.linalg.solve(M, b)
+            y += np.linalg.solve(M, b - M @ y)
+            sign = int(np.linalg.slogdet(M)[0])
+            return self._accept(codes, E @ y, sign)
+        y = Vt[:rank].T @ ((U[:, :rank].T @ b) / sigma[:rank])
+        if np.max(np.abs(M @ y - b)) > self.tolerance:
+            return None
+        return self._polytope(codes, E @ y, E @ Vt[rank:].T)
+
+    def _accept(self, codes: Codes, point: NDArray[np.float64], sign: int) -> SelectionSolution | None:
+        slack = self.slacks(codes, point, self._w(point))
+        least = float(np.min(slack)) if len(slack) else np.inf
+        if not least >= -self.tolerance:
+            return None
+        return SelectionSolution(codes, (point,), 0, sign, least > self.tolerance)
+
+    def _polytope(
+        self, codes: Codes, point: NDArray[np.float64], kernel: NDArray[np.float64]
+    ) -> SelectionSolution | None:
+        d = self.slacks(codes, point, self._w(point))
+        C = np.column_stack([self.slacks(codes, column, -self.system.S @ column) for column in kernel.T])
+        steps = _vertices(C, d, self.tolerance)
+        if not len(steps):
+            return None
+        points = point + steps @ kernel.T
+        spread = np.linalg.svd((points - points[0]) / self._force_scale, compute_uv=False)
+        dimension = int(np.sum(spread > 10 * self.tolerance))
+        if dimension == 0:
+            points = points[:1]
+        return SelectionSolution(codes, tuple(points), dimension, 0, strict=False)
+
+    # -- conditions ------------------------------------------------------------------------------------------------
+
+    def _w(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(self.system.g - self.system.S @ point)
+
+    def slacks(self, codes: Codes, point: NDArray[np.float64], w: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Scaled slacks of the selection's inequalities at forces ``point`` and displacements ``w``, in node order."""
+        rows, out = self._rows(point, w), []
+        for i, code in enumerate(codes):
+            for kind in CONDITIONS[code].inequalities:
+                if kind == RowKind.NORMAL_FORCE and code != FRICTIONLESS:
+                    out.append(point[i] * self._slip_scale[code - SLIP_PLUS, i])
+                else:
+                    out.append(rows[kind, i] / self._norms[kind, i])
+        return np.array(out)
+
+    def _rows(self, point: NDArray[np.float64], w: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of all rows in the order of RowKind, shape (7, p)."""
+        p = self.p
+        bound, t = self.system.F * point[:p], point[p:]
+        return np.array([point[:p], t, bound - t, bound + t, -w[:p], w[p:], -w[p:]])
+
+    def active(self, point: NDArray[np.float64]) -> ActiveSets:
+        """Per node the codes whose conditions hold at the point within the tolerance."""
+        rows = self._rows(point, self._w(point)) / np.where(self._norms > 0, self._norms, 1)
+        return active_within(rows, self.F_positive, self.tolerance)
+
+    def equal(self, a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+        """Whether two points agree within ten tolerances in scaled forces."""
+        return bool(np.max(np.abs(a - b) / self._force_scale) <= 10 * self.tolerance)
+
+    def meet(self, a: SelectionSolution, b: SelectionSolution) -> bool:
+        """Whether two polytopes share a point, within the tolerance: the distance of their hulls, a linear program."""
+        from scipy.optimize import linprog  # only families need it
+
+        Va = np.array(a.vertices) / self._force_scale
+        Vb = np.array(b.vertices) / self._force_scale
+        columns = np.concatenate([Va, -Vb]).T
+        ones = np.zeros((2, columns.shape[1]))
+        ones[0, : len(Va)] = 1
+        ones[1, len(Va) :] = 1
+        # smallest distance in the maximum norm between the two hulls
+        size = columns.shape[0]
+        upper = np.block([[columns, -np.ones((size, 1))], [-columns, -np.ones((size, 1))]])
+        equal = np.column_stack([ones, np.zeros(2)])
+        cost = np.zeros(columns.shape[1] + 1)
+        cost[-1] = 1
+        answer = linprog(cost, A_ub=upper, b_ub=np.zeros(2 * size), A_eq=equal, b_eq=np.ones(2))
+        return bool(answer.status == 0 and answer.fun <= 10 * self.tolerance)
+
+    def departure(self, solution: SelectionSolution, direction: NDArray[np.int64]) -> int | None:
+        """See SelectionSolver.departure."""
+        if solution.det_sign == 0:
+            return 0
+        rows, E = self.reduced(solution.codes)
+        step = np.zeros(2 * self.p)
+        push = direction * self._length_scale
+        if len(rows):
+            scale = 1.0 / self._length_scale[rows]
+            step = E @ np.linalg.solve(scale[:, None] * (self.system.S[rows] @ E), scale * push[rows])
+        moved = self.slacks(solution.codes, step, push - self.system.S @ step)
+        slack = self.slacks(solution.codes, solution.vertices[0], self._w(solution.vertices[0]))
+        rate = moved[slack <= self.tolerance]
+        if np.any(np.abs(rate) <= self.tolerance * (1 + np.max(np.abs(moved), initial=0.0))):
+            return None
+        return solution.det_sign if np.all(rate > 0) else 0
+
+    # -- values ----------------------------------------------------------------------------------------------------
+
+    def forces(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Unscaled lambda."""
+        return point * self.system.force
+
+    def displacements(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Unscaled w = g - S lambda."""
+        return self._w(point) * self.system.length
+
+    def bounds(self, point: NDArray[np.float64]) -> None:
+        """Floats prove no bounds."""
+        del point
+
+    def slip_signs(self, point: NDArray[np.float64]) -> tuple[int, ...]:
+        """Signs of w_t; zero within the tolerance."""
+        w = (self._w(point) / self._length_scale)[self.p :]
+        return tuple(int(np.sign(v)) if abs(v) > self.tolerance else 0 for v in w)
+
+
+def _vertices(C: NDArray[np.float64], d: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+    """Vertices t of {C t + d >= 0}, shape (k, dim), by trying every basis; the set is known to be bounded."""
+    size = C.shape[1]
+    norms = np.linalg.norm(C, axis=1)
+    flat = norms <= RANK_TOLERANCE * max(float(np.max(norms, initial=0.0)), 1.0)
+    if np.any(d[flat] < -tolerance):
+        return np.zeros((0, size))
+    C, d = C[~flat], d[~flat]
+    if comb(len(d), size) > MAX_BASES:
+        raise VertexLimitError(
+            f"a family of roots has {comb(len(d), size)} candidate vertices; at most {MAX_BASES} are enumerated"
+        )
+    unit, offset = C / norms[~flat, None], d / norms[~flat]
+    found: list[NDArray[np.float64]] = []
+    bases = combinations(range(len(d)), size)
+    while block := list(islice(bases, 4096)):
+        index = np.array(block)
+        matrices = unit[index]
+        usable = np.linalg.svd(matrices, compute_uv=False)[:, -1] > 1e-9
+        if not np.any(usable):
+            continue
+        points = np.linalg.solve(matrices[usable], -offset[index[usable]][:, :, None])[:, :, 0]
+        feasible = np.all(points @ C.T + d >= -tolerance, axis=1)
+        for point in points[feasible]:
+            if all(np.max(np.abs(C @ (point - other))) > 10 * tolerance for other in found):
+                found.append(point)
+    return np.array(found).reshape(-1, size)
+
+
+def selection_systems(
+    S: NDArray[np.float64], g: NDArray[np.float64], F: NDArray[np.float64], codes: NDArray[np.int8]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Linear systems M lambda = b of condensed selections (theory, section 2.3).
+
+    Parameters
+    ----------
+    S, g, F : condensed compliance (2p, 2p), displacements (2p,) and friction (p,)
+    codes : (k, p) integer array of status codes
+
+    Returns
+    -------
+    M : (k, 2p, 2p) array
+    b : (k, 2p) array
+        Rows: lambda_n = 0 and lambda_t = 0 (open); w_n = 0 and w_t = 0 (stick); w_n = 0 and lambda_t = +-F lambda_n.
+    """
+    k, p = codes.shape
+    node = np.arange(p)
+    closed, stick = codes != OPEN, codes == STICK
+    slip = np.where(codes == SLIP_PLUS, 1.0, 0.0) - np.where(codes == SLIP_MINUS, 1.0, 0.0)
+    M = np.zeros((k, 2 * p, 2 * p))
+    held = np.concatenate([closed, stick], axis=1)
+    M += held[:, :, None] * S
+    M[:, np.arange(2 * p), np.arange(2 * p)] += ~held
+    M[:, p + node, node] -= slip * F
+    return M, held * g

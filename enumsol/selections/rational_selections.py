@@ -1,0 +1,226 @@
+"""Selections solved in rational arithmetic: the given data read as exact rationals (theory, section 6.5)."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+
+from enumsol.arithmetic.rationals import rational
+from enumsol.condensation.exact import ExactSystem
+from enumsol.model.statuses import CONDITIONS, FINAL, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
+from enumsol.selections.polytopes import polytope_vertices, value
+from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.model.statuses import Conditions
+    from enumsol.selections.polytopes import Form, Point, Table
+
+
+def _outward(number: Any) -> tuple[float, float]:
+    """The floats next below and above a rational; the same one twice if it is a float."""
+    exact = Fraction(int(number.p), int(number.q))
+    near = float(exact)
+    if near == exact:
+        return near, near
+    return math.nextafter(near, -math.inf), math.nextafter(near, math.inf)
+
+
+def _holds(conditions: Conditions, rows: Sequence[Any]) -> bool:
+    return all(rows[k] == 0 for k in conditions.equations) and all(rows[k] >= 0 for k in conditions.inequalities)
+
+
+class ExactSelections:
+    """Solver of selections in rationals (a SelectionSolver; points are tuples of 2p fmpq).
+
+    Parameters
+    ----------
+    system : ExactSystem
+    """
+
+    def __init__(self, system: ExactSystem) -> None:
+        self.system = system
+        self.p = p = system.p
+        self.F_positive = tuple(bool(f > 0) for f in system.F)
+        self._S = system.S.tolist()
+        self._zero = [fmpq(0)] * (2 * p)
+
+    # -- linear forms ----------------------------------------------------------------------------------------------
+
+    def form(self, kind: RowKind, node: int) -> Form:
+        """A row as an affine function of lambda: 2p coefficients, and what is added."""
+        p, form = self.p, list(self._zero)
+        if kind >= RowKind.PENETRATION:
+            row, sign = (node, -1) if kind == RowKind.PENETRATION else (p + node, 1)
+            sign = -sign if kind == RowKind.SLIP_BACKWARD else sign
+            return [-sign * v for v in self._S[row]], sign * self.system.g[row]
+        if kind != RowKind.TANGENTIAL_FORCE:
+            form[node] = fmpq(1) if kind == RowKind.NORMAL_FORCE else self.system.F[node]
+        if kind != RowKind.NORMAL_FORCE:
+            form[p + node] = fmpq(-1 if kind == RowKind.CONE_PLUS else 1)
+        return form, fmpq(0)
+
+    def forms(self, codes: Codes) -> tuple[list[Form], list[Form]]:
+        """Equations and inequalities (>= 0) of a selection as forms over lambda."""
+        equations, inequalities = (
+            [self.form(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][part]] for part in (0, 1)
+        )
+        return equations, inequalities
+
+    # -- the field -------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def row_reduced(table: Table) -> tuple[Table, list[int]]:
+        """Rows of the reduced row echelon form that are not zero, and their pivot columns."""
+        reduced, rank = fmpq_mat(table).rref()
+        rows = reduced.tolist()[:rank]
+        return rows, [next(j for j, v in enumerate(row) if v != 0) for row in rows]
+
+    @staticmethod
+    def as_float(number: Any) -> float:
+        """The nearest float."""
+        return float(Fraction(int(number.p), int(number.q)))
+
+    def pushed(self, direction: tuple[Any, ...]) -> ExactSelections:
+        """The solver whose g is a direction."""
+        return ExactSelections(ExactSystem(self.system.S, direction, self.system.F))
+
+    # -- solving ---------------------------------------------------------------------------------------------------
+
+    def reduced(self, codes: Codes) -> tuple[list[int], list[list[Any]]]:
+        """Rows of S that vanish in the selection and columns of E, lambda = E y."""
+        p, F = self.p, self.system.F
+        rows, columns = [], []
+        for i, code in enumerate(codes):
+            if code != OPEN:
+                column = list(self._zero)
+                column[i] = fmpq(1)
+                if code in (SLIP_PLUS, SLIP_MINUS):
+                    column[p + i] = F[i] if code == SLIP_PLUS else -F[i]
+                rows.append(i)
+                columns.append(column)
+        for i, code in enumerate(codes):
+            if code == STICK:
+                column = list(self._zero)
+                column[p + i] = fmpq(1)
+                rows.append(p + i)
+                columns.append(column)
+        return rows, columns
+
+    def solve_equations(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
+        """The selection's forces for the right-hand side ``target`` and sign det, or None when it is singular."""
+        rows, columns = self.reduced(codes)
+        if not rows:
+            return tuple(self._zero), 1
+        E = fmpq_mat(columns).transpose()
+        M = fmpq_mat([self._S[r] for r in rows]) * E
+        det = M.det()
+        if det == 0:
+            return None
+        y = M.solve(fmpq_mat([[target[r]] for r in rows]))
+        return tuple((E * y).entries()), 1 if det > 0 else -1
+
+    def solve(self, codes: Codes) -> SelectionSolution | None:
+        """All roots in the selection, or None."""
+        regular = self.solve_equations(codes, self.system.g)
+        equations, inequalities = self.forms(codes)
+        if regular is not None:
+            point, sign = regular
+            values = [value(form, point) for form in inequalities]
+            if any(v < 0 for v in values):
+                return None
+            return SelectionSolution(codes, (point,), 0, sign, all(v > 0 for v in values), exact=True)
+        vertices = polytope_vertices(equations, inequalities, self.row_reduced)
+        if not vertices:
+            return None
+        differences = [[a - b for a, b in zip(v, vertices[0], strict=True)] for v in vertices[1:]]
+        dimension = len(self.row_reduced(differences)[1]) if differences else 0
+        return SelectionSolution(codes, tuple(vertices), dimension, 0, strict=False, exact=True)
+
+    # -- decisions -------------------------------------------------------------------------------------------------
+
+    def moved(self, point: Point) -> list[Any]:
+        """w = g - S lambda."""
+        product = self.system.S * fmpq_mat([[v] for v in point])
+        return [g - v for g, v in zip(self.system.g, product.entries(), strict=True)]
+
+    def active(self, point: Point) -> ActiveSets:
+        """Per node the codes whose conditions hold at the point, exactly."""
+        p, w = self.p, self.moved(point)
+        result = []
+        for i, (F, friction) in enumerate(zip(self.system.F, self.F_positive, strict=True)):
+            n, t, bound, w_t = point[i], point[p + i], F * point[i], w[p + i]
+            rows = (n, t, bound - t, bound + t, -w[i], w_t, -w_t)  # in the order of RowKind
+            result.append(frozenset(code for code in FINAL[friction] if n >= 0 and _holds(CONDITIONS[code], rows)))
+        return tuple(result)
+
+    def statuses_by_test_functions(self, point: Point, r: NDArray[np.float64]) -> tuple[int, ...]:
+        """Per node the code that the signs of theory, (1.7), name at any point; ``r`` holds powers of two."""
+        p, w = self.p, self.moved(point)
+        codes = []
+        for i, (F, friction) in enumerate(zip(self.system.F, self.F_positive, strict=True)):
+            unit = rational(float(r[i]))
+            bound, across = F * point[i], point[p + i] + unit * w[p + i]
+            if point[i] + unit * w[i] <= 0:
+                codes.append(OPEN)
+            elif not friction:
+                codes.append(FRICTIONLESS)
+            else:
+                codes.append(SLIP_PLUS if across > bound else SLIP_MINUS if across < -bound else STICK)
+        return tuple(codes)
+
+    def equal(self, a: Point, b: Point) -> bool:
+        """Exact equality."""
+        return a == b
+
+    def meet(self, a: SelectionSolution, b: SelectionSolution) -> bool:
+        """Whether both selections' conditions hold at a common point, exactly."""
+        first, second = self.forms(a.codes), self.forms(b.codes)
+        return bool(polytope_vertices(first[0] + second[0], first[1] + second[1], self.row_reduced))
+
+    def departure(self, solution: SelectionSolution, direction: NDArray[np.int64]) -> int | None:
+        """See SelectionSolver.departure."""
+        if solution.det_sign == 0:
+            return 0
+        push = tuple(fmpq(int(v)) for v in direction)
+        moved = self.solve_equations(solution.codes, push)
+        if moved is None:  # det_sign says otherwise
+            raise AssertionError("a regular selection became singular")
+        step, sign = moved
+        _, inequalities = self.forms(solution.codes)
+        _, rates = self.pushed(push).forms(solution.codes)
+        point = solution.vertices[0]
+        for condition, rate in zip(inequalities, rates, strict=True):
+            if value(condition, point) == 0:
+                change = value(rate, step)
+                if change == 0:
+                    return None
+                if change < 0:
+                    return 0
+        return sign
+
+    # -- values ----------------------------------------------------------------------------------------------------
+
+    def forces(self, point: Point) -> NDArray[np.float64]:
+        """lambda as floats."""
+        return np.array([self.as_float(v) for v in point])
+
+    def displacements(self, point: Point) -> NDArray[np.float64]:
+        """w = g - S lambda as floats, rounded once."""
+        return np.array([self.as_float(v) for v in self.moved(point)])
+
+    def slip_signs(self, point: Point) -> tuple[int, ...]:
+        """Signs of w_t, exactly."""
+        return tuple((v > 0) - (v < 0) for v in self.moved(point)[self.p :])
+
+    def bounds(self, point: Point) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Floats below and above (lambda, w), two arrays of shape (4p,), equal where a value is a float."""
+        pairs = [_outward(v) for v in (*point, *self.moved(point))]
+        return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])

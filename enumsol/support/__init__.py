@@ -1,0 +1,1 @@
+"""What every room uses: arguments of calls, messages, files, deadlines, workers."""

@@ -1,0 +1,275 @@
+"""The trusted test of pieces with one solution: along an arc its root is the only one (theory, section 7.15).
+
+At one alpha a solution is the only one if the form (6.9) is definite for numbers theta that serve it. Along an arc
+theta follows the solution, which is known as polynomials in tau with bounds of their errors (theory, section 7.14).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_norm, upper_sum
+from enumsol.trusted.arcs.ball_arrays import Ball
+from enumsol.trusted.arcs.bernstein import bernstein_values
+from enumsol.trusted.arcs.over_parts import expansions
+from enumsol.trusted.status_rows import OPEN
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.trusted.arcs.over_parts import Expansion
+    from enumsol.trusted.arcs.selection_balls import ArcSelection
+
+    Array = NDArray[np.float64]
+    Span = tuple[ArcSelection, float, float]
+
+#: How often an interval of alpha is halved, and how many parts are expanded together.
+_HALVINGS, _TOGETHER = 8, 8
+
+
+@dataclass(frozen=True, eq=False)
+class PieceNumbers:
+    """The numbers of the form of theory, (6.9), for all alpha of a piece.
+
+    Attributes
+    ----------
+    mu, kappa, nu : (p,) arrays
+        mu and kappa positive; kappa and nu are read at nodes with friction only.
+    """
+
+    mu: Array
+    kappa: Array
+    nu: Array
+
+    @property
+    def usable(self) -> bool:
+        """Whether they are numbers, and positive where they must be."""
+        finite = all(np.all(np.isfinite(part)) for part in (self.mu, self.kappa, self.nu))
+        return bool(finite and np.all(self.mu > 0) and np.all(self.kappa > 0))
+
+
+def only_roots(asked: Sequence[Span], numbers: PieceNumbers, errors: float = 1.0, margin: float = 0.0) -> list[bool]:
+    """Of every selection whether there is no other solution at any alpha at which it has a root.
+
+    Parameters
+    ----------
+    asked : sequence of (selection, low, high)
+        Each over its own interval of alpha; beyond it nothing is said.
+    numbers : PieceNumbers
+        In the units of the selections.
+    errors : bounds of the errors of the arcs are multiplied by this
+    margin : the smallest eigenvalue must be larger than this, relative to the largest entry
+        A search asks for more than its checker, which may round otherwise.
+    """
+    found, waiting = [True] * len(asked), [(k, span, _HALVINGS) for k, span in enumerate(asked)]
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        while waiting:
+            # the shortest first: where no shorter one will do, that is seen without all the others
+            waiting.sort(key=lambda part: -part[2])
+            taken, waiting = waiting[-_TOGETHER:], waiting[:-_TOGETHER]
+            known = expansions([span for _, span, _ in taken], errors)
+            for expansion, (k, span, halvings) in zip(known, taken, strict=True):
+                along = None if expansion is None else _Along(expansion, numbers)
+                if not found[k] or (along is not None and along.alone(margin)):
+                    continue
+                selection, low, high = span
+                middle = 0.5 * (low + high)
+                if not halvings or not low < middle < high or (along is not None and along.hopeless):
+                    found[k] = False
+                    continue
+                waiting += [(k, (selection, *part), halvings - 1) for part in ((low, middle), (middle, high))]
+            waiting = [part for part in waiting if found[part[0]]]
+    return found
+
+
+class _Along:
+    """A selection's solution over an interval, t > 0 times its forces and displacements, as polynomials in tau.
+
+    A polynomial is a ball of coefficients, a row each; the bound of its error is a radius of the constant one.
+    """
+
+    def __init__(self, expansion: Expansion, numbers: PieceNumbers) -> None:
+        self._rows, self._system = expansion.selection.rows, expansion.selection.system
+        self._series, self._numbers = expansion.series, numbers
+        self._ends = expansion.tau(expansion.low, expansion.high)
+        system, series = self._system, self._series
+        self._rubbing = (system.F0 != 0) | (system.F1 != 0)
+        coefficients, radii = series.coefficients.copy(), np.zeros_like(series.coefficients)
+        radii[:, 0] = series.error
+        low, high = _between(Ball(coefficients[-1:], radii[-1:]), self._ends)
+        self.sign = int(low[0] > 0) - int(high[0] < 0)
+        z = Ball(self.sign * coefficients, radii)
+        moving, closed, stick = len(self._rows.moving), len(self._rows.closed), len(self._rows.stick)
+        self._t, self._apart = z[-1:], z[: moving - len(self._rows.slip)]
+        self._normal = z[moving : moving + closed]
+        plus, minus = z[moving + closed : moving + closed + stick], z[moving + closed + stick : -1]
+        self._stuck = (minus - plus) * Ball.exact(np.full((1, 1), 0.5))
+        #: No shorter interval will do.
+        self.hopeless = False
+
+    def alone(self, margin: float) -> bool:
+        """Whether the form is definite at every alpha, with theta that serves the solution there."""
+        numbers, p = self._numbers, self._system.p
+        if not self.sign:
+            return False
+        friction = [self._affine(self._system.F0, self._system.F1, tau) for tau in self._ends]
+        size = np.maximum(friction[0].size, friction[1].size)
+        if np.any(np.abs(numbers.nu) * size * SAFE + TINY > numbers.mu):
+            return False
+        slopes = self._slopes(friction, size)
+        if slopes is None:
+            return False
+        kept = np.concatenate([np.arange(p), p + np.flatnonzero(self._rubbing)])
+        forms, taken = [self._form(theta)[np.ix_(kept, kept)] for theta in slopes[:2]], self._taken(slopes[2])
+        self.hopeless = not all(_definite(form, margin) for form in forms)
+        return not self.hopeless and all(_definite(form - taken[np.ix_(kept, kept)], margin) for form in forms)
+
+    def _affine(self, constant: Array, slope: Array, tau: float) -> Ball:
+        """constant + alpha slope at the alpha of a tau."""
+        middle, turn = self._linear(constant, slope)
+        return middle + turn * Ball.exact(np.full(1, tau))
+
+    def _slopes(self, friction: Sequence[Ball], size: Array) -> tuple[Ball, Ball, Array] | None:
+        """theta of all nodes at both ends, affine between them, and by how much it may be off there.
+
+        None where no theta is known that serves the solution.
+        """
+        rows, p = self._rows, self._system.p
+        first, last = (Ball(np.zeros(p), np.zeros(p)) for _ in friction)
+        ends = first, last
+        for theta, F in zip(ends, friction, strict=True):
+            theta.mid[rows.slip], theta.rad[rows.slip] = rows.slip_signs * F.mid[rows.slip], F.rad[rows.slip]
+        off = np.zeros(p)
+        if len(rows.stick):
+            loaded = self._normal[rows.stick_columns]
+            values = [_values(self._stuck.mid, tau) / _values(loaded.mid, tau) for tau in self._ends]
+            turn = (values[1] - values[0]) / (self._ends[1] - self._ends[0])
+            start = values[0] - turn * self._ends[0]
+            for theta, tau in zip(ends, self._ends, strict=True):
+                theta.mid[rows.stick] = start + turn * tau
+                theta.rad[rows.stick] = 4 * UNIT * (np.abs(start) + np.abs(turn)) + TINY
+            # |lambda_t / lambda_n - theta| = |lambda_t - theta lambda_n| / lambda_n
+            apart = _longer(self._stuck) - _turned(Ball.exact(start), Ball.exact(turn), loaded)
+            low, high = _between(apart, self._ends)
+            least = _between(loaded, self._ends)[0]
+            if not np.all(least > 0):
+                return None
+            off[rows.stick] = np.maximum(-low, high) / least * SAFE + TINY
+        opened = np.flatnonzero((np.array(rows.codes) == OPEN) & self._rubbing)
+        if len(opened):
+            sides = self._sides(opened, size)
+            if sides is None:
+                return None
+            for theta, F in zip(ends, friction, strict=True):
+                theta.mid[opened], theta.rad[opened] = sides * F.mid[opened], np.abs(sides) * F.rad[opened]
+        return (first, last, off) if np.all(np.isfinite(off)) else None
+
+    def _sides(self, opened: NDArray[np.intp], size: Array) -> Array | None:
+        """theta / F of open nodes, 0 where the gap allows that, else the sign of w_t; None where neither is proven."""
+        numbers = self._numbers
+        low, high = _between(self._slips(opened), self._ends)
+        place = {i: k for k, i in enumerate(i for i, code in enumerate(self._rows.codes) if code == OPEN)}
+        gap = _between(self._apart, self._ends)[0][[place[int(i)] for i in opened]]
+        room = (numbers.mu[opened] - np.abs(numbers.nu[opened]) * size[opened] * SAFE) / SAFE
+        slip = np.maximum(np.abs(low), np.abs(high)) * numbers.kappa[opened] * size[opened] * SAFE + TINY
+        still = (gap > 0) & (room > 0) & (room * gap / SAFE - TINY > slip)
+        sides = np.where(low > 0, 1.0, np.where(high < 0, -1.0, np.nan))
+        sides = np.where(still, 0.0, sides)
+        return sides if np.all(np.isfinite(sides)) else None
+
+    def _slips(self, nodes: NDArray[np.intp]) -> Ball:
+        """t w_t of some nodes: t g - S (t lambda)."""
+        system, rows, p, series = self._system, self._rows, self._system.p, self._series
+        length = self._t.mid.shape[1] + 1
+        force = Ball(np.zeros((2 * p, length)), np.zeros((2 * p, length)))
+        slipping = self._normal[rows.slip_columns]
+        bound = _turned(*self._linear(system.F0[rows.slip], system.F1[rows.slip]), slipping)
+        for places, part, signs in (
+            (rows.closed, _longer(self._normal), 1.0),
+            (p + rows.stick, _longer(self._stuck), 1.0),
+            (p + rows.slip, bound, rows.slip_signs[:, None]),
+        ):
+            force.mid[places], force.rad[places] = signs * part.mid, part.rad
+        g0, g1 = system.g0[p + nodes], system.g1[p + nodes]
+        middle, radius = (Ball.exact(np.full(1, value)) for value in (series.middle, series.radius))
+        t = Ball(np.repeat(self._t.mid, len(nodes), axis=0), np.repeat(self._t.rad, len(nodes), axis=0))
+        return _turned(g0 + g1 * middle, g1 * radius, t) - system.S[p + nodes] @ force
+
+    def _linear(self, constant: Array, slope: Array) -> tuple[Ball, Ball]:
+        """constant + alpha slope by powers of tau."""
+        middle, radius = (Ball.exact(np.full(1, value)) for value in (self._series.middle, self._series.radius))
+        return Ball.exact(constant) + Ball.exact(slope) * middle, Ball.exact(slope) * radius
+
+    def _form(self, theta: Ball) -> Ball:
+        """D'S, of which (6.9) is the symmetric part."""
+        S, p, numbers = self._system.S, self._system.p, self._numbers
+        along = S[:p] * Ball.exact(numbers.mu[:, None])
+        turned = (theta * Ball.exact(numbers.kappa))[:, None]
+        across = S[:p] * Ball.exact(numbers.nu[:, None]) + S[p:] * Ball.exact(numbers.kappa[:, None])
+        along = along - S[p:] * turned
+        return Ball(np.concatenate([along.mid, across.mid]), np.concatenate([along.rad, across.rad]))
+
+    def _taken(self, off: Array) -> Ball:
+        """What a theta that is off by so much takes from the form at most."""
+        S, p = self._system.S, self._system.p
+        nodes = np.flatnonzero(off > 0)
+        length = upper_norm(S[p + nodes].size, axis=1)
+        weight = self._numbers.kappa[nodes] * off[nodes] * SAFE
+        # weights at least kappa rho / |r|, for any rounding
+        T = S[p + nodes] * Ball.exact((np.sqrt(weight / length) * SAFE + TINY)[:, None])
+        square = Ball(T.mid.T, T.rad.T) @ T
+        taken = Ball(0.5 * square.mid, 0.5 * square.rad)
+        taken.mid[nodes, nodes] += 0.5 * weight * length * SAFE
+        taken.rad[nodes, nodes] += 4 * UNIT * taken.mid[nodes, nodes]
+        return taken
+
+
+def _definite(form: Ball, margin: float) -> bool:
+    """Whether the symmetric parts of all matrices in a ball are positive definite."""
+    mid = 0.5 * (form.mid + form.mid.T)
+    # the symmetric part of the form lies in the mean of both triangles
+    rad = (np.maximum(form.rad, form.rad.T) + 4 * UNIT * np.abs(mid)) * SAFE
+    if not (np.all(np.isfinite(mid)) and np.all(np.isfinite(rad))):
+        return False
+    k, largest = gamma(len(mid) + 2), float(np.max(np.abs(np.diagonal(mid)), initial=0.0))
+    # a Cholesky factorization that runs to its end proves M >= -gamma trace (Rump 2006)
+    slack = k / (1 - k) * float(np.trace(np.abs(mid))) + float(upper_norm(rad)) + margin * largest
+    shift = (slack + 8 * UNIT * largest) * (1.0 + 8 * UNIT) * SAFE + TINY
+    try:
+        np.linalg.cholesky(mid - shift * np.eye(len(mid)))
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def _between(polynomials: Ball, ends: tuple[float, float]) -> tuple[Array, Array]:
+    """Bounds of polynomials over a part of [-1, 1]."""
+    low, high = (np.array([end]) for end in ends)
+    values = bernstein_values(polynomials.mid[None], low, high)[0]
+    k = gamma(8 * values.shape[1])
+    error = upper_sum(polynomials.rad + k * np.abs(polynomials.mid), axis=1)
+    least, largest = np.min(values, axis=1), np.max(values, axis=1)
+    return least - error - 2 * UNIT * (np.abs(least) + error), largest + error + 2 * UNIT * (np.abs(largest) + error)
+
+
+def _values(coefficients: Array, tau: float) -> Array:
+    """Polynomials at one tau; no claim rests on them."""
+    return np.asarray(coefficients @ tau ** np.arange(coefficients.shape[1]))
+
+
+def _longer(polynomials: Ball) -> Ball:
+    """The same with one coefficient more."""
+    none = np.zeros((len(polynomials.mid), 1))
+    return Ball(np.hstack([polynomials.mid, none]), np.hstack([polynomials.rad, none]))
+
+
+def _turned(constant: Ball, slope: Ball, polynomials: Ball) -> Ball:
+    """Polynomials times constant + tau slope, one factor each."""
+    longer = _longer(polynomials)
+    shifted = Ball(np.roll(longer.mid, 1, axis=1), np.roll(longer.rad, 1, axis=1))
+    return longer * constant[:, None] + shifted * slope[:, None]

@@ -1,0 +1,415 @@
+"""Selections over short intervals of alpha in balls of many digits (theory, section 7.14).
+
+Where several conditions vanish within the rounding of double arithmetic, S and g are computed from the problem's own
+data in balls of many_digits.PRECISION bits, and the events are told apart there. Over a short interval the unknowns and
+their slopes are enclosed at once; conditions whose slopes have one sign are known from their values at both ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from flint import arb, arb_mat
+
+from enumsol.trusted.arcs.many_digits import (
+    ball_of,
+    column,
+    fraction_of,
+    matrix,
+    precision,
+    rounded,
+    sign_of,
+    signs_of,
+    taylor_around,
+)
+from enumsol.trusted.arcs.over_parts import OverInterval
+from enumsol.trusted.selection import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, SelectionRows
+from enumsol.trusted.status_rows import SLIP_PLUS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.model.problem import ContactProblem
+
+    Signs = NDArray[np.int8]
+    Number = float | Fraction
+
+#: Zeros are enclosed to 2^-_ZERO_BITS relative to the interval, and closer ones are one.
+_ZERO_BITS = 200
+#: Steps of Newton's method from the middle of an interval, enlargements of a zero's bounds.
+_STEPS, _WIDENINGS = 8, 6
+#: Intervals shorter than this share of alpha are narrow beside the distances at which conditions bend.
+_NEAR = Fraction(1, 2**30)
+#: Zeros are farther apart (tau), or the rounding of floats hides it.
+_LEAST_SPLIT = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class PreciseSystem:
+    """The condensed problem over alpha in balls of many digits: w = g0 + alpha g1 - S lambda.
+
+    Attributes
+    ----------
+    S : arb_mat, 2p x 2p
+    g0, g1 : lists of 2p arb
+    F0, F1 : lists of p arb
+    """
+
+    S: Any
+    g0: list[Any]
+    g1: list[Any]
+    F0: list[Any]
+    F1: list[Any]
+
+    @classmethod
+    def of(cls, problem: ContactProblem) -> PreciseSystem | None:
+        """Condensed from the problem's own data; None where A is singular within so many digits.
+
+        A is inverted as a dense matrix: some 0.02 s for 80 degrees of freedom, and 0.3 s for 250.
+        """
+        with precision():
+            rows = problem.contact_rows.toarray()
+            slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
+            right = np.column_stack([rows.T, problem.f, slope])
+            try:
+                X = arb_mat(problem.A.toarray().tolist()).solve(arb_mat(right.tolist()))
+            except ZeroDivisionError:
+                return None
+            product = arb_mat(rows.tolist()) * X
+            size = len(rows)
+            offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")]).tolist()
+            S = arb_mat(size, size, [product[i, j] for i in range(size) for j in range(size)])
+            g0 = [product[i, size] - arb(offset[i]) for i in range(size)]
+            g1 = [product[i, size + 1] for i in range(size)]
+            F0, F1 = ([arb(float(x)) for x in part] for part in problem.friction)
+            return cls(S, g0, g1, F0, F1)
+
+    @cached_property
+    def rows(self) -> list[list[Any]]:
+        """S by its rows."""
+        return [[self.S[i, j] for j in range(self.S.ncols())] for i in range(self.S.nrows())]
+
+    def constant_load(self, side: float) -> PreciseSystem:
+        """For the constant load g1 or -g1 (see trusted.over_interval)."""
+        return PreciseSystem(self.S, [arb(side) * x for x in self.g1], [arb(0)] * len(self.g1), self.F0, self.F1)
+
+
+class PreciseSelection:
+    """One selection as a function of alpha.
+
+    Parameters
+    ----------
+    system : PreciseSystem
+    codes : p status codes, complete
+
+    Attributes
+    ----------
+    rows : SelectionRows
+    """
+
+    def __init__(self, system: PreciseSystem, codes: Sequence[int]) -> None:
+        self.system = system
+        self.rows = rows = SelectionRows(codes)
+        self._signs: dict[Fraction, Signs | None] = {}
+        with precision():
+            p = len(rows.codes)
+            constant, slope = self._columns()
+            unknown = rows.unknown.tolist()
+            self._M = tuple(matrix([part[r] for r in unknown]) for part in (constant, slope))
+            self._g = tuple(column([part[r] for r in unknown]) for part in (system.g0, system.g1))
+            # conditions c0 + a c1 + (C0 + a C1) y
+            place = {i: j for j, i in enumerate(rows.closed.tolist())}
+            stuck = {i: len(place) + j for j, i in enumerate(rows.stick.tolist())}
+            parts: tuple[list[Any], ...] = ([], [], [], [])
+            for node, kind in rows.conditions:
+                row0, row1, at0, at1 = [arb(0)] * len(unknown), [arb(0)] * len(unknown), arb(0), arb(0)
+                if kind == NORMAL_FORCE:
+                    row0[place[node]] = arb(1)
+                elif kind in (CONE_PLUS, CONE_MINUS):
+                    row0[place[node]], row1[place[node]] = system.F0[node], system.F1[node]
+                    row0[stuck[node]] = arb(-1 if kind == CONE_PLUS else 1)
+                else:
+                    r = node if kind == PENETRATION else p + node
+                    sign = arb(1 if kind != PENETRATION and rows.codes[node] == SLIP_PLUS else -1)
+                    row0, row1 = ([-sign * x for x in part[r]] for part in (constant, slope))
+                    at0, at1 = sign * system.g0[r], sign * system.g1[r]
+                for part, value in zip(parts, (row0, row1, at0, at1), strict=True):
+                    part.append(value)
+            self._C, self._c = (matrix(parts[0]), matrix(parts[1])), (column(parts[2]), column(parts[3]))
+
+    def _columns(self) -> tuple[dict[int, list[Any]], dict[int, list[Any]]]:
+        """The rows of S dlambda/dy that count: the constant part, and what alpha is multiplied by."""
+        system, rows, p = self.system, self.rows, len(self.rows.codes)
+        closed, stick, zero = rows.closed.tolist(), rows.stick.tolist(), arb(0)
+        slipping = [
+            (j, p + i, arb(sign) * system.F0[i], arb(sign) * system.F1[i])
+            for j, i, sign in zip(rows.slip_columns.tolist(), rows.slip.tolist(), rows.slip_signs.tolist(), strict=True)
+        ]
+        constant, slope = {}, {}
+        for r in {*rows.unknown.tolist(), *rows.moving.tolist()}:
+            whole = system.rows[r]
+            row0, row1 = [whole[i] for i in closed], [zero] * len(closed)
+            for j, i, F0, F1 in slipping:
+                row0[j] += F0 * whole[i]
+                row1[j] = F1 * whole[i]
+            constant[r] = row0 + [whole[p + i] for i in stick]
+            slope[r] = row1 + [zero] * len(stick)
+        return constant, slope
+
+    @cached_property
+    def _lines(self) -> tuple[Any, Any] | None:
+        """Conditions c0 + a c1, where neither M nor what they are made of depends on alpha; else None."""
+        rows, F1 = self.rows, self.system.F1
+        if any(F1[i] != 0 for i in (*rows.slip.tolist(), *rows.stick.tolist())):
+            return None
+        if not len(rows.unknown):
+            return self._c
+        try:
+            y0, y1 = (self._M[0].solve(g) for g in self._g)
+        except ZeroDivisionError:
+            return None
+        return self._c[0] + self._C[0] * y0, self._c[1] + self._C[0] * y1
+
+    @cached_property
+    def _constant_index(self) -> int:
+        """Sign of det M where M does not depend on alpha."""
+        return sign_of(self._M[0].det()) if self._M[0].nrows() else 1
+
+    def solve(self, a: Any, algorithm: str | None = None) -> tuple[Any, Any] | None:
+        """Unknowns for every alpha in a ball, and the matrix; None where that is not proven regular."""
+        M = self._M[0] + self._M[1] * a
+        if not M.nrows():
+            return arb_mat(0, 1), M
+        try:
+            return M.solve(self._g[0] + self._g[1] * a, algorithm=algorithm), M
+        except ZeroDivisionError:
+            return None
+
+    def slope(self, a: Any, y: Any, M: Any) -> Any:
+        """Slopes of the conditions; no claim rests on them."""
+        held = self._c[1] + self._C[1] * y
+        if not M.nrows():
+            return held
+        rise = M.solve(self._g[1] - self._M[1] * y, algorithm="approx")
+        return held + (self._C[0] + self._C[1] * a) * rise
+
+    def values(self, a: Any, y: Any) -> Any:
+        """Values of the conditions."""
+        return self._c[0] + self._c[1] * a + (self._C[0] + self._C[1] * a) * y
+
+    def signs_at(self, alpha: Fraction) -> Signs | None:
+        """1 or -1 where a condition is positive or negative at an alpha, else 0; None where it is not regular."""
+        if alpha not in self._signs:
+            with precision():
+                a = ball_of(alpha)
+                if self._lines is not None:
+                    self._signs[alpha] = signs_of(self._lines[0] + self._lines[1] * a)
+                else:
+                    # the faster way gives wider balls
+                    signs = self._signs_by(a, "lu")
+                    self._signs[alpha] = self._signs_by(a, None) if signs is None or not np.all(signs) else signs
+        return self._signs[alpha]
+
+    def _signs_by(self, a: Any, algorithm: str | None) -> Signs | None:
+        solved = self.solve(a, algorithm)
+        return None if solved is None else signs_of(self.values(a, solved[0]))
+
+    def expansion(self, low: Number, high: Number) -> PreciseExpansion | None:
+        """The conditions over [low, high]; None where the interval is too long."""
+        first, last = Fraction(low), Fraction(high)
+        with precision():
+            middle, radius = ball_of((first + last) / 2), ball_of((last - first) / 2)
+            if self._lines is not None:
+                constant, slope = self._lines
+                values = constant + slope * ball_of(first).union(ball_of(last))
+                near = constant + slope * middle
+                return PreciseExpansion(self, first, last, values, slope * radius, self._constant_index, near)
+            return self._expansion(first, last, middle, radius)
+
+    def _expansion(self, first: Fraction, last: Fraction, middle: Any, radius: Any) -> PreciseExpansion | None:
+        """The conditions by the powers of tau, with what is left of the unknowns (theory, (7.17))."""
+        M, M1 = self._M[0] + self._M[1] * middle, self._M[1] * radius
+        C, C1 = self._C[0] + self._C[1] * middle, self._C[1] * radius
+        if not M.nrows():
+            near, steep = self._c[0] + self._c[1] * middle, self._c[1] * radius
+            return PreciseExpansion(self, first, last, near + steep * arb(0, 1), steep, 1, near)
+        g = [[self._g[0][i, 0] + self._g[1][i, 0] * middle, self._g[1][i, 0] * radius] for i in range(M.nrows())]
+        try:
+            X = M.solve(matrix([[*g[i], *(M1[i, j] for j in range(M.ncols()))] for i in range(M.nrows())]))
+        except ZeroDivisionError:
+            return None
+        P = matrix([[X[i, j + 2] for j in range(M.ncols())] for i in range(M.nrows())])
+        y = column([X[i, 0] for i in range(M.nrows())])
+        rise = column([X[i, 1] for i in range(M.nrows())]) - P * y
+        found = taylor_around(rise, P)
+        if found is None:
+            return None
+        bend, left, left_slope = found
+        near = self.values(middle, y)
+        steep = (self._c[1] + self._C[1] * y) * radius + C * rise
+        curved, cubic = C1 * rise - C * bend, C1 * bend
+        # C + tau C1 and powers of tau, for |tau| <= 1
+        unit = arb(0, 1)
+        turned = C + C1 * unit
+        values = near + steep * unit + curved * arb(0.5, 0.5) - cubic * unit + turned * left
+        slopes = steep + curved * (2 * unit) - cubic * arb(1.5, 1.5) + C1 * left + turned * left_slope
+        return PreciseExpansion(self, first, last, values, slopes, sign_of(M.det()), near)
+
+    def newton(
+        self, condition: int, low: Fraction, high: Fraction, width: Fraction, steps: int = _STEPS
+    ) -> Fraction | None:
+        """Where a condition seems to vanish between two alphas, to a part of ``width``; no claim rests on it."""
+        with precision():
+            alpha, unit = (low + high) / 2, width / 2**8
+            if self._lines is not None:
+                constant, slope = (part[condition, 0].mid() for part in self._lines)
+                return None if slope == 0 else rounded(fraction_of((-constant / slope).mid()), low, high, unit)
+            for _ in range(steps):
+                a = ball_of(alpha)
+                solved = self.solve(a, "approx")
+                if solved is None:
+                    return None
+                y, M = solved
+                rise = self.slope(a, y, M)[condition, 0].mid()
+                if not rise.is_finite() or rise == 0:
+                    return None
+                step = fraction_of((self.values(a, y)[condition, 0] / rise).mid())
+                alpha = rounded(alpha - step, low, high, unit)
+                # the next step is about the square of this one
+                if step * step <= unit * (high - low):
+                    break
+            return alpha
+
+    def enclosed(
+        self, condition: int, low: Fraction, high: Fraction, width: Fraction | None = None
+    ) -> tuple[Fraction, Fraction] | None:
+        """Bounds of the only zero of a condition between two alphas: its signs there are proven to be opposite.
+
+        They are about ``width`` apart, by default as close as zeros are told apart.
+        """
+        width = Fraction(1, 2**_ZERO_BITS) * (high - low) if width is None else width
+        # bounds that are narrow already are so near that one step is enough
+        near = high - low <= _NEAR * max(abs(low), abs(high))
+        for steps, widenings in ((1, 1), (_STEPS, _WIDENINGS)) if near else ((_STEPS, _WIDENINGS),):
+            alpha = self.newton(condition, low, high, width, steps)
+            if alpha is None:
+                return None
+            reach = width
+            for _ in range(widenings):
+                ends = max(alpha - reach, low), min(alpha + reach, high)
+                signs = [self.signs_at(end) for end in ends]
+                if all(found is not None for found in signs) and _opposite(signs, condition):
+                    return ends
+                reach *= 2**20
+        return None
+
+    def forces(self, alpha: Fraction) -> tuple[list[Any], list[Any]] | None:
+        """lambda and w as 2p arb each."""
+        system, rows = self.system, self.rows
+        p = len(rows.codes)
+        with precision():
+            a = ball_of(alpha)
+            solved = self.solve(a)
+            if solved is None:
+                return None
+            y = [solved[0][k, 0] for k in range(solved[0].nrows())]
+            forces = [arb(0)] * (2 * p)
+            for row, value in zip(rows.unknown.tolist(), y, strict=True):
+                forces[row] = value
+            for i, sign in zip(rows.slip.tolist(), rows.slip_signs.tolist(), strict=True):
+                forces[p + i] = arb(sign) * (system.F0[i] + a * system.F1[i]) * forces[i]
+            moved = system.S * column(forces)
+            w = [system.g0[r] + a * system.g1[r] - moved[r, 0] for r in range(2 * p)]
+            return forces, w
+
+
+class PreciseExpansion:
+    """Conditions of a selection over a short interval, like ``arcs.Expansion``; it is regular there.
+
+    Attributes
+    ----------
+    low, high : Fraction
+    apart : Fraction
+        Zeros closer than this are not told apart.
+    rough, final : bool
+        A shorter interval gives neither smaller errors, nor does it tell more zeros apart.
+    """
+
+    rough, final = False, True
+
+    def __init__(
+        self,
+        selection: PreciseSelection,
+        low: Fraction,
+        high: Fraction,
+        values: Any,
+        slopes: Any,
+        index: int,
+        near: Any,
+    ) -> None:
+        self.low, self.high = low, high
+        self.apart = (high - low) * Fraction(4, 2**_ZERO_BITS)
+        self._selection, self._index = selection, index
+        self._whole, self._rises = signs_of(values), signs_of(slopes)
+        self._small = [bool(abs(values[k, 0]) < arb(2) ** -_ZERO_BITS) for k in range(values.nrows())]
+        # about where conditions vanish, by tau in [-1, 1]
+        self._crossings = [
+            -float((near[k, 0] / slopes[k, 0]).mid()) if self._rises[k] else np.nan for k in range(values.nrows())
+        ]
+
+    def split(self) -> Fraction | None:
+        """An alpha below which one condition seems to be negative, and above which another; None where there is none.
+
+        No claim rests on it.
+        """
+        rising = [tau for tau, rise in zip(self._crossings, self._rises, strict=True) if rise > 0]
+        falling = [tau for tau, rise in zip(self._crossings, self._rises, strict=True) if rise < 0]
+        if not rising or not falling or max(rising) - min(falling) < _LEAST_SPLIT:
+            return None
+        tau = 0.5 * (max(rising) + min(falling))
+        return self.low + Fraction(1 + tau) * (self.high - self.low) / 2 if abs(tau) < 1.0 else None
+
+    def over(self, low: Number, high: Number) -> OverInterval:
+        """What is known over a part of the interval."""
+        signs, unknown = self._whole.copy(), np.zeros_like(self._whole)
+        found = [self._selection.signs_at(Fraction(alpha)) for alpha in (low, high)]
+        ends = tuple(unknown if end is None else end for end in found)
+        if found[0] is not None and found[1] is not None:
+            # without a change of the slope's sign, values lie between those at the ends
+            same = (signs == 0) & (ends[0] == ends[1]) & ((self._rises != 0) | (low == high))
+            signs[same] = ends[0][same]
+        none = bool(np.any(signs < 0))
+        return OverInterval(signs, bool(self._index), none, self._index, (ends[0], ends[1]), self._rises)
+
+    def near(self, condition: int, low: Number, high: Number) -> tuple[Number, Number]:
+        """As in arcs.Expansion; bounds are found at once, by ``zero_bounds``."""
+        del condition, high
+        return low, low
+
+    def zeros(self, condition: int) -> list[Fraction]:
+        """Alphas inside the interval at which a condition seems to vanish; no claim rests on them."""
+        if condition >= len(self._rises) or not self._rises[condition]:
+            return []
+        width = (self.high - self.low) / 2**_ZERO_BITS
+        found = self._selection.newton(condition, self.low, self.high, width)
+        return [] if found is None or not self.low < found < self.high else [found]
+
+    def flat(self, condition: int) -> bool:
+        """Whether a condition cannot be told from zero."""
+        return self._small[condition] if condition < len(self._small) else False
+
+    def zero_bounds(self, condition: int, slope: int, low: Number, high: Number) -> tuple[Fraction, Fraction]:
+        """Bounds of the only zero of a condition in a part, at whose ends it has opposite signs."""
+        del slope
+        part = Fraction(low), Fraction(high)
+        return self._selection.enclosed(condition, *part) or part
+
+
+def _opposite(signs: Sequence[Any], condition: int) -> bool:
+    return int(signs[0][condition]) * int(signs[1][condition]) < 0

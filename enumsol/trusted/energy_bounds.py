@@ -1,0 +1,180 @@
+"""The trusted bounds of a convex quadratic form from given multipliers, in floats (theory, sections 6.2 and 6.12).
+
+Rows of a partial assignment, each times its multiplier, add up to y on S lambda - g and to c on lambda. What the
+multipliers prove holds for every S, g and F in the balls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma
+from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE, ROW_KINDS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.arithmetic.balls import Array
+    from enumsol.condensation.enclosure import EnclosedSystem
+
+#: Steps of refinement; forms may be hardly convex.
+_REFINEMENTS = 3
+
+
+def margins(
+    ends: Sequence[Any],
+    allowed: NDArray[np.int8],
+    friction: tuple[Array, Array],
+    leaf: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    values: Array,
+    errors: float,
+    bounds_of: Callable[[Any, Array, Array, Array, float], Array] | None = None,
+) -> Array:
+    """Bounds as of exclusion_margins that hold at all ``ends``, -inf where one is not finite.
+
+    Parameters
+    ----------
+    ends : EnclosedSystems that differ in g only, and in F, which enters by its bounds; or an EnclosedForm
+    allowed : (m, p, kinds) array, what the multipliers may be: seven kinds of rows, or nine over an interval
+    friction : two (p,) arrays, the smallest and the largest coefficients; equal where friction is constant
+    bounds_of : what bounds one of ``ends``, by default energy_bounds
+    """
+    m, p, kinds = allowed.shape
+    low, high = friction
+    bad = (rows < 0) | (rows >= kinds * p) | ~np.isfinite(values)
+    rows, values = np.where(bad, 0, rows), np.where(bad, 0.0, values)
+    kind, node = np.divmod(rows, p)
+    signs = allowed[leaf, node, kind]
+    bad |= (signs == FORBIDDEN) | ((signs == NONNEGATIVE) & (values < 0))
+    refused = np.bincount(leaf[bad], minlength=m) > 0
+    # one table a leaf with a row for each kind; several multipliers of a row add up
+    place, count = leaf * (kinds * p) + rows, kinds * p * m
+    table = np.bincount(place, values, minlength=count).reshape(m, kinds, p)
+    size = np.bincount(place, np.abs(values), minlength=count).reshape(m, kinds, p)
+    # what overflows gives no bound
+    with np.errstate(over="ignore", invalid="ignore"):
+        cone_size = size[:, 2] + size[:, 3]
+        y = np.hstack([table[:, 4], table[:, 6] - table[:, 5]])
+        normal, tangential = table[:, 0] + high * (table[:, 2] + table[:, 3]), table[:, 1] - table[:, 2] + table[:, 3]
+        normal_size, tangential_size = size[:, 0] + high * cone_size, size[:, 1] + cone_size
+        if kinds > ROW_KINDS:
+            normal, tangential = normal - low * (table[:, 7] + table[:, 8]), tangential + table[:, 7] - table[:, 8]
+            least_size = size[:, 7] + size[:, 8]
+            normal_size, tangential_size = normal_size + low * least_size, tangential_size + least_size
+        c, c_size = np.hstack([normal, tangential]), np.hstack([normal_size, tangential_size])
+        # The rounded y is as good a choice of multipliers as the exact one: every component belongs to rows of one
+        # sign, or to rows that are free, and sums of one sign keep it. c is not free in this way: cone rows tie its two
+        # halves by F. A component of c is a sum over at most five kinds of rows, four at one alpha, each repeated at
+        # most so often.
+        repeated = int(np.bincount(place, minlength=1).max())
+        c_rad = gamma((5 if kinds > ROW_KINDS else 4) * repeated + 8) * c_size
+        # where friction is constant a cone row may be an equation, and its coefficient must be the exact one
+        c_rad[:, :p] += np.max([end.F_rad for end in ends], axis=0) * (low == high) * cone_size
+        bounds_of = bounds_of or energy_bounds
+        bounds = np.min([bounds_of(end, y, c, c_rad * SAFE, errors) for end in ends], axis=0)
+    return np.where(refused | ~np.isfinite(bounds), -np.inf, bounds)
+
+
+def energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array, errors: float = 1.0) -> Array:
+    """Lower bounds on the energy for multipliers y (m, 2p) on S lambda - g and c, a ball, on lambda.
+
+    By theory, (6.2); where that proves nothing, by (6.1), which loses less to large multipliers: with v = g + c + S y
+    and any x, e >= y'g - (2 x'v - x'S x + r'S^{-1}r) / 4, r = v - S x.
+
+    ``errors`` is how often the error bound is subtracted: once proves the bound. A writer of proofs subtracts it twice,
+    so that a checker, which sums in another order, finds a positive bound too.
+    """
+    bounds = _energy_bounds(system, y, c, c_rad, errors)
+    short = np.flatnonzero(~(bounds > 0))
+    if len(short):
+        second = form_bounds(EnergyForm.of(system), y[short], c[short], c_rad[short], errors)
+        bounds[short] = np.fmax(bounds[short], second)
+    return bounds
+
+
+def _energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array, errors: float) -> Array:
+    """The same by theory, (6.2) and (6.3)."""
+    S, g = system.S, system.g
+    # every inner product of up to 2p terms below is off by at most k times that of the absolute values
+    k = gamma(4 * len(g) + 16)
+    q = g + c
+    q_abs, y_abs = np.abs(q), np.abs(y)
+    q_rad = (system.g_rad + c_rad + 2 * UNIT * q_abs) * SAFE
+    # Any x is a choice; a good one needs S x near q, which a computed inverse gives from the left, not its transpose.
+    # The step of refinement makes a checker's bound better than that of the search, which does without.
+    x = q @ system.inverse.T
+    x += (q - x @ S) @ system.inverse.T
+    Sx, Sy = x @ S, y @ S
+    first, cross = dots(y, g - c), dots(x, q)
+    y_form, x_form = dots(y, Sy), dots(x, Sx)
+    first_error = dots(y_abs, k * (np.abs(g) + np.abs(c)) + system.g_rad + c_rad)
+    cross_error = dots(np.abs(x), k * q_abs + q_rad)
+    y_square, x_square, rest = dots(y, y), dots(x, x), q - Sx
+    rest_norm = np.sqrt(dots(rest, rest)) + np.sqrt(dots(q_rad, q_rad)) + k * np.sqrt(dots(q, q))
+    rest_norm = (rest_norm + system.form_error * np.sqrt(x_square) + ROOT_TINY) * (1 + k) * SAFE
+    tail = rest_norm * rest_norm / system.smallest_eigenvalue
+    total = 0.5 * first - 0.25 * y_form - 0.5 * cross + 0.25 * x_form
+    error = 0.5 * (first_error + cross_error) + 0.25 * (system.form_error * (y_square + x_square) + tail)
+    error += 8 * UNIT * (np.abs(first) + np.abs(y_form) + np.abs(cross) + np.abs(x_form))
+    return np.asarray(total - errors * error * (1 + k) * SAFE * SAFE - TINY)
+
+
+@dataclass(frozen=True)
+class EnergyForm:
+    """The energy with the fields of an EnclosedForm: H = S, h = g, k = 0."""
+
+    system: EnclosedSystem
+    H: Array
+    h: Array
+    h_rad: Array
+    inverse: Array
+    form_error: float
+    smallest_eigenvalue: float
+    k: float = 0.0
+    k_rad: float = 0.0
+
+    @classmethod
+    def of(cls, system: EnclosedSystem) -> EnergyForm:
+        """That of an enclosed problem."""
+        own = system.inverse, system.form_error, system.smallest_eigenvalue
+        return cls(system, system.S, system.g, system.g_rad, *own)
+
+
+def form_bounds(form: Any, y: Array, c: Array, c_rad: Array, errors: float) -> Array:
+    """Lower bounds on q for multipliers y (m, 2p) on S lambda - g and c, a ball, on lambda; as energy_bounds.
+
+    ``form`` is an EnclosedForm, or what else has its fields.
+    """
+    S, S_rad, g, g_rad = form.system.S, form.system.S_rad, form.system.g, form.system.g_rad
+    k = gamma(4 * len(g) + 16)
+    y_abs = np.abs(y)
+    v = form.h + c + y @ S
+    size = np.abs(form.h) + np.abs(c) + y_abs @ np.abs(S)
+    v_rad = (form.h_rad + c_rad + y_abs @ S_rad + k * size) * (1 + k) * SAFE
+    x = v @ form.inverse.T
+    # until the rest is that of rounding, which its bound covers: a checker, which adds up in another order, then finds
+    # nearly the same
+    for _ in range(_REFINEMENTS):
+        x += (v - x @ form.H) @ form.inverse.T
+    Hx = x @ form.H
+    x_abs, rest = np.abs(x), v - Hx
+    x_square, cross, x_form, first = dots(x, x), dots(x, v), dots(x, Hx), y @ g
+    rest_norm = np.sqrt(dots(rest, rest)) + np.sqrt(dots(v_rad, v_rad)) + k * np.sqrt(dots(v, v))
+    rest_norm = (rest_norm + form.form_error * np.sqrt(x_square) + ROOT_TINY) * (1 + k) * SAFE
+    tail = rest_norm * rest_norm / form.smallest_eigenvalue
+    total = form.k + first - 0.5 * cross + 0.25 * x_form
+    error = form.k_rad + y_abs @ (g_rad + k * np.abs(g)) + 0.5 * dots(x_abs, v_rad + k * np.abs(v))
+    error += 0.25 * (form.form_error * x_square + tail)
+    error += 8 * UNIT * (abs(form.k) + np.abs(first) + np.abs(cross) + np.abs(x_form))
+    return np.asarray(total - errors * error * (1 + k) * SAFE * SAFE - TINY)
+
+
+def dots(a: Array, b: Array) -> Array:
+    """Inner products of the rows of two arrays."""
+    return np.asarray(np.einsum("ij,ij->i", a, b))

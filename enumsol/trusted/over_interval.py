@@ -1,0 +1,184 @@
+"""Exclusion inequalities over an interval of alpha (theory, section 7.9).
+
+With fixed multipliers the dual bound is concave in alpha: constraint normals are constant (friction enters by its
+extreme values) and right-hand sides affine. Positive at both ends, it is positive in between, and a partial assignment
+holds no solution anywhere in the interval.
+
+Rows 7 and 8 of node i, beyond those of ``enumsol.trusted.status_rows``: lambda_t - F_lo lambda_n and
+-lambda_t - F_lo lambda_n; rows 2 and 3 have F_hi in place of F.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE
+from enumsol.condensation.enclosure import CondensedEnclosure
+from enumsol.trusted.energy_bounds import form_bounds, margins
+from enumsol.trusted.quadratic_forms import EnclosedForm
+from enumsol.trusted.status_rows import BACKWARD, FORWARD, ROW_KINDS, STILL, UNDECIDED, row_table
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.arithmetic.balls import Array
+    from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.model.problem import ContactProblem
+
+KINDS = ROW_KINDS + 2
+#: Table of rows.row_table with kinds 7 and 8; then slip+ and slip- at a node whose friction varies.
+_CONSTANT = np.hstack([row_table(), np.zeros((len(row_table()), 2), dtype=np.int8)])
+_VARYING = _CONSTANT.copy()
+_VARYING[2] = [1, 0, 1, 1, 2, 1, 0, 1, 0]
+_VARYING[3] = [1, 0, 1, 1, 2, 0, 1, 0, 1]
+# no tree over an interval has these codes
+_VARYING[[FORWARD, BACKWARD]] = _VARYING[UNDECIDED]
+
+
+@dataclass(frozen=True)
+class EnclosedPiece:
+    """The condensed problem at both ends of a piece of the interval, in common units.
+
+    Attributes
+    ----------
+    ends : tuple of EnclosedSystem
+        At both ends; one where g does not vary.
+    low, high : (p,) arrays
+        Bounds of the friction coefficients over the piece; equal exactly where friction is constant.
+    """
+
+    ends: tuple[EnclosedSystem, ...]
+    low: Array
+    high: Array
+
+    @classmethod
+    def from_enclosure(
+        cls,
+        enclosure: CondensedEnclosure,
+        a: Fraction,
+        b: Fraction,
+        force: Array,
+        length: Array,
+        origin: Fraction | None,
+    ) -> EnclosedPiece:
+        """A piece [a, b]; with ``origin`` (the alpha at one of its ends where g vanishes) for the load +-g1.
+
+        Solutions at alpha are then alpha's distance from the origin times those of that constant load.
+        """
+        systems = [enclosure.at(alpha, force, length) for alpha in (a, b)]
+        constant = np.array(enclosure.problem.friction[1]) == 0
+        # a coefficient near the largest float has no upper bound, nor has any product with it
+        with np.errstate(over="ignore"):
+            low = np.min([s.F - s.F_rad * SAFE for s in systems], axis=0)
+            high = np.max([s.F + s.F_rad * SAFE for s in systems], axis=0)
+            low = np.where(constant, systems[0].F, np.maximum(np.nextafter(low, -np.inf), 0.0))
+            high = np.where(constant, systems[0].F, np.nextafter(high, np.inf))
+        if origin is not None:
+            direction = 1.0 if b > origin else -1.0
+            zero = np.zeros_like(enclosure.g1)
+            still = CondensedEnclosure(
+                enclosure.S,
+                enclosure.S_rad,
+                direction * enclosure.g1,
+                enclosure.g1_rad,
+                zero,
+                zero,
+                enclosure.stiffness_bound,
+                enclosure.problem,
+            )
+            systems = [still.at(a, force, length)]
+        elif enclosure.problem.load_slope is None:
+            systems = systems[:1]
+        return cls(tuple(systems), low, high)
+
+
+def as_computed(problem: ContactProblem) -> CondensedEnclosure:
+    """S and g as computed in floats, as balls of radius zero."""
+    c = problem.condensed
+    zero, none = np.zeros_like(c.S), np.zeros_like(c.g0)
+    return CondensedEnclosure(c.S, zero, c.g0, none, c.g1, none, 0.0, problem)
+
+
+def interval_row_tables() -> NDArray[np.int8]:
+    """What the multipliers may be, shape (2, 10, 9), by status code as in rows.row_table; second: friction varies."""
+    return np.stack([_CONSTANT, _VARYING])
+
+
+def interval_exclusion_margin(
+    piece: EnclosedPiece, codes: Sequence[int], rows: NDArray[np.intp], values: Array, errors: float = 1.0
+) -> float:
+    """Proven lower bound on the energy over one partial assignment and a piece (see interval_exclusion_margins)."""
+    leaf = np.zeros(len(rows), dtype=np.intp)
+    found = interval_exclusion_margins(piece, np.array([codes], dtype=np.intp), leaf, rows, values, errors)
+    return float(found[0])
+
+
+def interval_exclusion_margins(
+    piece: EnclosedPiece,
+    codes: NDArray[np.intp],
+    leaf: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    values: Array,
+    errors: float = 1.0,
+) -> Array:
+    """Proven lower bounds on the energy over partial assignments and all alpha of a piece; positive excludes.
+
+    Parameters
+    ----------
+    piece : EnclosedPiece
+    codes : (m, p) array of (partial) status codes
+    leaf : (k,) array, the assignment to which each multiplier belongs
+    rows, values : (k,) arrays of row numbers (kind * p + node, nine kinds) and multipliers
+    errors : how often the error bound is subtracted (see energy_bounds)
+
+    Returns
+    -------
+    (m,) array
+    """
+    return margins(piece.ends, _allowed(piece, codes), (piece.low, piece.high), leaf, rows, values, errors)
+
+
+def _allowed(piece: EnclosedPiece, codes: NDArray[np.intp]) -> NDArray[np.int8]:
+    """What multipliers may be, (m, p, 9)."""
+    code = np.where((codes == UNDECIDED) & (piece.high == 0), STILL, codes)
+    return np.where((piece.low == piece.high)[:, None], _CONSTANT[code], _VARYING[code])
+
+
+def piece_forms(piece: EnclosedPiece, multipliers: Array) -> tuple[EnclosedForm, ...]:
+    """A form for all alpha of a piece, at its ends: with F_lo in place of F (theory, section 7.9).
+
+    Parameters
+    ----------
+    piece : EnclosedPiece
+    multipliers : (4, p) array
+        mu, nu, alpha and beta (see EnclosedForm); the last two are at least zero.
+    """
+    everything = (UNDECIDED,) * len(piece.low)
+    # exact coefficients, below those of the piece, where friction varies
+    uncertain = [np.where(piece.low == piece.high, end.F_rad, 0.0) for end in piece.ends]
+    systems = [replace(end, F=piece.low, F_rad=rad) for end, rad in zip(piece.ends, uncertain, strict=True)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return tuple(EnclosedForm.of(system, everything, multipliers, 0.0) for system in systems)
+
+
+def interval_form_margins(
+    piece: EnclosedPiece,
+    forms: Sequence[EnclosedForm],
+    codes: NDArray[np.intp],
+    leaf: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    values: Array,
+    errors: float = 1.0,
+) -> Array:
+    """The same as interval_exclusion_margins with ``forms`` of piece_forms in place of the energy."""
+    if not all(form.smallest_eigenvalue > 0 for form in forms):
+        return np.full(len(codes), -np.inf)
+    allowed, friction = _allowed(piece, codes), (piece.low, piece.high)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return margins(forms, allowed, friction, leaf, rows, values, errors, form_bounds)

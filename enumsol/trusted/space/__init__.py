@@ -1,0 +1,1 @@
+"""The trusted core in three dimensions: sectors of slip directions, leaves, uniqueness."""

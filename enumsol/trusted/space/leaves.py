@@ -1,0 +1,441 @@
+"""The trusted kernel in 3D: what a leaf holds, by Krawczyk's operator on balls (theory, section 12.3).
+
+A leaf gives every node a status: open, in contact without friction, slip+ or slip- along one axis, stick, or a sector
+of slip directions. What is concluded here holds for all data in the balls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm, upper_sum
+from enumsol.model.sectors import SECTORS, direction, end_number
+from enumsol.trusted.arcs.ball_arrays import Ball, determinant_sign, nearly_singular, rough_inverse, smaller
+from enumsol.trusted.space.sector_rows import OPEN, SLIP_PLUS, STICK
+from enumsol.trusted.space.turning import LIBRARY, Box, Turning, turned_by
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space_condensed import EnclosedSpace
+
+    Array = NDArray[np.float64]
+
+#: A sector's box of directions is this share of its width wider on both sides: a root on an end lies inside two boxes.
+_WIDENED = 0.125
+#: Contractions of a box before the leaf is given up.
+_CONTRACTIONS = 10
+#: Contractions of a box that holds exactly one zero, down to rounding.
+_REFINEMENTS = 60
+#: Boxes of directions narrower than this hold a point, and forces known no better are not known; neither is halved for.
+_POINT = 2.0**-24
+#: Directions that change no G by more (scaled) are not halved, nor for a linear system that they change by no more.
+_NEGLIGIBLE, _SINGULAR = 2.0**-44, 2.0**-36
+
+
+def _cut(angle: Array, radius: Array, reach: Array, move: Ball) -> tuple[Array, Array]:
+    """The part of a box of angles that lies within ``move`` of its centre."""
+    low, high = np.maximum(move.mid - move.rad, -radius), np.minimum(move.mid + move.rad, radius)
+    middle = 0.5 * (low + high)
+    # low, high, their middle and the new centre are rounded by less than a unit each
+    return angle + middle, np.maximum(high - middle, middle - low) * SAFE + 4 * UNIT * reach
+
+
+@dataclass(frozen=True)
+class SpaceRoot:
+    """Exactly one root in a box of directions, regular: all conditions hold strictly.
+
+    Attributes
+    ----------
+    y, w : Ball of shape (m,)
+        Forces (lambda_n, tau) and displacements, scaled.
+    centre : (q, 2) array
+        A direction for every node in a sector; angles count from there.
+    angle, angle_rad : (q,) arrays
+        The root's directions.
+    reach : (q,) array
+        There is no other root with these statuses and angles up to ``reach``.
+    index : int
+    slack : float
+        A lower bound of the least slack.
+    """
+
+    y: Ball
+    w: Ball
+    centre: Array
+    angle: Array
+    angle_rad: Array
+    reach: Array
+    index: int
+    slack: float
+
+
+class Cause(Enum):
+    """Why a leaf is not settled."""
+
+    EQUALITY = "a condition holds with equality, or nearly so, at what may be a root"
+    DIRECTIONS = "slip directions are not isolated, or hardly so, at what may be a root: a fold or a continuum is near"
+    EQUATIONS = "the equations of its statuses are singular, or nearly so, for some slip directions: the body may wedge"
+    ROUNDING = "rounding leaves the forces there open: the body is almost free to move"
+
+
+@dataclass(frozen=True)
+class Open:
+    """A leaf that is not settled, with bounds of all solutions in it.
+
+    Attributes
+    ----------
+    node : int or None
+        The node whose sector is to be halved, the widest; None where that is not expected to help.
+    y, w : Ball of shape (m,), or None
+        As in SpaceRoot; None where the linear system is not proven regular in the box.
+    centre : (q, 2) array
+    angle, angle_rad : (q,) arrays
+        As in SpaceRoot.
+    cause : Cause
+        What stands in the way, as computed in the middle of the box; no claim.
+    """
+
+    node: int | None
+    y: Ball | None
+    w: Ball | None
+    centre: Array
+    angle: Array
+    angle_rad: Array
+    cause: Cause
+
+
+def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | None:
+    """What a leaf holds: exactly one root in its box, no root (None), or it is not settled."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _Leaf(system, codes).settle()
+
+
+def unsettled(system: EnclosedSpace, codes: Sequence[int]) -> Open:
+    """A leaf of which nothing is known but its sectors."""
+    leaf = _Leaf(system, codes)
+    return Open(None, None, None, leaf.centre, np.zeros(len(leaf.half)), leaf.half, Cause.EQUALITY)
+
+
+class _State(NamedTuple):
+    """y, w, G and dG/dpsi over a box of angles, and what they are made of."""
+
+    y: Ball
+    w: Ball
+    G: Ball
+    J: Ball
+    box: Box
+
+
+class _Leaf:
+    """Equations of a leaf: y = E(psi) x with x = (lambda_n of the nodes in contact, tau of the sticking ones).
+
+    psi are angles of the slip directions d = cos psi c + sin psi c' from a direction c in every sector, c' a quarter
+    turn further. P picks w_n of the nodes in contact and the slips of the sticking ones: P (g - S E x) = 0. The
+    directions are zeros of G_i = v_i1 d_i2 - v_i2 d_i1.
+    """
+
+    def __init__(self, system: EnclosedSpace, codes: Sequence[int]) -> None:
+        self.system = system
+        tau = system.tau
+        self.open = [i for i, code in enumerate(codes) if code == OPEN]
+        self.closed = [i for i, code in enumerate(codes) if code != OPEN]
+        self.stick = [i for i, code in enumerate(codes) if code == STICK]
+        self.sliding = [(i, 1.0 if codes[i] == SLIP_PLUS else -1.0) for i in self.closed if codes[i] in (2, 3)]
+        self.turning = [i for i, code in enumerate(codes) if code > SECTORS]
+        self.numbers = [codes[i] - SECTORS for i in self.turning]
+        self.rows = [*self.closed, *(int(t) for i in self.stick for t in tau[i] if t >= 0)]
+        self.column = [self.closed.index(i) for i in self.turning]
+        self.t = tau[self.turning].reshape(-1, 2)
+        # v = w / unit; slips as ``slips`` of FrictionUnits has them, which have the same directions
+        self.slip_scale = system.slip_scale[self.turning][:, None] / system.unit[self.t]
+        E = np.zeros((len(system.g), len(self.rows)))
+        E[self.rows, np.arange(len(self.rows))] = 1.0
+        for i, sign in self.sliding:
+            along = int(np.max(tau[i]))
+            E[along, self.closed.index(i)] = sign / system.unit[along]
+        self.E = E
+        self.centre, self.half = self._boxes()
+        self._last: tuple[bytes, Turning | None] | None = None
+
+    def _boxes(self) -> tuple[Array, Array]:
+        """A direction in the middle of every sector, and an angle on both sides that covers it."""
+        centres, halves = [], []
+        for number in self.numbers:
+            a, b = (np.array(direction(n)) for n in (number, end_number(number)))
+            c = a + b
+            c /= np.hypot(*c)
+            # the angle to an end is 2 arcsin(|a - c| / 2), at most 1.12 |a - c| for sectors of a quarter
+            halves.append(1.12 * max(np.hypot(*(a - c)), np.hypot(*(b - c))) + 1e-14)
+            centres.append(c)
+        return np.array(centres).reshape(-1, 2), np.array(halves)
+
+    # -- what the leaf holds ---------------------------------------------------------------------------------------
+
+    def settle(self) -> SpaceRoot | Open | None:
+        q = len(self.turning)
+        reach = (1.0 + 2.0 * _WIDENED) * self.half
+        angle, radius = np.zeros(q), reach.copy()
+        state, rough = None, False
+        for _ in range(_CONTRACTIONS):
+            state = self._state(angle, radius) or state
+            if state is None:
+                break
+            if self._broken(state.y, state.w, angle, radius) or np.any(self._outside(angle, radius)):
+                return None
+            if not q:
+                return self._root(state, angle, radius, reach)
+            new_angle, new_radius = angle, radius
+            move = self._move(angle, radius, state, rough=rough)
+            if move is not None:
+                if np.any(np.abs(move.mid) > (move.rad + radius) * SAFE):
+                    return None
+                new_angle, new_radius = _cut(angle, radius, reach, move)
+                # the box holds exactly one zero
+                if np.all(move.size < radius):
+                    return self._refined(new_angle, new_radius, reach)
+            if np.any(new_radius <= 0.9 * radius):
+                angle, radius = new_angle, new_radius
+            elif rough or (move is not None and not nearly_singular(state.J.mid)):
+                break
+            else:
+                rough = True
+        return self._left_open(angle, radius, state)
+
+    def _move(self, angle: Array, radius: Array, state: _State, *, rough: bool = False) -> Ball | None:
+        """Krawczyk's operator: a ball of psi - angle for all zeros psi in a box over which the state is known.
+
+        ``rough``: only in the directions in which dG/dpsi is surely not singular, so that those of other nodes are cut.
+        """
+        q = len(angle)
+        point = self._state(angle, np.zeros(q))
+        if point is None:
+            return None
+        try:
+            Y = rough_inverse(state.J) if rough else np.linalg.inv(point.J.mid)
+        except np.linalg.LinAlgError:
+            return None
+        inverse, span = Ball.exact(np.asarray(Y, dtype=np.float64)), Ball(np.zeros(q), radius)
+        # Y times the second derivatives first: they are large where Y is small
+        bends = self._bends(state, angle, radius)
+        wide = (inverse @ Ball(bends.mid.reshape(q, -1), bends.rad.reshape(q, -1))).size.reshape(q, q, q) * radius
+        slope = inverse @ point.J
+        slope = Ball(slope.mid, (slope.rad + upper_sum(wide, axis=2)) * SAFE)
+        slope = smaller(slope, inverse @ state.J)
+        return (Ball.exact(np.eye(q)) - slope) @ span - inverse @ point.G
+
+    def _refined(self, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open | None:
+        """The one zero of a box, enclosed as closely as floats can."""
+        for _ in range(_REFINEMENTS):
+            if np.any(self._outside(angle, radius)):
+                return None
+            state = self._state(angle, radius)
+            move = None if state is None else self._move(angle, radius, state)
+            if move is None:
+                break
+            new_angle, new_radius = _cut(angle, radius, reach, move)
+            # the zero lies in both boxes, angle by angle: an angle that rounding keeps from becoming narrower stays
+            narrower = new_radius < radius
+            done = not np.any(new_radius <= 0.9 * radius)
+            angle, radius = np.where(narrower, new_angle, angle), np.where(narrower, new_radius, radius)
+            if done:
+                break
+        state = self._state(angle, radius)
+        if state is None:
+            return self._left_open(angle, radius, None)
+        if self._broken(state.y, state.w, angle, radius) or np.any(self._outside(angle, radius)):
+            return None
+        return self._root(state, angle, radius, reach)
+
+    def _left_open(self, angle: Array, radius: Array, state: _State | None) -> Open:
+        """What is known of a leaf that is not settled."""
+        node = None
+        # what is proven does not depend on which sector is halved, and whether any is
+        if len(angle) and (state is None or not np.all(radius < _POINT)):
+            worth = self._worth_halving(angle, radius, state)
+            node = self.turning[int(np.argmax(worth))] if np.any(worth) else None
+        y, w = (None, None) if state is None else (state.y, state.w)
+        low, high = np.maximum(angle - radius, -self.half), np.minimum(angle + radius, self.half)
+        cause = self._cause(angle, state)
+        return Open(node, y, w, self.centre, 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT, cause)
+
+    def _cause(self, angle: Array, state: _State | None) -> Cause:
+        point = self._state(angle, np.zeros(len(angle)))
+        if state is None or point is None:
+            return Cause.EQUATIONS
+        if not np.all(point.y.rad <= _POINT):
+            return Cause.ROUNDING
+        return Cause.DIRECTIONS if len(angle) and nearly_singular(point.J.mid) else Cause.EQUALITY
+
+    def _worth_halving(self, angle: Array, radius: Array, state: _State | None) -> Array:
+        """What is expected of halving each sector; 0 where smaller ones would be left open, too."""
+        point = self._state(angle, np.zeros(len(angle)))
+        if state is not None and point is not None and np.all(point.y.rad <= _POINT):
+            # the width, where it changes more than what is not known anyway
+            known = np.maximum(_NEGLIGIBLE, point.G.rad)[:, None]
+            return np.where(np.any(state.J.size * radius > known, axis=0), self.half, 0.0)
+        # the change of the linear system, where it keeps that from being regular
+        widths = self._directions(angle, radius)[0].rad / self.system.unit[self.t]
+        changes = np.max(np.sum(np.abs(self.system.S[self.rows][:, self.t]) * widths, axis=2), axis=0)
+        turning = self._turning(angle)
+        worth = changes if turning is None else np.max(turning.coupling(radius), axis=0)
+        return worth if changes[int(np.argmax(worth))] > _SINGULAR else np.zeros_like(worth)
+
+    def _outside(self, angle: Array, radius: Array) -> NDArray[np.bool_]:
+        """Which directions are outside of their sectors for certain; what lies there belongs to another leaf."""
+        return np.abs(angle) - radius > self.half * (1.0 + 1e-9)
+
+    def _root(self, state: _State, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open:
+        slack = self._slacks(state.y, state.w, angle, radius)
+        turning = self._turning(angle) if np.all(slack > 0) else None
+        sign = 0 if turning is None else turning.sign * determinant_sign(state.J)
+        if not sign:
+            return self._left_open(angle, radius, state)
+        least = float(np.min(slack)) if len(slack) else np.inf
+        return SpaceRoot(state.y, state.w, self.centre, angle, radius, reach, sign, least)
+
+    # -- evaluation over a box -------------------------------------------------------------------------------------
+
+    def _directions(self, angle: Array, radius: Array) -> tuple[Ball, Ball]:
+        """d (q, 2) and d' (q, 2) over a box of angles."""
+        mid_d, mid_turned = turned_by(self.centre, angle)
+        # |d(psi + r) - d(psi)| <= min(|d'(psi)| r + r^2 / 2, r), and d' likewise; libraries are off by a few units
+        r = np.minimum(radius, 2.0)[:, None]
+        bent = 0.5 * r * r
+        d = Ball(mid_d, np.minimum(np.abs(mid_turned) * r + bent, r) * SAFE + LIBRARY)
+        return d, Ball(mid_turned, np.minimum(np.abs(mid_d) * r + bent, r) * SAFE + LIBRARY)
+
+    def _turning(self, angle: Array) -> Turning | None:
+        """The linear equations with the directions at these angles in the middle; None if not proven regular there."""
+        key = angle.tobytes()
+        if self._last is None or self._last[0] != key:
+            directions = turned_by(self.centre, angle)
+            self._last = key, Turning.of(self.system, self.E, self.rows, self.column, self.t, directions)
+        return self._last[1]
+
+    def _state(self, angle: Array, radius: Array) -> _State | None:
+        """y, w, G and dG/dpsi over a box; None where the linear system is not proven regular in it."""
+        turning = self._turning(angle)
+        box = None if turning is None else turning.over(radius)
+        if box is None:
+            return None
+        (v1, v2), (dv1, dv2) = self._slips(box.w), self._slips(box.dw)
+        d, turned = self._directions(angle, radius)
+        d1, d2 = d[:, 0], d[:, 1]
+        J = dv1 * d2[:, None] - dv2 * d1[:, None]
+        diagonal = np.arange(len(angle))
+        corrected = J[diagonal, diagonal] + (v1 * turned[:, 1] - v2 * turned[:, 0])
+        J.mid[diagonal, diagonal], J.rad[diagonal, diagonal] = corrected.mid, corrected.rad
+        return _State(box.y, box.w, v1 * d2 - v2 * d1, J, box)
+
+    def _bends(self, state: _State, angle: Array, radius: Array) -> Ball:
+        """Second derivatives of G over a box, (q, q, q)."""
+        box, (d, turned), own = state.box, self._directions(angle, radius), np.arange(len(angle))
+        (b1, b2), (dv1, dv2), (v1, v2) = (self._slips(part) for part in (box.bends(), box.dw, box.w))
+        d1, d2 = d[:, 0], d[:, 1]
+        bends = b1 * d2[:, None, None] - b2 * d1[:, None, None]
+        turn = dv1 * turned[:, 1][:, None] - dv2 * turned[:, 0][:, None]
+        # psi_i turns d_i itself, in both orders, and d_i'' = -d_i
+        for part, add in (
+            ((own, slice(None), own), turn),
+            ((own, own, slice(None)), turn),
+            ((own, own, own), v2 * d1 - v1 * d2),
+        ):
+            there = bends[part] + add
+            bends.mid[part], bends.rad[part] = there.mid, there.rad
+        return bends
+
+    def _slips(self, w: Ball) -> tuple[Ball, Ball]:
+        """Both components of v at the nodes in sectors, times ``slip_scale`` of FrictionUnits; ``w`` by rows."""
+        first, second = (w[self.t[:, k]] for k in (0, 1))
+        scales = (self.slip_scale[:, k].reshape(-1, *[1] * (w.mid.ndim - 1)) for k in (0, 1))
+        pairs = zip((first, second), scales, strict=True)
+        one, other = (Ball(part.mid * scale, part.rad * scale) for part, scale in pairs)
+        return one, other
+
+    def _conditions(self, y: Ball, w: Ball) -> tuple[Array, Array]:
+        """Conditions that a root has to satisfy but for directions, as midpoints and radii; stick by |tau| in both.
+
+        Those of slips and of sticking are in the units of ``slips`` and ``taus`` of FrictionUnits.
+        """
+        tau, unit, scale = self.system.tau, self.system.unit, self.system.disc_scale
+        mid = [-w.mid[i] for i in self.open] + [y.mid[i] for i in self.closed]
+        rad = [w.rad[i] for i in self.open] + [y.rad[i] for i in self.closed]
+        for i in self.stick:
+            t = [int(k) for k in tau[i] if k >= 0]
+            if t:
+                units, most, uncertain = unit[t] * scale[i], y.mid[i] * scale[i], y.rad[i] * scale[i]
+                length = float(np.linalg.norm(y.mid[t] * units))
+                mid.append(most - length)
+                uncertain += float(upper_norm(y.rad[t] * units)) + 16 * UNIT * (abs(most) + length)
+                rad.append(uncertain * SAFE + TINY)
+        for i, sign in self.sliding:
+            along = int(np.max(tau[i]))
+            mid.append(sign * w.mid[along])
+            rad.append(w.rad[along])
+        return np.array(mid), np.array(rad)
+
+    def _forward(self, w: Ball, angle: Array, radius: Array) -> tuple[Array, Array]:
+        """v . d of the nodes in sectors, and v_1 d_1 and v_2 d_2 alone, as midpoints and radii, (3, q) each.
+
+        Where G vanishes v = t d: none of the three is negative if t >= 0, and t > 0 if one is positive. A component
+        alone tells where the rounding of the other would hide it, as its coefficient is much larger.
+        """
+        d, _ = self._directions(angle, radius)
+        v1, v2 = self._slips(w)
+        products = (v1 * d[:, 0] + v2 * d[:, 1], w[self.t[:, 0]] * d[:, 0], w[self.t[:, 1]] * d[:, 1])
+        return np.array([product.mid for product in products]), np.array([product.rad for product in products])
+
+    def _broken(self, y: Ball, w: Ball, angle: Array, radius: Array) -> bool:
+        """Whether some condition is broken at every zero of G in the box."""
+        mid, rad = self._conditions(y, w)
+        forward, uncertain = self._forward(w, angle, radius)
+        return bool(np.any(mid < -rad) or np.any(forward < -uncertain))
+
+    def _slacks(self, y: Ball, w: Ball, angle: Array, radius: Array) -> Array:
+        """Lower bounds of the conditions at zeros of G in the box; of directions, numbers of the same signs."""
+        mid, rad = self._conditions(y, w)
+        forward, uncertain = self._forward(w, angle, radius)
+        return np.concatenate([mid - rad * SAFE, np.max(forward - uncertain * SAFE, axis=0)])
+
+
+def same_root(one: SpaceRoot, other: SpaceRoot) -> bool | None:
+    """Whether two roots of leaves with the same statuses up to sectors are one; None where that is open.
+
+    The leaves have the same nodes open, sticking and slipping. They are one if one root's directions lie in the box in
+    which the other is the only root; they are two if their forces differ.
+    """
+    if np.any(np.abs(one.y.mid - other.y.mid) > (one.y.rad + other.y.rad) * SAFE):
+        return False
+    # the angle of one root's centre from the other's
+    c, e = other.centre, one.centre
+    shift = np.arctan2(c[:, 0] * e[:, 1] - c[:, 1] * e[:, 0], np.sum(c * e, axis=1))
+    away = np.abs(shift + one.angle) + one.angle_rad + 1e-12
+    return True if np.all(away < other.reach) else None
+
+
+def distinct_roots(
+    found: Iterable[tuple[tuple[int, ...], SpaceRoot]],
+) -> tuple[list[tuple[tuple[int, ...], SpaceRoot]], list[tuple[int, ...]]]:
+    """Roots of leaves without those that two leaves share, and the leaves whose roots could not be told apart.
+
+    Neither depends on the order in which the leaves are given.
+    """
+    distinct: list[tuple[tuple[int, ...], SpaceRoot]] = []
+    doubtful = []
+    for codes, root in sorted(found, key=lambda leaf: leaf[0]):
+        pattern = [min(code, SECTORS) for code in codes]
+        alike = [other for known, other in distinct if [min(code, SECTORS) for code in known] == pattern]
+        answers = [same_root(root, other) for other in alike]
+        if True in answers:
+            continue
+        if None in answers:
+            doubtful.append(codes)
+        distinct.append((codes, root))
+    return distinct, doubtful

@@ -1,0 +1,134 @@
+"""The trusted kernel in 3D: branchings, rows and exclusions (theory, section 12.2). Leaves are in ``trusted.space.leaves``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE, TINY, gamma, upper_norm, upper_sum
+from enumsol.model.sectors import SECTORS, contains, direction, end_number
+from enumsol.trusted.energy_bounds import energy_bounds
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space_condensed import EnclosedSpace
+
+    Array = NDArray[np.float64]
+
+OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
+#: Kinds of rows (theory, section 12.2); a row is (kind, node, number), the number that of a direction or sector.
+GAP, FORCE, TAU, SLIP, END, ALONG, TANGENT, CHORD, LEFT, RIGHT = range(10)
+FORBIDDEN, NONNEGATIVE, FREE = range(3)
+Row = tuple[int, int, int]
+
+
+def children_of(code: int, tangents: int) -> tuple[int, ...]:
+    """Codes that together cover a partial status of a node with so many components of tau; empty for a final one."""
+    if code == UNDECIDED:
+        return (OPEN, CONTACT) if tangents else (OPEN, FRICTIONLESS)
+    if code == CONTACT:
+        if tangents == 1:
+            return STICK, SLIP_PLUS, SLIP_MINUS
+        return STICK, *(SECTORS + i for i in range(4, 8))
+    if code > SECTORS:
+        return SECTORS + 2 * (code - SECTORS), SECTORS + 2 * (code - SECTORS) + 1
+    return ()
+
+
+def row_sign(code: int, row: Row) -> int:
+    """What the multiplier of a row may be at a node of this code."""
+    kind, _, number = row
+    if kind == GAP:
+        return NONNEGATIVE if code in (OPEN, UNDECIDED) else FREE
+    if kind == FORCE:
+        return FREE if code == OPEN else NONNEGATIVE
+    if kind == TAU:
+        return FREE if code == OPEN else FORBIDDEN
+    if kind == SLIP:
+        return FREE if code == STICK else FORBIDDEN
+    if kind == END:
+        return FREE if code == (SLIP_PLUS if number > 0 else SLIP_MINUS) else NONNEGATIVE
+    if kind == ALONG:
+        return NONNEGATIVE if code == (SLIP_PLUS if number > 0 else SLIP_MINUS) else FORBIDDEN
+    if kind == TANGENT:
+        return NONNEGATIVE
+    return NONNEGATIVE if code > SECTORS and contains(number, code - SECTORS) else FORBIDDEN
+
+
+def row_terms(row: Row, tau: NDArray[np.intp], size: int) -> tuple[list[int], list[float]]:
+    """A row as a sum over y and, from ``size`` on, over w: indices and coefficients, off by 16 units at most.
+
+    Raises
+    ------
+    ValueError
+        The node has no such row.
+    """
+    kind, node, number = row
+    if kind == GAP:
+        return [size + node], [-1.0]
+    if kind == FORCE:
+        return [node], [1.0]
+    t1, t2 = (int(t) for t in tau[node])
+    if kind in (TAU, SLIP):
+        t = (t1, t2)[number] if number in (0, 1) else -1
+        _exists(t >= 0)
+        return [t if kind == TAU else size + t], [1.0]
+    if kind in (END, ALONG):
+        _exists((t1 < 0) != (t2 < 0) and number in (1, -1))
+        t = max(t1, t2)
+        return ([node, t], [1.0, -float(number)]) if kind == END else ([size + t], [float(number)])
+    _exists(t1 >= 0 and t2 >= 0 and number >= 4)
+    x, y = direction(number)
+    if kind == TANGENT:
+        return [node, t1, t2], [1.0, -x, -y]
+    p, q = direction(end_number(number))
+    if kind == CHORD:
+        return [t1, t2, node], [x + p, y + q, -(1.0 + (x * p + y * q))]
+    return ([size + t1, size + t2], [-y, x]) if kind == LEFT else ([size + t1, size + t2], [q, -p])
+
+
+def _exists(condition: bool) -> None:
+    if not condition:
+        raise ValueError("a node has no such row")
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def exclusion_margin(
+    system: EnclosedSpace, codes: Sequence[int], rows: Sequence[Row], values: Array, errors: float = 1.0
+) -> float:
+    """Proven lower bound on the energy over a partial assignment; positive means that it holds no solution.
+
+    ``errors`` as in ``energy_bounds``; -inf where a multiplier has the wrong sign.
+    """
+    size, units = len(system.g), system.row_unit.tolist()
+    y, y_size, c, c_size = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
+    for row, value in zip(rows, values.tolist(), strict=True):
+        sign = row_sign(codes[row[1]], row)
+        if sign == FORBIDDEN or (sign == NONNEGATIVE and value < 0) or not np.isfinite(value):
+            return -np.inf
+        for i, coefficient in zip(*row_terms(row, system.tau, size), strict=True):
+            # a power of two: nothing is rounded but what underflows, which is less than TINY
+            term = value * (coefficient * units[i])
+            if i < size:
+                c[i] += term
+                c_size[i] += abs(term)
+            else:
+                # w = g - S lambda: a row on w acts on S lambda - g with the opposite sign
+                y[i - size] -= term
+                y_size[i - size] += abs(term)
+    k = gamma(len(rows) + 24)
+    k *= 1.0 + 2.0 * k  # the sizes are sums as long
+    with np.errstate(over="ignore", invalid="ignore"):
+        c_rad, y_rad = k * c_size * SAFE + TINY, k * y_size * SAFE + TINY
+        bound = float(energy_bounds(system, y[None], c[None], c_rad[None], errors)[0])
+        # rounded y are not quite multipliers: the bound is quadratic in y with the gradient g - v / 2, v = g + c + S y
+        v = np.abs(system.g + c + system.S @ y) + gamma(size + 4) * (np.abs(c) + np.abs(system.S) @ np.abs(y))
+        v += system.g_rad + c_rad + system.S_rad @ np.abs(y) + gamma(size + 4) * np.abs(system.g)
+        slope = np.abs(system.g) + system.g_rad + 0.5 * v * SAFE
+        lost = upper_sum(y_rad * slope) + (upper_norm(system.S) + upper_norm(system.S_rad)) * upper_norm(y_rad) ** 2
+        bound -= errors * float(lost) * SAFE * SAFE
+    return bound if np.isfinite(bound) else -np.inf

@@ -1,0 +1,352 @@
+"""The trusted test in 3D that a whole problem has one solution only, which is enclosed (theory, section 12.6).
+
+A solution that is known well enough is the only one where a matrix is positive definite. That there is one follows from
+the degree. It is enclosed by a leaf, where it is regular, or by a point near it, whatever statuses hold there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, upper_norm
+from enumsol.model.sectors import DEEPEST, SECTORS, level_of
+from enumsol.trusted.arcs.ball_arrays import Ball
+from enumsol.trusted.space.leaves import SpaceRoot, settle
+from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space_condensed import EnclosedSpace
+
+    Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+#: Directions whose squared length is as near to one stand for the direction of length one.
+_UNIT_LENGTH = 2.0**-40
+#: Units of tau beyond this, or below its inverse, are left to the tree: nothing here underflows with others.
+LARGEST_UNIT = 2.0**128
+
+
+@dataclass(frozen=True)
+class OnlySolution:
+    """The one solution of a problem as balls; its statuses need not be known.
+
+    Attributes
+    ----------
+    y, w : Ball of shape (m,)
+        Forces (lambda_n, tau) and displacements, scaled; without radius where they are 0 for certain.
+    open, stick, slip : (p,) bool arrays
+        Statuses that may hold; of nodes without friction that may touch both of the last two.
+    """
+
+    y: Ball
+    w: Ball
+    open: Flags
+    stick: Flags
+    slip: Flags
+
+    index = 1
+
+
+def only_solution(system: EnclosedSpace, numbers: Array, normal: Array, errors: float = 1.0) -> OnlySolution | None:
+    """The only solution near a point, or None where that is not proven.
+
+    Parameters
+    ----------
+    system : EnclosedSpace
+    numbers : see ``Numbers.of``
+    normal : (p,) array, lambda_n of the point, scaled; what is negative counts as 0
+    errors : what is not known of theta counts as often: 1 proves, a writer of proofs takes more, so that a checker,
+        which rounds otherwise, comes to the same answer
+
+    Raises
+    ------
+    NotEnclosedError
+        S is not proven positive definite.
+    """
+    with np.errstate(all="ignore"):
+        form = _Form.of(system, numbers)
+        return None if form is None else form.enclosed(normal, errors)
+
+
+def only_root(system: EnclosedSpace, numbers: Array, codes: Sequence[int], errors: float = 1.0) -> SpaceRoot | None:
+    """The regular root of a leaf, if it is proven that it has one and that there is no other solution at all.
+
+    Parameters and errors as for ``only_solution``; ``codes`` are those of the leaf.
+    """
+    if not is_complete(system, codes):
+        return None
+    with np.errstate(all="ignore"):
+        form = _Form.of(system, numbers)
+        root = None if form is None else settle(system, codes)
+        # the degree of a problem is +1
+        if form is None or not isinstance(root, SpaceRoot) or root.index != 1:
+            return None
+        return root if form.serves(root.y, root.w, errors) else None
+
+
+def is_complete(system: EnclosedSpace, codes: Sequence[int]) -> bool:
+    """Whether every node has a final code that it can have."""
+    tangents = np.sum(system.tau >= 0, axis=1).tolist()
+    return len(codes) == len(tangents) and all(map(_is_final, codes, tangents))
+
+
+def _is_final(code: int, tangents: int) -> bool:
+    if tangents == 2 and code > SECTORS:
+        return 2 <= level_of(code - SECTORS) <= DEEPEST + 1
+    return code in ((OPEN, FRICTIONLESS), (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), (OPEN, STICK))[tangents]
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """The numbers of the form of theory, (12.7), node by node.
+
+    Where there is no tau, components are 0.
+
+    Attributes
+    ----------
+    mu, kappa, wide : (p,) arrays
+        ``wide`` is positive where the form serves any theta.
+    nu, theta : (p, 2) arrays
+    off : (p,) array
+        theta stands for one that is no farther away: where ``whole``, for that of length one.
+    whole : (p,) bool array
+    """
+
+    mu: Array
+    kappa: Array
+    wide: Array
+    nu: Array
+    theta: Array
+    off: Array
+    whole: Flags
+
+    @classmethod
+    def of(cls, system: EnclosedSpace, numbers: Array) -> Numbers | None:
+        """From one array: mu, kappa and wide of all nodes, then nu and theta of all tau, in the order of y.
+
+        mu and kappa are positive, wide is not negative, |nu| <= mu, |theta| <= 1, and theta = 0 where wide is positive.
+        None where this is not so.
+        """
+        p, m = len(system.tau), len(system.g)
+        if numbers.shape != (p + 2 * m,) or not np.all(np.isfinite(numbers)):
+            return None
+        (mu, kappa, wide), pairs = numbers[: 3 * p].reshape(3, p), numbers[3 * p :].reshape(2, m - p)
+        place = np.where(system.tau >= 0, system.tau - p, m - p)
+        nu, theta = (np.append(pair, 0.0)[place] for pair in pairs)
+        square = np.sum(theta * theta, axis=1)
+        whole = np.abs(square - 1.0) < _UNIT_LENGTH
+        wrong = (mu <= 0) | (kappa <= 0) | (wide < 0) | (upper_norm(nu, axis=1) > mu)
+        wrong |= ~whole & (square > 1.0 - _UNIT_LENGTH)
+        wrong |= (wide > 0) & (np.any(theta != 0, axis=1) | np.all(system.tau < 0, axis=1))
+        # | |theta| - 1 | <= | |theta|^2 - 1 |
+        off = np.where(whole, (np.abs(square - 1.0) + 8 * UNIT) * SAFE, 0.0)
+        return None if np.any(wrong) else cls(mu, kappa, wide, nu, theta, off, whole)
+
+
+@dataclass(frozen=True)
+class _Form:
+    """Q of theory, (12.7), and what it proves; in the units of FrictionUnits.
+
+    Attributes
+    ----------
+    least : float
+        Positive lower bound of the eigenvalues of Q, for every theta that ``numbers`` stand for.
+    turn : Ball of shape (p, 2)
+        theta over the unit of the tau.
+    push : (p, 2) array
+        nu times that unit.
+    """
+
+    system: EnclosedSpace
+    numbers: Numbers
+    turn: Ball
+    push: Array
+    least: float
+
+    @classmethod
+    def of(cls, system: EnclosedSpace, values: Array) -> _Form | None:
+        """None where Q is not proven definite."""
+        numbers = Numbers.of(system, values)
+        if numbers is None or not system.smallest_eigenvalue > 0:
+            return None
+        if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
+            return None
+        unit = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
+        # units are powers of two: what is rounded is less than TINY
+        turn = Ball(numbers.theta / unit, numbers.off[:, None] / unit * SAFE + TINY)
+        turn = Ball(turn.mid, np.where(system.tau >= 0, turn.rad, 0.0))
+        push = numbers.nu * unit
+        least = _least(system, numbers, turn, push, unit)
+        return cls(system, numbers, turn, push, least) if least > 0 else None
+
+    # -- enclosure -------------------------------------------------------------------------------------------------
+
+    def enclosed(self, normal: Array, errors: float) -> OnlySolution | None:
+        """The only solution by its distance from a point, None where it is not proven to be the only one."""
+        tau, p = self.system.tau, len(self.system.tau)
+        n = np.maximum(normal, 0.0)
+        if n.shape != (p,) or not np.all(np.isfinite(n)):
+            return None
+        y = Ball(np.zeros(len(self.system.g)), np.zeros(len(self.system.g)))
+        y.mid[:p] = n
+        for k in range(2):
+            has = (tau[:, k] >= 0) & (n > 0)
+            part = Ball.exact(n[has]) * self.turn[has, k]
+            y.mid[tau[has, k]], y.rad[tau[has, k]] = part.mid, part.rad
+        reach = self._moved(self._change(n, self._displacements(y))) / self.least * SAFE
+        if not np.isfinite(reach):
+            return None
+        y = Ball(y.mid, (y.rad + reach) * SAFE)
+        w = self._displacements(y)
+        # open at every solution
+        for i in np.flatnonzero((n == 0) & (w.mid[:p] + w.rad[:p] < 0)):
+            y.rad[[i, *tau[i][tau[i] >= 0]]] = 0.0
+        w = self._displacements(y)
+        return self._described(y, w) if self.serves(y, w, errors) else None
+
+    def _displacements(self, y: Ball) -> Ball:
+        S, g = Ball(self.system.S, self.system.S_rad), Ball(self.system.g, self.system.g_rad)
+        return g - (S @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
+
+    def _change(self, n: Array, w: Ball) -> Array:
+        """How much the load has to change at most, row by row, that a point with these lambda_n is a solution."""
+        system, numbers, p = self.system, self.numbers, len(n)
+        change = w.size.copy()
+        apart = n == 0
+        change[:p][apart] = np.maximum(w.mid[:p] + w.rad[:p], 0.0)[apart] * SAFE
+        for i, places in enumerate(system.tau):
+            t = places[places >= 0]
+            if numbers.whole[i]:
+                # v along theta
+                unit, theta = system.unit[t], self.turn[i][places >= 0]
+                along = max(float(numbers.theta[i][places >= 0] @ (w.mid[t] / unit)), 0.0)
+                change[t] = (w[t] - theta * Ball.exact(along * unit * unit)).size
+            elif apart[i] and self._gap_serves(i, w):
+                change[t] = 0.0
+        return change
+
+    def _gap_serves(self, i: int, w: Ball) -> bool:
+        """Whether theta of a node without load serves for all w in a ball, by its gap (theory, (12.6))."""
+        numbers, places = self.numbers, self.system.tau[i]
+        t, theta = places[places >= 0], numbers.theta[i][places >= 0]
+        gap = -float(w.mid[i] + w.rad[i]) / SAFE
+        if not gap > 0:
+            return False
+        unit = self.system.unit[t]
+        v = Ball(w.mid[t] / unit, w.rad[t] / unit * SAFE + TINY)
+        slip = float(upper_norm(v.size)) - float(theta @ v.mid) + float(np.abs(theta) @ v.rad)
+        slip += 32 * UNIT * float(np.sum(v.size)) + float(numbers.off[i] * np.sum(v.size))
+        room = (numbers.mu[i] - float(upper_norm(numbers.nu[i]))) / SAFE
+        return bool(room * gap / SAFE >= numbers.kappa[i] * slip * SAFE * SAFE + TINY)
+
+    def _moved(self, change: Array) -> float:
+        """Upper bound of ||D'delta||, |delta| <= change."""
+        numbers, tau, p = self.numbers, self.system.tau, len(self.system.tau)
+        moved = np.zeros_like(change)
+        moved[:p] = numbers.mu * change[:p]
+        for k in range(2):
+            has = tau[:, k] >= 0
+            t, kappa = tau[has, k], numbers.kappa[has]
+            moved[:p][has] += kappa * self.turn.size[has, k] * change[t]
+            moved[t] = np.abs(self.push[has, k]) * change[:p][has] + kappa * change[t]
+        return float(upper_norm(moved * SAFE + TINY) * SAFE)
+
+    # -- uniqueness ------------------------------------------------------------------------------------------------
+
+    def serves(self, y: Ball, w: Ball, errors: float) -> bool:
+        """Whether any solution within these balls is the only one, given that all lie there or that it exists."""
+        numbers, system = self.numbers, self.system
+        off = np.array([self._off(i, y, w) for i in range(len(system.tau))])
+        slopes = np.zeros((len(off), 2))
+        size = (np.abs(system.S) + system.S_rad) * SAFE
+        for k in range(2):
+            has = system.tau[:, k] >= 0
+            t = system.tau[has, k]
+            slopes[has, k] = upper_norm(size[t], axis=1) / system.unit[t] * SAFE
+        lost = numbers.kappa * off * upper_norm(slopes, axis=1)
+        return bool(self.least > errors * upper_norm(lost * SAFE + TINY) * SAFE)
+
+    def _off(self, i: int, y: Ball, w: Ball) -> float:
+        """How far theta is at most from one that serves a solution within a node's balls; infinite if that is open."""
+        system, numbers, places = self.system, self.numbers, self.system.tau[i]
+        t, theta = places[places >= 0], numbers.theta[i][places >= 0]
+        if not len(t) or numbers.wide[i] > 0:
+            return 0.0
+        if w.mid[i] + w.rad[i] < 0 and self._gap_serves(i, w):
+            return 0.0
+        off, unit = np.inf, system.unit[t]
+        scale = system.slip_scale[i] / unit
+        v, v_rad = w.mid[t] * scale, float(upper_norm(w.rad[t] * scale * SAFE + TINY))
+        length = float(np.linalg.norm(v))
+        if length * (1.0 - 32 * UNIT) > v_rad * SAFE:
+            # it slides, in a direction that is off by 2 v_rad / length at most
+            apart = np.linalg.norm(v / length - theta) + (2.0 * v_rad / length if len(t) > 1 else 0.0)
+            off = float(apart * SAFE + 32 * UNIT)
+        low = float(y.mid[i] - y.rad[i]) / SAFE
+        if low > 0:
+            # |tau / lambda_n - theta| = |tau - theta lambda_n| / lambda_n
+            scale, most = unit * system.disc_scale[i], system.disc_scale[i]
+            tau, n = Ball(y.mid[t] * scale, y.rad[t] * scale * SAFE + TINY), Ball(y.mid[i] * most, y.rad[i] * most)
+            apart = upper_norm((tau - Ball.exact(theta) * n).size + TINY) / (low * most) * SAFE
+            off = min(off, float(apart))
+        return off
+
+    # -- what is known ---------------------------------------------------------------------------------------------
+
+    def _described(self, y: Ball, w: Ball) -> OnlySolution:
+        """The statuses that may hold within balls, and what vanishes by those that hold for certain."""
+        system, p = self.system, len(self.system.tau)
+        touch = w.mid[:p] + w.rad[:p] >= 0
+        loose = y.mid[:p] - y.rad[:p] <= 0
+        w.mid[:p], w.rad[:p] = np.where(loose, w.mid[:p], 0.0), np.where(loose, w.rad[:p], 0.0)
+        stick, slip = touch.copy(), touch.copy()
+        for i, places in enumerate(system.tau):
+            t = places[places >= 0]
+            if not len(t):
+                continue
+            scale = system.unit[t] * system.disc_scale[i]
+            tau = upper_norm((np.abs(y.mid[t]) + y.rad[t]) * scale * SAFE + TINY)
+            if tau < (y.mid[i] - y.rad[i]) * system.disc_scale[i] / SAFE:
+                slip[i] = False
+                w.mid[t], w.rad[t] = 0.0, 0.0
+            stick[i] &= bool(np.all(np.abs(w.mid[t]) <= w.rad[t]))
+        return OnlySolution(y, w, loose, stick, slip)
+
+
+def _least(system: EnclosedSpace, numbers: Numbers, turn: Ball, push: Array, unit: Array) -> float:
+    """Lower bound of the smallest eigenvalue of Q, at most 0 where none positive is proven."""
+    tau, p = system.tau, len(system.tau)
+    S = Ball(system.S, system.S_rad)
+    form = Ball(S.mid.copy(), S.rad.copy())
+    along = S[:p] * Ball.exact(numbers.mu[:, None])
+    form.mid[:p], form.rad[:p] = along.mid, along.rad
+    spread = Ball.exact(np.zeros_like(S.mid))
+    for k in range(2):
+        has = np.flatnonzero(tau[:, k] >= 0)
+        t, kappa = tau[has, k], numbers.kappa[has]
+        turned = form[has] - S[t] * (turn[has, k] * Ball.exact(kappa))[:, None]
+        pushed = S[t] * Ball.exact(kappa[:, None]) + S[has] * Ball(push[has, k], np.full(len(has), TINY))[:, None]
+        for rows, part in ((has, turned), (t, pushed)):
+            form.mid[rows], form.rad[rows] = part.mid, part.rad
+        used = np.flatnonzero(numbers.wide[has] > 0)
+        # weights at least kappa / sqrt(wide), for any rounding
+        weight = kappa[used] / np.sqrt(numbers.wide[has[used]]) / unit[has[used], k] * SAFE + TINY
+        rows = S[t[used]] * Ball.exact(weight[:, None])
+        spread = spread + Ball(rows.mid.T, rows.rad.T) @ rows
+    Q = form - Ball(0.5 * spread.mid, 0.5 * spread.rad)
+    normal = np.arange(p)
+    Q.mid[normal, normal] -= 0.5 * numbers.wide
+    Q.rad[normal, normal] += 2 * UNIT * (np.abs(Q.mid[normal, normal]) + numbers.wide)
+    mid = 0.5 * (Q.mid + Q.mid.T)
+    # the symmetric part of the form lies in the mean of both triangles
+    rad = (np.maximum(Q.rad, Q.rad.T) + 4 * UNIT * np.abs(mid)) * SAFE
+    if not (np.all(np.isfinite(mid)) and np.all(np.isfinite(rad))):
+        return 0.0
+    return float((dense_eigenvalue_bound(mid) - float(upper_norm(rad))) / SAFE)

@@ -1,0 +1,234 @@
+"""The linear equations of a leaf in 3D over a box of slip directions (theory, section 12.3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE, UNIT
+from enumsol.trusted.arcs.ball_arrays import Ball, Inverse, determinant_sign, smaller
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space_condensed import EnclosedSpace
+
+    Array = NDArray[np.float64]
+
+#: Cosine and sine of numerical libraries, and what is made of two of them here, are off by no more.
+LIBRARY = 64 * UNIT
+
+
+def turned_by(centre: Array, angle: Array) -> tuple[Array, Array]:
+    """Directions at angles from their centres and those a quarter turn further, (q, 2) each, off by ``LIBRARY``."""
+    across = np.stack([-centre[:, 1], centre[:, 0]], axis=1)
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    return cos * centre + sin * across, cos * across - sin * centre
+
+
+@dataclass(frozen=True)
+class Box:
+    """Values over a box of angles, and their derivatives with respect to these.
+
+    Attributes
+    ----------
+    y, w : Ball of shape (m,)
+        w is zero, exactly, where the equations say so.
+    dw : Ball of shape (m, q)
+    x : Ball of shape (q,)
+        The turning nodes' normal forces.
+    z : Ball of shape (q, q)
+        -dx_i / dpsi_j is z_ij x_j.
+    along : Ball of shape (m, q)
+        Change of w with forces of size one along d.
+    across : Ball of shape (m, q)
+        The same a quarter turn further, so that dw_j is across_j x_j.
+    """
+
+    y: Ball
+    w: Ball
+    dw: Ball
+    x: Ball
+    z: Ball
+    along: Ball
+    across: Ball
+
+    def bends(self) -> Ball:
+        """Second derivatives of w with respect to the angles, (m, q, q)."""
+        across, q = self.across, len(self.x.mid)
+        # d^2 w / dpsi_j dpsi_k = -(across_k z_kj x_j + across_j z_jk x_k), and -along_j x_j more where j = k
+        moved = self.z * self.x
+        half = across[:, None, :] * Ball(moved.mid.T, moved.rad.T)
+        bends = half + Ball(half.mid.transpose(0, 2, 1), half.rad.transpose(0, 2, 1))
+        diagonal = np.arange(q)
+        own = bends[:, diagonal, diagonal] + self.along * self.x
+        bends.mid[:, diagonal, diagonal], bends.rad[:, diagonal, diagonal] = own.mid, own.rad
+        return Ball(-bends.mid, bends.rad)
+
+
+@dataclass(frozen=True)
+class Turning:
+    """y and w of a leaf for directions d_k in its sectors, and what other ones change.
+
+    With x the unknowns, y = E x and P (g - S E x) = 0. Directions that turn by D, E = E0 + T D (T the tangential
+    forces in sectors), change
+
+        x_c = (I + B_c D)^-1 x_0c,     y = y_0 + Pi_0 T D x_c,     w = w_0 - S Pi_0 T D x_c,
+
+    x_c the normal forces of the turning nodes, B = (P S E0)^-1 P S T and Pi_0 = I - E0 (P S E0)^-1 P S. S Pi_0 is the
+    compliance of what is left free. It is small where weak springs make S large, and known as well as S is: all
+    products are taken before anything is widened by a box.
+
+    Attributes
+    ----------
+    d, turned : (q, 2) arrays
+        The directions as they are computed, in the units of y, and those a quarter turn further.
+    x : Ball of shape (q,)
+        x_0c.
+    start : Ball of shape (2 m,)
+        y_0, then w_0.
+    B : Ball of shape (q, 2 q)
+        B_c; columns are tangential forces, both of one node side by side, as of ``change``.
+    change : Ball of shape (2 m, 2 q)
+        Pi_0 T, then -S Pi_0 T.
+    matrix : Ball of shape (k, k)
+        P S E0.
+    rows : sequence of k ints
+        Those that P picks.
+    off : (q,) array
+        How much directions may be off in the units of y, for every node.
+    """
+
+    d: Array
+    turned: Array
+    x: Ball
+    start: Ball
+    B: Ball
+    change: Ball
+    matrix: Ball
+    rows: Sequence[int]
+    off: Array
+
+    @classmethod
+    def of(
+        cls,
+        system: EnclosedSpace,
+        E: Array,
+        rows: Sequence[int],
+        column: Sequence[int],
+        t: NDArray[np.intp],
+        directions: tuple[Array, Array],
+    ) -> Turning | None:
+        """None where the equations are not proven regular for these directions.
+
+        Parameters
+        ----------
+        system : EnclosedSpace
+        E : (m, k) array, without the directions
+        rows : of the unknowns in y, k
+        column : of the turning nodes' normal forces among the unknowns, q
+        t : (q, 2), the rows of the turning nodes' tangential forces
+        directions : as of ``turned_by``
+        """
+        units = system.unit[t]
+        d, turned = (part / units for part in directions)
+        if not len(rows):  # every node is open
+            none, start = Ball.exact(np.zeros((0, 0))), Ball(system.g, system.g_rad)
+            start = _stacked(Ball.exact(np.zeros_like(system.g)), start)
+            change = Ball.exact(np.zeros((len(start.mid), 0)))
+            return cls(d, turned, Ball.exact(np.zeros(0)), start, none, change, none, rows, np.zeros(0))
+        E = E.copy()
+        E[t, np.asarray(column, dtype=np.intp)[:, None]] = d
+        S, sparse, both = Ball(system.S, system.S_rad), Ball.exact(E), t.ravel()
+        SE = S @ sparse
+        matrix = SE[rows]
+        inverse = Inverse.of(matrix)
+        if inverse is None:
+            return None
+        # columns: the load, and unit forces in the sectors
+        load = Ball(np.column_stack([system.g, S.mid[:, both]]), np.column_stack([system.g_rad, S.rad[:, both]]))
+        near = Ball.exact(inverse.near(load.mid[rows]))
+        left = load - SE @ near
+        # what is left of the equations is rounding; (P S E0)^-1 is taken of that, and S E0 (P S E0)^-1, which is
+        # Q + (S E0 - Q P S E0) (P S E0)^-1 for whatever Q
+        rest = inverse.solve(left[rows])
+        Q = Ball.exact(SE.mid @ inverse.near(np.eye(len(rows))))
+        w = left - (Q @ left[rows] + (SE - Q @ matrix) @ rest)
+        w.mid[rows], w.rad[rows] = 0.0, 0.0
+        x = near + rest
+        y = sparse @ x
+        unit_forces = np.zeros_like(y.mid[:, 1:])
+        unit_forces[both, np.arange(len(both))] = 1.0
+        start, change = _stacked(y[:, 0], w[:, 0]), _stacked(Ball.exact(unit_forces) - y[:, 1:], w[:, 1:])
+        change = Ball(np.where(np.arange(len(change.mid))[:, None] < len(y.mid), 1.0, -1.0) * change.mid, change.rad)
+        x = x[list(column)]
+        return cls(d, turned, x[:, 0], start, x[:, 1:], change, matrix, rows, LIBRARY / np.min(units, axis=1))
+
+    @property
+    def sign(self) -> int:
+        """That of det P S E over every box in which the equations are regular; 0 where it is not proven."""
+        return determinant_sign(self.matrix)
+
+    @cached_property
+    def point(self) -> Box | None:
+        """What holds in the middle; the directions there are known but for rounding."""
+        return self._over(np.zeros(len(self.d)), None)
+
+    def over(self, radius: Array) -> Box | None:
+        """What holds over all angles up to ``radius``, (q,), from the middle; None if they are not proven regular."""
+        point = self.point
+        return point if point is None or not np.any(radius) else self._over(radius, point)
+
+    def coupling(self, radius: Array) -> Array:
+        """Sizes of B_c D over a box, (q, q): nothing is singular in it while they are small."""
+        return self._turned(self.B, radius)[0].size
+
+    def _turned(self, A: Ball, radius: Array) -> tuple[Ball, Ball, Ball]:
+        """A D, A dD/dpsi and A d for directions d and their changes D over a box; A has two columns for every node."""
+        first, second = A[:, 0::2], A[:, 1::2]
+        along, across = (first * Ball.exact(d[:, 0]) + second * Ball.exact(d[:, 1]) for d in (self.d, self.turned))
+        rounding = Ball(np.zeros_like(along.mid), (first.size + second.size) * self.off * SAFE)
+        # D = turned sin r - d (1 - cos r), dD/dpsi = turned cos r - d sin r
+        sin = Ball(0.0 * radius, np.where(radius < 1.5, np.minimum(radius, np.sin(radius) * (1.0 + LIBRARY)), 1.0))
+        half = np.minimum(0.25 * radius * radius * SAFE, 1.0)
+        lost = Ball(half, half)
+        cos = Ball.exact(np.ones(len(half))) - lost
+        return (
+            across * sin - along * lost + rounding,
+            across * cos - along * sin + rounding,
+            along * cos + across * sin + rounding,
+        )
+
+    def _over(self, radius: Array, point: Box | None) -> Box | None:
+        q, m = len(radius), len(self.start.mid) // 2
+        moved, push, ahead = self._turned(self.change, radius)
+        B_moved, B_push, B_ahead = self._turned(self.B, radius)
+        x, z, straight = self.x, Ball.exact(np.zeros((q, q))), Ball.exact(np.zeros((q, q)))
+        if q:
+            inverse = Inverse.of(Ball.exact(np.eye(q)) + B_moved)
+            if inverse is None:
+                return None
+            both = Ball(np.hstack([B_push.mid, B_ahead.mid]), np.hstack([B_push.rad, B_ahead.rad]))
+            both, x = inverse.solve(both), inverse.solve(self.x[:, None])[:, 0]
+            z, straight = both[:, :q], both[:, q:]
+        span = Ball(np.zeros((q, 1)), radius[:, None])
+        if point is not None:
+            for _ in range(2):
+                # the mean value form: what the box adds to the values in its middle, dx = -z x dpsi
+                x = smaller(x, point.x - ((z * x) @ span)[:, 0])
+        across, along = push - moved @ z, ahead - moved @ straight
+        value, slope = self.start + (moved @ x[:, None])[:, 0], across * x
+        if point is not None:
+            value = smaller(value, _stacked(point.y, point.w) + (slope @ span)[:, 0])
+        w = value[m:]
+        w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
+        return Box(value[:m], w, slope[m:], x, z, along[m:], across[m:])
+
+
+def _stacked(upper: Ball, lower: Ball) -> Ball:
+    return Ball(np.concatenate([upper.mid, lower.mid]), np.concatenate([upper.rad, lower.rad]))

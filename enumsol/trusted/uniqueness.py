@@ -1,0 +1,329 @@
+"""The trusted test of closed subtrees: one reduced solution where some contact nodes are free (theory, section 6.11).
+
+Some nodes have a status, others are free: they may have any; and others slide: they are open or slip in one direction.
+Eliminating the equations of the fixed nodes leaves the reduced problem of the others, w = h - R x. Where its matrix
+passes a test of definiteness it has exactly one solution, which is enclosed without knowing the statuses of its nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE
+from enumsol.trusted.arcs.ball_arrays import Ball, determinant_sign, solution
+from enumsol.trusted.at_alpha import row_balls, solve_selection
+from enumsol.trusted.status_rows import (
+    BACKWARD,
+    CONDITIONS,
+    FORWARD,
+    FRICTIONLESS,
+    OPEN,
+    SLIP_MINUS,
+    SLIP_PLUS,
+    STICK,
+    UNDECIDED,
+    final_codes,
+    refines,
+)
+from enumsol.trusted.uniqueness_weights import Components, Weights
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.arithmetic.balls import Array
+    from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.trusted.at_alpha import VerifiedSelection
+
+    Codes = tuple[int, ...]
+
+#: Radii of forces by the largest force, beyond which a solution is hardly placed.
+_WIDE = 1e-3
+
+
+def core_of(selection: Sequence[int], free: Sequence[int]) -> Codes:
+    """The selection with its free nodes undecided."""
+    chosen = set(free)
+    return tuple(UNDECIDED if i in chosen else code for i, code in enumerate(selection))
+
+
+@dataclass(frozen=True)
+class ClosedSolution:
+    """The one solution of a reduced problem as balls, in scaled units.
+
+    Attributes
+    ----------
+    core : status codes, UNDECIDED at the free nodes, FORWARD or BACKWARD at those that slide
+    force, force_rad, w, w_rad : (2p,) arrays
+        lambda and w = g - S lambda.
+    possible : per node the final codes that may hold there; those of a fixed node that holds strictly are its own only
+    sign : int
+        Sign of the determinant of the fixed nodes' equations: the index, if the conditions below hold strictly.
+    slack, slack_rad : arrays
+        The conditions of the fixed nodes, and of every sliding one: the sign of its slip, unless it is open.
+    regular : VerifiedSelection or None
+        Its selection's solution, where its balls were taken for it.
+    """
+
+    core: Codes
+    force: Array
+    force_rad: Array
+    w: Array
+    w_rad: Array
+    possible: tuple[frozenset[int], ...]
+    sign: int
+    slack: Array
+    slack_rad: Array
+    regular: VerifiedSelection | None = None
+
+    @property
+    def is_root(self) -> bool:
+        """All conditions hold strictly: exactly one root has this core."""
+        return bool(np.all(self.slack > self.slack_rad))
+
+    @property
+    def is_excluded(self) -> bool:
+        """A condition is broken strictly: no root has this core."""
+        return bool(np.any(self.slack < -self.slack_rad))
+
+    @property
+    def is_wide(self) -> bool:
+        """The balls hardly tell where it lies."""
+        return bool(np.max(self.force_rad, initial=0.0) > _WIDE * np.max(np.abs(self.force), initial=0.0))
+
+
+def closed_solution(
+    system: EnclosedSystem, selection: Codes, free: Sequence[int], weights: Array, force: Array
+) -> ClosedSolution | None:
+    """The only solution of the reduced problem, or None where that is not proven.
+
+    Parameters
+    ----------
+    system : EnclosedSystem
+    selection : final codes, those of the free nodes only name a point near the solution; FORWARD or BACKWARD where a
+        node slides
+    free : ascending nodes, none of which slides
+    weights : numbers of the form of theory, (6.9), as ``Weights.of`` takes them
+    force : (2p,) array, lambda near the solution; only lambda_n of nodes that are free or slide is read
+    """
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        reduced = Reduced.of(system, selection, free)
+        numbers = None if reduced is None else Weights.of(reduced, weights)
+        return None if reduced is None or numbers is None else reduced.enclosed(numbers, force)
+
+
+def only_solution(
+    system: EnclosedSystem,
+    selection: Codes,
+    free: Sequence[int],
+    weights: Array,
+    point: Sequence[Any],
+    w: Sequence[Any],
+) -> int:
+    """The determinant's sign of the fixed nodes' equations if a solution of the reduced problem is its only one.
+
+    0 where that is not proven.
+
+    Parameters
+    ----------
+    system, selection, free, weights : as for ``closed_solution``
+    point, w : 2p rationals each, lambda in units of force and w in units of length
+        At a solution of the reduced problem that has the statuses of the selection at the nodes that do not slide.
+    """
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        reduced = Reduced.of(system, selection, free)
+        numbers = None if reduced is None else Weights.of(reduced, weights)
+        numbers = None if reduced is None or numbers is None else numbers.at(reduced, point, w)
+        return reduced.sign if reduced is not None and numbers is not None and reduced.least(numbers) > 0 else 0
+
+
+def same_solution(
+    one: Codes, one_possible: Sequence[frozenset[int]], other: Codes, other_possible: Sequence[frozenset[int]]
+) -> bool | None:
+    """Whether two solutions, each the only one of its core, are the same; None where that is open.
+
+    The solution of one core solves that of another if it has the statuses of its fixed nodes. A solution in a complete
+    selection is one whose core is complete.
+    """
+    if any(not a & b for a, b in zip(one_possible, other_possible, strict=True)):
+        return False
+    for core, possible in ((one, other_possible), (other, one_possible)):
+        if all(all(refines(c, code) for c in held) for code, held in zip(core, possible, strict=True)):
+            return True
+    return None
+
+
+_SLIDING = (FORWARD, BACKWARD)
+
+
+@dataclass(frozen=True)
+class Reduced(Components):
+    """w = h - R x on the nodes that are free or slide, by elimination of the fixed ones.
+
+    Attributes
+    ----------
+    nodes : int array
+        Those that are free, then those that slide.
+    turn : Ball
+        lambda_t of a sliding node is so many times its lambda_n, +-F; zero for free nodes.
+    E, Z : Ball
+        lambda = E y + P x, and y = Z (1, -x): the fixed nodes' forces for x.
+    h : Ball
+    """
+
+    rows: NDArray[np.intp]
+    turn: Ball
+    E: Ball
+    Z: Ball
+    h: Ball
+    sign: int
+
+    @classmethod
+    def of(cls, system: EnclosedSystem, selection: Codes, free: Sequence[int]) -> Reduced | None:
+        """None where the fixed nodes' equations are not proven regular, or a node cannot have its code."""
+        chosen = set(free)
+        for i, (code, F) in enumerate(zip(selection, system.F, strict=True)):
+            if code not in final_codes(F > 0) and not (code in _SLIDING and F > 0 and i not in chosen):
+                return None
+        p, status = system.p, np.array(core_of(selection, free), dtype=np.intp)
+        slides = np.isin(status, _SLIDING)
+        nodes = np.concatenate([np.array(free, dtype=np.intp), np.flatnonzero(slides)])
+        rubbing = (system.F[nodes] > 0) & ~slides[nodes]
+        places = np.concatenate([nodes, p + nodes[rubbing]])
+        tangential = np.full(len(nodes), -1, dtype=np.intp)
+        tangential[rubbing] = len(nodes) + np.arange(np.count_nonzero(rubbing))
+        closed = np.flatnonzero((status != OPEN) & (status != UNDECIDED) & ~slides)
+        held = p + np.flatnonzero(status == STICK)
+        slip = np.where(np.isin(status, (SLIP_PLUS, FORWARD)), 1.0, 0.0)
+        slip -= np.where(np.isin(status, (SLIP_MINUS, BACKWARD)), 1.0, 0.0)
+        E, E_rad = np.zeros((2 * p, len(closed) + len(held))), np.zeros((2 * p, len(closed) + len(held)))
+        column = np.arange(len(closed))
+        E[closed, column] = 1.0
+        E[p + closed, column], E_rad[p + closed, column] = (slip * system.F)[closed], (abs(slip) * system.F_rad)[closed]
+        E[held, len(closed) + np.arange(len(held))] = 1.0
+        forms, rows = Ball(E, E_rad), np.concatenate([closed, held])
+        S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
+        M = S[rows] @ forms
+        sign = determinant_sign(M)
+        turn = Ball((slip * system.F)[nodes], (abs(slip) * system.F_rad)[nodes])
+        across = S[:, places]
+        side = np.flatnonzero(slides[nodes])
+        turned = across[:, side] + S[:, p + nodes[side]] * turn[side]
+        across.mid[:, side], across.rad[:, side] = turned.mid, turned.rad
+        above = across[rows]
+        right = Ball(np.column_stack([g.mid[rows], above.mid]), np.column_stack([g.rad[rows], above.rad]))
+        Z = solution(M, right) if sign else None
+        if Z is None:
+            return None
+        moved = (S[places] @ forms) @ Z
+        R, h = across[places] - moved[:, 1:], g[places] - moved[:, 0]
+        return cls(system, selection, nodes, places, tangential, R, rows, turn, forms, Z, h, sign)
+
+    def enclosed(self, numbers: Weights, force: Array) -> ClosedSolution | None:
+        """The solution as a ball, None where it is not proven to exist and to be the only one."""
+        if len(self.nodes) == self.system.p and not any(code in _SLIDING for code in self.selection):
+            # all nodes are free: where its selection holds strictly, that is closer than (6.10) if Q is hardly definite
+            root = solve_selection(self.system, self.selection)
+            if root is not None and root.is_root:
+                # R is S and h is g: so these are x and w here, and w is closer than R times the radii of x gives it
+                x = Ball(root.force[self.places], root.force_rad[self.places])
+                w = Ball(root.w[self.places], root.w_rad[self.places])
+                numbers = numbers.beside(x, self.tangential[numbers.normal])
+                alone = self._alone(x, w, numbers, self.least(numbers))
+                return None if alone is None else replace(alone, regular=root)
+        least = self.least(numbers)
+        if not least > 0:
+            return None
+        x = self._point(force, numbers)
+        reach = self._distance(x.mid, self._displacements(x), numbers) / least * SAFE
+        if not np.isfinite(reach):
+            return None
+        x = Ball(x.mid, (x.rad + reach) * SAFE)
+        w = self._displacements(x)
+        for i, node in enumerate(self.nodes):
+            # open at every solution
+            if self.selection[node] == OPEN and w.mid[i] + w.rad[i] < 0:
+                x.rad[[i, self.tangential[i]] if self.tangential[i] >= 0 else i] = 0.0
+        return self._alone(x, self._displacements(x), numbers, least)
+
+    def _alone(self, x: Ball, w: Ball, numbers: Weights, least: float) -> ClosedSolution | None:
+        """The solution that is known to lie in a ball, if Q is definite for every theta that it may have there."""
+        return self._solution(x, w) if self.serves(numbers, x, w, least) else None
+
+    def _displacements(self, x: Ball) -> Ball:
+        """w of the free components."""
+        return self.h - (self.R @ Ball(x.mid[:, None], x.rad[:, None]))[:, 0]
+
+    def _point(self, force: Array, numbers: Weights) -> Ball:
+        """Forces in the cones, with the statuses of the selection, near the given ones."""
+        mid = np.array([0.0 if self.selection[i] == OPEN else max(float(force[i]), 0.0) for i in self.nodes])
+        turned = Ball.exact(mid[self.tangential >= 0]) * numbers.slope
+        radii = np.where(mid[self.tangential >= 0] > 0, turned.rad, 0.0)
+        return Ball(np.concatenate([mid, turned.mid]), np.concatenate([np.zeros(len(mid)), radii]))
+
+    def _distance(self, point: Array, w: Ball, numbers: Weights) -> float:
+        """Bound of the numerator of theory, (6.10), for a point that is a solution with another h."""
+        size, change = w.size, np.zeros(len(self.places))
+        up, down = np.maximum(w.mid + w.rad, 0.0) * SAFE, np.maximum(w.rad - w.mid, 0.0) * SAFE
+        gap = np.maximum(-(w.mid + w.rad), 0.0) / SAFE
+        if not np.all(np.isfinite(size)):
+            return np.inf
+        for i, node in enumerate(self.nodes):
+            code, t = self.selection[node], self.tangential[i]
+            apart = code == OPEN or (code in _SLIDING and point[i] == 0)
+            change[i] = up[i] if apart else size[i]
+            if t >= 0:
+                slips = {STICK: size[t], SLIP_PLUS: down[t], SLIP_MINUS: up[t]}
+                change[t] = numbers.beyond(t - len(self.nodes), gap[i], up[t], down[t]) if apart else slips[code]
+        return numbers.moved(change)
+
+    def _solution(self, x: Ball, w_free: Ball) -> ClosedSolution:
+        system, p = self.system, self.system.p
+        y = self.Z[:, 0] - (self.Z[:, 1:] @ Ball(x.mid[:, None], x.rad[:, None]))[:, 0]
+        force = (self.E @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
+        free = [int(node) for node in self.nodes if self.selection[node] not in _SLIDING]
+        core = core_of(self.selection, free)
+        status = np.array(core)
+        fixed = (status != UNDECIDED) & ~np.isin(status, _SLIDING)
+        idle = np.concatenate([~fixed | (status == OPEN), ~fixed | (status == OPEN) | (status == FRICTIONLESS)])
+        force.mid[idle], force.rad[idle] = 0.0, 0.0
+        force.mid[self.places], force.rad[self.places] = x.mid, x.rad
+        side = np.flatnonzero(np.isin(status[self.nodes], _SLIDING))
+        turned = x[side] * self.turn[side]
+        force.mid[p + self.nodes[side]], force.rad[p + self.nodes[side]] = turned.mid, turned.rad
+        S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
+        w = g - (S @ Ball(force.mid[:, None], force.rad[:, None]))[:, 0]
+        w.mid[self.places], w.rad[self.places] = w_free.mid, w_free.rad
+        w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
+        values, radii = row_balls(system, force.mid, force.rad, w.mid, w.rad)
+        tests = [(values[kind, i], radii[kind, i]) for i in np.flatnonzero(fixed) for kind in CONDITIONS[core[i]][1]]
+        tests += [self._slides(core[node], values[:, node], radii[:, node]) for node in self.nodes[side]]
+        slack, slack_rad = (np.array(part) for part in (zip(*tests, strict=True) if tests else ((), ())))
+        possible = tuple(
+            frozenset((core[i],)) if fixed[i] else self._possible(i, values[:, i], radii[:, i]) for i in range(p)
+        )
+        return ClosedSolution(core, force.mid, force.rad, w.mid, w.rad, possible, self.sign, slack, slack_rad)
+
+    @staticmethod
+    def _slides(code: int, values: Array, radii: Array) -> tuple[float, float]:
+        """What tells that a sliding node slips in its direction or is open, with its radius."""
+        forward = 5 if code == FORWARD else 6
+        separate, slips = (values[4], radii[4]), (values[forward], radii[forward])
+        if values[4] > radii[4]:
+            return separate
+        loaded = values[0] > radii[0]
+        return slips if loaded or slips[0] > slips[1] else (0.0, 0.0)
+
+    def _possible(self, node: int, values: Array, radii: Array) -> frozenset[int]:
+        """Final codes of a node that its balls do not exclude."""
+        high, low = values + radii, values - radii
+        return frozenset(
+            code
+            for code in final_codes(self.system.F[node] > 0)
+            if all(low[k] <= 0 <= high[k] for k in CONDITIONS[code][0])
+            and all(high[k] >= 0 for k in CONDITIONS[code][1])
+        )

@@ -1,0 +1,209 @@
+"""The numbers of the trusted form of theory, (6.9), and its least eigenvalue; of closed subtrees and of lone roots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, upper_norm
+from enumsol.trusted.arcs.ball_arrays import Ball
+from enumsol.trusted.status_rows import SLIP_MINUS, SLIP_PLUS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.arithmetic.balls import Array
+    from enumsol.condensation.enclosure import EnclosedSystem
+
+_SIGNS = {SLIP_PLUS: 1, SLIP_MINUS: -1}
+
+
+@dataclass(frozen=True)
+class Weights:
+    """The numbers of the form of theory, (6.9).
+
+    Attributes
+    ----------
+    mu : one number a node
+    kappa, nu, share, tau : one number for every free node with friction
+    slope : Ball
+        theta there.
+    friction : Ball
+        F there.
+    normal : places of lambda_n of free nodes with friction
+    """
+
+    mu: Array
+    kappa: Array
+    nu: Array
+    share: Array
+    tau: Array
+    slope: Ball
+    friction: Ball
+    normal: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, part: Components, numbers: Array) -> Weights | None:
+        """From one array: mu of all nodes, then kappa, nu, theta / F and tau of the free ones with friction.
+
+        mu and kappa are positive, |nu| F <= mu, |theta| <= F; theta = +-F at nodes that slip in the selection; tau is
+        not negative, and theta = 0 where it is positive. None where this is not so.
+        """
+        system, m, normal = part.system, len(part.nodes), np.flatnonzero(part.tangential >= 0)
+        if len(numbers) != m + 4 * len(normal) or not np.all(np.isfinite(numbers)):
+            return None
+        mu, (kappa, nu, share, tau) = numbers[:m], numbers[m:].reshape(4, -1)
+        nodes = part.nodes[normal]
+        friction = Ball(system.F[nodes], system.F_rad[nodes])
+        sides = np.array([_SIGNS.get(part.selection[i], 0) for i in nodes])
+        wrong = (np.abs(share) > 1) | ((sides != 0) & (share != sides)) | ((tau > 0) & (share != 0))
+        wrong |= np.abs(nu) * friction.size * SAFE + TINY > mu[normal]
+        if np.any(wrong) or np.any(mu <= 0) or np.any(kappa <= 0) or np.any(tau < 0):
+            return None
+        turned = friction * Ball.exact(share)
+        whole = np.abs(share) == 1
+        slope = Ball(np.where(whole, share * friction.mid, turned.mid), np.where(whole, friction.rad, turned.rad))
+        return cls(mu, kappa, nu, share, tau, slope, friction, normal)
+
+    def at(self, part: Components, point: Sequence[Any], w: Sequence[Any]) -> Weights | None:
+        """With theta = lambda_t / lambda_n where lambda_n > 0 at a rational solution; None if they do not serve it."""
+        p, slope = part.system.p, Ball(self.slope.mid.copy(), self.slope.rad.copy())
+        for k, i in enumerate(self.normal):
+            node = int(part.nodes[i])
+            if self.tau[k] > 0:
+                continue
+            if point[node] != 0:
+                ratio = point[p + node] / point[node]
+                slope.mid[k] = int(ratio.p) / int(ratio.q)
+                slope.rad[k] = 2 * UNIT * abs(slope.mid[k]) + TINY
+            elif self.beyond(k, *_bounds(w[node], w[p + node])) > 0:
+                return None
+        return replace(self, slope=slope)
+
+    def beside(self, x: Ball, tangential: NDArray[np.intp]) -> Weights:
+        """With theta = lambda_t / lambda_n at the middle of a solution's ball where it is not F or -F, nor tau > 0."""
+        n, t = x.mid[self.normal], x.mid[tangential]
+        told = (self.tau == 0) & (np.abs(self.share) < 1) & (n > 0)
+        ratio = np.where(told, t / np.where(told, n, 1.0), self.slope.mid)
+        # off says how far that is from theta
+        return replace(self, slope=Ball(ratio, np.where(told, 0.0, self.slope.rad)))
+
+    def beyond(self, k: int, gap: float, up: float, down: float) -> float:
+        """What w_t of a node that is open is too large for the numbers, if -w_n >= gap and -down <= w_t <= up."""
+        excess = 0.0
+        for side, size in ((1.0, up), (-1.0, down)):
+            left = (1.0 - side * self.share[k]) * self.kappa[k] * self.friction.size[k] * SAFE
+            if left > 0 and size > 0:
+                normal = self.mu[self.normal[k]] + side * self.nu[k] * self.friction.mid[k]
+                normal -= (abs(self.nu[k]) * self.friction.rad[k] + 4 * UNIT * self.mu[self.normal[k]]) * SAFE
+                excess = max(excess, size - max(normal, 0.0) * gap / left / SAFE)
+        return float(excess * SAFE)
+
+    def off(self, k: int, n: Ball, t: Ball, w_n: Ball, w_t: Ball) -> float:
+        """How far theta is at most from one that serves a solution within a node's balls; infinite if that is open."""
+        share, F = float(self.share[k]), self.friction[k]
+        slips = np.sign(w_t.mid) if abs(w_t.mid) > w_t.rad else 0.0
+        if self.tau[k] > 0 or (slips and share == slips):
+            return 0.0
+        if w_n.mid + w_n.rad < 0:
+            up, down = (max(float(side), 0.0) * SAFE for side in (w_t.mid + w_t.rad, w_t.rad - w_t.mid))
+            return np.inf if self.beyond(k, -float(w_n.mid + w_n.rad) / SAFE, up, down) > 0 else 0.0
+        low = float(n.mid - n.rad) / SAFE
+        if low <= 0:
+            return np.inf
+        slope = self.slope[k]
+        if slips:
+            return float((abs(slips * F.mid - slope.mid) + F.rad + slope.rad) * SAFE)
+        # |lambda_t / lambda_n - theta| = |lambda_t - theta lambda_n| / lambda_n
+        apart = t - slope * n
+        return float(apart.size / low * SAFE)
+
+    def moved(self, change: Array) -> float:
+        """Upper bound of ||D'delta||, |delta| <= change."""
+        m, n = len(self.mu), self.normal
+        along = self.mu * change[:m]
+        along[n] += self.kappa * self.slope.size * change[m:]
+        across = np.abs(self.nu) * change[n] + self.kappa * change[m:]
+        return float(upper_norm(np.concatenate([along, across]) * SAFE + TINY) * SAFE)
+
+
+def _bounds(w_n: Any, w_t: Any) -> tuple[float, float, float]:
+    """-w_n >= 0 from below, and from above w_t and -w_t where they are positive, of rationals."""
+    try:
+        gap, slip = -int(w_n.p) / int(w_n.q), int(w_t.p) / int(w_t.q)
+    except OverflowError:
+        return 0.0, np.inf, np.inf
+    size = abs(slip) * SAFE + TINY
+    return max(gap / SAFE - TINY, 0.0), size * bool(w_t > 0), size * bool(w_t < 0)
+
+
+@dataclass(frozen=True)
+class Components:
+    """Components x of lambda and those of w that belong to them, which change by -R d where x changes by d.
+
+    Attributes
+    ----------
+    system : EnclosedSystem
+    selection : status codes; those of the nodes below name the slip at a solution
+    nodes : int array
+    places : int array
+        Of x in lambda: lambda_n of all these nodes, then lambda_t of those with friction whose lambda_t is no multiple
+        of lambda_n.
+    tangential : int array
+        Place of lambda_t among them, for all nodes; -1 where there is none.
+    R : Ball
+    """
+
+    system: EnclosedSystem
+    selection: tuple[int, ...]
+    nodes: NDArray[np.intp]
+    places: NDArray[np.intp]
+    tangential: NDArray[np.intp]
+    R: Ball
+
+    def form(self, numbers: Weights) -> Ball:
+        """D'R, of which (6.9) is the symmetric part."""
+        R, n, t = self.R, np.flatnonzero(self.tangential >= 0), self.tangential[self.tangential >= 0]
+        form = Ball(R.mid.copy(), R.rad.copy())
+        along = R[: len(self.nodes)] * Ball.exact(numbers.mu[:, None])
+        turned = (numbers.slope * Ball.exact(numbers.kappa))[:, None]
+        across = R[n] * Ball.exact(numbers.nu[:, None]) + R[t] * Ball.exact(numbers.kappa[:, None])
+        for rows, part in ((np.arange(len(self.nodes)), along), (n, along[n] - R[t] * turned), (t, across)):
+            form.mid[rows], form.rad[rows] = part.mid, part.rad
+        return form
+
+    def least(self, numbers: Weights, further: Ball | None = None) -> float:
+        """Lower bound of the smallest eigenvalue of Q (theory, (6.9)), at most 0 where none positive is proven.
+
+        ``further``: rows whose squares are added to the form.
+        """
+        if not len(self.places):
+            return 1.0
+        used = np.flatnonzero(numbers.tau > 0)
+        normal, tau = numbers.normal[used], numbers.tau[used]
+        # weights at least kappa F / sqrt(tau), for any rounding
+        weight = numbers.kappa[used] * numbers.friction.size[used] / np.sqrt(tau) * SAFE + TINY
+        T = self.R[self.tangential[normal]] * Ball.exact(weight[:, None])
+        square = Ball(T.mid.T, T.rad.T) @ T
+        Q = self.form(numbers) - Ball(0.5 * square.mid, 0.5 * square.rad)
+        if further is not None:
+            Q = Q + Ball(further.mid.T, further.rad.T) @ further
+        Q.mid[normal, normal] -= 0.5 * tau
+        Q.rad[normal, normal] += UNIT * (np.abs(Q.mid[normal, normal]) + tau)
+        mid = 0.5 * (Q.mid + Q.mid.T)
+        # the symmetric part of the form lies in the mean of both triangles
+        rad = (np.maximum(Q.rad, Q.rad.T) + 4 * UNIT * np.abs(mid)) * SAFE
+        if not (np.all(np.isfinite(mid)) and np.all(np.isfinite(rad))):
+            return 0.0
+        return float((dense_eigenvalue_bound(mid) - upper_norm(rad)) / SAFE)
+
+    def serves(self, numbers: Weights, x: Ball, w: Ball, least: float) -> bool:
+        """Whether Q is definite for every theta that a solution in a ball may have."""
+        n, t = numbers.normal, self.tangential[numbers.normal]
+        off = np.array([numbers.off(k, x[a], x[b], w[a], w[b]) for k, (a, b) in enumerate(zip(n, t, strict=True))])
+        # at each of them Q is not smaller than this
+        return bool(least > upper_norm(numbers.kappa * off * upper_norm(self.R[t].size, axis=1)) * SAFE)
