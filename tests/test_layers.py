@@ -14,14 +14,12 @@ import enumsol
 
 #: Rooms from the ground up ("." is the package's own ``__init__``). A room imports rooms of lower layers only.
 LAYERS = (
-    ("errors", "sealed", "compiled", "executors", "deadlines", "texts", "_version", "arithmetic"),
-    ("checks", "figures", "files"),
-    ("array_checks", "statuses", "sectors"),
+    ("errors", "_version", "arithmetic"),
+    ("support",),
     ("condensation",),
-    ("contact_body",),
-    ("friction", "body2d", "body3d", "shapes"),
-    ("facets", "problem", "problem3d"),
-    ("equation", "kernel", "selections"),
+    ("model",),
+    ("trusted",),
+    ("selections",),
     ("relaxation", "proof"),
     ("search", "checker"),
     ("roots",),
@@ -35,7 +33,7 @@ LAYERS = (
 )
 #: Rooms that share no more than what both must trust: who finds roots and who checks the proofs of it.
 STRANGERS = {
-    "checker": {"selections", "relaxation", "equation"},
+    "checker": {"selections", "relaxation"},
     "roots": {"checker"},
     "branches": {"checker"},
     "continuation": {"checker", "fixed_points"},

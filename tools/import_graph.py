@@ -1,8 +1,8 @@
 """The import graph of a package, read from its source without running it.
 
 Every import counts: those at the top of a module, those under ``if TYPE_CHECKING`` and those inside functions. A *room*
-is a module or a package directly below the package (``enumsol.model.problem``, ``enumsol.search``); an *arrow* joins two
-rooms when a module of one imports a module of the other.
+is a module or a package directly below the package (``enumsol.errors``, ``enumsol.search``); an *arrow* joins two rooms
+when a module of one imports a module of the other.
 """
 
 from __future__ import annotations

@@ -359,7 +359,7 @@ class BranchGraph(Immutable):
         write_graphml(self.data, self.branch_of, file)
 
     def plot(self, quantity: str | None = None, nodes: Sequence[Any] | None = None, **options: Any) -> Any:
-        """A figure of alpha against an overview, or a quantity of chosen nodes; see enumsol.branches.figures.graph_plots."""
+        """A figure of alpha against an overview, or a quantity of chosen nodes; see branches.figures.graph_plots."""
         from enumsol.branches.figures.graph_plots import plot_graph  # as above
 
         return plot_graph(self, quantity, nodes, **options)

@@ -1,4 +1,4 @@
-"""The proof of a branch graph as a file (see enumsol.checker.graph_checker and enumsol.checker.arcs for its records)."""
+"""The proof of a branch graph as a file; its records are read by enumsol.checker.graph_checker and checker.arcs."""
 
 from __future__ import annotations
 

@@ -6,47 +6,50 @@ What a verified proof says
     solve the problem, and nothing else does. The proof of a branch graph says that every solution for every alpha of an
     interval lies in the selections handed on and, if it holds arcs, what each of them does along the interval, except
     for short intervals that it leaves open. All this rests on the energy bound (theory, (5.2)), on branchings that
-    cover (``trusted.status_rows.children_of``), on the a-priori error bounds of IEEE double arithmetic with rounding to nearest
-    in ``arithmetic.balls``, ``condensation.enclosure`` and ``kernel``, and on rational arithmetic in
+    cover (``trusted.status_rows.children_of``), on the a-priori error bounds of IEEE double arithmetic with rounding to
+    nearest in ``arithmetic.balls``, ``condensation.enclosure`` and ``trusted``, and on rational arithmetic in
     ``checker.rational`` and ``checker.hull``. Linear algebra kernels may sum in any order and fuse multiplications and
     additions; fast matrix multiplication of Strassen's kind and changed rounding modes are excluded.
 
 What checker and search share
-    ``checker.verify``, ``checker.graph_checker`` and ``checker.space_checker`` import nothing of the search, neither its trees and
-    relaxations nor its arcs and results, and a test guards that. They are not independent of all that it uses. These
-    serve both, and an error in one of them may write a false proof and accept it:
+    ``checker.verify``, ``checker.graph_checker`` and ``checker.space_checker`` import nothing of the search, neither
+    its trees and relaxations nor its arcs and results, and a test guards that. They are not independent of all that it
+    uses. These serve both, and an error in one of them may write a false proof and accept it:
 
-    - ``trusted.status_rows``: the codes, the rows and the branchings that cover, on which writer and reader have to agree;
+    - ``trusted.status_rows``: the codes, the rows and the branchings that cover, on which writer and reader have to
+      agree;
     - ``condensation.products``, ``condensation.enclosure`` and ``arithmetic.balls``: balls for S, g and F, and the
       proofs that A and S are positive definite;
-    - ``trusted.at_alpha`` and ``trusted.over_interval``: the exclusion inequality, the verified solve of a selection and the
-      contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled copy of
-      the inequality); ``trusted.energy_bounds``, what multipliers prove; ``trusted.quadratic_forms``, other forms than the energy;
+    - ``trusted.at_alpha`` and ``trusted.over_interval``: the exclusion inequality, the verified solve of a selection
+      and the contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled
+      copy of the inequality); ``trusted.energy_bounds``, what multipliers prove; ``trusted.quadratic_forms``, other
+      forms than the energy;
     - ``trusted.uniqueness``, the test by which a subtree is closed by its only possible solution, and which of these
-      solutions are the same; ``trusted.uniqueness_in_contact``, the test that a root is alone below an assignment; ``trusted.uniqueness_weights``,
-      the form of both, and ``trusted.arcs.ball_arrays``, their linear systems of balls;
+      solutions are the same; ``trusted.uniqueness_in_contact``, the test that a root is alone below an assignment;
+      ``trusted.uniqueness_weights``, the form of both, and ``trusted.arcs.ball_arrays``, their linear systems of balls;
     - for the arcs of branch graphs: ``trusted.selection``, the numbers of unknowns and conditions;
-      ``trusted.arcs.selection_balls``, ``trusted.arcs.series``, ``trusted.arcs.bernstein`` and ``trusted.arcs.over_parts``, a selection over an
-      interval as a series with bounds of its error; ``trusted.arcs.precise`` and ``trusted.arcs.many_digits``, the same with many
-      digits, loaded only where a box asks for it; ``trusted.arcs.only_branch``, the test by which the roots of arcs are the
-      only solutions over a piece; ``trusted.arcs.ball_arrays`` (in 3D, too);
-    - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings and the
-      exclusion inequality; ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds and which leaves
-      share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution only; ``sectors``, the ends
-      of sectors; ``condensation.space_condensed``, balls for S and g in the variables in which friction is isotropic;
-      ``problem3d``, ``body3d`` and ``friction``, the data and their checks;
+      ``trusted.arcs.selection_balls``, ``trusted.arcs.series``, ``trusted.arcs.bernstein`` and
+      ``trusted.arcs.over_parts``, a selection over an interval as a series with bounds of its error;
+      ``trusted.arcs.precise`` and ``trusted.arcs.many_digits``, the same with many digits, loaded only where a box asks
+      for it; ``trusted.arcs.only_branch``, the test by which the roots of arcs are the only solutions over a piece;
+      ``trusted.arcs.ball_arrays`` (in 3D, too);
+    - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings and
+      the exclusion inequality; ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds
+      and which leaves share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution
+      only; ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the variables
+      in which friction is isotropic; ``model.problem3d``, ``model.body3d`` and ``model.friction``, the data and their
+      checks;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
-      search whether it does at all (then there is no proof);
-      ``condensation.affine``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
-      definite matrix, and floats as rationals;
+      search whether it does at all (then there is no proof); ``condensation.affine``: F(alpha) and f(alpha) without
+      rounding; of ``arithmetic.rationals`` the pivots of a definite matrix, and floats as rationals;
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file; a search that goes on
       with an earlier proof reads its multipliers and forms by ``proof.reading``, ``proof.reading_space``,
-      ``proof.form_records`` and ``proof.root_records``, too, from what ``proof.begun`` finds, and proves them again before
-      ``proof.writer`` and ``proof.compressed_parts`` have them;
-    - ``problem``, ``body2d``, ``contact_body``, ``condensation.data``, ``condensation.condensed``,
-      ``condensation.factorization``, ``sealed``, ``checks``, ``array_checks``, ``files``, ``texts`` and ``errors``: the
-      data, their checks and their fingerprint, the factorization of A (no bound assumes that it is accurate), S and g
-      as computed;
+      ``proof.form_records`` and ``proof.root_records``, too, from what ``proof.begun`` finds, and proves them again
+      before ``proof.writer`` and ``proof.compressed_parts`` have them;
+    - ``model.problem``, ``model.body2d``, ``model.contact_body``, ``condensation.data``, ``condensation.condensed``,
+      ``condensation.factorization``, ``support.immutable``, ``support.arguments``, ``support.array_arguments``,
+      ``support.files``, ``support.messages`` and ``errors``: the data, their checks and their fingerprint, the
+      factorization of A (no bound assumes that it is accurate), S and g as computed;
     - numpy, scipy and python-flint.
 
     They are shared because the two must agree. A leaf is written when its inequality is proven positive, and a second

@@ -21,7 +21,7 @@ _ENTRIES = 9
 
 @dataclass(frozen=True)
 class LoneRoot:
-    """What shows that a root is the only one below an assignment: the arguments of ``trusted.uniqueness_in_contact.lone_root``.
+    """What shows that a root is the only one below an assignment: the arguments of ``lone_root``.
 
     Attributes
     ----------

@@ -63,7 +63,7 @@ _MAY = {
 
 @dataclass(frozen=True)
 class LoneProposal:
-    """The selection of a known root, and the numbers and strengths with which ``trusted.uniqueness_in_contact`` may prove it alone."""
+    """The selection of a known root, and the numbers and strengths that may prove it alone."""
 
     selection: Codes
     weights: Array

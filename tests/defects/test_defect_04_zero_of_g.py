@@ -93,7 +93,7 @@ def test_the_zero_is_that_of_an_independent_condensation():
 
 def test_search_and_checker_ask_one_place(monkeypatch):
     # told of another alpha, both cut there: neither decides anew
-    from enumsol.checker import graph_checker as graph_checker
+    from enumsol.checker import graph_checker
     from enumsol.condensation import exact as path
 
     problem = ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1.0, 2.0], load_slope=[1.0, 1.0], friction=1.0)

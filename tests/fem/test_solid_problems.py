@@ -303,8 +303,8 @@ def test_nothing_of_this_is_loaded_for_a_problem_in_2d():
 
     code = (
         "import sys, enumsol; from enumsol import fem; enumsol.gallery.get('wedge-8-5').build(); "
-        "sys.exit(any(name.startswith(('enumsol.model.problem3d', 'enumsol.model.friction', 'enumsol.fem.so', 'enumsol.fem.su', "
-        "'meshio')) for name in sys.modules))"
+        "sys.exit(any(name.startswith(('enumsol.model.problem3d', 'enumsol.model.friction', 'enumsol.fem.so', "
+        "'enumsol.fem.su', 'meshio')) for name in sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 

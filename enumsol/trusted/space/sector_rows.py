@@ -1,4 +1,4 @@
-"""The trusted kernel in 3D: branchings, rows and exclusions (theory, section 12.2). Leaves are in ``trusted.space.leaves``."""
+"""The trusted core in 3D: branchings, rows and exclusions (theory, section 12.2); leaves are in ``leaves``."""
 
 from __future__ import annotations
 

@@ -1,0 +1,320 @@
+"""Exclusion margins are lower bounds, and selections are solved with balls that hold the exact solution."""
+
+from fractions import Fraction
+from itertools import product
+
+import numpy as np
+import pytest
+from generators import dense_compliance, fe_compliance, from_condensed, integer_problem
+from oracles import _affine, _at, _conditions, exact_condense
+from proof_tools import Judge, det_sign, leaves_of, multipliers, records_of
+
+from enumsol import enumerate_roots, gallery
+from enumsol.search.certifiers._margin import Margins
+from enumsol.search.solvers import Solvers
+from enumsol.trusted import at_alpha as point
+from enumsol.trusted.at_alpha import exclusion_margin, exclusion_margins, solve_selection
+from enumsol.trusted.status_rows import row_signs
+
+CODES = (0, 1, 2, 3, 5, 6)
+
+
+def system_of(problem, alpha=0.0):
+    one = np.ones(2 * problem.p)
+    return problem.enclosure.at(alpha, one, one)
+
+
+def judge_of(problem, alpha=0.0):
+    judge = Judge(problem)
+    judge.S, judge.g, judge.F = exact_condense(problem, alpha)
+    judge.force = judge.length = [Fraction(1)] * (2 * problem.p)
+    return judge
+
+
+def random_problem(rng, p):
+    S = (dense_compliance if rng.random() < 0.5 else fe_compliance)(rng, p)
+    return from_condensed(S, rng.normal(size=2 * p), rng.uniform(0.05, 3.0, size=p))
+
+
+def random_multipliers(rng, codes, F, *, bad):
+    """Allowed multipliers of an assignment; with ``bad`` now and then a wrong sign or a row it does not impose."""
+    signs = row_signs(np.array(codes), F)
+    p = len(codes)
+    rows, values = [], []
+    for kind in range(7):
+        for i in range(p):
+            if rng.random() < 0.5 and (signs[i, kind] or (bad and rng.random() < 0.2)):
+                value = rng.normal() * 10 ** rng.uniform(-2, 1)
+                rows.append(kind * p + i)
+                values.append(value if signs[i, kind] == 2 or (bad and rng.random() < 0.1) else abs(value))
+    return np.array(rows, dtype=np.intp), np.array(values)
+
+
+def ray(problem, rows, values):
+    """The multipliers stretched to where their bound is largest, in floats."""
+    system = system_of(problem)
+    S, g, p = system.S, system.g, system.p
+    d, b = np.zeros(2 * p), 0.0
+    for row, value in zip(rows, values, strict=True):
+        kind, i = divmod(int(row), p)
+        if kind < 4:
+            d[i] += value * (kind != 1) * (1.0 if kind == 0 else system.F[i])
+            d[p + i] += value * {0: 0.0, 1: 1.0, 2: -1.0, 3: 1.0}[kind]
+        else:
+            k, sign = (i, 1.0) if kind == 4 else (p + i, -1.0 if kind == 5 else 1.0)
+            d += sign * value * S[k]
+            b += sign * value * g[k]
+    inverse = np.linalg.inv(S)
+    slope, curvature = b - 0.5 * d @ inverse @ g, 0.25 * d @ inverse @ d
+    return values * (0.5 * slope / curvature) if slope > 0 and curvature > 0 else values
+
+
+def test_margins_agree_with_rationals():
+    rng = np.random.default_rng(1)
+    positive = refused = 0
+    for _ in range(16):
+        p = int(rng.integers(1, 4))
+        problem = random_problem(rng, p)
+        system, judge = system_of(problem), judge_of(problem)
+        compiled = Margins((system,), system.F, system.F)
+        for _ in range(30):
+            codes = tuple(int(c) for c in rng.choice(CODES, size=p))
+            rows, values = random_multipliers(rng, codes, system.F, bad=rng.random() < 0.3)
+            if not len(rows):
+                continue
+            values = ray(problem, rows, values)
+            margin = exclusion_margin(system, codes, rows, values)
+            allowed = all(
+                judge._allowed(codes[r % p], r // p, r % p) is not None
+                and (judge._allowed(codes[r % p], r // p, r % p) == 0 or v >= 0)
+                for r, v in zip(rows.tolist(), values.tolist(), strict=True)
+            )
+            refused += not allowed
+            assert (margin == -np.inf) == (not allowed)
+            if allowed:
+                bound = exact_bound(judge, rows, values)
+                assert Fraction(float(margin)) <= bound
+                # no more is lost than rounding
+                assert float(bound) - margin <= 1e-9 * (1 + abs(float(bound)) + float(np.sum(values**2)))
+                positive += margin > 0
+                assert judge._excluded(codes, rows.tolist(), values.tolist()) == (bound > 0)
+            fast = compiled.margin(codes, rows, values)
+            assert fast == margin or abs(fast - margin) <= 1e-11 * (1 + abs(margin) + float(np.sum(values**2)))
+    assert positive >= 2
+    assert refused >= 30
+
+
+def test_large_multipliers_of_an_infeasible_assignment():
+    # two nodes that hardly move against each other: the first cannot be open while the second is in contact. Along the
+    # multipliers that say so the bound grows in proportion, the forms of (6.2) with the square
+    little = 2.0**-30
+    n = np.array([[1.0, 1.0 - little], [1.0 - little, 1.0]])
+    S = np.block([[n, np.zeros((2, 2))], [np.zeros((2, 2)), np.eye(2)]])
+    problem = from_condensed(S, np.array([1.0 + 1e-8, 1.0, 0.0, 0.0]), np.zeros(2))
+    system, judge = system_of(problem), judge_of(problem)
+    compiled = Margins((system,), system.F, system.F)
+    codes, rows = (0, 4), np.array([0, 1, 8, 9], dtype=np.intp)
+    positive = 0
+    for length in 2.0 ** np.arange(10, 34):
+        values = length * np.array([-little, little, 1.0, -1.0])
+        bound = exact_bound(judge, rows, values)
+        for margin in exclusion_margin(system, codes, rows, values), compiled.margin(codes, rows, values):
+            assert Fraction(margin) <= bound
+            assert margin > 0 or bound < 1e-3
+            positive += margin > 0
+    assert positive == 18
+
+
+def exact_bound(judge, rows, values):
+    """The dual bound itself in Fractions."""
+    m = 2 * len(judge.F)
+    linear, constant = [-x for x in judge.g], Fraction(0)
+    for row, value in zip(rows.tolist(), values.tolist(), strict=True):
+        kind, i = divmod(row, len(judge.F))
+        u = Fraction(value) * (judge.length[i] if kind < 4 else judge.force[i])
+        form = judge._row(kind, i)
+        linear = [a - u * b for a, b in zip(linear, form, strict=False)]
+        constant -= u * form[m]
+    solved = _affine([[*row, v / 2] for row, v in zip(judge.S, linear, strict=True)])[0]
+    return sum(a * x for a, x in zip(linear, solved, strict=True)) / 2 + constant
+
+
+def test_sign_of_the_margin_where_the_bound_is_next_to_zero():
+    # along the ray of a pruned leaf's multipliers the bound is a parabola: look on both sides of its zero
+    signs = []
+    for name in ("two-node-5", "chain-2", "two-node-6.4"):
+        entry = gallery.get(name)
+        problem = entry.build()
+        bench = Solvers(problem, entry.alpha, "verified", 1e-9)
+        system, judge = bench.enclosed, judge_of(problem, entry.alpha)
+        records = records_of(enumerate_roots(problem, entry.alpha).proof)
+        judge.force, judge.length = ([Fraction(float(x)) for x in v] for v in (bench.scaled.force, bench.scaled.length))
+        size = judge.force[0] * judge.length[0]
+        for k, codes in leaves_of(records):
+            if records[k][0] != "x":
+                continue
+            rows, values = (np.array(part) for part in multipliers(records[k]))
+            zero, one, two = (float(exact_bound(judge, rows, t * values) / size) for t in (0.0, 1.0, 2.0))
+            bend = 0.5 * (two - 2 * one + zero)
+            slope = one - zero - bend
+            start = -2 * zero / (slope + np.sqrt(max(slope**2 - 4 * bend * zero, 0.0)))
+            for step in (0.0, *(s * 10.0**-d for d in range(2, 17) for s in (1, -1))):
+                stretched = start * (1 + step) * values
+                bound = exact_bound(judge, rows, stretched)
+                for margin in (
+                    exclusion_margin(system, codes, rows, stretched),
+                    Margins((system,), system.F, system.F).margin(codes, rows.astype(np.intp), stretched),
+                ):
+                    assert Fraction(float(margin)) <= bound / size
+                    assert margin > 0 or bound / size < 1e-9
+                signs.append(np.sign(float(bound)))
+    assert min(signs.count(1), signs.count(-1)) >= 100
+
+
+def test_bounds_never_exceed_the_energy_of_a_solution():
+    # the sharpest test there is: a leaf that holds a root can have no positive bound, whatever the multipliers
+    rng = np.random.default_rng(2)
+    for name in ("one-node-6.1", "two-node-5", "two-node-6.4"):
+        entry = gallery.get(name)
+        problem = entry.build()
+        system = system_of(problem, entry.alpha)
+        for root in enumerate_roots(problem, entry.alpha, "exact"):
+            codes = tuple({"open": 0, "stick": 1, "slip+": 2, "slip-": 3}[s.value] for s in root.statuses)
+            for _ in range(120):
+                rows, values = random_multipliers(rng, codes, system.F, bad=False)
+                assert exclusion_margin(system, codes, rows, values * 10 ** rng.uniform(-3, 6)) <= 0
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e308, -1e308, 1e200])
+def test_absurd_multipliers_prove_nothing(value):
+    problem = gallery.two_node_square()
+    system = system_of(problem, 2.0)
+    rows = np.array([0, 8, 9], dtype=np.intp)
+    values = np.array([1.0, value, value])
+    assert not exclusion_margin(system, (1, 1), rows, values) > 0
+    assert not Margins((system,), system.F, system.F).margin((1, 1), rows, values) > 0
+
+
+@pytest.mark.parametrize("row", [-1, 14, 10**9])
+def test_rows_that_do_not_exist(row):
+    system = system_of(gallery.two_node_square(), 2.0)
+    rows, values = np.array([row], dtype=np.intp), np.array([1.0])
+    assert exclusion_margin(system, (6, 6), rows, values) == -np.inf
+    assert Margins((system,), system.F, system.F).margin((6, 6), rows, values) == -np.inf
+
+
+def test_batches_equal_single_leaves():
+    rng = np.random.default_rng(7)
+    problem = random_problem(rng, 3)
+    system = system_of(problem)
+    codes = rng.choice(CODES, size=(20, 3))
+    parts = [random_multipliers(rng, c, system.F, bad=False) for c in codes]
+    parts[4] = (np.zeros(0, dtype=np.intp), np.zeros(0))
+    leaf = np.repeat(np.arange(20), [len(rows) for rows, _ in parts])
+    rows, values = (np.concatenate([part[k] for part in parts]) for k in range(2))
+    batch = exclusion_margins(system, codes, leaf, rows, values)
+    for k, (r, v) in enumerate(parts):
+        assert exclusion_margin(system, tuple(codes[k]), r, v) == pytest.approx(batch[k], rel=1e-12, abs=1e-12)
+
+
+def _check_selection(system, S, g, F, codes):
+    """Compare one verified selection with the exact solution; its verdict, None for not regular."""
+    p = len(F)
+    ball = solve_selection(system, codes)
+    sign = det_sign(S, F, codes)
+    if ball is None:
+        return None
+    assert ball.det_sign == sign != 0
+    equations, inequalities = _conditions(S, g, F, codes)
+    point, free = _affine(equations)
+    assert not free
+    w = [g[r] - sum(S[r][k] * point[k] for k in range(2 * p)) for r in range(2 * p)]
+    for exact, mid, rad in ((point, ball.force, ball.force_rad), (w, ball.w, ball.w_rad)):
+        for x, m, r in zip(exact, mid.tolist(), rad.tolist(), strict=True):
+            assert abs(x - Fraction(m)) <= Fraction(r)
+    least = min(_at(row, point) for row in inequalities)
+    assert not ball.is_root or least > 0
+    assert not ball.is_excluded or least < 0
+    return ball.is_root or ball.is_excluded
+
+
+def test_selections_hold_the_exact_solution():
+    rng = np.random.default_rng(8)
+    for p, count in ((1, 20), (2, 15), (3, 3)):
+        for _ in range(count):
+            problem = random_problem(rng, p)
+            system = system_of(problem)
+            S, g, F = exact_condense(problem, 0.0)
+            verdicts = [_check_selection(system, S, g, F, codes) for codes in product(range(4), repeat=p)]
+            assert np.mean([bool(v) for v in verdicts]) > 0.95
+
+
+def test_nearly_singular_selections():
+    rng = np.random.default_rng(9)
+    unproven = proven = 0
+    for exponent in (4, 8, 12, 13, 14, 15, 16, 17):
+        for _ in range(6):
+            # one node: the determinant of slip- is S_nn - F S_nt, zero for F = S_nn / S_nt
+            S = np.array([[2.0, 1.0], [1.0, 1.5]]) * 2.0 ** rng.integers(-3, 4)
+            F = 2.0 * (1 + rng.choice([-1, 1]) * 10.0**-exponent)
+            problem = from_condensed(S, rng.normal(size=2), np.array([F]))
+            verdict = solve_selection(system_of(problem), (3,))
+            unproven += verdict is None
+            proven += verdict is not None
+            _check_selection(system_of(problem), *exact_condense(problem, 0.0), (3,))
+    assert unproven >= 6
+    assert proven >= 20
+
+
+def test_singular_integer_selections_are_never_called_regular():
+    rng = np.random.default_rng(10)
+    singular = 0
+    for _ in range(150):
+        problem = integer_problem(rng, int(rng.integers(1, 4)))
+        S, _, F = exact_condense(problem, 0.0)
+        system = system_of(problem)
+        for codes in product(*(range(4) if f > 0 else (0, 4) for f in F)):
+            if rng.random() < 0.3 and det_sign(S, F, codes) == 0:
+                singular += 1
+                assert solve_selection(system, codes) is None
+    assert singular >= 10
+
+
+def test_scaled_units_change_nothing():
+    entry = gallery.get("wedge-8-3")
+    bench = Solvers(entry.build(), entry.alpha, "verified", 1e-9)
+    assert bench.enclosed is not None
+    assert bench.data == "problem"
+    assert bench.enclosed.smallest_eigenvalue <= np.linalg.eigvalsh(bench.scaled.S)[0]
+
+
+def test_displacements_of_ill_conditioned_selections(monkeypatch):
+    """On weak springs forces are known far worse than displacements; radii in which that cancels are true, too."""
+    radii = []
+
+    def recorded(*args, closer=point._closer):
+        radii.append(closer(*args))
+        return radii[-1]
+
+    monkeypatch.setattr(point, "_closer", recorded)
+    for name in ("is_root", "is_excluded"):
+        monkeypatch.setattr(point.VerifiedSelection, name, property(lambda _: False))
+    rng, times = np.random.default_rng(5), []
+    for _ in range(40):
+        S, v = fe_compliance(rng, 2), rng.normal(size=4)
+        S = S + 10.0 ** rng.uniform(0, 9) * np.outer(v, v)
+        problem = from_condensed(0.5 * (S + S.T), rng.normal(size=4), rng.choice([0.1, 1.0, 30.0], size=2))
+        system, exact = system_of(problem), exact_condense(problem, 0.0)
+        for codes in product(range(4), repeat=2):
+            radii.clear()
+            _check_selection(system, *exact, codes)
+            if not radii:
+                continue
+            ball = solve_selection(system, codes)
+            point_of, _ = _affine(_conditions(*exact, codes)[0])
+            for r in np.flatnonzero(ball.w_rad > 0):
+                w = exact[1][r] - sum(exact[0][r][k] * point_of[k] for k in range(4))
+                assert abs(w - Fraction(float(ball.w[r]))) <= Fraction(float(radii[0][r]))
+                times.append(radii[0][r] / (np.abs(system.S) @ ball.force_rad + system.g_rad)[r])
+    assert len(times) > 300
+    assert np.quantile(times, 0.2) < 0.2

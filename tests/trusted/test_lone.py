@@ -1,0 +1,189 @@
+"""The test that a root is alone below an assignment, against all selections in rationals (theory, section 6.13)."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from generators import fe_compliance, from_condensed, integer_problem, planted_load, random_load, random_problem
+from rational_closings import Closings, Lone
+from rational_forms import Data, Forms, Refused, exact
+from touching import touching_problem
+
+from enumsol.condensation.enclosure import CondensedEnclosure
+from enumsol.search.fathoming_in_contact import KnownRoot
+from enumsol.search.fathoming_in_contact import Lone as Proposed
+from enumsol.search.splitting import ImposedRows, PlaneSplitting
+from enumsol.search.tree import make_engine
+from enumsol.trusted import uniqueness_in_contact as lone
+from enumsol.trusted.at_alpha import solve_selection
+from enumsol.trusted.uniqueness_in_contact import gaps, lone_root
+
+
+def problem_of(rng, kind):
+    """Integers full of coincidences, nodes that touch, generic problems, some with several roots."""
+    p = int(rng.integers(1, 4))
+    if kind == 0:
+        return integer_problem(rng, p)
+    if kind == 1:
+        return touching_problem(rng, p)
+    if kind == 2:
+        return random_problem(rng, p)
+    S, F = fe_compliance(rng, p), rng.uniform(0.3, 3.0, size=p)
+    g = planted_load(rng, S, F)
+    return from_condensed(S, random_load(rng, p) if g is None else g, F)
+
+
+def assignment(rng, selection, friction):
+    """Codes above a selection, some of them."""
+    codes = list(selection)
+    for i, positive in enumerate(friction):
+        above = [6, 6, *([5] if codes[i] in (1, 2, 3) else []), codes[i]]
+        above += [{0: int(rng.choice([7, 8])), 2: 7, 3: 8}.get(codes[i], 6)] if positive else []
+        codes[i] = int(rng.choice(above))
+    return tuple(codes)
+
+
+class Case:
+    """A problem with everything that the test and its judge need."""
+
+    def __init__(self, problem):
+        self.problem, self.p = problem, problem.p
+        self.scaled = problem.condensed.at(0.0).scaled
+        self.system = CondensedEnclosure.from_problem(problem).at(0.0, self.scaled.force, self.scaled.length)
+        data = Data(problem)
+        self.forms = Forms(data.S, data.load(0), data.friction(0))
+        self.friction = [F > 0 for F in self.forms.F]
+        unit = [[exact(float(x)) for x in part[: self.p]] for part in (self.scaled.length, self.scaled.force)]
+        self.judge = Closings(self.forms, self.friction, unit)
+        self.units = unit
+        self.engine = make_engine(self.scaled)
+        self.rows = ImposedRows(PlaneSplitting(self.scaled.F), self.p)
+        self.roots = []
+        for codes in product(*((0, 1, 2, 3) if positive else (0, 4) for positive in self.friction)):
+            root = solve_selection(self.system, codes)
+            if root is not None and root.is_root:
+                self.roots.append((codes, root))
+
+    def proposed(self, codes, root):
+        """Numbers, strengths and multipliers for a root below an assignment; None where floats find none."""
+        relaxation = self.engine.root(*self.rows.over(codes, range(self.p)))
+        if relaxation.pruned or relaxation.stalled:
+            return None
+        known = KnownRoot(root[0], root[1].force, root[1].w)
+        proposal = Proposed(self.scaled, codes, known, relaxation).proposal()
+        return None if proposal is None else [proposal.weights, proposal.strengths, *relaxation.multipliers()]
+
+    def judged(self, codes, selection, weights, strengths, rows, values):
+        """Whether the judge in rationals finds the same."""
+        kinds = rows // self.p
+        terms = [
+            (int(row), exact(float(value)) * self.units[0 if kind < 4 else 1][row % self.p])
+            for row, kind, value in zip(rows, kinds, values, strict=True)
+        ]
+        try:
+            self.judge.alone(codes, selection, weights.tolist(), strengths.ravel().tolist(), terms)
+        except Refused as refused:
+            return str(refused)
+        return None
+
+
+def cases(seeds):
+    for seed in seeds:
+        rng = np.random.default_rng([23, seed])
+        case = Case(problem_of(rng, seed % 4))
+        for root in case.roots:
+            for _ in range(3):
+                codes = assignment(rng, root[0], case.friction)
+                given = case.proposed(codes, root)
+                if given is not None:
+                    yield rng, case, codes, root[0], given
+
+
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 3))])
+def test_what_is_proven_is_so(part):
+    proven = squares = several = 0
+    for _, case, codes, selection, given in cases(range(120 * part, 120 * part + 120)):
+        root = lone_root(case.system, codes, selection, *given)
+        if root is None:
+            continue
+        proven += 1
+        loose = [i for i in range(case.p) if given[1][0, i] > 0 and codes[i] > 5]
+        squares += bool(loose)
+        several += len(case.roots) > 1
+        assert case.judged(codes, selection, *given) is None
+    assert proven > 60
+    assert squares > 20
+    assert several > 20
+
+
+def changed(rng, case, codes, given):
+    """The same with something that may be wrong."""
+    codes, (weights, strengths, rows, values) = list(codes), [a.copy() for a in given]
+    how, i = rng.integers(6), int(rng.integers(case.p))
+    if how == 0 and codes[i] in (1, 2, 3, 5):
+        codes[i] = 6 if codes[i] == 5 else 5
+        nodes, own = lone.numbers_of(codes, case.friction)
+        weights = np.concatenate([np.ones(len(nodes) + np.count_nonzero(own)), np.zeros(2 * np.count_nonzero(own))])
+    elif how == 1:
+        strengths[0] *= rng.choice([1.01, 2.0, 100.0])
+    elif how == 2:
+        strengths[0, i] = 1e3
+    elif how == 3 and len(values):
+        values *= rng.choice([0.1, 0.9, 1.1])
+    elif how == 4 and len(weights):
+        weights[rng.integers(len(weights))] *= rng.choice([-1.0, 0.1, 10.0])
+    else:
+        strengths[1, i] = rng.choice([1.0, 1e3])
+    return tuple(codes), [weights, strengths, rows, values]
+
+
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 3))])
+def test_what_is_changed_is_refused_or_true(part):
+    refused = accepted = 0
+    for rng, case, codes, selection, given in cases(range(120 * part, 120 * part + 120)):
+        for _ in range(3):
+            others = changed(rng, case, codes, given)
+            if lone_root(case.system, others[0], selection, *others[1]) is None:
+                refused += 1
+                continue
+            accepted += 1
+            assert case.judged(others[0], selection, *others[1]) is None
+    assert refused > 60
+    assert accepted > 60
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", ["equations of free nodes", "narrow gaps"])
+def test_a_wrong_test_is_seen(wrong, monkeypatch):
+    """Squares of what does not vanish, and gaps that are not bounds: roots are then said to be alone that are not."""
+    if wrong == "narrow gaps":
+        monkeypatch.setattr(lone, "gaps", lambda *arguments: 0.01 * gaps(*arguments))
+    else:
+        monkeypatch.setattr(lone, "_allowed", lambda *_: True)
+    false = 0
+    for _, case, codes, selection, given in cases(range(120)):
+        strengths = given[1].copy()
+        free = [i for i in range(case.p) if codes[i] > 5 and selection[i] != 0]
+        strengths[0, free] = 1e3 if wrong != "narrow gaps" else 50.0 * strengths[0, free]
+        given[1] = strengths
+        if lone_root(case.system, codes, selection, *given) is not None:
+            reason = case.judged(codes, selection, *given)
+            false += reason is not None
+    assert false > 5
+
+
+@pytest.mark.slow
+def test_gaps_hold_at_all_roots():
+    for _, case, codes, _selection, (_, _, rows, values) in cases(range(120)):
+        bounds = gaps(case.system, codes, rows, values)
+        for other, root in case.roots:
+            if KnownRoot(other, root.force, root.w).below(codes):
+                assert np.all(-root.w[: case.p] <= bounds + 1e-12)
+        terms = [
+            (int(row), exact(float(value)) * case.units[0 if row // case.p < 4 else 1][row % case.p])
+            for row, value in zip(rows, values, strict=True)
+        ]
+        exactly = Lone(case.forms, codes, case.friction)
+        for i in range(case.p):
+            middle, square = exactly.gap(terms, i)
+            assert bounds[i] * case.scaled.length[i] >= float(middle) + float(square) ** 0.5 - 1e-12

@@ -1,0 +1,181 @@
+"""What the test of an only solution in 3D concludes holds for all data in wide balls (theory, section 12.6)."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from problems3d import from_compliance, random_compliance
+
+from enumsol.search.space.space_fathoming import SpaceCloser
+from enumsol.search.space.space_newton import Isotropic
+from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.trusted.space.leaves import SpaceRoot
+from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, Numbers, OnlySolution, _Form, only_root, only_solution
+
+
+class Proposals:
+    """Takes note of what is proposed, and proves nothing."""
+
+    def __init__(self):
+        self.proposed = []
+
+    def close(self, numbers, codes, normal):
+        self.proposed.append((numbers, codes, normal))
+
+
+def proposed(solvers):
+    taken = Proposals()
+    SpaceCloser(solvers.system, taken).whole()
+    return taken.proposed
+
+
+def random_solvers(rng, degenerate):
+    p = int(rng.integers(1, 4))
+    S = random_compliance(rng, p)
+    F = 10.0 ** rng.uniform(-0.5, 0.2, (p, 2))
+    if rng.random() < 0.3:
+        F[rng.integers(p), rng.integers(2)] = 0.0
+    g = rng.normal(size=3 * p)
+    if degenerate:
+        lam, w = np.zeros((p, 3)), np.zeros((p, 3))
+        for i in range(p):
+            n, d = rng.exponential() + 0.2, rng.normal(size=2)
+            tau, kind = d / np.hypot(*d), rng.integers(4)
+            lam[i] = [0, 0, 0] if kind < 2 else [n, *(n * F[i] * tau)]
+            w[i] = [0, 0, 0] if kind in (1, 2) else [0, *(tau / np.where(F[i] > 0, F[i], 1.0))]
+        g = S @ lam.ravel(order="F") + w.ravel(order="F")
+    return SpaceSolvers(from_compliance(S, g, tuple(F.T)), 0.0, "verified")
+
+
+def a_member(enclosed, rng):
+    """S and g in the balls, mostly far from their middles."""
+    signs = rng.choice([-1.0, 1.0, 0.3], enclosed.S.shape)
+    S = enclosed.S + np.triu(signs) * enclosed.S_rad + np.triu(signs, 1).T * enclosed.S_rad.T
+    return S, enclosed.g + rng.choice([-1.0, 1.0, 0.3], len(enclosed.g)) * enclosed.g_rad
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("degenerate", [False, True])
+def test_solutions_for_all_data_lie_in_the_balls(degenerate):
+    rng, concluded, nearest = np.random.default_rng(4), {SpaceRoot: 0, OnlySolution: 0}, 0.0
+    for _ in range(120):
+        solvers = random_solvers(rng, degenerate)
+        width = 10.0 ** rng.uniform(-9, -3.5)
+        S, g = solvers.enclosed.S, solvers.enclosed.g
+        enclosed = replace(solvers.enclosed, S_rad=np.full_like(S, width), g_rad=np.full_like(g, width))
+        for numbers, codes, normal in proposed(solvers):
+            found = only_root(enclosed, numbers, codes) if codes else only_solution(enclosed, numbers, normal)
+            if found is None:
+                continue
+            concluded[type(found)] += 1
+            for _ in range(5):
+                member, load = a_member(enclosed, rng)
+                system = replace(solvers.system, S=member, g=load)
+                problem = Isotropic.of(system)
+                y = problem.solution()
+                assert y is not None
+                w = problem.displacements(y)
+                taus = system.tau >= 0
+                flat = np.concatenate([y[:, 0], y[:, 1:][taus] / system.unit[system.tau[taus]]])
+                off = np.abs(flat - found.y.mid) - found.y.rad
+                assert np.max(off) <= 1e-9
+                nearest = max(nearest, float(np.max((off + found.y.rad) / (found.y.rad + 1e-12))))
+                slips = np.concatenate([w[:, 0], w[:, 1:][taus] * system.unit[system.tau[taus]]])
+                assert np.all(np.abs(slips - found.w.mid) <= found.w.rad + 1e-8)
+                if isinstance(found, OnlySolution):
+                    statuses(found, y, w, taus)
+    assert concluded[OnlySolution] > 40
+    assert degenerate or concluded[SpaceRoot] > 40
+    # balls are not so wide that this would not tell
+    assert nearest > 0.02
+
+
+def statuses(found, y, w, taus):
+    """Statuses that clearly hold are among those that may."""
+    for i in range(len(y)):
+        n, room, slip = y[i, 0], y[i, 0] - np.linalg.norm(y[i, 1:]), np.linalg.norm(w[i, 1:])
+        assert found.open[i] or n > -1e-9
+        assert found.open[i] or w[i, 0] > -1e-8
+        if w[i, 0] < -1e-8:
+            assert found.open[i]
+        elif n > 1e-8 and np.any(taus[i]):
+            assert found.stick[i] or slip > 0
+            assert found.stick[i] or room < 1e-8
+            assert found.slip[i] or slip < 1e-8
+
+
+def test_the_form_is_definite_for_all_data_and_theta():
+    rng, least = np.random.default_rng(8), []
+    for _ in range(80):
+        solvers = random_solvers(rng, degenerate=rng.random() < 0.5)
+        S, g = solvers.enclosed.S, solvers.enclosed.g
+        enclosed = replace(solvers.enclosed, S_rad=np.full_like(S, 10.0 ** rng.uniform(-6, -2.5)), g_rad=0 * g)
+        for values, _, _ in proposed(solvers)[:1]:
+            form, numbers = _Form.of(enclosed, values), Numbers.of(enclosed, values)
+            if form is None:
+                continue
+            for _ in range(5):
+                Q = of_member(enclosed, a_member(enclosed, rng)[0], numbers, rng)
+                sizes = np.linalg.eigvalsh(Q)
+                assert sizes[0] >= form.least
+                least.append(form.least / sizes[0])
+    assert len(least) > 100
+    assert max(least) > 0.5
+
+
+def of_member(enclosed, S, numbers, rng):
+    """Q for one S, with any theta where the numbers serve any, node by node from its definition."""
+    m, Q = len(S), np.zeros_like(S)
+    for i, places in enumerate(enclosed.tau):
+        t = places[places >= 0]
+        theta, nu = numbers.theta[i][places >= 0], numbers.nu[i][places >= 0]
+        if numbers.wide[i] > 0:
+            theta = rng.normal(size=len(t))
+            theta /= np.linalg.norm(theta)
+        unit = enclosed.unit[t]
+        pushed = numbers.mu[i] * np.eye(m)[i] + (nu * unit) @ np.eye(m)[t]
+        Q += np.outer(pushed, S[i])
+        for k, theta_k in zip(t, theta, strict=True):
+            turned = unit[list(t).index(k)] * np.eye(m)[k] - theta_k * np.eye(m)[i]
+            Q += numbers.kappa[i] * np.outer(turned, S[k] / unit[list(t).index(k)])
+    return 0.5 * (Q + Q.T)
+
+
+def test_numbers_are_refused_where_they_make_no_sense():
+    enclosed = SpaceSolvers(from_compliance(np.eye(6), np.ones(6), ((0.5, 0.3), (0.2, 0.0))), 0.0, "verified").enclosed
+    # two nodes, the second one with one tau: mu, kappa, wide; nu; theta
+    right = np.array([1.0, 1, 1, 1, 0, 0, *(0.0, 0, 0), *(0.6, 0.8, -1)])
+    assert Numbers.of(enclosed, right) is not None
+    for place, value in (
+        *((0, 0.0), (1, -1.0), (2, 0.0), (3, -0.0), (4, -1e-9), (4, 1.0), (5, 1e-9), (6, 1.1), (7, -1.1), (8, 1.01)),
+        *((9, 0.61), (10, 0.9), (11, 1.001), (11, -1.0 - 1e-12), (0, np.nan), (3, np.inf), (11, np.nan), (6, -np.inf)),
+    ):
+        numbers = right.copy()
+        numbers[place] = value
+        assert Numbers.of(enclosed, numbers) is None, (place, value)
+    for numbers in (right[:-1], np.append(right, 0.0), right[:0], right.reshape(2, 6)):
+        assert Numbers.of(enclosed, numbers) is None
+    numbers = right.copy()
+    numbers[6:8] = 0.8, 0.7
+    assert Numbers.of(enclosed, numbers) is None
+
+
+def test_points_that_make_no_sense():
+    solvers = SpaceSolvers(from_compliance(np.eye(3), np.array([1.0, 0.1, 0]), 0.5), 0.0, "verified")
+    (numbers, _, normal) = proposed(solvers)[-1]
+    assert only_solution(solvers.enclosed, numbers, normal) is not None
+    for point in ([np.nan], [np.inf], [1.0, 1.0], []):
+        assert only_solution(solvers.enclosed, numbers, np.array(point)) is None
+    # a point far away is as good, but for the width of the balls
+    far = only_solution(solvers.enclosed, numbers, normal + 0.3)
+    assert far is None or np.all(np.abs(far.y.mid[0] - normal) <= far.y.rad[0])
+
+
+def test_units_beyond_the_largest_are_refused():
+    solvers = SpaceSolvers(from_compliance(np.eye(3), np.ones(3), 0.5), 0.0, "verified")
+    numbers, codes, normal = proposed(solvers)[0]
+    unit = np.where(np.arange(3) > 0, 2.0 * LARGEST_UNIT, 1.0)
+    assert only_root(solvers.enclosed, numbers, codes) is not None
+    for units in (unit, 1.0 / unit):
+        assert only_root(replace(solvers.enclosed, unit=units), numbers, codes) is None
+        assert only_solution(replace(solvers.enclosed, unit=units), numbers, normal) is None
