@@ -26,13 +26,13 @@ What checker and search share
       forms than the energy;
     - ``trusted.uniqueness``, the test by which a subtree is closed by its only possible solution, and which of these
       solutions are the same; ``trusted.uniqueness_in_contact``, the test that a root is alone below an assignment;
-      ``trusted.uniqueness_weights``, the form of both, and ``trusted.arcs.ball_arrays``, their linear systems of balls;
+      ``trusted.uniqueness_weights``, the form of both, and ``arithmetic.ball_arrays``, their linear systems of balls;
     - for the arcs of branch graphs: ``trusted.selection``, the numbers of unknowns and conditions;
       ``trusted.arcs.selection_balls``, ``trusted.arcs.series``, ``trusted.arcs.bernstein`` and
       ``trusted.arcs.over_parts``, a selection over an interval as a series with bounds of its error;
       ``trusted.arcs.precise`` and ``trusted.arcs.many_digits``, the same with many digits, loaded only where a box asks
       for it; ``trusted.arcs.only_branch``, the test by which the roots of arcs are the only solutions over a piece;
-      ``trusted.arcs.ball_arrays`` (in 3D, too);
+      ``arithmetic.ball_arrays`` (in 3D, too);
     - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings and
       the exclusion inequality; ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds
       and which leaves share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution

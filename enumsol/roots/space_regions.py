@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.arithmetic.ball_arrays import Ball, smaller, solution
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
 from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.support.deadlines import over
-from enumsol.trusted.arcs.ball_arrays import Ball, smaller, solution
 from enumsol.trusted.space.leaves import settle, unsettled
 
 if TYPE_CHECKING:

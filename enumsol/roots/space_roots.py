@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, UNIT
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus
@@ -19,7 +20,6 @@ from enumsol.roots.root_set import RootSet, Undecided
 from enumsol.roots.space_regions import loose_angles, regions_of, slip_angles, with_zeros
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.immutable import sealed
-from enumsol.trusted.arcs.ball_arrays import Ball
 from enumsol.trusted.space.leaves import Cause, distinct_roots
 from enumsol.trusted.space.space_uniqueness import OnlySolution
 

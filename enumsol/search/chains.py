@@ -20,7 +20,7 @@ from enumsol.trusted.selection import (
     NORMAL_FORCE,
     SLIP_BACKWARD,
     SLIP_FORWARD,
-    SelectionRows,
+    Selection,
 )
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class SelectionCurve:
     """A selection's solution as a function of alpha."""
 
     def __init__(self, system: LoadedSystem, codes: Codes) -> None:
-        self._system, self.rows = system, SelectionRows(codes)
+        self._system, self.rows = system, Selection(codes)
         S, rows, p = system.S, self.rows, system.p
         self._fixed, self._turning = S[:, rows.unknown], S[:, p + rows.slip] * rows.slip_signs
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.errors import TooLargeError
-from enumsol.model.statuses import FINAL, INEQUALITIES
-from enumsol.selections.float_selections import selection_systems
+from enumsol.model.statuses import FINAL, INEQUALITIES, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
@@ -100,3 +99,31 @@ def exhaustive_exact(solver: SelectionSolver) -> Iterator[tuple[int, SelectionSo
     refuse_if_too_large(solver.F_positive, EXACT_LIMIT, 1_000.0)
     for done, codes in enumerate(all_codes(solver.F_positive), start=1):
         yield done, solver.solve(codes)
+
+
+def selection_systems(
+    S: NDArray[np.float64], g: NDArray[np.float64], F: NDArray[np.float64], codes: NDArray[np.int8]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Linear systems M lambda = b of condensed selections (theory, section 2.3).
+
+    Parameters
+    ----------
+    S, g, F : condensed compliance (2p, 2p), displacements (2p,) and friction (p,)
+    codes : (k, p) integer array of status codes
+
+    Returns
+    -------
+    M : (k, 2p, 2p) array
+    b : (k, 2p) array
+        Rows: lambda_n = 0 and lambda_t = 0 (open); w_n = 0 and w_t = 0 (stick); w_n = 0 and lambda_t = +-F lambda_n.
+    """
+    k, p = codes.shape
+    node = np.arange(p)
+    closed, stick = codes != OPEN, codes == STICK
+    slip = np.where(codes == SLIP_PLUS, 1.0, 0.0) - np.where(codes == SLIP_MINUS, 1.0, 0.0)
+    M = np.zeros((k, 2 * p, 2 * p))
+    held = np.concatenate([closed, stick], axis=1)
+    M += held[:, :, None] * S
+    M[:, np.arange(2 * p), np.arange(2 * p)] += ~held
+    M[:, p + node, node] -= slip * F
+    return M, held * g

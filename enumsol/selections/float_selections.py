@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import cho_solve
 
-from enumsol.model.statuses import CONDITIONS, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind, active_within
+from enumsol.model.statuses import CONDITIONS, FRICTIONLESS, SLIP_PLUS, RowKind, active_within
 from enumsol.selections.solution import MAX_BASES, ActiveSets, Codes, SelectionSolution, VertexLimitError
+from enumsol.trusted.selection import Selection, row_values
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,22 +65,10 @@ class FloatSelections:
 
     def reduced(self, codes: Codes) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Rows of S that vanish in the selection, and E with lambda = E y, columns of unit energy norm."""
-        p, F = self.p, self.system.F
-        closed = [i for i in range(p) if codes[i] != OPEN]
-        stuck = [i for i in range(p) if codes[i] == STICK]
-        rows = np.array(closed + [p + i for i in stuck], dtype=np.intp)
-        E = np.zeros((2 * p, len(rows)))
-        for k, i in enumerate(closed):
-            if codes[i] in (SLIP_PLUS, SLIP_MINUS):
-                minus = codes[i] == SLIP_MINUS
-                scale = 1.0 / self._slip_scale[int(minus), i]
-                E[i, k] = scale
-                E[p + i, k] = (-F[i] if minus else F[i]) * scale
-            else:
-                E[i, k] = 1.0 / self._length_scale[i]
-        for k, i in enumerate(stuck, start=len(closed)):
-            E[p + i, k] = 1.0 / self._length_scale[p + i]
-        return rows, E
+        selection, size = Selection(codes), self._length_scale.copy()
+        size[selection.slip] = self._slip_scale[np.where(selection.slip_signs > 0, 0, 1), selection.slip]
+        rows = selection.unknown
+        return rows, selection.forces(np.diag(1.0 / size[rows]), self.system.F)
 
     def matrix(self, codes: Codes) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Scaled matrix and right-hand side of the reduced selection system, and E."""
@@ -139,7 +128,7 @@ class FloatSelections:
 
     def slacks(self, codes: Codes, point: NDArray[np.float64], w: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scaled slacks of the selection's inequalities at forces ``point`` and displacements ``w``, in node order."""
-        rows, out = self._rows(point, w), []
+        rows, out = row_values(point, w, self.system.F), []
         for i, code in enumerate(codes):
             for kind in CONDITIONS[code].inequalities:
                 if kind == RowKind.NORMAL_FORCE and code != FRICTIONLESS:
@@ -148,15 +137,9 @@ class FloatSelections:
                     out.append(rows[kind, i] / self._norms[kind, i])
         return np.array(out)
 
-    def _rows(self, point: NDArray[np.float64], w: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values of all rows in the order of RowKind, shape (7, p)."""
-        p = self.p
-        bound, t = self.system.F * point[:p], point[p:]
-        return np.array([point[:p], t, bound - t, bound + t, -w[:p], w[p:], -w[p:]])
-
     def active(self, point: NDArray[np.float64]) -> ActiveSets:
         """Per node the codes whose conditions hold at the point within the tolerance."""
-        rows = self._rows(point, self._w(point)) / np.where(self._norms > 0, self._norms, 1)
+        rows = row_values(point, self._w(point), self.system.F) / np.where(self._norms > 0, self._norms, 1)
         return active_within(rows, self.F_positive, self.tolerance)
 
     def equal(self, a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
@@ -246,31 +229,3 @@ def _vertices(C: NDArray[np.float64], d: NDArray[np.float64], tolerance: float) 
             if all(np.max(np.abs(C @ (point - other))) > 10 * tolerance for other in found):
                 found.append(point)
     return np.array(found).reshape(-1, size)
-
-
-def selection_systems(
-    S: NDArray[np.float64], g: NDArray[np.float64], F: NDArray[np.float64], codes: NDArray[np.int8]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Linear systems M lambda = b of condensed selections (theory, section 2.3).
-
-    Parameters
-    ----------
-    S, g, F : condensed compliance (2p, 2p), displacements (2p,) and friction (p,)
-    codes : (k, p) integer array of status codes
-
-    Returns
-    -------
-    M : (k, 2p, 2p) array
-    b : (k, 2p) array
-        Rows: lambda_n = 0 and lambda_t = 0 (open); w_n = 0 and w_t = 0 (stick); w_n = 0 and lambda_t = +-F lambda_n.
-    """
-    k, p = codes.shape
-    node = np.arange(p)
-    closed, stick = codes != OPEN, codes == STICK
-    slip = np.where(codes == SLIP_PLUS, 1.0, 0.0) - np.where(codes == SLIP_MINUS, 1.0, 0.0)
-    M = np.zeros((k, 2 * p, 2 * p))
-    held = np.concatenate([closed, stick], axis=1)
-    M += held[:, :, None] * S
-    M[:, np.arange(2 * p), np.arange(2 * p)] += ~held
-    M[:, p + node, node] -= slip * F
-    return M, held * g

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq, fmpq_mat, fmpz_mat, fmpz_poly
 
 from enumsol.arithmetic.algebraic import integer_polynomial
-from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
+from enumsol.model.statuses import RowKind
+from enumsol.selections.rational_selections import as_objects
 from enumsol.support.deadlines import look
+from enumsol.trusted.selection import Selection
 
 if TYPE_CHECKING:
     from enumsol.condensation.exact import ExactCondensed
@@ -38,8 +40,7 @@ class SelectionFunctions:
 
     def __init__(self, exact: ExactCondensed, codes: Codes) -> None:
         self.exact, self.codes = exact, codes
-        self._closed = [i for i, c in enumerate(codes) if c != OPEN]
-        self._stuck = [i for i, c in enumerate(codes) if c == STICK]
+        self._selection = Selection(codes)
         self._cache: dict[tuple[RowKind, int], Any] = {}
 
     @cached_property
@@ -58,24 +59,18 @@ class SelectionFunctions:
         return self._solution[1]
 
     def _matrix(self, alpha: int) -> tuple[Any, Any]:
-        """Integer matrix and right-hand side of the reduced system at an integer alpha."""
-        data, p = self.exact.integers, self.exact.p
-        rows = self._closed + [p + i for i in self._stuck]
-        matrix = []
-        slips = [(i, _direction(self.codes[i]) * (data.F0[i] + alpha * data.F1[i])) for i in self._closed]
-        for r in rows:
-            S = data.S[r]
-            matrix.append(
-                [S[i] * data.friction_unit + f * S[p + i] if f != 0 else S[i] * data.friction_unit for i, f in slips]
-            )
-            matrix[-1] += [S[p + i] * data.friction_unit for i in self._stuck]
-        return matrix, [[data.g0[r] + alpha * data.g1[r]] for r in rows]
+        """Integer matrix and right-hand side of the reduced system at an integer alpha, columns times dF."""
+        data, rows = self.exact.integers, self._selection.unknown
+        S = as_objects([data.S[r] for r in rows])
+        F = as_objects([a + alpha * b for a, b in zip(data.F0, data.F1, strict=True)])
+        unit = data.friction_unit
+        return self._selection.columns(S, F, unit).tolist(), [[data.g0[r] + alpha * data.g1[r]] for r in rows]
 
     @cached_property
     def _solution(self) -> tuple[Any, list[Any]]:
         """Determinant and unknowns by evaluation and interpolation."""
-        exact, size = self.exact, len(self._closed) + len(self._stuck)
-        slips = sum(1 for i, c in enumerate(self.codes) if c in (SLIP_PLUS, SLIP_MINUS) and exact.F1[i] != 0)
+        exact, size = self.exact, len(self._selection.unknown)
+        slips = sum(1 for i in self._selection.slip if exact.F1[i] != 0)
         needed = slips + 1 + int(exact.loaded)
         if size == 0:
             return fmpz_poly([1]), []
@@ -127,16 +122,10 @@ class SelectionFunctions:
     @cached_property
     def _forces(self) -> list[Any]:
         """Numerators of lambda in units of ``_Integers.force`` (a slipping node's unknown is lambda_n / dF)."""
-        data, p, unknowns = self.exact.integers, self.exact.p, self.numerators
-        forces = [fmpz_poly([])] * (2 * p)
-        for k, i in enumerate(self._closed):
-            forces[i] = unknowns[k] * data.friction_unit
-            direction = _direction(self.codes[i])
-            if direction:
-                forces[p + i] = unknowns[k] * fmpz_poly([direction * data.F0[i], direction * data.F1[i]])
-        for k, i in enumerate(self._stuck, start=len(self._closed)):
-            forces[p + i] = unknowns[k] * data.friction_unit
-        return forces
+        data = self.exact.integers
+        F = as_objects([fmpz_poly([a, b]) for a, b in zip(data.F0, data.F1, strict=True)])
+        unknowns = as_objects(self.numerators)
+        return list(self._selection.forces(unknowns, F, fmpz_poly([]), data.friction_unit))
 
     def _displacement(self, row: int) -> Any:
         data = self.exact.integers
@@ -163,7 +152,3 @@ class SelectionFunctions:
             numerators = [f // shift for f in numerators]
         below = fmpq(det(alpha))
         return tuple(force * f(alpha) / below for f in numerators)
-
-
-def _direction(code: int) -> int:
-    return {SLIP_PLUS: 1, SLIP_MINUS: -1}.get(code, 0)

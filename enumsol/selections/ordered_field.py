@@ -14,6 +14,10 @@ from enumsol.selections.rational_selections import ExactSelections
 from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.polytopes import Form, Point, Table
     from enumsol.selections.solution import Codes
@@ -38,18 +42,12 @@ class FiberSelections(ExactSelections):
         self.exact, self.alpha = exact, alpha
         self.F_positive = tuple(not without for without in exact.frictionless)
 
-    def solve_equations(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
-        """The selection's forces for the right-hand side ``target`` and sign det, or None when it is singular."""
-        rows, columns = self.reduced(codes)
-        if not rows:
-            return tuple(self._zero), 1
-        table = [[*(dot(self._S[r], column) for column in columns), target[r]] for r in rows]
+    @staticmethod
+    def _solved(M: NDArray[Any], b: Sequence[Any]) -> tuple[Sequence[Any], int] | None:
+        """y with M y = b, and sign det M; None where it is zero."""
+        table = [[*row, value] for row, value in zip(M.tolist(), b, strict=True)]
         det = row_reduce(table)[0]
-        if det == 0:
-            return None
-        y = [row[-1] for row in table]
-        point = tuple(dot(y, [column[j] for column in columns]) for j in range(2 * self.p))
-        return point, 1 if det > 0 else -1
+        return None if det == 0 else ([row[-1] for row in table], 1 if det > 0 else -1)
 
     def forms(self, codes: Codes) -> tuple[list[Form], list[Form]]:
         """Equations and inequalities (>= 0) of a selection as forms over lambda."""

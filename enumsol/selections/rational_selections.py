@@ -14,6 +14,7 @@ from enumsol.condensation.exact import ExactSystem
 from enumsol.model.statuses import CONDITIONS, FINAL, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
 from enumsol.selections.polytopes import polytope_vertices, value
 from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
+from enumsol.trusted.selection import Selection, row_values
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,6 +38,13 @@ def _holds(conditions: Conditions, rows: Sequence[Any]) -> bool:
     return all(rows[k] == 0 for k in conditions.equations) and all(rows[k] >= 0 for k in conditions.inequalities)
 
 
+def as_objects(values: Sequence[Any]) -> NDArray[Any]:
+    """Exact numbers, or rows of them, as an array, on which the algebra of a selection works as on floats."""
+    if len(values) and isinstance(values[0], list | tuple):
+        return np.array([as_objects(row) for row in values], dtype=object)
+    return np.fromiter(values, object, len(values))  # polynomials are sequences, which np.array would unpack
+
+
 class ExactSelections:
     """Solver of selections in rationals (a SelectionSolver; points are tuples of 2p fmpq).
 
@@ -49,7 +57,7 @@ class ExactSelections:
         self.system = system
         self.p = p = system.p
         self.F_positive = tuple(bool(f > 0) for f in system.F)
-        self._S = system.S.tolist()
+        self._S, self._F = as_objects(system.S.tolist()), as_objects(system.F)
         self._zero = [fmpq(0)] * (2 * p)
 
     # -- linear forms ----------------------------------------------------------------------------------------------
@@ -60,7 +68,7 @@ class ExactSelections:
         if kind >= RowKind.PENETRATION:
             row, sign = (node, -1) if kind == RowKind.PENETRATION else (p + node, 1)
             sign = -sign if kind == RowKind.SLIP_BACKWARD else sign
-            return [-sign * v for v in self._S[row]], sign * self.system.g[row]
+            return (-sign * self._S[row]).tolist(), sign * self.system.g[row]
         if kind != RowKind.TANGENTIAL_FORCE:
             form[node] = fmpq(1) if kind == RowKind.NORMAL_FORCE else self.system.F[node]
         if kind != RowKind.NORMAL_FORCE:
@@ -94,38 +102,25 @@ class ExactSelections:
 
     # -- solving ---------------------------------------------------------------------------------------------------
 
-    def reduced(self, codes: Codes) -> tuple[list[int], list[list[Any]]]:
-        """Rows of S that vanish in the selection and columns of E, lambda = E y."""
-        p, F = self.p, self.system.F
-        rows, columns = [], []
-        for i, code in enumerate(codes):
-            if code != OPEN:
-                column = list(self._zero)
-                column[i] = fmpq(1)
-                if code in (SLIP_PLUS, SLIP_MINUS):
-                    column[p + i] = F[i] if code == SLIP_PLUS else -F[i]
-                rows.append(i)
-                columns.append(column)
-        for i, code in enumerate(codes):
-            if code == STICK:
-                column = list(self._zero)
-                column[p + i] = fmpq(1)
-                rows.append(p + i)
-                columns.append(column)
-        return rows, columns
-
     def solve_equations(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
         """The selection's forces for the right-hand side ``target`` and sign det, or None when it is singular."""
-        rows, columns = self.reduced(codes)
-        if not rows:
+        selection = Selection(codes)
+        if not len(selection.unknown):
             return tuple(self._zero), 1
-        E = fmpq_mat(columns).transpose()
-        M = fmpq_mat([self._S[r] for r in rows]) * E
-        det = M.det()
+        solved = self._solved(selection.matrix(self._S, self._F), [target[r] for r in selection.unknown])
+        if solved is None:
+            return None
+        y, sign = solved
+        return tuple(selection.forces(as_objects(y), self._F, fmpq(0))), sign
+
+    @staticmethod
+    def _solved(M: NDArray[Any], b: Sequence[Any]) -> tuple[Sequence[Any], int] | None:
+        """y with M y = b, and sign det M; None where it is zero."""
+        matrix = fmpq_mat(M.tolist())
+        det = matrix.det()
         if det == 0:
             return None
-        y = M.solve(fmpq_mat([[target[r]] for r in rows]))
-        return tuple((E * y).entries()), 1 if det > 0 else -1
+        return matrix.solve(fmpq_mat([[v] for v in b])).entries(), 1 if det > 0 else -1
 
     def solve(self, codes: Codes) -> SelectionSolution | None:
         """All roots in the selection, or None."""
@@ -153,13 +148,11 @@ class ExactSelections:
 
     def active(self, point: Point) -> ActiveSets:
         """Per node the codes whose conditions hold at the point, exactly."""
-        p, w = self.p, self.moved(point)
-        result = []
-        for i, (F, friction) in enumerate(zip(self.system.F, self.F_positive, strict=True)):
-            n, t, bound, w_t = point[i], point[p + i], F * point[i], w[p + i]
-            rows = (n, t, bound - t, bound + t, -w[i], w_t, -w_t)  # in the order of RowKind
-            result.append(frozenset(code for code in FINAL[friction] if n >= 0 and _holds(CONDITIONS[code], rows)))
-        return tuple(result)
+        values = row_values(as_objects(point), as_objects(self.moved(point)), self._F).T
+        return tuple(
+            frozenset(code for code in FINAL[friction] if rows[0] >= 0 and _holds(CONDITIONS[code], rows))
+            for rows, friction in zip(values, self.F_positive, strict=True)
+        )
 
     def statuses_by_test_functions(self, point: Point, r: NDArray[np.float64]) -> tuple[int, ...]:
         """Per node the code that the signs of theory, (1.7), name at any point; ``r`` holds powers of two."""

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.arithmetic.ball_arrays import Ball, determinant_sign, solution
 from enumsol.arithmetic.balls import SAFE
-from enumsol.trusted.arcs.ball_arrays import Ball, determinant_sign, solution
 from enumsol.trusted.at_alpha import row_balls, solve_selection
 from enumsol.trusted.status_rows import (
     BACKWARD,

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, gamma
-from enumsol.trusted.arcs.ball_arrays import Ball
 from enumsol.trusted.at_alpha import exclusion_margin, solve_selection
 from enumsol.trusted.status_rows import (
     BACKWARD,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, upper_norm
-from enumsol.trusted.arcs.ball_arrays import Ball
 from enumsol.trusted.status_rows import SLIP_MINUS, SLIP_PLUS
 
 if TYPE_CHECKING:

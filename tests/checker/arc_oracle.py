@@ -11,7 +11,7 @@ from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.model.statuses import RowKind
 from enumsol.selections.functions import SelectionFunctions
-from enumsol.trusted.selection import SelectionRows
+from enumsol.trusted.selection import Selection
 
 
 class ArcOracle:
@@ -28,7 +28,7 @@ class ArcOracle:
             if side:
                 exact = replace(exact, g0=tuple(side * v for v in exact.g1), g1=(fmpq(0),) * len(exact.g1), zero=None)
             found = SelectionFunctions(exact, codes)
-            conditions = SelectionRows(codes).conditions
+            conditions = Selection(codes).conditions
             self._known[codes, side] = found.det, [found.row(RowKind(kind), node) for node, kind in conditions]
         return self._known[codes, side]
 

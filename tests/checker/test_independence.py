@@ -62,7 +62,7 @@ SHARED = {
     "trusted.space.sector_rows": None,
     "trusted.space.leaves": None,
     "trusted.space.space_uniqueness": {"LARGEST_UNIT", "OnlySolution", "only_root", "only_solution"},
-    "trusted.arcs.ball_arrays": None,
+    "arithmetic.ball_arrays": None,
     "proof.begun": None,
     "proof.form_records": None,
     "proof.root_records": None,

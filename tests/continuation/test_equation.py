@@ -13,7 +13,7 @@ from enumsol import (
     sign_array,
 )
 from enumsol.model.statuses import STATUSES
-from enumsol.selections.float_selections import selection_systems
+from enumsol.search.exhaustive import selection_systems
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS = STATUSES
 NAMES = {OPEN: (-1, -1, -1), STICK: (1, -1, 1), SLIP_PLUS: (1, 1, 1), SLIP_MINUS: (1, -1, -1)}

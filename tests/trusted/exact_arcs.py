@@ -7,15 +7,15 @@ import numpy as np
 from flint import arb, arb_mat, fmpq, fmpq_mat
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge, rational_between, real_roots
+from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.model.statuses import RowKind
 from enumsol.selections.functions import SelectionFunctions
-from enumsol.trusted.arcs.ball_arrays import Ball
 from enumsol.trusted.arcs.many_digits import precision
 from enumsol.trusted.arcs.precise import PreciseSystem
 from enumsol.trusted.arcs.selection_balls import ArcSystem
-from enumsol.trusted.selection import SelectionRows
+from enumsol.trusted.selection import Selection
 
 
 def random_data(rng, p, *, integers=False, scale=0, ill=0):
@@ -87,7 +87,7 @@ class Truth:
     """Determinant and conditions of a selection, as polynomials and at single alphas."""
 
     def __init__(self, exact, codes):
-        self.exact, self.rows = exact, SelectionRows(codes)
+        self.exact, self.rows = exact, Selection(codes)
         functions = SelectionFunctions(exact, codes)
         self.det = functions.det
         if functions.singular:

@@ -10,10 +10,10 @@ from problems3d import block_on_springs
 from space_proofs import on_the_end_of_a_sector, random_problem
 
 from enumsol import enumerate_roots
+from enumsol.arithmetic.ball_arrays import Ball, determinant_sign
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.sectors import DEEPEST, SECTORS, contains, end_number, start_of
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.trusted.arcs.ball_arrays import Ball, determinant_sign
 from enumsol.trusted.space.leaves import SpaceRoot, _cut, _Leaf, distinct_roots, same_root, settle
 from enumsol.trusted.space.sector_rows import (
     ALONG,

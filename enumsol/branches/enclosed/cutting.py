@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     from enumsol.trusted.arcs.over_parts import OverInterval
-    from enumsol.trusted.selection import SelectionRows
+    from enumsol.trusted.selection import Selection
 
     Result = tuple[Box, list[Interval]]
     Shared = frozenset[Any]
@@ -66,7 +66,7 @@ class Cutting:
 
     Parameters
     ----------
-    rows : SelectionRows
+    rows : Selection
     expansion : AlphaExpansion
         That of the box.
     whole : bool
@@ -77,9 +77,7 @@ class Cutting:
         Bounds of events will be made narrower.
     """
 
-    def __init__(
-        self, rows: SelectionRows, expansion: AlphaExpansion, *, whole: bool, flat: bool, sharpened: bool
-    ) -> None:
+    def __init__(self, rows: Selection, expansion: AlphaExpansion, *, whole: bool, flat: bool, sharpened: bool) -> None:
         self._narrow = _NARROW_ENOUGH if sharpened else _NARROW
         self._rows, self._expansion, self._whole, self._keep_flat = rows, expansion, whole, flat
         self.low: Number

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_norm, upper_sum
-from enumsol.trusted.arcs.ball_arrays import Ball
 from enumsol.trusted.arcs.bernstein import bernstein_values
 from enumsol.trusted.arcs.over_parts import expansions
 from enumsol.trusted.status_rows import OPEN

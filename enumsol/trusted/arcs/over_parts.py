@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.arithmetic.ball_arrays import determinant_sign
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_sum
-from enumsol.trusted.arcs.ball_arrays import determinant_sign
 from enumsol.trusted.arcs.bernstein import bernstein_values, signs_beyond
 from enumsol.trusted.arcs.series import Series, expand
 
@@ -46,7 +46,7 @@ class OverInterval:
     Attributes
     ----------
     conditions : int8 array
-        Only where the selection is regular: 1 or -1 where a condition of ``SelectionRows.conditions`` is positive or
+        Only where the selection is regular: 1 or -1 where a condition of ``Selection.conditions`` is positive or
         negative throughout, else 0.
     regular : bool
         The selection has exactly one solution at every alpha.

@@ -27,7 +27,7 @@ from enumsol.trusted.arcs.many_digits import (
     taylor_around,
 )
 from enumsol.trusted.arcs.over_parts import OverInterval
-from enumsol.trusted.selection import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, SelectionRows
+from enumsol.trusted.selection import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, Selection
 from enumsol.trusted.status_rows import SLIP_PLUS
 
 if TYPE_CHECKING:
@@ -110,12 +110,12 @@ class PreciseSelection:
 
     Attributes
     ----------
-    rows : SelectionRows
+    rows : Selection
     """
 
     def __init__(self, system: PreciseSystem, codes: Sequence[int]) -> None:
         self.system = system
-        self.rows = rows = SelectionRows(codes)
+        self.rows = rows = Selection(codes)
         self._signs: dict[Fraction, Signs | None] = {}
         with precision():
             p = len(rows.codes)

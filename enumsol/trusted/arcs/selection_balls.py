@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.arithmetic.ball_arrays import Ball, solution
 from enumsol.arithmetic.balls import SAFE, TINY
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.trusted.arcs.ball_arrays import Ball, solution
-from enumsol.trusted.selection import SelectionRows
+from enumsol.trusted.selection import Selection
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,14 +83,14 @@ class ArcSelection:
     Attributes
     ----------
     system : ArcSystem
-    rows : SelectionRows
+    rows : Selection
     affine : bool
         M is constant.
     """
 
     def __init__(self, system: ArcSystem, codes: Sequence[int]) -> None:
         self.system = system
-        self.rows = rows = SelectionRows(codes)
+        self.rows = rows = Selection(codes)
         self.affine = not np.any(system.F1[rows.slip])
         self._fixed = system.S[:, rows.unknown]
         turning = system.S[:, system.p + rows.slip]

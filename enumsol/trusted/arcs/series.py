@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, gamma, upper_sum
-from enumsol.trusted.arcs.ball_arrays import Ball
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

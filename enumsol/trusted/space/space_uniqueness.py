@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, upper_norm
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of
-from enumsol.trusted.arcs.ball_arrays import Ball
 from enumsol.trusted.space.leaves import SpaceRoot, settle
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 

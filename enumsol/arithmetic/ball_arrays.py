@@ -6,17 +6,21 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg.lapack import dgetrf, dtrtri
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_sum
-from enumsol.trusted.at_alpha import verified_solve
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
-_LARGEST_CONTRACTION = 0.95
-_POWER_STEPS = 6
+#: Entries of |I - R M| must sum to less than this in every row for a selection to count as regular.
+_CONTRACTION = 0.5
+#: Of rounding in long double, which some processors have no better than double; what an operation adds is half of it.
+_LONG = float(np.finfo(np.longdouble).eps)
+#: The same for several right-hand sides, in a weighted norm; steps of the power method that finds the weights.
+_LARGEST_CONTRACTION, _POWER_STEPS = 0.95, 6
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,14 @@ class Ball:
     def __getitem__(self, item: Any) -> Ball:
         return Ball(self.mid[item], self.rad[item])
 
+    def __setitem__(self, item: Any, value: Ball) -> None:
+        self.mid[item], self.rad[item] = value.mid, value.rad
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes."""
+        return self.mid.ndim
+
     @property
     def size(self) -> Array:
         """Largest absolute values."""
@@ -63,6 +75,75 @@ def smaller(one: Ball, other: Ball) -> Ball:
     """Entry by entry the ball with the smaller radius, of two that hold the same values."""
     first = one.rad <= other.rad
     return Ball(np.where(first, one.mid, other.mid), np.where(first, one.rad, other.rad))
+
+
+@dataclass(frozen=True)
+class VerifiedSolution:
+    """The solutions of M y = b for all M and b in balls.
+
+    Attributes
+    ----------
+    y, radius : (n,) arrays
+    sign : of det M
+    inverse, rounded : (n, n) arrays
+        The midpoint and the radius of a matrix R near M^-1, of rows in another order.
+    rest : (n,) array
+        Bound of |b - M y| in that order.
+    defect : (n, n) array
+        Bound of |I - R M|.
+    """
+
+    y: Array
+    radius: Array
+    sign: int
+    inverse: Array
+    rounded: Array
+    rest: Array
+    defect: Array
+
+
+def verified_solve(M: Array, M_rad: Array, b: Array, b_rad: Array) -> VerifiedSolution | None:
+    """Ball of the solutions of M y = b and the sign of det M, or None when M is not proven regular.
+
+    R = U^{-1} L^{-1} P with explicit triangular approximations has a determinant of known sign; ||I - R M|| < 1 then
+    proves M regular and gives det M the same sign.
+    """
+    n = len(b)
+    lu, pivots, _ = dgetrf(M)
+    if not np.all(np.isfinite(lu)) or np.any(np.diagonal(lu) == 0):
+        return None
+    sign = 1 - 2 * (int(np.sum(pivots != np.arange(n))) % 2)
+    order = np.arange(n)
+    for i, j in enumerate(pivots):
+        order[[i, j]] = order[[j, i]]
+    lower = np.tril(dtrtri(lu, lower=1, unitdiag=1)[0], -1) + np.eye(n)
+    upper = np.triu(dtrtri(lu)[0])
+    if not (np.all(np.isfinite(lower)) and np.all(np.isfinite(upper))) or np.any(np.diagonal(upper) == 0):
+        return None
+    negative = int(np.sum(np.diagonal(upper) < 0))
+    MP, MP_rad, bP, bP_rad = M[order], M_rad[order], b[order], b_rad[order]
+    k = gamma(3 * n + 6)
+    product = upper @ (lower @ MP)
+    reach = np.abs(upper) @ np.abs(lower) * (1 + k)
+    error = (reach @ (k * np.abs(MP) + MP_rad)) * (1 + k) * SAFE + TINY
+    defect = np.abs(np.eye(n) - product) * (1 + 2 * UNIT) + error
+    contraction = float(np.max(upper_sum(defect, axis=1)))
+    if not contraction < _CONTRACTION:
+        return None
+    y = upper @ (lower @ bP)
+    y = y + upper @ (lower @ (bP - MP @ y))
+    # what the rounding of the rest would add is more than all the rest where M is ill-conditioned
+    rest = (bP.astype(np.longdouble) - MP.astype(np.longdouble) @ y.astype(np.longdouble)).astype(np.float64)
+    size = (np.abs(bP) + np.abs(MP) @ np.abs(y)) * (1 + k)
+    rest_rad = (bP_rad + MP_rad @ np.abs(y)) * (1 + k) + (n + 4) * _LONG * size + 2 * UNIT * np.abs(rest) + TINY
+    inverse, rounded = upper @ lower, k * reach
+    step = np.abs(upper @ (lower @ rest)) + rounded @ np.abs(rest) + (np.abs(inverse) + rounded) @ rest_rad
+    step = step * (1 + k) * SAFE + TINY
+    # |error| <= step + defect |error|, and ||error|| <= ||step|| / (1 - contraction)
+    largest = float(np.max(step)) / (1.0 - contraction) * SAFE
+    radius = (step + upper_sum(defect, axis=1) * largest) * SAFE
+    rest = (np.abs(rest) + rest_rad) * (1 + k)
+    return VerifiedSolution(y, radius, sign * (1 - 2 * (negative % 2)), inverse, rounded, rest, defect)
 
 
 class Inverse:
