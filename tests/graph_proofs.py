@@ -12,7 +12,7 @@ from rational_checker import Refused, check_records
 
 from enumsol import ContactProblem, branch_graph, gallery, verify
 from enumsol.search import form_policy as forms
-from enumsol.search.interval.subintervals import interval_tree
+from enumsol.search.interval import interval_tree
 
 
 def triangle(**data):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import (
     SAFE,
     TINY,
@@ -183,6 +184,11 @@ class EnclosedSystem:
     def p(self) -> int:
         """Number of contact nodes."""
         return len(self.F)
+
+    @cached_property
+    def balls(self) -> tuple[Ball, Ball, Ball]:
+        """S, g and F."""
+        return Ball(self.S, self.S_rad), Ball(self.g, self.g_rad), Ball(self.F, self.F_rad)
 
     @cached_property
     def smallest_eigenvalue(self) -> float:

@@ -11,6 +11,7 @@ from enumsol.model.statuses import BACKWARD, FORWARD, FRICTIONLESS, OPEN, SLIP_M
 from enumsol.search.definite import Nodes
 from enumsol.search.numbers import Numbers, weights_of
 from enumsol.support.deadlines import look
+from enumsol.trusted.selection import Selection
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,8 +47,7 @@ class Reduction:
         p, S, F = system.p, system.S, system.F
         self.system, self.free = system, (*free, *sorted(sliding))
         chosen = set(self.free)
-        fixed = [i for i in range(p) if i not in chosen and codes[i] != OPEN]
-        stuck = [i for i in fixed if codes[i] == STICK]
+        fixed = Selection([OPEN if i in chosen else code for i, code in enumerate(codes)])
         self.nodes = np.array(self.free, dtype=np.intp)
         self.slides = np.arange(len(self.nodes)) >= len(free)
         self.rubbing = (F[self.nodes] > 0) & ~self.slides
@@ -56,14 +56,8 @@ class Reduction:
         self.turn = np.array([(sliding.get(i, 0) == FORWARD) - (sliding.get(i, 0) == BACKWARD) for i in self.free])
         self.turn = self.turn * F[self.nodes]
         self._friction, self._F = F[self.nodes], F[self.nodes[self.rubbing]]
-        rows = np.array(fixed + [p + i for i in stuck], dtype=np.intp)
-        self.E = np.zeros((2 * p, len(rows)))
-        for k, i in enumerate(fixed):
-            self.E[i, k] = 1.0
-            if codes[i] in (SLIP_PLUS, SLIP_MINUS):
-                self.E[p + i, k] = F[i] if codes[i] == SLIP_PLUS else -F[i]
-        for k, i in enumerate(stuck, start=len(fixed)):
-            self.E[p + i, k] = 1.0
+        rows = fixed.unknown
+        self.E = fixed.forces(np.eye(len(rows)), F)
         across = S[:, self.places]
         across[:, : len(self.free)] += S[:, p + self.nodes] * self.turn
         self.M = M = S[rows] @ self.E

@@ -12,15 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import VerifiedSolution, verified_solve
+from enumsol.arithmetic.ball_arrays import Ball, VerifiedSolution, column_scale, verified_solve
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma, upper_norm
 from enumsol.trusted.energy_bounds import margins
+from enumsol.trusted.selection import Selection
 from enumsol.trusted.status_rows import (
     CONDITIONS,
-    OPEN,
-    SLIP_MINUS,
-    SLIP_PLUS,
-    STICK,
     row_signs,
 )
 
@@ -130,153 +127,79 @@ def contradicts(system: EnclosedSystem, codes: Sequence[int]) -> bool:
     that of the energy only of order d^2.
     """
     with np.errstate(over="ignore", divide="ignore", invalid="ignore", under="ignore"):
-        parts = _Equations.of(system, np.asarray(codes, dtype=np.intp))
-        b, b_rad = system.g[parts.rows], system.g_rad[parts.rows]
-        if not len(b) or not np.all(np.isfinite(parts.M)):
+        selection, (S, g, F) = Selection(codes), system.balls
+        M, b = selection.matrix(S, F), g[selection.unknown]
+        if not len(b.mid) or not np.all(np.isfinite(M.mid)):
             return False
         try:
-            U, sizes, _ = np.linalg.svd(parts.M)
+            U, sizes, _ = np.linalg.svd(M.mid)
         except np.linalg.LinAlgError:
             return False
         sizes = np.maximum(sizes / np.max(np.abs(system.S)), UNIT)
-        y = U @ ((b @ U) / sizes**2)
+        y = U @ ((b.mid @ U) / sizes**2)
         # its length does not matter
         y /= np.max(np.abs(y))
-        y_abs, k = np.abs(y), gamma(len(b) + 2)
-        least = abs(float(y @ b)) - float(y_abs @ (b_rad + k * np.abs(b))) * (1 + 2 * k) * SAFE - TINY
-        product = np.abs(y @ parts.M) + y_abs @ (parts.M_rad + k * np.abs(parts.M)) * (1 + 2 * k) * SAFE
+        y_abs, k = np.abs(y), gamma(len(b.mid) + 2)
+        least = abs(float(y @ b.mid)) - float(y_abs @ (b.rad + k * np.abs(b.mid))) * (1 + 2 * k) * SAFE - TINY
+        product = np.abs(y @ M.mid) + y_abs @ (M.rad + k * np.abs(M.mid)) * (1 + 2 * k) * SAFE
         reach = upper_norm(np.abs(system.g) + system.g_rad) / system.smallest_eigenvalue * SAFE
         return bool(least > upper_norm(product) * reach * SAFE + ROOT_TINY)
 
 
-@dataclass(frozen=True)
-class _Equations:
-    """M z = g[rows] of a complete selection: z holds lambda_n of the closed nodes, then lambda_t of the sticking ones.
-
-    Attributes
-    ----------
-    closed, across, held : int arrays
-        Places of lambda_n of the closed nodes, of their lambda_t, and of lambda_t of the sticking nodes.
-    slipping, uncertain : arrays
-        lambda_t / lambda_n of the closed nodes as a ball.
-    M, M_rad : square arrays
-    """
-
-    closed: NDArray[np.intp]
-    across: NDArray[np.intp]
-    held: NDArray[np.intp]
-    slipping: Array
-    uncertain: Array
-    M: Array
-    M_rad: Array
-
-    @property
-    def rows(self) -> NDArray[np.intp]:
-        return np.concatenate([self.closed, self.held])
-
-    @classmethod
-    def of(cls, system: EnclosedSystem, status: NDArray[np.intp]) -> _Equations:
-        p = system.p
-        closed, held = np.flatnonzero(status != OPEN), p + np.flatnonzero(status == STICK)
-        across = p + closed
-        slip = np.where(status == SLIP_PLUS, 1.0, 0.0) - np.where(status == SLIP_MINUS, 1.0, 0.0)
-        # lambda = E z: columns e_i + slip F e_(p+i), then e_(p+i) of the sticking nodes
-        slipping = (slip * system.F)[closed]
-        uncertain = (np.abs(slip) * system.F_rad)[closed]
-        turning = np.abs(slipping)
-        rows = np.concatenate([closed, held])
-        S_rows, rad_rows = system.S[rows], system.S_rad[rows]
-        normal, tangential = S_rows[:, closed], S_rows[:, across]
-        M = np.hstack([normal + tangential * slipping, S_rows[:, held]])
-        left = rad_rows[:, closed] + rad_rows[:, across] * (turning + uncertain)
-        left += np.abs(tangential) * (2 * uncertain + 4 * UNIT * turning) + 4 * UNIT * np.abs(normal)
-        M_rad = np.hstack([left, rad_rows[:, held]]) * SAFE + TINY
-        return cls(closed, across, held, slipping, uncertain, M, M_rad)
-
-
 def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSelection | None:
-    p, S = system.p, system.S
-    status = np.asarray(codes, dtype=np.intp)
-    parts = _Equations.of(system, status)
-    rows, closed, across, held = parts.rows, parts.closed, parts.across, parts.held
-    slipping, uncertain, M, M_rad = parts.slipping, parts.uncertain, parts.M, parts.M_rad
-    turning = np.abs(slipping)
+    selection, (S, g, F) = Selection(codes), system.balls
+    rows = selection.unknown
     if not len(rows):
-        zero = np.zeros(2 * p)
-        return _conditions(system, status, zero, zero, system.g, system.g_rad, 1)
+        return _conditions(codes, F, Ball.exact(np.zeros(2 * system.p)), g, 1)
     # scale the columns by powers of two, so that the unknowns are comparable in the contraction
-    scale = np.ldexp(1.0, -np.frexp(np.max(np.abs(M), axis=0) + TINY)[1])
+    M = selection.matrix(S, F)
+    scale = column_scale(M)
     # what underflows in the scaling is less than TINY
-    solved = verified_solve(M * scale, M_rad * scale + TINY, system.g[rows], system.g_rad[rows])
+    solved = verified_solve(M.mid * scale, M.rad * scale + TINY, g.mid[rows], g.rad[rows])
     if solved is None:
         return None
-    y, y_rad, sign = solved.y * scale, solved.radius * scale + TINY, solved.sign
-    count = len(closed)
-    force, force_rad = np.zeros(2 * p), np.zeros(2 * p)
-    force[closed], force_rad[closed] = y[:count], y_rad[:count]
-    force[across] = slipping * y[:count]
-    turned = turning * y_rad[:count] + uncertain * (np.abs(y[:count]) + y_rad[:count])
-    force_rad[across] = (turned + 2 * UNIT * np.abs(force[across])) * SAFE + np.where(turning > 0, TINY, 0.0)
-    force[held], force_rad[held] = y[count:], y_rad[count:]
-    w = system.g - S @ force
-    size = gamma(2 * p + 2)
-    w_rad = system.g_rad + np.abs(S) @ (force_rad + size * np.abs(force)) + system.S_rad @ (np.abs(force) + force_rad)
-    w_rad = (w_rad * (1 + size) + 2 * UNIT * np.abs(w) + size * np.abs(system.g)) * SAFE + TINY
-    w[rows], w_rad[rows] = 0.0, 0.0
-    found = _conditions(system, status, force, force_rad, w, w_rad, sign)
+    force = selection.forces(Ball(solved.y * scale, solved.radius * scale + TINY), F)
+    w = g - (S @ force[:, None])[:, 0]
+    w.mid[rows], w.rad[rows] = 0.0, 0.0
+    found = _conditions(codes, F, force, w, solved.sign)
     if found.is_root or found.is_excluded:
         return found
-    w_rad = np.fmin(w_rad, _closer(system, parts, solved, scale, force, force_rad))
-    w_rad[rows] = 0.0
-    return _conditions(system, status, force, force_rad, w, w_rad, sign)
+    w = Ball(w.mid, np.fmin(w.rad, _closer(system, selection, solved, scale, force)))
+    w.rad[rows] = 0.0
+    return _conditions(codes, F, force, w, solved.sign)
 
 
-def _closer(
-    system: EnclosedSystem, parts: _Equations, solved: VerifiedSolution, scale: Array, force: Array, force_rad: Array
-) -> Array:
+def _closer(system: EnclosedSystem, selection: Selection, solved: VerifiedSolution, scale: Array, force: Ball) -> Array:
     """Radii of g - S lambda in which errors of lambda cancel: those of a solution of ill-conditioned equations do.
 
     With lambda = E (y + e), e = R rest + (I - R M) e: S E R is not large where S E and R are.
     """
-    S, size = system.S, gamma(2 * system.p + 2)
-    moved = np.hstack([S[:, parts.closed] + S[:, parts.across] * parts.slipping, S[:, parts.held]]) * scale
+    S, size, slipping = system.S, gamma(2 * system.p + 2), selection.slip
+    moved = selection.columns(S, system.F) * scale
     product, reach = moved @ solved.inverse, np.abs(moved)
     k = gamma(moved.shape[1] + 8)
     # what rounds off in the inverse and in both products, and what is left of e
     beside = (np.abs(solved.inverse) * k + solved.rounded) @ solved.rest + solved.defect @ solved.radius
     error = (np.abs(product) @ solved.rest) * (1 + k) + (reach @ beside) * (1 + k) ** 3
     # of F, where E is a ball, and of S and g; then of g - S lambda as it is computed
-    turned = np.zeros_like(force)
-    turned[parts.across] = parts.uncertain * (np.abs(force[parts.closed]) + force_rad[parts.closed])
-    turned[parts.across] += 4 * UNIT * np.abs(parts.slipping) * (np.abs(force[parts.closed]) + force_rad[parts.closed])
-    most = np.abs(force) + force_rad
+    most = np.abs(force.mid) + force.rad
+    turned = np.zeros_like(most)
+    turned[system.p + slipping] = (system.F_rad + 4 * UNIT * system.F)[slipping] * most[slipping]
     error += system.g_rad + system.S_rad @ most + np.abs(S) @ (turned + size * most)
-    return (error * (1 + size) + size * np.abs(system.g)) * SAFE * SAFE + TINY
+    return np.asarray((error * (1 + size) + size * np.abs(system.g)) * SAFE * SAFE + TINY)
 
 
-def row_balls(
-    system: EnclosedSystem, force: Array, force_rad: Array, w: Array, w_rad: Array
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values of all rows, shape (7, p), for balls of lambda and w, and their radii."""
-    p = system.p
-    (n, t), (n_rad, t_rad) = force.reshape(2, p), force_rad.reshape(2, p)
-    reach = system.F * n
-    cone_rad = system.F * n_rad + system.F_rad * (np.abs(n) + n_rad) + t_rad
-    cone_rad = (cone_rad + 4 * UNIT * (np.abs(reach) + np.abs(t))) * SAFE + TINY
-    values = np.stack([n, t, reach - t, reach + t, -w[:p], w[p:], -w[p:]])
-    radii = np.stack([n_rad, t_rad, cone_rad, cone_rad, w_rad[:p], w_rad[p:], w_rad[p:]])
-    return values, radii
+def row_balls(F: Ball, force: Ball, w: Ball) -> Ball:
+    """Values of the seven rows of every node, shape (7, p), for balls of F, lambda and w."""
+    p = len(F.mid)
+    n, t = force[:p], force[p:]
+    bound = F * n
+    up, down = bound - t, bound + t
+    values = np.stack([n.mid, t.mid, up.mid, down.mid, -w.mid[:p], w.mid[p:], -w.mid[p:]])
+    return Ball(values, np.stack([n.rad, t.rad, up.rad, down.rad, w.rad[:p], w.rad[p:], w.rad[p:]]))
 
 
-def _conditions(
-    system: EnclosedSystem,
-    codes: NDArray[np.intp],
-    force: Array,
-    force_rad: Array,
-    w: Array,
-    w_rad: Array,
-    sign: int,
-) -> VerifiedSelection:
-    values, radii = row_balls(system, force, force_rad, w, w_rad)
-    kinds, nodes = np.array([(kind, i) for i, code in enumerate(codes.tolist()) for kind in CONDITIONS[code][1]]).T
-    return VerifiedSelection(force, force_rad, w, w_rad, values[kinds, nodes], radii[kinds, nodes], sign)
+def _conditions(codes: Sequence[int], F: Ball, force: Ball, w: Ball, sign: int) -> VerifiedSelection:
+    kinds, nodes = np.array([(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][1]]).T
+    slack = row_balls(F, force, w)[kinds, nodes]
+    return VerifiedSelection(force.mid, force.rad, w.mid, w.rad, slack.mid, slack.rad, sign)

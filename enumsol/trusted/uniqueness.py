@@ -15,6 +15,7 @@ import numpy as np
 from enumsol.arithmetic.ball_arrays import Ball, determinant_sign, solution
 from enumsol.arithmetic.balls import SAFE
 from enumsol.trusted.at_alpha import row_balls, solve_selection
+from enumsol.trusted.selection import Selection
 from enumsol.trusted.status_rows import (
     BACKWARD,
     CONDITIONS,
@@ -196,17 +197,11 @@ class Reduced(Components):
         places = np.concatenate([nodes, p + nodes[rubbing]])
         tangential = np.full(len(nodes), -1, dtype=np.intp)
         tangential[rubbing] = len(nodes) + np.arange(np.count_nonzero(rubbing))
-        closed = np.flatnonzero((status != OPEN) & (status != UNDECIDED) & ~slides)
-        held = p + np.flatnonzero(status == STICK)
         slip = np.where(np.isin(status, (SLIP_PLUS, FORWARD)), 1.0, 0.0)
         slip -= np.where(np.isin(status, (SLIP_MINUS, BACKWARD)), 1.0, 0.0)
-        E, E_rad = np.zeros((2 * p, len(closed) + len(held))), np.zeros((2 * p, len(closed) + len(held)))
-        column = np.arange(len(closed))
-        E[closed, column] = 1.0
-        E[p + closed, column], E_rad[p + closed, column] = (slip * system.F)[closed], (abs(slip) * system.F_rad)[closed]
-        E[held, len(closed) + np.arange(len(held))] = 1.0
-        forms, rows = Ball(E, E_rad), np.concatenate([closed, held])
-        S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
+        fixed, (S, g, F) = Selection(np.where(slides | (status == UNDECIDED), OPEN, status).tolist()), system.balls
+        rows = fixed.unknown
+        forms = fixed.forces(Ball.exact(np.eye(len(rows))), F)
         M = S[rows] @ forms
         sign = determinant_sign(M)
         turn = Ball((slip * system.F)[nodes], (abs(slip) * system.F_rad)[nodes])
@@ -295,11 +290,12 @@ class Reduced(Components):
         side = np.flatnonzero(np.isin(status[self.nodes], _SLIDING))
         turned = x[side] * self.turn[side]
         force.mid[p + self.nodes[side]], force.rad[p + self.nodes[side]] = turned.mid, turned.rad
-        S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
+        S, g, F = system.balls
         w = g - (S @ Ball(force.mid[:, None], force.rad[:, None]))[:, 0]
         w.mid[self.places], w.rad[self.places] = w_free.mid, w_free.rad
         w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
-        values, radii = row_balls(system, force.mid, force.rad, w.mid, w.rad)
+        conditions = row_balls(F, force, w)
+        values, radii = conditions.mid, conditions.rad
         tests = [(values[kind, i], radii[kind, i]) for i in np.flatnonzero(fixed) for kind in CONDITIONS[core[i]][1]]
         tests += [self._slides(core[node], values[:, node], radii[:, node]) for node in self.nodes[side]]
         slack, slack_rad = (np.array(part) for part in (zip(*tests, strict=True) if tests else ((), ())))

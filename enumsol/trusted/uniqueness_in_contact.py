@@ -95,7 +95,7 @@ def _components(system: EnclosedSystem, codes: Sequence[int], selection: Sequenc
     places = np.concatenate([nodes, p + nodes[own]])
     tangential = np.full(len(nodes), -1, dtype=np.intp)
     tangential[own] = len(nodes) + np.arange(np.count_nonzero(own))
-    S = Ball(system.S, system.S_rad)[places]
+    S = system.balls[0][places]
     side = np.flatnonzero(slip[nodes])
     turn = Ball((slip * system.F)[nodes[side]], system.F_rad[nodes[side]])
     R, turned = S[:, places], S[:, nodes[side]] + S[:, p + nodes[side]] * turn
@@ -152,8 +152,9 @@ def gaps(system: EnclosedSystem, codes: Sequence[int], rows: NDArray[np.intp], v
     cone = size[2] + size[3]
     c = table[0] + system.F * (table[2] + table[3])
     error = gamma(4 * len(rows) + 8) * (size[0] + system.F * cone) + system.F_rad * cone * SAFE
-    pushed = Ball(system.S[:p], system.S_rad[:p]) @ Ball.exact(np.concatenate([table[4], table[6] - table[5]])[:, None])
-    twice = Ball(system.g[:p], system.g_rad[:p]) - Ball(c, error * SAFE + TINY) - pushed[:, 0]
+    S, g, _ = system.balls
+    pushed = S[:p] @ Ball.exact(np.concatenate([table[4], table[6] - table[5]])[:, None])
+    twice = g[:p] - Ball(c, error * SAFE + TINY) - pushed[:, 0]
     diagonal = np.diagonal(system.S)[:p] + np.diagonal(system.S_rad)[:p]
     reach = np.sqrt(max(-least, 0.0) * diagonal) * SAFE * SAFE + TINY
     return np.asarray((np.maximum(twice.rad - twice.mid, 0.0) * 0.5 + reach) * SAFE)

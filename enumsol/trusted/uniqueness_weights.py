@@ -58,7 +58,7 @@ class Weights:
             return None
         mu, (kappa, nu, share, tau) = numbers[:m], numbers[m:].reshape(4, -1)
         nodes = part.nodes[normal]
-        friction = Ball(system.F[nodes], system.F_rad[nodes])
+        friction = system.balls[2][nodes]
         sides = np.array([_SIGNS.get(part.selection[i], 0) for i in nodes])
         wrong = (np.abs(share) > 1) | ((sides != 0) & (share != sides)) | ((tau > 0) & (share != 0))
         wrong |= np.abs(nu) * friction.size * SAFE + TINY > mu[normal]

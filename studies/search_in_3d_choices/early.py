@@ -15,8 +15,8 @@ from enumsol.model.sectors import DEEPEST, SECTORS, contains, direction, end_num
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.outcome import SearchLimits
+from enumsol.search.space import space_search as space
 from enumsol.search.space.space_search import SpaceSplitting
-from enumsol.search.space.space_search import space_search as space
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.search.tree import TreeSearch
 from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle

@@ -17,9 +17,9 @@ from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, 
 from enumsol.relaxation.interval_relaxation import IntervalEngine, IntervalSystem
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
+from enumsol.search.interval import subintervals as interval_search
 from enumsol.search.interval.interval_tree import EmptyLeaf
 from enumsol.search.interval.subintervals import FastIntervalCertifier, IntervalSearch, Piece
-from enumsol.search.interval.subintervals import subintervals as interval_search
 
 BELOW = {UNDECIDED: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), CONTACT: (STICK, SLIP_PLUS, SLIP_MINUS)}
 

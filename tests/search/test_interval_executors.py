@@ -9,7 +9,7 @@ from proof_tools import bytes_of
 
 import enumsol
 from enumsol import branch_graph, gallery, verify
-from enumsol.search.interval.subintervals import subintervals as interval_search
+from enumsol.search.interval import subintervals as interval_search
 
 
 def through_zero():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from branches.problems import generic_problem
 from flint import arb, arb_mat
-from kernel.exact_arcs import Truth, beside, exact_of, interval_at, precise_system, random_data, two_zeros
+from trusted.exact_arcs import Truth, beside, exact_of, interval_at, precise_system, random_data, two_zeros
 
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.gallery import wedge
