@@ -57,8 +57,15 @@ class Ball:
     def __getitem__(self, item: Any) -> Ball:
         return Ball(self.mid[item], self.rad[item])
 
-    def __setitem__(self, item: Any, value: Ball) -> None:
-        self.mid[item], self.rad[item] = value.mid, value.rad
+    def __setitem__(self, item: Any, value: Any) -> None:
+        """Put in a ball, or what is exact."""
+        exact = not isinstance(value, Ball)
+        self.mid[item], self.rad[item] = (value, 0.0) if exact else (value.mid, value.rad)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """As of an array."""
+        return self.mid.shape
 
     @property
     def ndim(self) -> int:

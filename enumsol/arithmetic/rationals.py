@@ -5,10 +5,12 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from flint import fmpq, fmpq_mat
 
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 
@@ -26,6 +28,13 @@ def rational_matrix(array: NDArray[np.float64]) -> Any:
     """The exact values of a matrix of floats as fmpq_mat."""
     rows, columns = array.shape
     return fmpq_mat(rows, columns, [fmpq(*float(v).as_integer_ratio()) for v in array.ravel()])
+
+
+def as_objects(values: Sequence[Any]) -> NDArray[Any]:
+    """Exact numbers, or rows of them, as an array, on which the algebra of a selection works as on floats."""
+    if len(values) and isinstance(values[0], list | tuple):
+        return np.array([as_objects(row) for row in values], dtype=object)
+    return np.fromiter(values, object, len(values))  # polynomials are sequences, which np.array would unpack
 
 
 def is_positive_definite(matrix: Any) -> bool:

@@ -91,8 +91,7 @@ class SelectionCurve:
 
     def __init__(self, system: LoadedSystem, codes: Codes) -> None:
         self._system, self.rows = system, Selection(codes)
-        S, rows, p = system.S, self.rows, system.p
-        self._fixed, self._turning = S[:, rows.unknown], S[:, p + rows.slip] * rows.slip_signs
+        self._slope = self.rows.columns(system.S, system.F1, 0)
 
     def at(self, alpha: float) -> tuple[Array, Array, Array, Array, Array, Array]:
         """lambda, w and the conditions, then their slopes.
@@ -102,29 +101,17 @@ class SelectionCurve:
         numpy.linalg.LinAlgError
             The selection is singular.
         """
-        system, rows, p = self._system, self.rows, self._system.p
+        system, rows = self._system, self.rows
         F, F1 = system.F0 + alpha * system.F1, system.F1
-        W, dW = self._fixed.copy(), np.zeros_like(self._fixed)
-        W[:, rows.slip_columns] += self._turning * F[rows.slip]
-        dW[:, rows.slip_columns] = self._turning * F1[rows.slip]
+        W, dW = rows.columns(system.S, F), self._slope
         g, M = system.g0 + alpha * system.g1, W[rows.unknown]
         y = np.asarray(np.linalg.solve(M, g[rows.unknown]))
         dy = np.asarray(np.linalg.solve(M, system.g1[rows.unknown] - dW[rows.unknown] @ y))
         w, dw = g - W @ y, np.asarray(system.g1 - W @ dy - dW @ y)
-        force, slope = np.zeros(2 * p), np.zeros(2 * p)
-        force[rows.unknown], slope[rows.unknown] = y, dy
-        n, dn = y[rows.slip_columns], dy[rows.slip_columns]
-        force[p + rows.slip] = rows.slip_signs * F[rows.slip] * n
-        slope[p + rows.slip] = rows.slip_signs * (F1[rows.slip] * n + F[rows.slip] * dn)
-        n, dn = y[rows.stick_columns], dy[rows.stick_columns]
-        bound, widens = F[rows.stick] * n, np.asarray(F1[rows.stick] * n + F[rows.stick] * dn)
-        return force, w, self._conditions(w, y, bound), slope, dw, self._conditions(dw, dy, widens)
-
-    def _conditions(self, w: Array, y: Array, bound: Array) -> Array:
-        """The conditions, or their slopes."""
-        rows = self.rows
-        closed, stuck = y[: len(rows.closed)], y[len(rows.closed) :]
-        return np.concatenate([rows.moving_signs * w[rows.moving], closed, bound - stuck, bound + stuck])
+        force, slope = rows.forces(y, F), rows.forces(dy, F) + rows.forces(y, F1, unit=0)
+        widens = np.zeros(len(rows.conditions))
+        widens[len(widens) - 2 * len(rows.stick) :] = np.tile(F1[rows.stick] * y[rows.stick_columns], 2)
+        return force, w, rows.slacks(y, w, F), slope, dw, rows.slacks(dy, dw, F) + widens
 
 
 class Chains:

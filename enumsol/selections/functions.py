@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq, fmpq_mat, fmpz_mat, fmpz_poly
 
 from enumsol.arithmetic.algebraic import integer_polynomial
+from enumsol.arithmetic.rationals import as_objects
 from enumsol.model.statuses import RowKind
-from enumsol.selections.rational_selections import as_objects
 from enumsol.support.deadlines import look
 from enumsol.trusted.selection import Selection
 

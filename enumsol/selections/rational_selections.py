@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import fmpq, fmpq_mat
 
-from enumsol.arithmetic.rationals import rational
+from enumsol.arithmetic.rationals import as_objects, rational
 from enumsol.condensation.exact import ExactSystem
 from enumsol.model.statuses import CONDITIONS, FINAL, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
 from enumsol.selections.polytopes import polytope_vertices, value
@@ -36,13 +36,6 @@ def _outward(number: Any) -> tuple[float, float]:
 
 def _holds(conditions: Conditions, rows: Sequence[Any]) -> bool:
     return all(rows[k] == 0 for k in conditions.equations) and all(rows[k] >= 0 for k in conditions.inequalities)
-
-
-def as_objects(values: Sequence[Any]) -> NDArray[Any]:
-    """Exact numbers, or rows of them, as an array, on which the algebra of a selection works as on floats."""
-    if len(values) and isinstance(values[0], list | tuple):
-        return np.array([as_objects(row) for row in values], dtype=object)
-    return np.fromiter(values, object, len(values))  # polynomials are sequences, which np.array would unpack
 
 
 class ExactSelections:

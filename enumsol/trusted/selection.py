@@ -74,15 +74,19 @@ class Selection:
     def columns(self, S: Any, F: Any, unit: Any = 1) -> Any:
         """S E for S, or for any of its rows: a column for every unknown.
 
+        E is linear in (unit, F). With ``unit`` 0 and the slope of F this is the slope of S E; with F as integers over a
+        common denominator ``unit``, y is lambda / unit.
+
         Parameters
         ----------
         S : (m, 2p) array or Ball
         F : (p,) array or Ball
-            Friction coefficients, times ``unit``: integers have a common denominator, and y is lambda / unit then.
+            Friction coefficients, times ``unit``.
         """
-        columns = S[:, self.unknown] if unit == 1 else S[:, self.unknown] * unit
+        columns = _times(S[:, self.unknown], unit)
         if len(self.slip):
-            columns[:, self.slip_columns] = columns[:, self.slip_columns] + S[:, self.p + self.slip] * self._turn(F)
+            turned = S[:, self.p + self.slip] * signed(F[self.slip], self.slip_signs)
+            columns[:, self.slip_columns] = columns[:, self.slip_columns] + turned if unit != 0 else turned
         return columns
 
     def matrix(self, S: Any, F: Any) -> Any:
@@ -91,24 +95,33 @@ class Selection:
 
     def forces(self, y: Any, F: Any, zero: Any = 0.0, unit: Any = 1) -> Any:
         """lambda = E y, shape (2p,) or (2p, k), for unknowns in rows; ``zero`` is that of the arithmetic."""
-        rows = 2 * self.p
-        force: Any
-        if isinstance(y, Ball):
-            force = Ball.exact(np.zeros((rows, *y.mid.shape[1:])))
-        else:
-            force = np.empty((rows, *y.shape[1:]), y.dtype)
-            force.fill(zero)
-        force[self.unknown] = y if unit == 1 else y * unit
+        force = _filled(y, (2 * self.p, *y.shape[1:]), zero)
+        force[self.unknown] = _times(y, unit)
         if len(self.slip):
-            turn = self._turn(F)
-            slipping = y[self.slip_columns]
+            turn, slipping = signed(F[self.slip], self.slip_signs), y[self.slip_columns]
             force[self.p + self.slip] = slipping * (turn if slipping.ndim == 1 else turn[:, None])
         return force
 
-    def _turn(self, F: Any) -> Any:
-        """lambda_t / lambda_n of the slipping nodes."""
-        chosen = F[self.slip]
-        return Ball(chosen.mid * self.slip_signs, chosen.rad) if isinstance(chosen, Ball) else chosen * self.slip_signs
+    def inequalities(self, W: Any, g: Any, F: Any, zero: Any = 0.0, unit: Any = 1) -> tuple[Any, Any]:
+        """C and c of the conditions c + C y, in their order, from W = ``columns`` of S and g, all rows."""
+        count, size, closed = len(self.conditions), len(self.unknown), len(self.closed)
+        C, c = _filled(W, (count, size), zero), _filled(g, (count,), zero)
+        first, stick = len(self.moving), np.arange(len(self.stick))
+        C[:first], c[:first] = (
+            signed(W[self.moving], -self.moving_signs[:, None]),
+            signed(g[self.moving], self.moving_signs),
+        )
+        C[first + np.arange(closed), np.arange(closed)] = zero + unit
+        for start, side in ((first + closed, -unit), (first + closed + len(stick), unit)):
+            C[start + stick, self.stick_columns] = F[self.stick]
+            C[start + stick, closed + stick] = zero + side
+        return C, c
+
+    def slacks(self, y: Any, w: Any, F: Any) -> Any:
+        """Values of the conditions at y and w = g - S E y; also their slopes, but for the change of F."""
+        bound, stuck = F[self.stick] * y[self.stick_columns], y[len(self.closed) :]
+        moves = signed(w[self.moving], self.moving_signs)
+        return _joined(moves, y[: len(self.closed)], bound - stuck, bound + stuck)
 
 
 def row_values(force: Any, w: Any, F: Any) -> Any:
@@ -116,3 +129,29 @@ def row_values(force: Any, w: Any, F: Any) -> Any:
     p = len(F)
     bound, t = F * force[:p], force[p:]
     return np.array([force[:p], t, bound - t, bound + t, -w[:p], w[p:], -w[p:]])
+
+
+def signed(values: Any, signs: Any) -> Any:
+    """Values times 1 or -1, without rounding."""
+    return Ball(values.mid * signs, values.rad) if isinstance(values, Ball) else values * signs
+
+
+def _times(values: Any, unit: Any) -> Any:
+    """Values times 1 or 0, or exact numbers times an integer."""
+    if unit == 1:
+        return values
+    return Ball.exact(np.zeros(values.shape)) if isinstance(values, Ball) else values * unit
+
+
+def _filled(like: Any, shape: tuple[int, ...], zero: Any) -> Any:
+    if isinstance(like, Ball):
+        return Ball.exact(np.zeros(shape))
+    found = np.empty(shape, like.dtype)
+    found.fill(zero)
+    return found
+
+
+def _joined(*parts: Any) -> Any:
+    if isinstance(parts[0], Ball):
+        return Ball(np.concatenate([part.mid for part in parts]), np.concatenate([part.rad for part in parts]))
+    return np.concatenate(parts)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import arb, arb_mat
 
+from enumsol.arithmetic.rationals import as_objects
 from enumsol.trusted.arcs.many_digits import (
     ball_of,
     column,
@@ -27,8 +28,7 @@ from enumsol.trusted.arcs.many_digits import (
     taylor_around,
 )
 from enumsol.trusted.arcs.over_parts import OverInterval
-from enumsol.trusted.selection import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, Selection
-from enumsol.trusted.status_rows import SLIP_PLUS
+from enumsol.trusted.selection import Selection
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,9 +91,10 @@ class PreciseSystem:
             return cls(S, g0, g1, F0, F1)
 
     @cached_property
-    def rows(self) -> list[list[Any]]:
-        """S by its rows."""
-        return [[self.S[i, j] for j in range(self.S.ncols())] for i in range(self.S.nrows())]
+    def rows(self) -> NDArray[Any]:
+        """S as an array."""
+        table: NDArray[Any] = as_objects(self.S.tolist())
+        return table
 
     def constant_load(self, side: float) -> PreciseSystem:
         """For the constant load g1 or -g1 (see trusted.over_interval)."""
@@ -118,49 +119,14 @@ class PreciseSelection:
         self.rows = rows = Selection(codes)
         self._signs: dict[Fraction, Signs | None] = {}
         with precision():
-            p = len(rows.codes)
-            constant, slope = self._columns()
-            unknown = rows.unknown.tolist()
-            self._M = tuple(matrix([part[r] for r in unknown]) for part in (constant, slope))
-            self._g = tuple(column([part[r] for r in unknown]) for part in (system.g0, system.g1))
-            # conditions c0 + a c1 + (C0 + a C1) y
-            place = {i: j for j, i in enumerate(rows.closed.tolist())}
-            stuck = {i: len(place) + j for j, i in enumerate(rows.stick.tolist())}
             parts: tuple[list[Any], ...] = ([], [], [], [])
-            for node, kind in rows.conditions:
-                row0, row1, at0, at1 = [arb(0)] * len(unknown), [arb(0)] * len(unknown), arb(0), arb(0)
-                if kind == NORMAL_FORCE:
-                    row0[place[node]] = arb(1)
-                elif kind in (CONE_PLUS, CONE_MINUS):
-                    row0[place[node]], row1[place[node]] = system.F0[node], system.F1[node]
-                    row0[stuck[node]] = arb(-1 if kind == CONE_PLUS else 1)
-                else:
-                    r = node if kind == PENETRATION else p + node
-                    sign = arb(1 if kind != PENETRATION and rows.codes[node] == SLIP_PLUS else -1)
-                    row0, row1 = ([-sign * x for x in part[r]] for part in (constant, slope))
-                    at0, at1 = sign * system.g0[r], sign * system.g1[r]
-                for part, value in zip(parts, (row0, row1, at0, at1), strict=True):
-                    part.append(value)
-            self._C, self._c = (matrix(parts[0]), matrix(parts[1])), (column(parts[2]), column(parts[3]))
-
-    def _columns(self) -> tuple[dict[int, list[Any]], dict[int, list[Any]]]:
-        """The rows of S dlambda/dy that count: the constant part, and what alpha is multiplied by."""
-        system, rows, p = self.system, self.rows, len(self.rows.codes)
-        closed, stick, zero = rows.closed.tolist(), rows.stick.tolist(), arb(0)
-        slipping = [
-            (j, p + i, arb(sign) * system.F0[i], arb(sign) * system.F1[i])
-            for j, i, sign in zip(rows.slip_columns.tolist(), rows.slip.tolist(), rows.slip_signs.tolist(), strict=True)
-        ]
-        constant, slope = {}, {}
-        for r in {*rows.unknown.tolist(), *rows.moving.tolist()}:
-            whole = system.rows[r]
-            row0, row1 = [whole[i] for i in closed], [zero] * len(closed)
-            for j, i, F0, F1 in slipping:
-                row0[j] += F0 * whole[i]
-                row1[j] = F1 * whole[i]
-            constant[r] = row0 + [whole[p + i] for i in stick]
-            slope[r] = row1 + [zero] * len(stick)
-        return constant, slope
+            for load, F, unit in ((system.g0, system.F0, 1), (system.g1, system.F1, 0)):
+                at, friction = as_objects(load), as_objects(F)
+                W = rows.columns(system.rows, friction, unit)
+                held, free = rows.inequalities(W, at, friction, arb(0), unit)
+                for part, value in zip(parts, (W[rows.unknown], at[rows.unknown], held, free), strict=True):
+                    part.append(matrix(value.tolist()) if value.ndim == 2 else column(value.tolist()))
+            self._M, self._g, self._C, self._c = (tuple(part) for part in parts)
 
     @cached_property
     def _lines(self) -> tuple[Any, Any] | None:
@@ -312,20 +278,15 @@ class PreciseSelection:
     def forces(self, alpha: Fraction) -> tuple[list[Any], list[Any]] | None:
         """lambda and w as 2p arb each."""
         system, rows = self.system, self.rows
-        p = len(rows.codes)
         with precision():
             a = ball_of(alpha)
             solved = self.solve(a)
             if solved is None:
                 return None
-            y = [solved[0][k, 0] for k in range(solved[0].nrows())]
-            forces = [arb(0)] * (2 * p)
-            for row, value in zip(rows.unknown.tolist(), y, strict=True):
-                forces[row] = value
-            for i, sign in zip(rows.slip.tolist(), rows.slip_signs.tolist(), strict=True):
-                forces[p + i] = arb(sign) * (system.F0[i] + a * system.F1[i]) * forces[i]
+            F = as_objects([F0 + a * F1 for F0, F1 in zip(system.F0, system.F1, strict=True)])
+            forces = rows.forces(as_objects(solved[0].entries()), F, arb(0)).tolist()
             moved = system.S * column(forces)
-            w = [system.g0[r] + a * system.g1[r] - moved[r, 0] for r in range(2 * p)]
+            w = [system.g0[r] + a * system.g1[r] - moved[r, 0] for r in range(len(forces))]
             return forces, w
 
 

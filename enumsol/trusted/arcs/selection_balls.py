@@ -90,36 +90,23 @@ class ArcSelection:
 
     def __init__(self, system: ArcSystem, codes: Sequence[int]) -> None:
         self.system = system
-        self.rows = rows = Selection(codes)
-        self.affine = not np.any(system.F1[rows.slip])
-        self._fixed = system.S[:, rows.unknown]
-        turning = system.S[:, system.p + rows.slip]
-        self._turning = Ball(turning.mid * rows.slip_signs, turning.rad)
+        self.rows = Selection(codes)
+        self.affine = not np.any(system.F1[self.rows.slip])
 
     def at(self, alpha: float) -> tuple[Ball, Ball, Ball] | None:
         """lambda, w and the conditions at one alpha, scaled; None where the selection is not proven regular."""
-        p, rows = self.system.p, self.rows.unknown
+        rows = self.rows.unknown
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             F = _affine(Ball.exact(self.system.F0), Ball.exact(self.system.F1), alpha)
             g = _affine(self.system.g0, self.system.g1, alpha)
-            W = self._columns(F)
+            W = self.rows.columns(self.system.S, F)
             y = solution(W[rows], g[rows, None])
             if y is None:
                 return None
             w = g - (W @ y)[:, 0]
-            w.mid[rows] = w.rad[rows] = 0.0
+            w[rows] = 0.0
             y = y[:, 0]
-            forces = Ball(np.zeros(2 * p), np.zeros(2 * p))
-            forces.mid[rows], forces.rad[rows] = y.mid, y.rad
-            slip = F[self.rows.slip] * y[self.rows.slip_columns]
-            forces.mid[p + self.rows.slip], forces.rad[p + self.rows.slip] = slip.mid * self.rows.slip_signs, slip.rad
-            bound, stuck, moves = (
-                F[self.rows.stick] * y[self.rows.stick_columns],
-                y[len(self.rows.closed) :],
-                w[self.rows.moving],
-            )
-            moves = Ball(moves.mid * self.rows.moving_signs, moves.rad)
-            return forces, w, _joined(moves, y[: len(self.rows.closed)], bound - stuck, bound + stuck)
+            return self.rows.forces(y, F), w, self.rows.slacks(y, w, F)
 
     def sign_at(self, alpha: float, condition: int) -> int:
         """Sign of a condition at an alpha at which the selection is regular; 0 where it is not proven."""
@@ -132,50 +119,23 @@ class ArcSelection:
     @cached_property
     def forms(self) -> tuple[Array, Array, Array, Array]:
         """H0, H1 and their radii: H0 + alpha H1 are rows of coefficients for (y, t), [M, -g_R] and the conditions."""
-        system, rows = self.system, self.rows
-        size, m = len(rows.unknown), len(rows.conditions)
-        constant, slope = (np.zeros((2, size + m, size + 1)) for _ in range(2))
-        first = size + len(rows.moving)
-        closed, stick = np.arange(len(rows.closed)), np.arange(len(rows.stick))
-        plus = first + len(closed) + stick
-        minus = plus + len(stick)
-        constant[0, first + closed, closed] = 1.0
-        constant[0, plus, len(closed) + stick], constant[0, minus, len(closed) + stick] = -1.0, 1.0
-        signs = rows.moving_signs
-        for (mid, rad), W, g, F in (
-            (constant, self._columns(Ball.exact(system.F0)), system.g0, system.F0),
-            (slope, self._slope(), system.g1, system.F1),
-        ):
-            mid[:size, :size], rad[:size, :size] = W.mid[rows.unknown], W.rad[rows.unknown]
-            mid[:size, size], rad[:size, size] = -g.mid[rows.unknown], g.rad[rows.unknown]
-            mid[size:first, :size], rad[size:first, :size] = -signs[:, None] * W.mid[rows.moving], W.rad[rows.moving]
-            mid[size:first, size], rad[size:first, size] = signs * g.mid[rows.moving], g.rad[rows.moving]
-            mid[plus, rows.stick_columns] = mid[minus, rows.stick_columns] = F[rows.stick]
-        return constant[0], slope[0], constant[1], slope[1]
+        system, rows, parts = self.system, self.rows, []
+        for g, F, unit in ((system.g0, system.F0, 1), (system.g1, system.F1, 0)):
+            W = rows.columns(system.S, Ball.exact(F), unit)
+            C, c = rows.inequalities(W, g, F, unit=unit)
+            M, b = W[rows.unknown], g[rows.unknown]
+            parts.append(
+                (
+                    np.block([[M.mid, -b.mid[:, None]], [C.mid, c.mid[:, None]]]),
+                    np.block([[M.rad, b.rad[:, None]], [C.rad, c.rad[:, None]]]),
+                )
+            )
+        (constant, constant_rad), (slope, slope_rad) = parts
+        return constant, slope, constant_rad, slope_rad
 
     def forget(self) -> None:
         """Let go of the forms, which are made again where they are asked for."""
         self.__dict__.pop("forms", None)
-
-    def _columns(self, F: Ball) -> Ball:
-        """S dlambda/dy, (2p, size)."""
-        mid, rad = self._fixed.mid.copy(), self._fixed.rad.copy()
-        k = self.rows.slip_columns
-        moved = self._fixed[:, k] + F[self.rows.slip] * self._turning
-        mid[:, k], rad[:, k] = moved.mid, moved.rad
-        return Ball(mid, rad)
-
-    def _slope(self) -> Ball:
-        """dW/dalpha."""
-        mid, rad = np.zeros_like(self._fixed.mid), np.zeros_like(self._fixed.mid)
-        if not self.affine:
-            moved = Ball.exact(self.system.F1[self.rows.slip]) * self._turning
-            mid[:, self.rows.slip_columns], rad[:, self.rows.slip_columns] = moved.mid, moved.rad
-        return Ball(mid, rad)
-
-
-def _joined(*parts: Ball) -> Ball:
-    return Ball(np.concatenate([b.mid for b in parts]), np.concatenate([b.rad for b in parts]))
 
 
 def _affine(constant: Ball, slope: Ball, alpha: float) -> Ball:
