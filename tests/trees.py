@@ -7,7 +7,7 @@ import pytest
 from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.search import fathoming as closing
 from enumsol.search.fathoming import Closer
-from enumsol.search.numbers import Numbers
+from enumsol.search.numbers import WeightSource
 from enumsol.search.space.space_fathoming import SpaceCloser
 
 
@@ -28,7 +28,7 @@ def above_known_roots():
     with pytest.MonkeyPatch.context() as patch:
 
         def whole(self):
-            self._proposed(Numbers.PLAIN)
+            self._proposed(WeightSource.PLAIN)
             self.known = self._regular
 
         def closed(self, codes, relaxation):

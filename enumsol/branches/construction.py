@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.enclosed.following import follow
+from enumsol.branches.enclosed.following import follow_selections
 from enumsol.branches.enclosed.make_traced import make_traced
 from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.branches.enclosed.traced import TracedProblem
@@ -229,7 +229,7 @@ def _make(
     if traced is not None:
         # after Ctrl-C only as much as takes a moment
         most = _BOXES_AFTER_INTERRUPT if any(stop.interrupted for stop in made.stops) else None
-        made.followed = follow(
+        made.followed = follow_selections(
             traced,
             search.pieces,
             tick,
@@ -343,7 +343,7 @@ def _proof_of_problem(
 ) -> Proof | None:
     """The proof for the problem's own data, with the arcs where they can be followed in balls."""
     if followed is None and (traced := _traced(problem, interval)) is not None:
-        followed = follow(traced, pieces)
+        followed = follow_selections(traced, pieces)
     whole = followed is None or followed.stopped is None
     return write_graph_proof(problem, interval, "problem", pieces, followed if whole else None)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.enclosed.arc_parts import PartKind
+from enumsol.branches.enclosed.arc_parts import ArcPartKind
 from enumsol.proof.proof_file import Proof, packed
 from enumsol.proof.reading import fits
 from enumsol.proof.writer import ProofWriter
@@ -17,7 +17,7 @@ from enumsol.search.proof_header import unit_exponents
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from enumsol.branches.enclosed.arc_parts import Part
+    from enumsol.branches.enclosed.arc_parts import ArcPart
     from enumsol.branches.enclosed.following import Followed
     from enumsol.model.problem import ContactProblem
     from enumsol.search.interval.subintervals import SearchedPiece
@@ -107,7 +107,7 @@ def _ends(followed: Followed) -> Iterator[float | Fraction]:
             yield from (box.low, box.high)
             for part in box.parts:
                 yield part.high
-                if part.kind is PartKind.EVENT:
+                if part.kind is ArcPartKind.EVENT:
                     yield from part.zero
 
 
@@ -123,12 +123,12 @@ def _write_arcs(writer: ProofWriter, followed: Followed) -> dict[str, int]:
     return {"traces": len(followed.traces), "arcs": len(followed.joined.arcs)}
 
 
-def _part(part: Part) -> list[Any]:
+def _part(part: ArcPart) -> list[Any]:
     """The kind of a part, its upper end, and what it says; its lower end is the upper end of the part before."""
     end = _number(part.high)
-    if part.kind is PartKind.HOLDS:
+    if part.kind is ArcPartKind.HOLDS:
         return [part.kind, end, part.index]
-    if part.kind is PartKind.EVENT:
+    if part.kind is ArcPartKind.EVENT:
         zero = [_number(bound) for bound in part.zero]
         return [part.kind, end, part.index, part.condition, int(part.rising), *zero]
     return [part.kind, end]

@@ -9,7 +9,7 @@ import numpy as np
 
 from enumsol.continuation.audit.audit_report import AuditReport
 from enumsol.continuation.audit.auditor import DETOUR, POINT_TOLERANCE, audit_on
-from enumsol.continuation.audit.graph_map import GraphMap, PlaceKind, checked_graph
+from enumsol.continuation.audit.graph_map import GraphMap, GraphPlaceKind, checked_graph
 from enumsol.continuation.audit.points import read_points
 from enumsol.continuation.follow import follow, start_tangents
 from enumsol.continuation.not_converged import AmbiguousStart
@@ -153,7 +153,7 @@ class _Coverage:
     def start(self, start: Any) -> None:
         """Follow a start in both directions unless its arc was passed before."""
         place = self.chart.place(self.chart.point(float(start.alpha), start.lambda_n, start.lambda_t))
-        if place.kind is PlaceKind.ARC and place.distance <= POINT_TOLERANCE and place.number in self.visited:
+        if place.kind is GraphPlaceKind.ARC and place.distance <= POINT_TOLERANCE and place.number in self.visited:
             return
         for direction in (1, -1):
             try:

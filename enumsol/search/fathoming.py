@@ -23,7 +23,7 @@ from enumsol.model.statuses import (
     UNDECIDED,
 )
 from enumsol.search.fathoming_in_contact import KnownRoot, Lone
-from enumsol.search.numbers import Numbers
+from enumsol.search.numbers import WeightSource
 from enumsol.search.reduction import NEAR, Reduction
 from enumsol.selections.solution import SelectionSolution
 
@@ -148,9 +148,9 @@ class Closer:
         self._touching = 0
         self._wait = self._pause = 0
         #: Tries of the whole problem that are left, by the number of nodes after which they are due.
-        self._tries = [(0, Numbers.DESCENT)]
+        self._tries = [(0, WeightSource.DESCENT)]
         if certifier.plain or system.p < _FEW:
-            self._tries = [(0, Numbers.PLAIN), (_LONG, Numbers.DESCENT)][: 1 if certifier.plain else 2]
+            self._tries = [(0, WeightSource.PLAIN), (_LONG, WeightSource.DESCENT)][: 1 if certifier.plain else 2]
         self._whole: Proposal | None = None
         #: The regular solution that was found for the whole problem, and the same where it is worth a try in the tree.
         self._regular: KnownRoot | None = None
@@ -171,7 +171,7 @@ class Closer:
         if proposal is None and self._due(0):
             sought = self._tries.pop(0)[1]
             # a regular solution is tried with the same numbers below, and what is left out of the form besides
-            proposal = self._proposed(Numbers.PLAIN if lone else sought)
+            proposal = self._proposed(WeightSource.PLAIN if lone else sought)
             if proposal is not None and proposal.weights is None and lone and self._regular is None:
                 proposal = self._proposed(sought)
         found = None
@@ -198,12 +198,12 @@ class Closer:
     def _due(self, nodes: int) -> bool:
         return bool(self._tries) and nodes >= self._tries[0][0]
 
-    def _proposed(self, sought: Numbers) -> Proposal | None:
+    def _proposed(self, sought: WeightSource) -> Proposal | None:
         """What may be the only solution of the whole problem; takes note of where it is degenerate."""
         system, p = self._system, self._system.p
         codes, exactly = (UNDECIDED,) * p, self._certifier.exactly
         proposal = propose(system, codes, (np.zeros(2 * p), system.g), exactly=exactly, sought=sought)
-        if proposal is None and (p >= _PATH or sought is Numbers.DESCENT):
+        if proposal is None and (p >= _PATH or sought is WeightSource.DESCENT):
             proposal = propose(system, codes, None, exactly=exactly, sought=sought)
         if proposal is None:
             return None
@@ -225,7 +225,7 @@ class Closer:
     def again(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
         """The solutions of a subtree that was closed in an earlier search."""
         if all(code == UNDECIDED for code in codes):
-            self._whole = self._proposed(Numbers.PLAIN if self._certifier.plain else Numbers.DESCENT)
+            self._whole = self._proposed(WeightSource.PLAIN if self._certifier.plain else WeightSource.DESCENT)
             return self.whole()
         return self._tried(codes, relaxation)
 
@@ -234,7 +234,7 @@ class Closer:
         near = (np.zeros(2 * system.p), system.g)
         if relaxation is not None:
             near = relaxation.forces, relaxation.displacements
-        sought = Numbers.PLAIN if certifier.plain else Numbers.CENTRES
+        sought = WeightSource.PLAIN if certifier.plain else WeightSource.CENTRES
         proposal = propose(system, codes, near, exactly=certifier.exactly, sought=sought)
         return certifier.closed(codes, proposal, near)
 
@@ -303,7 +303,7 @@ def propose(
     near: Point | None,
     *,
     exactly: bool,
-    sought: Numbers = Numbers.CENTRES,
+    sought: WeightSource = WeightSource.CENTRES,
 ) -> Proposal | None:
     """What may close a subtree, or None.
 

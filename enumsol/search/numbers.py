@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-class Numbers(enum.Enum):
+class WeightSource(enum.Enum):
     """Where numbers are sought: mu = kappa = 1 and nu = 0 only; near analytic centres besides; or by descent."""
 
     PLAIN = enum.auto()
@@ -26,7 +26,7 @@ class Numbers(enum.Enum):
     DESCENT = enum.auto()
 
 
-def weights_of(R: Array, nodes: Nodes, sought: Numbers = Numbers.CENTRES) -> Array | None:
+def weights_of(R: Array, nodes: Nodes, sought: WeightSource = WeightSource.CENTRES) -> Array | None:
     """mu, kappa, nu, theta / F and tau for which (6.9) is definite, as a proof has them; None where none were found.
 
     Parameters
@@ -50,10 +50,10 @@ def weights_of(R: Array, nodes: Nodes, sought: Numbers = Numbers.CENTRES) -> Arr
     try:
         if np.linalg.eigvalsh(0.5 * (form + form.T))[0] > DEFINITE:
             return np.concatenate([np.ones(nodes.count + b), np.zeros(b), share, tau])
-        if sought is Numbers.PLAIN:
+        if sought is WeightSource.PLAIN:
             return None
         with np.errstate(all="ignore"):
-            search = Descent if sought is Numbers.DESCENT and not len(wide) else AnalyticCentres
+            search = Descent if sought is WeightSource.DESCENT and not len(wide) else AnalyticCentres
             return search(R, nodes).numbers()
     except np.linalg.LinAlgError:
         return None

@@ -9,7 +9,7 @@ import numpy as np
 
 from enumsol.model.statuses import BACKWARD, FORWARD, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.definite import Nodes
-from enumsol.search.numbers import Numbers, weights_of
+from enumsol.search.numbers import WeightSource, weights_of
 from enumsol.support.deadlines import look
 from enumsol.trusted.selection import Selection
 
@@ -180,7 +180,9 @@ class Reduction:
 
     # -- the test of definiteness ----------------------------------------------------------------------------------
 
-    def weights(self, x: Array, v: Array, *, exactly: bool, sought: Numbers = Numbers.CENTRES) -> Array | None:
+    def weights(
+        self, x: Array, v: Array, *, exactly: bool, sought: WeightSource = WeightSource.CENTRES
+    ) -> Array | None:
         """Numbers for which the form of theory, (6.9), is definite at a solution, as a proof has them, or None.
 
         Parameters

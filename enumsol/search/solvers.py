@@ -125,7 +125,7 @@ class Solvers:
             pass
         if self.problem.n <= EXACT_DOF_LIMIT:
             return None, "problem"
-        enclosed = as_computed(system)
+        enclosed = as_computed_in_floats(system)
         return (enclosed if _positive(enclosed) else None), "condensed"
 
     @property
@@ -183,7 +183,7 @@ class Solvers:
     @cached_property
     def _forms(self) -> Forms | None:
         """Forms for a long search; None where the energy is the only one, or there are no balls to prove them by."""
-        system = as_computed(self.scaled) if self.arithmetic == "fast" else self.enclosed
+        system = as_computed_in_floats(self.scaled) if self.arithmetic == "fast" else self.enclosed
         return None if self.arithmetic == "exact" or system is None else Forms(self.scaled, system)
 
     def remake(self) -> Callable[[], Solvers]:
@@ -218,7 +218,7 @@ class Solvers:
         return point_header(self.problem, self.alpha, self.data, units)
 
 
-def as_computed(system: ScaledSystem) -> EnclosedSystem:
+def as_computed_in_floats(system: ScaledSystem) -> EnclosedSystem:
     """S and g as computed, without radii."""
     zero = np.zeros_like
     return EnclosedSystem(system.S, zero(system.S), system.g, zero(system.g), system.F, 4 * np.spacing(system.F))

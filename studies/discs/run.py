@@ -26,7 +26,7 @@ import numpy as np
 
 import enumsol
 from enumsol.model.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.search.numbers import Numbers, weights_of
+from enumsol.search.numbers import WeightSource, weights_of
 from enumsol.search.reduction import NEAR, Reduction
 from grazing.run import SOFT, STIFF
 from shared.results import yes
@@ -78,10 +78,10 @@ def problems(run):
                     yield kind, name, count, seed, discs(radii, weights, stiffness)
 
 
-def with_ones(R, nodes, sought=Numbers.PLAIN):
+def with_ones(R, nodes, sought=WeightSource.PLAIN):
     """What is found if mu = kappa = 1 and nu = 0."""
     del sought
-    return weights_of(R, nodes, Numbers.PLAIN)
+    return weights_of(R, nodes, WeightSource.PLAIN)
 
 
 def forms(system, root):
@@ -102,7 +102,10 @@ def forms(system, root):
         undecided = tuple(i for i in free if i not in sliding)
         reduction = Reduction(system, codes, undecided, sliding)
         x, v = force[reduction.places], w[reduction.places]
-        found = [reduction.weights(x, v, exactly=True, sought=sought) for sought in (Numbers.PLAIN, Numbers.CENTRES)]
+        found = [
+            reduction.weights(x, v, exactly=True, sought=sought)
+            for sought in (WeightSource.PLAIN, WeightSource.CENTRES)
+        ]
         definite += [yes(numbers is not None) for numbers in found]
     return len(free), len(sides), *definite
 

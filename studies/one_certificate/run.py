@@ -47,7 +47,7 @@ from enumsol import gallery
 from enumsol.branches.claims import uniqueness_bound
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search.fathoming import propose
-from enumsol.search.numbers import Numbers
+from enumsol.search.numbers import WeightSource
 from one_certificate.graphs import graphs
 from shared.clock import least_time, timed
 from shared.figures import BLUE, GREEN, GREY, ORANGE, RED, panels
@@ -117,7 +117,7 @@ def unchanged(_value: object, x: np.ndarray, *_arguments: object, **_options: ob
 
 
 @contextmanager
-def whole_by(numbers: Numbers | None) -> Iterator[None]:
+def whole_by(numbers: WeightSource | None) -> Iterator[None]:
     """In this context a certificate is sought with these numbers before the tree, and with none never."""
 
     def proposed(system, codes, near, *, exactly, sought):
@@ -132,13 +132,13 @@ def whole_by(numbers: Numbers | None) -> Iterator[None]:
         stack.enter_context(patch("enumsol.search.fathoming.propose", proposed))
         if numbers is None:
             stack.enter_context(patch("enumsol.search.space.space_fathoming.SpaceCloser.whole", lambda self: None))
-        if numbers is Numbers.PLAIN:
+        if numbers is WeightSource.PLAIN:
             # what is sought in 3D are better numbers than those given
             stack.enter_context(patch("scipy.optimize.minimize", unchanged))
         yield
 
 
-def decided(problem: Any, F: float, numbers: Numbers) -> bool:
+def decided(problem: Any, F: float, numbers: WeightSource) -> bool:
     """Whether one certificate with such numbers decides it."""
     with whole_by(numbers):
         return enumsol.enumerate_roots(problem, F, max_nodes=1).by_one_certificate
@@ -180,8 +180,8 @@ def row(case: Case, problem: Any, F: float, most: int) -> dict[str, Any]:
         assert not roots.whole or same(roots, tree), f"{case.name}, F = {F}: the tree has other roots"
         assert not tree.whole or same(tree, roots), f"{case.name}, F = {F}: the search has other roots"
     most_roots = max(len(roots), 0 if tree is None else len(tree))
-    plain = decided(problem, F, Numbers.PLAIN)
-    every = roots.by_one_certificate or decided(problem, F, Numbers.DESCENT)
+    plain = decided(problem, F, WeightSource.PLAIN)
+    every = roots.by_one_certificate or decided(problem, F, WeightSource.DESCENT)
     assert not (plain or every) or most_roots < 2, (
         f"{case.name}, F = {F}: {most_roots} roots, and a certificate for one"
     )
@@ -221,7 +221,9 @@ def before(case: Case, problem: Any) -> float:
 
 def largest(case: Case, problem: Any, most: int) -> dict[str, Any]:
     """How far the certificate goes, and what is beyond."""
-    plain, any_numbers = (last(partial(decided, problem, numbers=n)) for n in (Numbers.PLAIN, Numbers.DESCENT))
+    plain, any_numbers = (
+        last(partial(decided, problem, numbers=n)) for n in (WeightSource.PLAIN, WeightSource.DESCENT)
+    )
     known, at = before(case, problem), [float(GRID[k]) if k >= 0 else 0.0 for k in (plain, any_numbers)]
     beyond: dict[str, Any] = {"tree at F": "-", "roots": "-", "alone": "-"}
     if problem.p <= MOST_P:

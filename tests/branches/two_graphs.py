@@ -5,8 +5,8 @@ from fractions import Fraction
 from itertools import pairwise
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.enclosed.following import follow
-from enumsol.branches.enclosed.joining import PlaceKind
+from enumsol.branches.enclosed.following import follow_selections
+from enumsol.branches.enclosed.joining import EventPlaceKind
 from enumsol.branches.enclosed.make_traced import make_traced
 from enumsol.branches.enclosed.traced import TracedProblem
 from enumsol.branches.exact.gluing import glue
@@ -34,7 +34,7 @@ class TwoGraphs:
     @property
     def open(self):
         """Enclosures that the traced graph leaves open, with the selections it names."""
-        return [(p.low, p.high, set(p.members)) for p in self.places if p.kind is PlaceKind.OPEN]
+        return [(p.low, p.high, set(p.members)) for p in self.places if p.kind is EventPlaceKind.OPEN]
 
 
 def two_graphs(problem, interval):
@@ -45,7 +45,7 @@ def two_graphs(problem, interval):
     certifier = VerifiedIntervalCertifier(problem, exact, exact.zero)
     search = IntervalSearch(problem.condensed, (a, b), exact.zero, certifier)
     search.run()
-    followed = follow(traced, search.pieces, cut_short=search.stopped is not None)
+    followed = follow_selections(traced, search.pieces, cut_short=search.stopped is not None)
     gluing = glue(exact, search.selections, rational(a), rational(b))
     arcs = make_arcs(gluing)
     ours = make_traced(traced, followed.joined)
@@ -66,7 +66,7 @@ def _vertices(graphs, found):
     """By the number of a traced vertex that of the exact one, for all that are not open."""
     partner, taken = {}, set()
     for vertex, place in zip(graphs.traced[0], graphs.places, strict=True):
-        if place.kind is PlaceKind.OPEN:
+        if place.kind is EventPlaceKind.OPEN:
             continue
         same = [
             other.number
@@ -95,7 +95,7 @@ def _vertices(graphs, found):
 def _alike(vertex, other, place):
     if (vertex.index_left, vertex.index_right) != (other.index_left, other.index_right) or other.family is not None:
         return False
-    if place.kind is PlaceKind.ORIGIN:
+    if place.kind is EventPlaceKind.ORIGIN:
         return vertex.active == other.active
     return (vertex.kind, vertex.border, set(vertex.selections)) == (other.kind, other.border, set(other.selections))
 

@@ -7,7 +7,7 @@ import pytest
 from flint import fmpq, fmpq_mat
 
 from enumsol.search.definite import Nodes
-from enumsol.search.numbers import Numbers, weights_of
+from enumsol.search.numbers import WeightSource, weights_of
 
 
 def exact(values):
@@ -158,7 +158,7 @@ def test_numbers_are_needed_and_found():
     R = np.array([[1.0, 5.0], [0.0, 1.0]])
     mu = weights_of(R, frictionless(R))
     assert np.linalg.eigvalsh(mu[:, None] * R + (mu[:, None] * R).T)[0] > 0
-    assert weights_of(R, frictionless(R), Numbers.PLAIN) is None
+    assert weights_of(R, frictionless(R), WeightSource.PLAIN) is None
     assert weights_of(np.eye(3), frictionless(np.eye(3))).tolist() == [1.0, 1.0, 1.0]
     # no P-matrix: some problem has several solutions
     for wrong in ([[1.0, 2.0], [2.0, 1.0]], [[1.0, -2.0], [-1.0, 1.0]], [[-1.0]], [[0.0]], [[np.nan]]):

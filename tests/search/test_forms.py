@@ -14,7 +14,7 @@ from enumsol import enumerate_roots, gallery, verify
 from enumsol.checker.stability import stability_radius
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.search import form_policy as policy
-from enumsol.search.solvers import Solvers, as_computed
+from enumsol.search.solvers import Solvers, as_computed_in_floats
 from enumsol.trusted.quadratic_forms import EnclosedForm, Equations, form_margin
 from enumsol.trusted.status_rows import row_signs
 
@@ -285,7 +285,7 @@ def test_compiled_bounds_are_below_the_exact_one_and_that_of_the_checker(seed):
     margins = pytest.importorskip("enumsol.search.certifiers._margin").FormMargins
     rng = np.random.default_rng(seed)
     p = int(rng.integers(1, 4))
-    system = as_computed(slipping(seed, p).condensed.at(1.0).scaled)
+    system = as_computed_in_floats(slipping(seed, p).condensed.at(1.0).scaled)
     S, g = fmpq_mat([[_exact(x) for x in row] for row in system.S]), [_exact(x) for x in system.g]
     codes = tuple(int(c) for c in rng.choice((0, 1, 2, 3, 5, 6), size=p))
     signs = row_signs(np.array(codes), system.F)

@@ -10,7 +10,14 @@ from enumsol.search.space.space_fathoming import SpaceCloser
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import SpaceRoot
-from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, Numbers, OnlySolution, _Form, only_root, only_solution
+from enumsol.trusted.space.space_uniqueness import (
+    LARGEST_UNIT,
+    OnlySolution,
+    SpaceWeights,
+    _Form,
+    only_root,
+    only_solution,
+)
 
 
 class Proposals:
@@ -111,7 +118,7 @@ def test_the_form_is_definite_for_all_data_and_theta():
         S, g = solvers.enclosed.S, solvers.enclosed.g
         enclosed = replace(solvers.enclosed, S_rad=np.full_like(S, 10.0 ** rng.uniform(-6, -2.5)), g_rad=0 * g)
         for values, _, _ in proposed(solvers)[:1]:
-            form, numbers = _Form.of(enclosed, values), Numbers.of(enclosed, values)
+            form, numbers = _Form.of(enclosed, values), SpaceWeights.of(enclosed, values)
             if form is None:
                 continue
             for _ in range(5):
@@ -145,19 +152,19 @@ def test_numbers_are_refused_where_they_make_no_sense():
     enclosed = SpaceSolvers(from_compliance(np.eye(6), np.ones(6), ((0.5, 0.3), (0.2, 0.0))), 0.0, "verified").enclosed
     # two nodes, the second one with one tau: mu, kappa, wide; nu; theta
     right = np.array([1.0, 1, 1, 1, 0, 0, *(0.0, 0, 0), *(0.6, 0.8, -1)])
-    assert Numbers.of(enclosed, right) is not None
+    assert SpaceWeights.of(enclosed, right) is not None
     for place, value in (
         *((0, 0.0), (1, -1.0), (2, 0.0), (3, -0.0), (4, -1e-9), (4, 1.0), (5, 1e-9), (6, 1.1), (7, -1.1), (8, 1.01)),
         *((9, 0.61), (10, 0.9), (11, 1.001), (11, -1.0 - 1e-12), (0, np.nan), (3, np.inf), (11, np.nan), (6, -np.inf)),
     ):
         numbers = right.copy()
         numbers[place] = value
-        assert Numbers.of(enclosed, numbers) is None, (place, value)
+        assert SpaceWeights.of(enclosed, numbers) is None, (place, value)
     for numbers in (right[:-1], np.append(right, 0.0), right[:0], right.reshape(2, 6)):
-        assert Numbers.of(enclosed, numbers) is None
+        assert SpaceWeights.of(enclosed, numbers) is None
     numbers = right.copy()
     numbers[6:8] = 0.8, 0.7
-    assert Numbers.of(enclosed, numbers) is None
+    assert SpaceWeights.of(enclosed, numbers) is None
 
 
 def test_points_that_make_no_sense():

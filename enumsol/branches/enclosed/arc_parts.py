@@ -18,7 +18,7 @@ Number = float | Fraction
 Interval = tuple[Number, Number]
 
 
-class PartKind(enum.StrEnum):
+class ArcPartKind(enum.StrEnum):
     """What a selection does on a part of an interval; as in proofs (docs/proof_format.md)."""
 
     HOLDS = "h"
@@ -28,12 +28,12 @@ class PartKind(enum.StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class ArcPart:
     """A part [low, high] of a box; another part with the same content is not the same.
 
     Attributes
     ----------
-    kind : PartKind
+    kind : ArcPartKind
     low, high : float or Fraction
     condition : int
         At an event the condition that changes its sign, as numbered by the selection; -1 elsewhere.
@@ -47,7 +47,7 @@ class Part:
         At an open part the nodes whose conditions may vanish there.
     """
 
-    kind: PartKind
+    kind: ArcPartKind
     low: Number
     high: Number
     condition: int = -1
@@ -58,14 +58,14 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Box:
+class AlphaBox:
     """An interval on which one expansion decides.
 
     Attributes
     ----------
     low, high : float or Fraction
         Those of the expansion; the parts may end before.
-    parts : tuple of Part
+    parts : tuple of ArcPart
         From left to right.
     precise : bool
         Decided in many digits.
@@ -73,7 +73,7 @@ class Box:
 
     low: Number
     high: Number
-    parts: tuple[Part, ...]
+    parts: tuple[ArcPart, ...]
     precise: bool = False
 
 
@@ -87,7 +87,7 @@ class Trace:
     low, high : float
     side : float
         1 or -1 above or below an alpha at which g vanishes (see trusted.over_interval), else 0.
-    boxes : list of Box
+    boxes : list of AlphaBox
         Its parts, box by box from left to right. A box may reach beyond its parts.
     """
 
@@ -95,17 +95,17 @@ class Trace:
     low: float
     high: float
     side: float = 0.0
-    boxes: list[Box] = field(default_factory=list)
+    boxes: list[AlphaBox] = field(default_factory=list)
 
     @property
-    def parts(self) -> Iterator[Part]:
+    def parts(self) -> Iterator[ArcPart]:
         """All parts, from left to right."""
         return (part for box in self.boxes for part in box.parts)
 
 
-def inside(
-    trace: Trace, low: Fraction, high: Fraction, sharpen: Callable[[Trace, Part], tuple[Fraction, Fraction] | None]
-) -> Iterator[Part]:
+def parts_between(
+    trace: Trace, low: Fraction, high: Fraction, sharpen: Callable[[Trace, ArcPart], tuple[Fraction, Fraction] | None]
+) -> Iterator[ArcPart]:
     """The parts of a trace between two alphas, beyond which it was rounded outward; no event lies beyond them.
 
     ``sharpen`` gives narrower bounds of an event's zero, or None.
@@ -115,16 +115,16 @@ def inside(
             yield part
         elif part.high < low or part.low > high:
             continue
-        elif part.kind is PartKind.EVENT:
+        elif part.kind is ArcPartKind.EVENT:
             yield from _event_inside(trace, part, (low, high), sharpen(trace, part) or part.zero)
         else:
             yield part
 
 
-def _event_inside(trace: Trace, part: Part, ends: tuple[Fraction, Fraction], zero: Interval) -> Iterator[Part]:
+def _event_inside(trace: Trace, part: ArcPart, ends: tuple[Fraction, Fraction], zero: Interval) -> Iterator[ArcPart]:
     """An event, or what the selection does inside where its zero lies outside, or cannot be told from an end."""
     (low, high), (first, last) = ends, zero
-    below, above = (PartKind.NONE, PartKind.HOLDS) if part.rising else (PartKind.HOLDS, PartKind.NONE)
+    below, above = (ArcPartKind.NONE, ArcPartKind.HOLDS) if part.rising else (ArcPartKind.HOLDS, ArcPartKind.NONE)
     if not (trace.low < low and first <= low) and not (trace.high > high and last >= high):
         yield part
     elif last < low:
@@ -135,8 +135,8 @@ def _event_inside(trace: Trace, part: Part, ends: tuple[Fraction, Fraction], zer
         doubtful = frozenset((trace.selection.rows.conditions[part.condition][0],))
         if first > low:
             yield replace(part, kind=below, high=first)
-            yield Part(PartKind.OPEN, first, part.high, doubtful=doubtful)
+            yield ArcPart(ArcPartKind.OPEN, first, part.high, doubtful=doubtful)
         else:
-            yield Part(PartKind.OPEN, part.low, last, doubtful=doubtful)
+            yield ArcPart(ArcPartKind.OPEN, part.low, last, doubtful=doubtful)
             if last < min(part.high, high):
                 yield replace(part, kind=above, low=last)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.branches.enclosed.arc_parts import Box, Interval, Number, Part, PartKind
+from enumsol.branches.enclosed.arc_parts import AlphaBox, ArcPart, ArcPartKind, Interval, Number
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from enumsol.trusted.arcs.over_parts import OverInterval
     from enumsol.trusted.selection import Selection
 
-    Result = tuple[Box, list[Interval]]
+    Result = tuple[AlphaBox, list[Interval]]
     Shared = frozenset[Any]
 
 #: Bounds of a zero that are wider, relative to alpha, are looked for anew at single alphas; the second where they are
@@ -83,21 +83,23 @@ class Cutting:
         self.low: Number
         self.high: Number
         self.low, self.high = expansion.low, expansion.high
-        self._known: dict[Part, OverInterval] = {}  # of parts in which nothing holds
+        self._known: dict[ArcPart, OverInterval] = {}  # of parts in which nothing holds
 
     def run(self) -> Generator[list[Interval], list[OverInterval], Result]:
         """Asks for what is known of parts; the box with its parts, and the intervals behind that need their own."""
         (known,) = yield [(self.low, self.high)]
         whole = self._decided(self.low, self.high, known)
         if whole is None and self._expansion.rough and not self._whole:
-            return Box(self.low, self.high, ()), self._rest(self.low, self.high)
-        parts, rest = (yield from self._cut(known)) if whole is None or whole.kind is PartKind.EVENT else ([whole], [])
+            return AlphaBox(self.low, self.high, ()), self._rest(self.low, self.high)
+        parts, rest = (
+            (yield from self._cut(known)) if whole is None or whole.kind is ArcPartKind.EVENT else ([whole], [])
+        )
         parts = yield from self._tidied(parts)
-        return Box(self.low, self.high, tuple(parts), self._expansion.final), rest
+        return AlphaBox(self.low, self.high, tuple(parts), self._expansion.final), rest
 
     def _cut(
         self, whole: OverInterval
-    ) -> Generator[list[Interval], list[OverInterval], tuple[list[Part], list[Interval]]]:
+    ) -> Generator[list[Interval], list[OverInterval], tuple[list[ArcPart], list[Interval]]]:
         """Parts, and the intervals behind them."""
         middle = self._expansion.split()
         if middle is not None:
@@ -111,7 +113,7 @@ class Cutting:
         # where the others seem to vanish
         some = [k for k in doubtful if k not in self._flat]
         self._zeros = sorted((zero, k) for k in some for zero in self._expansion.zeros(k))
-        parts: list[Part] = []
+        parts: list[ArcPart] = []
         ends = list(pairwise(self._ends()))
         known = [whole] if len(ends) == 1 else (yield ends)
         cells = [(*cell, found, _HALVINGS) for cell, found in zip(ends, known, strict=True)]
@@ -132,9 +134,9 @@ class Cutting:
                 return parts, self._rest(low, high)
         return parts, []
 
-    def _tidied(self, parts: list[Part]) -> Generator[list[Interval], list[OverInterval], list[Part]]:
+    def _tidied(self, parts: list[ArcPart]) -> Generator[list[Interval], list[OverInterval], list[ArcPart]]:
         """Neighbouring parts that say the same joined, and events with bounds."""
-        runs: list[list[Part]] = []
+        runs: list[list[ArcPart]] = []
         shared: Shared = frozenset()
         for part in parts:
             reasons = self._reasons(part)
@@ -147,17 +149,17 @@ class Cutting:
         asked = [self._questions(run[0], run[-1]) for run in runs]
         everything = [part for questions in asked for part in questions]
         answers = iter((yield everything) if everything else [])
-        tidied: list[Part] = []
+        tidied: list[ArcPart] = []
         for run, questions in zip(runs, asked, strict=True):
             tidied += self._settled(run, questions, [next(answers) for _ in questions])
         return tidied
 
-    def _reasons(self, part: Part) -> Shared:
+    def _reasons(self, part: ArcPart) -> Shared:
         """What neighbours of the same kind must have in common to be joined."""
-        if part.kind is PartKind.EVENT:
+        if part.kind is ArcPartKind.EVENT:
             return frozenset()
         known = self._known.get(part)
-        if part.kind is not PartKind.NONE or known is None:
+        if part.kind is not ArcPartKind.NONE or known is None:
             return frozenset([part.index])
         # conditions that are negative, or of opposite signs
         signs = known.conditions
@@ -166,18 +168,18 @@ class Cutting:
             below if known.regular else [(j, k) for j in below for k in np.flatnonzero(signs > 0).tolist()]
         )
 
-    def _questions(self, first: Part, last: Part) -> list[Interval]:
+    def _questions(self, first: ArcPart, last: ArcPart) -> list[Interval]:
         """What has to be known to join neighbours, or about what should be an event's bounds."""
-        if first.kind is PartKind.EVENT:
+        if first.kind is ArcPartKind.EVENT:
             low, high = self._expansion.near(first.condition, first.low, first.high)
             narrow = first.low <= low < high <= first.high and high - low <= self._narrow * max(abs(low), abs(high))
             return [(low, low), (high, high)] if narrow else []
-        return [(first.low, last.high)] if first is not last and first.kind is not PartKind.OPEN else []
+        return [(first.low, last.high)] if first is not last and first.kind is not ArcPartKind.OPEN else []
 
-    def _settled(self, run: list[Part], questions: list[Interval], known: list[OverInterval]) -> list[Part]:
+    def _settled(self, run: list[ArcPart], questions: list[Interval], known: list[OverInterval]) -> list[ArcPart]:
         """Neighbours joined, or an event with its bounds, where that is known."""
         first, last = run[0], run[-1]
-        if first.kind is PartKind.EVENT:
+        if first.kind is ArcPartKind.EVENT:
             k, slope = first.condition, 1 if first.rising else -1
             if [int(found.ends[0][k]) for found in known] == [-slope, slope]:
                 zero = questions[0][0], questions[1][0]
@@ -187,7 +189,7 @@ class Cutting:
         if first is last or (known and not (known[0].none or (known[0].holds and known[0].index == first.index))):
             return run
         doubtful = frozenset(node for part in run for node in part.doubtful)
-        return [Part(first.kind, first.low, last.high, index=first.index, doubtful=doubtful)]
+        return [ArcPart(first.kind, first.low, last.high, index=first.index, doubtful=doubtful)]
 
     def _rest(self, low: Number, high: Number) -> list[Interval]:
         """What is left when a part cannot be decided: the part and what lies behind it, or two halves."""
@@ -231,27 +233,27 @@ class Cutting:
         """Whether a condition cannot be told from zero."""
         return any(k in self._flat for k in _in_doubt(known))
 
-    def _decided(self, low: Number, high: Number, known: OverInterval) -> Part | None:
+    def _decided(self, low: Number, high: Number, known: OverInterval) -> ArcPart | None:
         if known.none:
-            nowhere = Part(PartKind.NONE, low, high)
+            nowhere = ArcPart(ArcPartKind.NONE, low, high)
             self._known[nowhere] = known
             return nowhere
         doubtful = known.doubtful
         if not known.regular or len(doubtful) > 1 or not known.index:
             return None
         if not len(doubtful):
-            return Part(PartKind.HOLDS, low, high, index=known.index)
+            return ArcPart(ArcPartKind.HOLDS, low, high, index=known.index)
         condition = int(doubtful[0])
         slope = int(known.slopes[condition])
         if not slope or [int(end[condition]) for end in known.ends] != [-slope, slope]:
             return None
-        return Part(PartKind.EVENT, low, high, condition, (low, high), slope > 0, known.index)
+        return ArcPart(ArcPartKind.EVENT, low, high, condition, (low, high), slope > 0, known.index)
 
-    def _open(self, low: Number, high: Number, known: OverInterval) -> Part:
+    def _open(self, low: Number, high: Number, known: OverInterval) -> ArcPart:
         nodes = frozenset(range(len(self._rows.codes)))
         if known.regular:
             nodes = frozenset(self._rows.conditions[k][0] for k in known.doubtful)
-        return Part(PartKind.OPEN, low, high, doubtful=nodes)
+        return ArcPart(ArcPartKind.OPEN, low, high, doubtful=nodes)
 
 
 def _in_doubt(known: OverInterval) -> list[int]:

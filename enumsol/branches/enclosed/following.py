@@ -62,7 +62,7 @@ class Followed:
         return found
 
 
-def follow(
+def follow_selections(
     traced: TracedProblem,
     pieces: Sequence[SearchedPiece],
     tick: Callable[[float], object] | None = None,

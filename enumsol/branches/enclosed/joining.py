@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from networkx.utils import UnionFind
 
-from enumsol.branches.enclosed.arc_parts import PartKind, inside
+from enumsol.branches.enclosed.arc_parts import ArcPartKind, parts_between
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.trusted.selection import (
     CONE_MINUS,
@@ -29,7 +29,7 @@ from enumsol.trusted.selection import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from enumsol.branches.enclosed.arc_parts import Part, Trace
+    from enumsol.branches.enclosed.arc_parts import ArcPart, Trace
     from enumsol.selections.solution import Codes
 
     Bounds = tuple[Fraction, Fraction]
@@ -47,7 +47,7 @@ _ACROSS = {
 }
 
 
-class PlaceKind(enum.StrEnum):
+class EventPlaceKind(enum.StrEnum):
     """Where arcs end."""
 
     #: The first or last alpha.
@@ -61,12 +61,12 @@ class PlaceKind(enum.StrEnum):
 
 
 @dataclass(eq=False)
-class Place:
+class EventPlace:
     """A point at which arcs end, or a short interval that was left open.
 
     Attributes
     ----------
-    kind : PlaceKind
+    kind : EventPlaceKind
     low, high : Fraction
         Bounds of its alpha.
     members : list of codes
@@ -77,7 +77,7 @@ class Place:
         Every selection that holds there was examined (which open places leave undecided).
     """
 
-    kind: PlaceKind
+    kind: EventPlaceKind
     low: Fraction
     high: Fraction
     members: list[Codes]
@@ -92,7 +92,7 @@ class JoinedArc:
     Attributes
     ----------
     trace : Trace
-    tail, head : Place
+    tail, head : EventPlace
     low, high : Fraction
         It holds between them at least. Beside an open place, which may stand for many parts, that is more than between
         the places.
@@ -101,8 +101,8 @@ class JoinedArc:
     """
 
     trace: Trace
-    tail: Place
-    head: Place
+    tail: EventPlace
+    head: EventPlace
     low: Fraction
     high: Fraction
     index: int = 0
@@ -119,7 +119,7 @@ class Joined:
 
     Attributes
     ----------
-    places : list of Place
+    places : list of EventPlace
     arcs : list of JoinedArc
     reasons : list of str
         What contradicts completeness.
@@ -127,15 +127,15 @@ class Joined:
         The order of all places is known.
     """
 
-    places: list[Place] = field(default_factory=list)
+    places: list[EventPlace] = field(default_factory=list)
     arcs: list[JoinedArc] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
     ordered: bool = True
 
     @property
-    def open(self) -> list[Place]:
+    def open(self) -> list[EventPlace]:
         """Places that were left open."""
-        return [place for place in self.places if place.kind is PlaceKind.OPEN]
+        return [place for place in self.places if place.kind is EventPlaceKind.OPEN]
 
 
 @dataclass(eq=False)
@@ -143,8 +143,8 @@ class _Found:
     """An event or an open part of a trace."""
 
     trace: Trace
-    part: Part
-    place: Place | None = None
+    part: ArcPart
+    place: EventPlace | None = None
 
     @property
     def codes(self) -> Codes:
@@ -152,11 +152,11 @@ class _Found:
 
     @property
     def low(self) -> Fraction:
-        return Fraction(self.part.zero[0] if self.part.kind is PartKind.EVENT else self.part.low)
+        return Fraction(self.part.zero[0] if self.part.kind is ArcPartKind.EVENT else self.part.low)
 
     @property
     def high(self) -> Fraction:
-        return Fraction(self.part.zero[1] if self.part.kind is PartKind.EVENT else self.part.high)
+        return Fraction(self.part.zero[1] if self.part.kind is ArcPartKind.EVENT else self.part.high)
 
     @property
     def condition(self) -> tuple[int, int]:
@@ -164,7 +164,7 @@ class _Found:
 
     @property
     def doubtful(self) -> frozenset[int]:
-        return frozenset((self.condition[0],)) if self.part.kind is PartKind.EVENT else self.part.doubtful
+        return frozenset((self.condition[0],)) if self.part.kind is ArcPartKind.EVENT else self.part.doubtful
 
     def inside(self, other: _Found) -> bool:
         """Whether the zero lies in the other's part."""
@@ -175,7 +175,7 @@ def join(
     traces: Sequence[Trace],
     interval: Bounds,
     origin: Fraction | None,
-    sharpen: Callable[[Trace, Part], Bounds | None],
+    sharpen: Callable[[Trace, ArcPart], Bounds | None],
     *,
     cut_short: bool = False,
 ) -> Joined:
@@ -201,24 +201,24 @@ class _Joining:
         traces: Sequence[Trace],
         interval: Bounds,
         origin: Fraction | None,
-        sharpen: Callable[[Trace, Part], Bounds | None],
+        sharpen: Callable[[Trace, ArcPart], Bounds | None],
         *,
         whole: bool,
     ) -> None:
         self._traces, self._interval, self._sharpen = traces, interval, sharpen
         self._joined = Joined()
-        self._origin = None if origin is None else Place(PlaceKind.ORIGIN, origin, origin, [], whole=whole)
+        self._origin = None if origin is None else EventPlace(EventPlaceKind.ORIGIN, origin, origin, [], whole=whole)
         self._parts = []
         for trace in traces:
             low, high = interval
             if origin is not None:
                 low, high = (origin, high) if trace.side > 0 else (low, origin)
-            self._parts.append(list(inside(trace, low, high, sharpen)))
+            self._parts.append(list(parts_between(trace, low, high, sharpen)))
         self._found = {
             part: _Found(trace, part)
             for trace, parts in zip(traces, self._parts, strict=True)
             for part in parts
-            if part.kind in (PartKind.EVENT, PartKind.OPEN)
+            if part.kind in (ArcPartKind.EVENT, ArcPartKind.OPEN)
         }
 
     def run(self) -> Joined:
@@ -231,7 +231,7 @@ class _Joining:
         if self._origin is not None:
             self._origin.members = sorted({trace.selection.rows.codes for trace in self._traces})
             if any(place.low <= self._origin.low <= place.high for place in self._joined.open):
-                self._origin.kind = PlaceKind.OPEN  # unknown arcs may end there
+                self._origin.kind = EventPlaceKind.OPEN  # unknown arcs may end there
             places.append(self._origin)
         places.sort(key=lambda place: (place.low, place.high, place.members))
         self._check_order()
@@ -245,7 +245,7 @@ class _Joining:
         """Pair events of neighbouring selections that are the same point."""
         by_codes: dict[Codes, list[_Found]] = {}
         for found in self._found.values():
-            if found.part.kind is PartKind.EVENT:
+            if found.part.kind is ArcPartKind.EVENT:
                 by_codes.setdefault(found.codes, []).append(found)
         for codes, events in by_codes.items():
             for event in events:
@@ -259,7 +259,7 @@ class _Joining:
                 if len(partners) == 1:
                     low, high = self._bounds(event, partners[0])
                     members = sorted((codes, partners[0].codes))
-                    place = Place(PlaceKind.EVENT, low, high, members, event.condition[0])
+                    place = EventPlace(EventPlaceKind.EVENT, low, high, members, event.condition[0])
                     event.place = partners[0].place = place
                     self._joined.places.append(place)
 
@@ -297,12 +297,12 @@ class _Joining:
         for group in groups.values():
             members = sorted({found.codes for found in group})
             low, high = min(found.low for found in group), max(found.high for found in group)
-            place = Place(PlaceKind.OPEN, low, high, members)
+            place = EventPlace(EventPlaceKind.OPEN, low, high, members)
             for found in group:
                 found.place = place
             self._joined.places.append(place)
 
-    def _border(self, trace: Trace, alpha: float, *, upper: bool) -> Place | None:
+    def _border(self, trace: Trace, alpha: float, *, upper: bool) -> EventPlace | None:
         """Where a trace that holds up to its end ends there; None inside the interval."""
         origin = self._origin
         towards = origin is not None and trace.side == (-1.0 if upper else 1.0)
@@ -311,7 +311,7 @@ class _Joining:
         end = self._interval[int(upper)]
         if (alpha < end) if upper else (alpha > end):
             return None
-        place = Place(PlaceKind.BORDER, end, end, [trace.selection.rows.codes])
+        place = EventPlace(EventPlaceKind.BORDER, end, end, [trace.selection.rows.codes])
         self._joined.places.append(place)
         return place
 
@@ -328,23 +328,23 @@ class _Joining:
 
     # -- arcs ------------------------------------------------------------------------------------------------------
 
-    def _follow(self, trace: Trace, parts: Sequence[Part]) -> None:
+    def _follow(self, trace: Trace, parts: Sequence[ArcPart]) -> None:
         """The arcs of one trace."""
         arc: JoinedArc | None = None
-        before: Place | None = None  # what was left open directly before
+        before: EventPlace | None = None  # what was left open directly before
         first = True
         for part in parts:
-            if part.kind is PartKind.OPEN:
+            if part.kind is ArcPartKind.OPEN:
                 place = self._found[part].place
                 if arc is not None and place is not None:
                     self._end(arc, place, Fraction(part.low))
                 arc, before = None, place
-            elif part.kind is PartKind.NONE:
+            elif part.kind is ArcPartKind.NONE:
                 if arc is not None:
                     self._contradiction(trace, part)
                 arc = before = None
             else:
-                rises = part.kind is PartKind.EVENT and part.rising
+                rises = part.kind is ArcPartKind.EVENT and part.rising
                 if arc is None and not rises:
                     start = self._border(trace, trace.low, upper=False) if first else before
                     if start is None:
@@ -354,13 +354,13 @@ class _Joining:
                 elif arc is not None and rises:
                     self._contradiction(trace, part)
                 before = None
-                if part.kind is PartKind.EVENT:
+                if part.kind is ArcPartKind.EVENT:
                     place = self._found[part].place
                     assert place is not None
                     if rises:
                         arc = _begun(trace, place, part)
                     elif arc is not None:
-                        unpaired = place.kind is PlaceKind.OPEN
+                        unpaired = place.kind is EventPlaceKind.OPEN
                         self._end(arc, place, Fraction(part.zero[0]) if unpaired else place.low)
                         arc = None
             first = False
@@ -371,11 +371,11 @@ class _Joining:
             else:
                 self._end(arc, end, end.low)
 
-    def _end(self, arc: JoinedArc, place: Place, alpha: Fraction) -> None:
+    def _end(self, arc: JoinedArc, place: EventPlace, alpha: Fraction) -> None:
         arc.head, arc.high = place, alpha
         self._joined.arcs.append(arc)
 
-    def _contradiction(self, trace: Trace, part: Part) -> None:
+    def _contradiction(self, trace: Trace, part: ArcPart) -> None:
         codes = "".join(map(str, trace.selection.rows.codes))
         self._complain(f"selection {codes} begins or ends near alpha = {float(part.low):.17g} for no reason")
 
@@ -384,11 +384,11 @@ class _Joining:
             self._joined.reasons.append(reason)
 
 
-def _begun(trace: Trace, place: Place, part: Part) -> JoinedArc:
+def _begun(trace: Trace, place: EventPlace, part: ArcPart) -> JoinedArc:
     """An arc that begins at a place, with this part."""
     low = place.high
-    if place.kind is PlaceKind.OPEN:
-        low = Fraction(part.zero[1] if part.kind is PartKind.EVENT and part.rising else part.low)
+    if place.kind is EventPlaceKind.OPEN:
+        low = Fraction(part.zero[1] if part.kind is ArcPartKind.EVENT and part.rising else part.low)
     return JoinedArc(trace, place, place, low, low, part.index)
 
 

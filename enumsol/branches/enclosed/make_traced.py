@@ -10,15 +10,15 @@ from enumsol.arithmetic.algebraic import EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.elements import Arc, Vertex, VertexKind
 from enumsol.branches.enclosed.arc_values import TracedArcValues
-from enumsol.branches.enclosed.joining import PlaceKind
-from enumsol.branches.exact.make_elements import degree_of, named_active, vertex_kind, with_zeros
+from enumsol.branches.enclosed.joining import EventPlaceKind
+from enumsol.branches.exact.make_elements import degree_of, named_active, vertex_kind, with_exact_zeros
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK
 from enumsol.roots.slip_signs import shown_status
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.branches.enclosed.joining import Joined, JoinedArc, Place
+    from enumsol.branches.enclosed.joining import EventPlace, Joined, JoinedArc
     from enumsol.branches.enclosed.traced import TracedProblem
     from enumsol.selections.solution import ActiveSets
 
@@ -43,7 +43,7 @@ def _arc(
     sample = (arc.low + arc.high) / 2
     # beside what was left open only inner bounds are known
     begin, end = (
-        EnclosedAlpha(rational(known), rational(known)) if place.kind is PlaceKind.OPEN else exact[vertex]
+        EnclosedAlpha(rational(known), rational(known)) if place.kind is EventPlaceKind.OPEN else exact[vertex]
         for place, known, vertex in zip((arc.tail, arc.head), (arc.low, arc.high), ends, strict=True)
     )
     still = [i for i, code in enumerate(arc.codes) if code == FRICTIONLESS]
@@ -69,20 +69,20 @@ def _arc(
 def _vertex(
     traced: TracedProblem,
     number: int,
-    place: Place,
+    place: EventPlace,
     exact: EnclosedAlpha,
     left: Sequence[Arc],
     right: Sequence[Arc],
 ) -> Vertex:
     p, border = traced.problem.p, place.low == place.high and place.low in traced.interval
-    settled = place.kind is not PlaceKind.OPEN and place.whole
+    settled = place.kind is not EventPlaceKind.OPEN and place.whole
     degrees = (degree_of(left), degree_of(right)) if settled else (None, None)
     active = _active(traced, place)
     middle = (place.low + place.high) / 2
     values = traced.values(place.members[0], middle, precisely=True) if place.members else None
     forces, w = (np.zeros(2 * p), np.zeros(2 * p)) if values is None else values
     if settled:
-        forces, w = with_zeros(forces, w, active)
+        forces, w = with_exact_zeros(forces, w, active)
     still = [i for i, codes in enumerate(active) if FRICTIONLESS in codes]
     signs = traced.slip_signs(place.members[0], middle, still) if still and place.members else {}
     names = named_active(active, lambda node: signs.get(node, 0))
@@ -105,9 +105,9 @@ def _vertex(
     )
 
 
-def _active(traced: TracedProblem, place: Place) -> ActiveSets:
+def _active(traced: TracedProblem, place: EventPlace) -> ActiveSets:
     """Codes that hold at every node, or may hold where the place was left open."""
-    if place.kind is PlaceKind.ORIGIN:
+    if place.kind is EventPlaceKind.ORIGIN:
         F0, F1 = traced.problem.friction
         without = ((F0 == 0) & (F1 == 0)).tolist()
         return tuple(

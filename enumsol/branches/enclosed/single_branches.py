@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.branches.enclosed.joining import PlaceKind, join
+from enumsol.branches.enclosed.joining import EventPlaceKind, join
 from enumsol.search.chains import Chains, LoadedSystem, SelectionCurve
 from enumsol.search.interval.subintervals import Piece, whole_pieces
-from enumsol.search.numbers import Numbers
+from enumsol.search.numbers import WeightSource
 from enumsol.support.deadlines import look
 from enumsol.trusted.arcs.only_branch import PieceNumbers, only_roots
 
@@ -116,8 +116,8 @@ def _is_chain(joined: Joined) -> bool:
     if joined.reasons or joined.open or not joined.arcs or len(joined.places) != len(joined.arcs) + 1:
         return False
     ends = joined.arcs[0].tail.kind, joined.arcs[-1].head.kind
-    inner = (one.head is other.tail and one.head.kind is PlaceKind.EVENT for one, other in pairwise(joined.arcs))
-    return PlaceKind.EVENT not in ends and all(inner)
+    inner = (one.head is other.tail and one.head.kind is EventPlaceKind.EVENT for one, other in pairwise(joined.arcs))
+    return EventPlaceKind.EVENT not in ends and all(inner)
 
 
 def _was_tested(joined: Joined, proposed: _Proposed) -> bool:
@@ -205,7 +205,9 @@ class _Proposals:
         p, system = self._system.p, self._system.at(alpha)
         force, w, *_ = SelectionCurve(self._system, link.codes).at(alpha)
         reduction = self._system.reduction(alpha)
-        found = reduction.weights(force[reduction.places], w[reduction.places], exactly=False, sought=Numbers.DESCENT)
+        found = reduction.weights(
+            force[reduction.places], w[reduction.places], exactly=False, sought=WeightSource.DESCENT
+        )
         rubbing = np.flatnonzero(system.F > 0)
         if found is None or np.any(found[p + 3 * len(rubbing) :] > 0):
             return None

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.branches.enclosed.arc_parts import Part, Trace
+    from enumsol.branches.enclosed.arc_parts import ArcPart, Trace
     from enumsol.model.problem import ContactProblem
     from enumsol.selections.solution import Codes
 
@@ -120,7 +120,7 @@ class TracedProblem:
             sharpened=self.problem.n <= EXACT_DOF_LIMIT,
         )
 
-    def sharpen(self, found: Trace, part: Part) -> Bounds | None:
+    def sharpen(self, found: Trace, part: ArcPart) -> Bounds | None:
         """Narrower bounds of an event's zero; None where there is no need or no means."""
         low, high = (Fraction(end) for end in part.zero)
         width = Fraction(_NARROW * max(abs(float(low)), abs(float(high))))

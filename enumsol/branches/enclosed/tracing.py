@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.enclosed.arc_parts import Box, Part, PartKind, Trace
+from enumsol.branches.enclosed.arc_parts import AlphaBox, ArcPart, ArcPartKind, Trace
 from enumsol.branches.enclosed.cutting import Cutting, between
 from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.arcs.over_parts import Expansion, expansions, over_parts
@@ -111,7 +111,7 @@ class _Tracing:
         self.finished = False
 
     def run(self) -> Asking:
-        """Box by box, from left to right."""
+        """AlphaBox by box, from left to right."""
         waiting: list[Interval] = [(self._found.low, self._found.high)]
         while waiting:
             look()
@@ -133,7 +133,7 @@ class _Tracing:
         precise = self._precise() if short and self._count <= _MOST_BOXES else None
         smallest = share < _SMALLEST_PRECISE if precise is not None else float(last - first) <= self._spacing
         whole = self._count > _MOST_BOXES or smallest
-        tried: list[tuple[Box, list[Interval]]] = []
+        tried: list[tuple[AlphaBox, list[Interval]]] = []
         if self._count <= _MOST_BOXES and isinstance(first, float) and isinstance(last, float):
             (expansion,) = yield [(self._selection, first, last)]
             if expansion is not None:
@@ -150,16 +150,16 @@ class _Tracing:
             return rest
         if whole or tiny:
             everywhere = frozenset(range(len(self._selection.rows.codes)))
-            part = Part(PartKind.OPEN, first, last, doubtful=everywhere)
+            part = ArcPart(ArcPartKind.OPEN, first, last, doubtful=everywhere)
             fine = not isinstance(first, float) or not isinstance(last, float)
-            self._found.boxes.append(Box(first, last, (part,), fine))
+            self._found.boxes.append(AlphaBox(first, last, (part,), fine))
             return []
         middle = between(first, last)
         return [(first, middle), (middle, last)]
 
     def _cut(
         self, expansion: AlphaExpansion, *, whole: bool, flat: bool
-    ) -> Generator[list[Question], list[Any], tuple[Box, list[Interval]]]:
+    ) -> Generator[list[Question], list[Any], tuple[AlphaBox, list[Interval]]]:
         """The box of an expansion, and what is left of it."""
         cutting = Cutting(self._selection.rows, expansion, whole=whole, flat=flat, sharpened=self._sharpened).run()
         parts = next(cutting)
@@ -171,13 +171,13 @@ class _Tracing:
             try:
                 parts = cutting.send(known)
             except StopIteration as end:
-                result: tuple[Box, list[Interval]] = end.value
+                result: tuple[AlphaBox, list[Interval]] = end.value
                 return result
 
 
-def _decides(box: Box, rest: list[Interval]) -> bool:
+def _decides(box: AlphaBox, rest: list[Interval]) -> bool:
     """Whether nothing stays open."""
-    return not rest and all(part.kind is not PartKind.OPEN for part in box.parts)
+    return not rest and all(part.kind is not ArcPartKind.OPEN for part in box.parts)
 
 
 def _as_float(alpha: Number) -> Number:

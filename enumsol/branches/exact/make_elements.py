@@ -122,7 +122,7 @@ def named_active(active: ActiveSets, slip_sign: Callable[[int], int]) -> tuple[f
     )
 
 
-def with_zeros(forces: Array, w: Array, active: ActiveSets) -> tuple[Array, Array]:
+def with_exact_zeros(forces: Array, w: Array, active: ActiveSets) -> tuple[Array, Array]:
     """Forces and displacements with exact zeros where the statuses say so."""
     p = len(active)
     for i, codes in enumerate(active):
@@ -197,7 +197,7 @@ def _values(gluing: Gluing, glued: GluedVertex) -> tuple[Any, Any]:
         (fmpq(0),) * (2 * p),
     )
     w = np.array([as_float(a - dot(row, point)) for a, row in zip(exact.at(alpha)[0], exact.rows, strict=True)])
-    return with_zeros(np.array([as_float(v) for v in point]), w, glued.active)
+    return with_exact_zeros(np.array([as_float(v) for v in point]), w, glued.active)
 
 
 def _family(glued: GluedVertex, index: int | None, *, proven: bool) -> RootFamily | None:

@@ -123,7 +123,7 @@ class _Polygon:
         return np.asarray(np.max(np.divide(off, length, out=np.hypot(across, up), where=length > 0), axis=1))
 
 
-class Place(NamedTuple):
+class CurvePlace(NamedTuple):
     """The place of an arc among those that cannot be told from it in a picture: its rank, and how many there are."""
 
     rank: int
@@ -139,7 +139,7 @@ _EVENLY = 64
 
 def side_by_side(
     drawn: Mapping[int, Curve], branch_of: Mapping[int, int], column: int, height: float | None = None
-) -> dict[int, Place]:
+) -> dict[int, CurvePlace]:
     """Places of arcs, by their numbers, among those that coincide in one column wherever both are.
 
     Parameters
@@ -183,6 +183,6 @@ def side_by_side(
     count = {group: 1 + max(r for r, g in zip(ranks, groups, strict=True) if g == group) for group in set(groups)}
     alone = {group for group in count if groups.count(group) == 1}
     return {
-        arc: Place(0, 1, group) if group in alone else Place(rank, count[group], group)
+        arc: CurvePlace(0, 1, group) if group in alone else CurvePlace(rank, count[group], group)
         for arc, rank, group in zip(numbers, ranks, groups, strict=True)
     }

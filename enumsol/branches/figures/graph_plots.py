@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.branches.figures.curves import Curve, Place, curves, side_by_side
+from enumsol.branches.figures.curves import Curve, CurvePlace, curves, side_by_side
 from enumsol.branches.figures.marks import GREY, MARKERS, STATUS_STYLES, colour_of, handles, index_style
 from enumsol.branches.figures.panels import draw_numbers, draw_steps, drawn_range, family_range, sheet_range
 from enumsol.branches.figures.quantities import Quantity, quantity_of, state_columns
@@ -239,7 +239,7 @@ def _panel(
     row: int,
     drawn: dict[int, Curve],
     window: tuple[float, float],
-) -> tuple[Any, dict[int, Curve], dict[int, Place], Mapping[int, int], int]:
+) -> tuple[Any, dict[int, Curve], dict[int, CurvePlace], Mapping[int, int], int]:
     """Draw one panel; returns what numbers beside its curves need."""
     from matplotlib.transforms import ScaledTranslation
 

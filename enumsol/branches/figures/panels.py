@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
     from enumsol.branches.claims import MultiplicitySteps
     from enumsol.branches.elements import Arc, Vertex
-    from enumsol.branches.figures.curves import Curve, Place
+    from enumsol.branches.figures.curves import Curve, CurvePlace
     from enumsol.branches.figures.quantities import Quantity
     from enumsol.model.problem import ContactProblem
     from enumsol.roots.root_set import RootSet
 
     Floats = NDArray[np.float64]
     #: Axes, curves, places, branches of arcs, column.
-    Panel = tuple[Any, dict[int, Curve], dict[int, Place], Mapping[int, int], int]
+    Panel = tuple[Any, dict[int, Curve], dict[int, CurvePlace], Mapping[int, int], int]
 
 #: Points of a sheet, and branches that a label names one by one.
 _SHEET, _NAMED = 9, 4
@@ -125,7 +125,7 @@ def draw_numbers(figure: Any, panels: Sequence[Panel], alone: Any) -> None:
 
 
 def _number(
-    axis: Any, drawn: dict[int, Curve], places: dict[int, Place], branch_of: Mapping[int, int], column: int
+    axis: Any, drawn: dict[int, Curve], places: dict[int, CurvePlace], branch_of: Mapping[int, int], column: int
 ) -> tuple[set[int], set[int]]:
     """Write the numbers; returns those that are there, and those for which there was no room."""
     members: dict[int, set[int]] = {}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.continuation.audit.graph_map import PlaceKind
+from enumsol.continuation.audit.graph_map import GraphPlaceKind
 from enumsol.roots.root import summary
 from enumsol.support.messages import counted
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from enumsol.continuation.audit.graph_map import Place
+    from enumsol.continuation.audit.graph_map import GraphPlace
     from enumsol.model.statuses import ContactStatus
 
 #: How rows are counted, printed with a report.
@@ -53,7 +53,7 @@ class AuditedPoint:
         Its row in the frame or file, counted from 0 (row 0 of a file is the first one below the names of the columns),
         or its number in its Path.
     alpha : float
-    place : Place
+    place : GraphPlace
         The nearest arc or vertex and the distance from it.
     branch : int
         Branch of that arc; -1 for a vertex.
@@ -65,7 +65,7 @@ class AuditedPoint:
     path: int | str
     row: int
     alpha: float
-    place: Place
+    place: GraphPlace
     branch: int
     verdict: Verdict
     reason: str = ""
@@ -90,7 +90,7 @@ class Jump:
         Of both points, as in AuditedPoint.
     alpha : (float, float)
         Of both points.
-    places : (Place, Place)
+    places : (GraphPlace, GraphPlace)
         The arcs or vertices on which they lie.
     arcs : (int, int)
         Numbers of these arcs; -1 for a vertex.
@@ -106,7 +106,7 @@ class Jump:
     point: int
     rows: tuple[int, int]
     alpha: tuple[float, float]
-    places: tuple[Place, Place]
+    places: tuple[GraphPlace, GraphPlace]
     branches: tuple[int, int]
     distance: float
     way: float
@@ -114,7 +114,7 @@ class Jump:
     @property
     def arcs(self) -> tuple[int, int]:
         """Numbers of the arcs on which the points lie; -1 for a vertex."""
-        first, second = (place.number if place.kind is PlaceKind.ARC else -1 for place in self.places)
+        first, second = (place.number if place.kind is GraphPlaceKind.ARC else -1 for place in self.places)
         return first, second
 
 
@@ -225,7 +225,7 @@ class AuditReport:
         return np.array([point.distance for point in self.points], dtype=np.float64)
 
     @property
-    def places(self) -> tuple[Place, ...]:
+    def places(self) -> tuple[GraphPlace, ...]:
         """Nearest arc or vertex of every point."""
         return tuple(point.place for point in self.points)
 
@@ -365,7 +365,7 @@ def _line(item: AuditedPoint | Jump | MissedArc | str) -> str:
     if isinstance(item, Jump):
         if -1 in item.branches:
             ends = " -> ".join(
-                f"{place.kind} {place.number}" + (f" of branch {branch}" if place.kind is PlaceKind.ARC else "")
+                f"{place.kind} {place.number}" + (f" of branch {branch}" if place.kind is GraphPlaceKind.ARC else "")
                 for place, branch in zip(item.places, item.branches, strict=True)
             )
         else:
@@ -378,9 +378,9 @@ def _line(item: AuditedPoint | Jump | MissedArc | str) -> str:
         )
     where = f"path {item.path}, row {item.row}, alpha = {item.alpha:.8g}"
     nearest = {
-        PlaceKind.ARC: f"{item.distance:.2e} from arc {item.place.number} of branch {item.branch}",
-        PlaceKind.VERTEX: f"{item.distance:.2e} from vertex {item.place.number}",
-        PlaceKind.NONE: "the graph holds no arc",
+        GraphPlaceKind.ARC: f"{item.distance:.2e} from arc {item.place.number} of branch {item.branch}",
+        GraphPlaceKind.VERTEX: f"{item.distance:.2e} from vertex {item.place.number}",
+        GraphPlaceKind.NONE: "the graph holds no arc",
     }[item.place.kind]
     return f"{where}: {nearest}"
 
@@ -390,7 +390,7 @@ def _point_record(point: AuditedPoint) -> dict[str, Any]:
     return {**record, "distance": point.distance, **({"reason": point.reason} if point.reason else {})}
 
 
-def _place_record(place: Place, branch: int) -> dict[str, Any]:
+def _place_record(place: GraphPlace, branch: int) -> dict[str, Any]:
     return {"place": place.kind.value, "number": place.number, "branch": branch}
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from enumsol.continuation.audit.audit_report import AuditedPoint, AuditReport, Jump, MissedArc, Verdict
-from enumsol.continuation.audit.graph_map import GraphLike, GraphMap, Place, PlaceKind
+from enumsol.continuation.audit.graph_map import GraphLike, GraphMap, GraphPlace, GraphPlaceKind
 from enumsol.continuation.audit.points import Columns, PointRun, read_points
 from enumsol.continuation.path import Path
 from enumsol.errors import InvalidArgumentError
@@ -90,7 +90,7 @@ def audit_on(chart: GraphMap, runs: Sequence[PointRun], detour: float) -> AuditR
     tally = _Tally(chart, detour)
     for run in runs:
         tally.add(run)
-    touched = {place.number for place in tally.on if place.kind is PlaceKind.VERTEX}
+    touched = {place.number for place in tally.on if place.kind is GraphPlaceKind.VERTEX}
     # the ends of a sheet are parts of it
     single = {v.number for v in graph.vertices if v.family is not None}
     single -= {end for arc in graph.arcs if arc.dimension for end in (arc.tail, arc.head)}
@@ -113,7 +113,7 @@ class _Tally:
     def __init__(self, chart: GraphMap, detour: float) -> None:
         self.chart, self.detour = chart, detour
         self.points: list[AuditedPoint] = []
-        self.on: list[Place] = []
+        self.on: list[GraphPlace] = []
         self.breaks: list[Jump] = []
         self.visited: set[int] = set()
         self._branch_of = {arc.number: branch.number for branch in chart.graph.branches for arc in branch.arcs}
@@ -122,17 +122,17 @@ class _Tally:
         """One run of points."""
         equation = self.chart.equation
         points = [equation.point(float(a), forces) for a, forces in zip(run.alpha, run.forces, strict=True)]
-        here: Place | None = None
+        here: GraphPlace | None = None
         for k, x in enumerate(points):
             previous, here = here, self._locate(run, k, x, here)
             if previous is not None and here is not None:
                 self._connect(run, k - 1, (points[k - 1], x), (previous, here))
 
-    def _locate(self, run: PointRun, k: int, x: Vector, near: Place | None) -> Place | None:
-        """Place of one point; None unless it lies on the graph."""
+    def _locate(self, run: PointRun, k: int, x: Vector, near: GraphPlace | None) -> GraphPlace | None:
+        """GraphPlace of one point; None unless it lies on the graph."""
         chart, alpha = self.chart, float(run.alpha[k])
         if chart.outside(alpha):
-            place = Place(PlaceKind.OUTSIDE, -1, math.nan)
+            place = GraphPlace(GraphPlaceKind.OUTSIDE, -1, math.nan)
             low, high = (float(end) for end in chart.graph.interval)
             verdict, reason = Verdict.NOT_COMPARED, f"outside the graph's interval [{low:.10g}, {high:.10g}]"
         else:
@@ -144,14 +144,16 @@ class _Tally:
         if verdict is not Verdict.ON:
             return None
         self.on.append(place)
-        if place.kind is PlaceKind.ARC:
+        if place.kind is GraphPlaceKind.ARC:
             self.visited.add(place.number)
         return place
 
-    def _branch(self, place: Place) -> int:
-        return self._branch_of.get(place.number, -1) if place.kind is PlaceKind.ARC else -1
+    def _branch(self, place: GraphPlace) -> int:
+        return self._branch_of.get(place.number, -1) if place.kind is GraphPlaceKind.ARC else -1
 
-    def _connect(self, run: PointRun, k: int, points: tuple[Vector, Vector], places: tuple[Place, Place]) -> None:
+    def _connect(
+        self, run: PointRun, k: int, points: tuple[Vector, Vector], places: tuple[GraphPlace, GraphPlace]
+    ) -> None:
         """Arcs passed whole between two neighbouring points, or the break between them."""
         chart, (x, y) = self.chart, points
         length, passed = chart.way(x, places[0], y, places[1])
@@ -173,9 +175,9 @@ class _Tally:
         )
 
 
-def _between(chart: GraphMap, points: tuple[Vector, Vector], places: tuple[Place, Place]) -> set[int]:
+def _between(chart: GraphMap, points: tuple[Vector, Vector], places: tuple[GraphPlace, GraphPlace]) -> set[int]:
     """The arc that joins two neighbouring vertices on which the points lie: passed although no point is inside."""
-    if any(place.kind is not PlaceKind.VERTEX for place in places) or places[0].number == places[1].number:
+    if any(place.kind is not GraphPlaceKind.VERTEX for place in places) or places[0].number == places[1].number:
         return set()
     ends = {places[0].number, places[1].number}
     joining = [arc for arc in chart.curves if {arc.tail, arc.head} == ends]

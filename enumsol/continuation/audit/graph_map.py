@@ -113,7 +113,7 @@ def checked_graph(graph: Any) -> GraphLike:
     return found
 
 
-class PlaceKind(enum.StrEnum):
+class GraphPlaceKind(enum.StrEnum):
     """What a point lies on; members compare with their texts."""
 
     #: An arc, or a sheet.
@@ -129,12 +129,12 @@ class PlaceKind(enum.StrEnum):
 
 
 @dataclass(frozen=True)
-class Place:
+class GraphPlace:
     """Where a point lies.
 
     Attributes
     ----------
-    kind : PlaceKind
+    kind : GraphPlaceKind
         "arc", "vertex", "outside" or "none".
     number : int
         Of the arc or vertex; -1 for none.
@@ -142,7 +142,7 @@ class Place:
         From it, in the lengths of ContinuationOptions [-]; nan outside, infinite for none.
     """
 
-    kind: PlaceKind
+    kind: GraphPlaceKind
     number: int
     distance: float
 
@@ -198,40 +198,40 @@ class GraphMap:
         slack = self.tolerance * self.equation.alpha_scale
         return not low - slack <= alpha <= high + slack
 
-    def place(self, x: Vector, near: Place | None = None) -> Place:
+    def place(self, x: Vector, near: GraphPlace | None = None) -> GraphPlace:
         """Nearest arc or vertex; the arc of the point before is tried first, until one is close enough."""
         vertex = min(
-            (Place(PlaceKind.VERTEX, number, self.vertex_distance(x, number)) for number in self.vertices),
+            (GraphPlace(GraphPlaceKind.VERTEX, number, self.vertex_distance(x, number)) for number in self.vertices),
             key=lambda place: place.distance,
-            default=Place(PlaceKind.NONE, -1, math.inf),
+            default=GraphPlace(GraphPlaceKind.NONE, -1, math.inf),
         )
         if vertex.distance <= self.tolerance:
             return self._at_vertex(x, vertex)
-        best = Place(PlaceKind.NONE, -1, math.inf)
+        best = GraphPlace(GraphPlaceKind.NONE, -1, math.inf)
         for arc in self._in_order(near):
             if self._gap(x, arc) <= min(best.distance, vertex.distance):
                 distance = self.arc_distance(x, arc)
                 if distance < best.distance:
-                    best = Place(PlaceKind.ARC, arc.number, distance)
+                    best = GraphPlace(GraphPlaceKind.ARC, arc.number, distance)
                 if distance <= self.tolerance:
                     break
         return vertex if vertex.distance < _NEARER * best.distance else best
 
-    def _at_vertex(self, x: Vector, place: Place) -> Place:
+    def _at_vertex(self, x: Vector, place: GraphPlace) -> GraphPlace:
         """A place at a vertex with the distance from it or from an arc that ends there."""
         ends = [arc for arc in self.curves if place.number in (arc.tail, arc.head)]
         distance = min((self.arc_distance(x, arc) for arc in ends), default=math.inf)
-        return Place(PlaceKind.VERTEX, place.number, min(place.distance, distance))
+        return GraphPlace(GraphPlaceKind.VERTEX, place.number, min(place.distance, distance))
 
     def _gap(self, x: Vector, arc: ArcLike) -> float:
         """Distance in alpha alone, a lower bound."""
         alpha = self.equation.alpha(x)
         return max(arc.lo - alpha, alpha - arc.hi, 0.0) / self.equation.alpha_scale
 
-    def _in_order(self, near: Place | None) -> Iterable[ArcLike]:
+    def _in_order(self, near: GraphPlace | None) -> Iterable[ArcLike]:
         if near is None:
             return self.arcs.values()
-        if near.kind is PlaceKind.ARC and near.number in self.arcs:
+        if near.kind is GraphPlaceKind.ARC and near.number in self.arcs:
             arc = self.arcs[near.number]
             ends, first = {arc.tail, arc.head}, arc.number
         else:
@@ -313,7 +313,7 @@ class GraphMap:
         points = [self.on_arc(arc, alpha) for alpha in np.linspace(arc.lo, arc.hi, _SAMPLES)]
         return sum(self.equation.norm(b - a) for a, b in pairwise(points))
 
-    def way(self, x: Vector, start: Place, y: Vector, end: Place) -> tuple[float, tuple[int, ...]]:
+    def way(self, x: Vector, start: GraphPlace, y: Vector, end: GraphPlace) -> tuple[float, tuple[int, ...]]:
         """Length of the shortest way along the graph between two points, and the arcs that it passes whole.
 
         The length is infinite when no way leads from one to the other.
@@ -331,9 +331,9 @@ class GraphMap:
                     best = (head + lengths[last] + tail, self._passed(routes[last]))
         return best
 
-    def _exits(self, x: Vector, place: Place) -> dict[int, float]:
+    def _exits(self, x: Vector, place: GraphPlace) -> dict[int, float]:
         """Vertices next to a point with their distances."""
-        if place.kind is PlaceKind.VERTEX:
+        if place.kind is GraphPlaceKind.VERTEX:
             return {place.number: 0.0}
         arc = self.arcs[place.number]
         return {number: self.vertex_distance(x, number) for number in (arc.tail, arc.head)}

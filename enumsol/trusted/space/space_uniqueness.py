@@ -60,7 +60,7 @@ def only_solution(system: EnclosedSpace, numbers: Array, normal: Array, errors: 
     Parameters
     ----------
     system : EnclosedSpace
-    numbers : see ``Numbers.of``
+    numbers : see ``SpaceWeights.of``
     normal : (p,) array, lambda_n of the point, scaled; what is negative counts as 0
     errors : what is not known of theta counts as often: 1 proves, a writer of proofs takes more, so that a checker,
         which rounds otherwise, comes to the same answer
@@ -104,7 +104,7 @@ def _is_final(code: int, tangents: int) -> bool:
 
 
 @dataclass(frozen=True)
-class Numbers:
+class SpaceWeights:
     """The numbers of the form of theory, (12.7), node by node.
 
     Where there is no tau, components are 0.
@@ -128,7 +128,7 @@ class Numbers:
     whole: Flags
 
     @classmethod
-    def of(cls, system: EnclosedSpace, numbers: Array) -> Numbers | None:
+    def of(cls, system: EnclosedSpace, numbers: Array) -> SpaceWeights | None:
         """From one array: mu, kappa and wide of all nodes, then nu and theta of all tau, in the order of y.
 
         mu and kappa are positive, wide is not negative, |nu| <= mu, |theta| <= 1, and theta = 0 where wide is positive.
@@ -165,7 +165,7 @@ class _Form:
     """
 
     system: EnclosedSpace
-    numbers: Numbers
+    numbers: SpaceWeights
     turn: Ball
     push: Array
     least: float
@@ -173,7 +173,7 @@ class _Form:
     @classmethod
     def of(cls, system: EnclosedSpace, values: Array) -> _Form | None:
         """None where Q is not proven definite."""
-        numbers = Numbers.of(system, values)
+        numbers = SpaceWeights.of(system, values)
         if numbers is None or not system.smallest_eigenvalue > 0:
             return None
         if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
@@ -320,7 +320,7 @@ class _Form:
         return OnlySolution(y, w, loose, stick, slip)
 
 
-def _least(system: EnclosedSpace, numbers: Numbers, turn: Ball, push: Array, unit: Array) -> float:
+def _least(system: EnclosedSpace, numbers: SpaceWeights, turn: Ball, push: Array, unit: Array) -> float:
     """Lower bound of the smallest eigenvalue of Q, at most 0 where none positive is proven."""
     tau, p = system.tau, len(system.tau)
     S = Ball(system.S, system.S_rad)
