@@ -33,7 +33,7 @@ from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
 from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
 from enumsol.search.interval.interval_parallel import run_parallel
 from enumsol.search.interval.subintervals import FastIntervalCertifier, IntervalSearch
-from enumsol.search.stopping import Stop, StopReason
+from enumsol.search.outcome import Stop, StopReason
 from enumsol.support.arguments import (
     alpha_interval,
     instance_of,

@@ -323,13 +323,13 @@ class BranchGraph(Immutable):
 
     def to_frame(self) -> pd.DataFrame:
         """One row an arc: its branch, component, ends and their kinds, index, dimension and statuses (node by node)."""
-        from enumsol.branches.frames import arcs_frame  # pandas, slow to import
+        from enumsol.branches.graph_text import arcs_frame  # pandas, slow to import
 
         return arcs_frame(self.data, self.components, self.branch_of)
 
     def vertices_frame(self) -> pd.DataFrame:
         """One row a vertex and contact node: alpha, kind, statuses that hold, and values."""
-        from enumsol.branches.frames import vertices_frame  # as above
+        from enumsol.branches.graph_text import vertices_frame  # as above
 
         return vertices_frame(self.data)
 

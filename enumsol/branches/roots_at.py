@@ -14,7 +14,7 @@ from enumsol.roots.components import connected_components
 from enumsol.roots.enumerate import roots_of_selections
 from enumsol.roots.local_degree import local_degree
 from enumsol.roots.root_set import RootSet, SearchStats
-from enumsol.search.stopping import Stop, StopReason
+from enumsol.search.outcome import Stop, StopReason
 from enumsol.selections.float_selections import FloatSelections
 from enumsol.selections.rational_selections import ExactSelections
 

@@ -28,7 +28,7 @@ What checker and search share
       solutions are the same; ``trusted.uniqueness_in_contact``, the test that a root is alone below an assignment;
       ``trusted.uniqueness_weights``, the form of both, and ``arithmetic.ball_arrays``, their linear systems of balls;
     - for the arcs of branch graphs: ``trusted.selection``, the numbers of unknowns and conditions;
-      ``trusted.arcs.selection_balls``, ``trusted.arcs.series``, ``trusted.arcs.bernstein`` and
+      ``trusted.arcs.selection_balls``, ``trusted.arcs.series``, ``trusted.arcs.series`` and
       ``trusted.arcs.over_parts``, a selection over an interval as a series with bounds of its error;
       ``trusted.arcs.precise`` and ``trusted.arcs.many_digits``, the same with many digits, loaded only where a box asks
       for it; ``trusted.arcs.only_branch``, the test by which the roots of arcs are the only solutions over a piece;

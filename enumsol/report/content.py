@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.elements import VertexKind
-from enumsol.branches.figures.curves import Curve, curves, side_by_side
+from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side, state_columns
 from enumsol.branches.figures.marks import colour_of
-from enumsol.branches.figures.quantities import QUANTITIES, state_columns
 from enumsol.model.statuses import STATUSES
 from enumsol.report.body import body_record
 

@@ -19,9 +19,8 @@ from enumsol.roots.local_degree import local_degree
 from enumsol.roots.root_set import RootSet
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
-from enumsol.search.outcome import SearchLimits, SearchProgress
+from enumsol.search.outcome import SearchLimits, SearchProgress, Stop, StopReason
 from enumsol.search.solvers import Arithmetic, Solvers
-from enumsol.search.stopping import Stop, StopReason
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 from enumsol.support.arguments import (
     alpha_value,

@@ -12,10 +12,9 @@ from enumsol.proof.begun import begun_proof
 from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root_set import SearchStats
 from enumsol.search.certifiers.protocol import UndecidedPart
-from enumsol.search.outcome import SearchLimits, SearchOutcome
+from enumsol.search.outcome import SearchLimits, SearchOutcome, Stop, StopReason
 from enumsol.search.parallel import Searchable, Spread
 from enumsol.search.resume import resume
-from enumsol.search.stopping import Stop, StopReason
 from enumsol.support.deadlines import Deadline, within
 from enumsol.support.messages import counted
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from enumsol.proof.compressed_parts import Part, encoded
-from enumsol.search.stopping import Stop, StopReason
+from enumsol.search.outcome import Stop, StopReason
 from enumsol.search.tree import TreeNode
 from enumsol.support.workers import Crew
 

@@ -24,9 +24,8 @@ from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart
 from enumsol.search.form_policy import Forms, HeldRecords
-from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress
+from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting, branching_node
-from enumsol.search.stopping import Stop, StopReason
 from enumsol.selections.solution import Codes
 from enumsol.support.deadlines import Deadline, TimeOverError, over, within
 

@@ -8,10 +8,9 @@ import pytest
 
 from enumsol import ContactProblem, InvalidArgumentError, branch_graph, gallery
 from enumsol.branches.claims import MultiplicitySteps
-from enumsol.branches.figures.curves import Curve, curves, side_by_side
+from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
+from enumsol.branches.figures.labels import narrow_changes
 from enumsol.branches.figures.marks import MARKERS, STATUS_STYLES
-from enumsol.branches.figures.quantities import QUANTITIES
-from enumsol.branches.figures.zooms import narrow_changes
 from enumsol.model.statuses import ContactStatus
 
 

@@ -41,7 +41,7 @@ SEARCH = (
 #: What may write a false proof and accept it: of these modules the search uses no more than these names; None: all.
 SHARED = {
     "arithmetic.balls": {"SAFE", "TINY", "UNIT", "upper_norm"},
-    "arithmetic.rationals": {"is_positive_definite", "rational", "rational_matrix", "to_fraction"},
+    "arithmetic.rationals": {"as_objects", "is_positive_definite", "rational", "rational_matrix", "to_fraction"},
     "condensation.affine": {"exactly_at"},
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
     "condensation.space_condensed": {"EnclosedSpace", "SpaceSystem"},

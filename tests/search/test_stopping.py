@@ -6,7 +6,7 @@ import enumsol
 from enumsol import gallery
 from enumsol.branches import branch_graph
 from enumsol.errors import Interrupted
-from enumsol.search.stopping import Stop, StopReason
+from enumsol.search.outcome import Stop, StopReason
 
 
 @pytest.mark.parametrize(

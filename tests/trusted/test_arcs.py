@@ -8,9 +8,9 @@ import pytest
 from trusted.exact_arcs import Truth, arc_system, beside, exact_of, interval_at, random_data, two_zeros, widened
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.trusted.arcs.bernstein import bernstein_values, signs_beyond, to_bernstein
 from enumsol.trusted.arcs.over_parts import expansions, over_parts
 from enumsol.trusted.arcs.selection_balls import ArcSelection
+from enumsol.trusted.arcs.series import bernstein_values, signs_beyond, to_bernstein
 from enumsol.trusted.status_rows import FRICTIONLESS
 
 

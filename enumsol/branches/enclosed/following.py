@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from enumsol.branches.enclosed.joining import Joined, join
-from enumsol.search.stopping import Stop, StopReason
+from enumsol.search.outcome import Stop, StopReason
 from enumsol.support.deadlines import Deadline, TimeOverError, within
 from enumsol.support.messages import counted
 

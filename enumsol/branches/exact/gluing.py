@@ -17,7 +17,7 @@ from enumsol.arithmetic.algebraic import CriticalAlpha, merge
 from enumsol.branches.exact.known_selections import KnownSelections
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.roots.components import connected_components
-from enumsol.search.stopping import Stop, StopReason
+from enumsol.search.outcome import Stop, StopReason
 from enumsol.selections.ordered_field import FiberSelections
 from enumsol.support.deadlines import Deadline, TimeOverError, look, within
 

@@ -7,11 +7,18 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.branches.figures.curves import Curve, CurvePlace, curves, side_by_side
+from enumsol.branches.figures.curves import (
+    Curve,
+    CurvePlace,
+    Quantity,
+    curves,
+    quantity_of,
+    side_by_side,
+    state_columns,
+)
+from enumsol.branches.figures.labels import narrow_changes
 from enumsol.branches.figures.marks import GREY, MARKERS, STATUS_STYLES, colour_of, handles, index_style
 from enumsol.branches.figures.panels import draw_numbers, draw_steps, drawn_range, family_range, sheet_range
-from enumsol.branches.figures.quantities import Quantity, quantity_of, state_columns
-from enumsol.branches.figures.zooms import narrow_changes
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import alpha_interval, positive_number, shown
 from enumsol.support.messages import counted

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Points = NDArray[np.float64]
+    from enumsol.branches.claims import MultiplicitySteps
+
 
 #: Where along a curve a label may stand, the best place first, and on which sides of it.
 _ALONG = (0.5, 0.65, 0.35, 0.8, 0.2, 0.9, 0.1, 0.97, 0.03)
@@ -98,3 +100,40 @@ def dense(line: Points, step: float) -> Points:
     along = np.concatenate([[0.0], np.cumsum(gaps)])
     at = np.linspace(0.0, along[-1], min(int(along[-1] / step) + 2, 4000))
     return np.stack([np.interp(at, along, line[:, 0]), np.interp(at, along, line[:, 1])], axis=1)
+
+
+#: Narrower than this part of the interval, a change cannot be seen; at most so many are shown.
+_NARROW, _MOST = 0.02, 2
+#: What is shown on both sides, by the width of the narrow part.
+_MARGIN = 0.75
+
+
+def narrow_changes(steps: MultiplicitySteps, interval: tuple[float, float]) -> list[tuple[float, float]]:
+    """Windows of alpha around steps too narrow to be seen, in the order of alpha.
+
+    Of many those with the largest changes, of these the narrowest. Neighbours share a window in which both are seen.
+    """
+    a, b = interval
+    alphas, least = [float(alpha) for alpha in steps.alphas], _NARROW * (b - a)
+    # plateaus of equal counts: count, first and last alpha
+    plateaus: list[tuple[int, float, float]] = []
+    for count, lo, hi in zip(steps.between, alphas, alphas[1:], strict=False):
+        if plateaus and plateaus[-1][0] == count:
+            plateaus[-1] = (count, plateaus[-1][1], hi)
+        else:
+            plateaus.append((count, lo, hi))
+    # change, first and last alpha, width of the narrowest step
+    found: list[tuple[int, float, float, float]] = []
+    for k, (count, lo, hi) in enumerate(plateaus):
+        if len(plateaus) == 1 or not 0 < hi - lo < least:
+            continue
+        change = max(abs(count - plateaus[j][0]) for j in (k - 1, k + 1) if 0 <= j < len(plateaus))
+        largest, first, last, width = found[-1] if found else (0, lo, float("-inf"), 0.0)
+        width = min(width, hi - lo)
+        if lo <= last and hi - first < least and width >= _NARROW * (hi - first):
+            found[-1] = (max(change, largest), first, hi, width)
+        else:
+            found.append((change, lo, hi, hi - lo))
+    found.sort(key=lambda item: (-item[0], item[2] - item[1]))
+    margins = [(lo, hi, _MARGIN * (hi - lo)) for _, lo, hi, _ in found[:_MOST]]
+    return sorted((max(a, lo - margin), min(b, hi + margin)) for lo, hi, margin in margins)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.branches.figures.curves import columns, state_columns
 from enumsol.branches.figures.labels import Label, dense, place_labels
 from enumsol.branches.figures.marks import GREY, colour_of
-from enumsol.branches.figures.quantities import columns, state_columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
     from enumsol.branches.claims import MultiplicitySteps
     from enumsol.branches.elements import Arc, Vertex
-    from enumsol.branches.figures.curves import Curve, CurvePlace
-    from enumsol.branches.figures.quantities import Quantity
+    from enumsol.branches.figures.curves import Curve, CurvePlace, Quantity
     from enumsol.model.problem import ContactProblem
     from enumsol.roots.root_set import RootSet
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.parameter_path import AffinePath
-from enumsol.continuation.selection_distance import selection_distance
 from enumsol.continuation.start import ALPHA_FRACTION
+from enumsol.continuation.transitions import selection_distance
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import real_or_nan, shown

@@ -19,7 +19,7 @@ import numpy as np
 from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.interval_relaxation import IntervalSystem
 from enumsol.search.interval.interval_tree import LARGEST_TREE, EmptyLeaf, PieceTree, Subtree, TreeResult
-from enumsol.search.stopping import Stop, StopReason
+from enumsol.search.outcome import Stop, StopReason
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

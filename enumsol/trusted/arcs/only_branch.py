@@ -13,8 +13,8 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_norm, upper_sum
-from enumsol.trusted.arcs.bernstein import bernstein_values
 from enumsol.trusted.arcs.over_parts import expansions
+from enumsol.trusted.arcs.series import bernstein_values
 from enumsol.trusted.status_rows import OPEN
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import determinant_sign
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_sum
-from enumsol.trusted.arcs.bernstein import bernstein_values, signs_beyond
-from enumsol.trusted.arcs.series import Series, expand
+from enumsol.trusted.arcs.series import Series, bernstein_values, expand, signs_beyond
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
