@@ -1,4 +1,4 @@
-"""A branch graph as text."""
+"""A branch graph as text and as tables of its arcs and vertices."""
 
 from __future__ import annotations
 
