@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -14,14 +15,24 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import Codes
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
-#: The compiled module of the active-set method.
-COMPILED = "enumsol.relaxation._active_set"
 #: Largest violation of a row (rows of unit length in the norm of S^{-1}) that the QP ignores.
 FEASIBILITY_TOLERANCE = 1e-11
 #: A leaf is pruned when its energy bound exceeds this; g' S^{-1} g lies in [1, 4), so it is relative to the data.
 PRUNE_MARGIN = 1e-9
 #: Nodes whose children are bounded before one of them is branched on (measured in studies/branching_rule).
 BRANCHING_CANDIDATES = 24
+
+
+def not_compiled(error: ImportError) -> str:
+    """What is the case where the compiled solver cannot be imported, and what to do, in one sentence.
+
+    Python imports the first enumsol that it finds: in a source tree the one there, where nothing may be compiled.
+    """
+    package = Path(__file__).resolve().parents[1]
+    return (
+        f"the compiled active-set solver cannot be loaded from {package} ({' '.join(str(error).split())}; install "
+        f"enumsol with a C compiler, and start Python in another directory than {package.parent} if it is installed)"
+    )
 
 
 class Relaxation(Protocol):

@@ -22,7 +22,7 @@ from enumsol.condensation.condensed import CondensedSystem, ScaledSystem
 from enumsol.errors import InvalidProblemError, MissingDependencyError
 from enumsol.model.statuses import CONDITIONS, SLIP_MINUS, SLIP_PLUS, RowKind
 from enumsol.relaxation.active_set import CompiledEngine
-from enumsol.relaxation.engine import BRANCHING_CANDIDATES, COMPILED
+from enumsol.relaxation.engine import BRANCHING_CANDIDATES, not_compiled
 from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY, row_terms, status_rows
 
 if TYPE_CHECKING:
@@ -184,12 +184,7 @@ class IntervalEngine(CompiledEngine):
         try:
             from enumsol.relaxation import _active_set
         except ImportError as error:
-            from enumsol.support.compiled import why_missing  # seldom needed
-
-            raise MissingDependencyError(
-                "branch_graph needs the compiled active-set solver, which is not available: "
-                f"{why_missing(COMPILED, error)}"
-            ) from error
+            raise MissingDependencyError(f"branch_graph needs it, but {not_compiled(error)}") from error
         p = system.p
         rule = _active_set.BranchingRule(system.F, *_slip_rows(system), BRANCHING_CANDIDATES)
         start, index, value = _all_rows(system)

@@ -20,7 +20,7 @@ from enumsol.condensation.condensed import ScaledSystem
 from enumsol.errors import MissingDependencyError
 from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine
-from enumsol.relaxation.engine import COMPILED, Engine, Relaxation
+from enumsol.relaxation.engine import Engine, Relaxation, not_compiled
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart
 from enumsol.search.form_policy import Forms, HeldRecords
@@ -69,9 +69,7 @@ def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
     try:
         return ActiveSetEngine(system)
     except ImportError as error:
-        from enumsol.support.compiled import why_missing  # seldom needed
-
-        missing = f"the compiled active-set solver is not available: {why_missing(COMPILED, error)}"
+        missing = not_compiled(error)
         if name is not None:
             raise MissingDependencyError(missing) from error
         warnings.warn(f"{missing}; the much slower interior-point solver is used", RuntimeWarning, stacklevel=2)

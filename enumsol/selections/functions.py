@@ -40,8 +40,12 @@ class SelectionFunctions:
 
     def __init__(self, exact: ExactCondensed, codes: Codes) -> None:
         self.exact, self.codes = exact, codes
-        self._selection = Selection(codes)
         self._cache: dict[tuple[RowKind, int], Any] = {}
+
+    @property
+    def _selection(self) -> Selection:
+        """Made where it is needed: what a graph keeps holds no arrays that can be written to."""
+        return Selection(self.codes)
 
     @cached_property
     def det(self) -> Any:

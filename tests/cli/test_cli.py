@@ -456,7 +456,7 @@ def test_warnings_are_lines_without_source_code(capsys, monkeypatch):
     status, out, err = run(capsys, "roots", "gallery:one-node-6.1", "--alpha", 5, "--arithmetic", "fast")
     assert status == 0
     assert "3 roots" in out
-    assert err.startswith("enumsol: warning: the compiled active-set solver is not available")
+    assert err.startswith("enumsol: warning: the compiled active-set solver cannot be loaded")
     assert err.count("\n") == 1
 
 

@@ -266,7 +266,7 @@ def test_contact_nodes_come_in_their_order_along_the_boundary():
     shuffled = np.random.default_rng(3).permutation(len(mesh.points))
     where = np.argsort(shuffled)
     other = fem.mesh_problem(
-        fem.parts.PartedMesh(
+        fem.PartedMesh(
             mesh.points[shuffled], where[mesh.cells], {name: where[part] for name, part in mesh.facets.items()}
         ),
         **STEEL, contact="bottom", clamp="top",
@@ -411,7 +411,7 @@ def test_what_nothing_holds_is_named(holds):
 
 def test_a_part_that_hangs_together_with_no_other():
     one, two = grid(1, 1, 4), grid(1, 1, 4)
-    mesh = fem.parts.PartedMesh(
+    mesh = fem.PartedMesh(
         np.concatenate([one.points, two.points + np.array([5, 0])]),
         np.concatenate([one.cells, two.cells + 4]),
         one.facets,
@@ -422,14 +422,14 @@ def test_a_part_that_hangs_together_with_no_other():
 
 def test_facets_inside_the_body_are_refused():
     mesh = grid(2, 2, 3)
-    inside = fem.parts.PartedMesh(mesh.points, mesh.cells, {**mesh.facets, "cut": np.array([[3, 4]])})
+    inside = fem.PartedMesh(mesh.points, mesh.cells, {**mesh.facets, "cut": np.array([[3, 4]])})
     with pytest.raises(InvalidArgumentError, match=r"cut row 0, nodes \[3, 4\], is no facet on the boundary"):
         fem.mesh_problem(inside, **STEEL, contact="cut", clamp="top")
 
 
 def test_facets_without_their_nodes_between_are_refused():
     mesh = grid(2, 2, 6)
-    bare = fem.parts.PartedMesh(mesh.points, mesh.cells, {name: part[:, :2] for name, part in mesh.facets.items()})
+    bare = fem.PartedMesh(mesh.points, mesh.cells, {name: part[:, :2] for name, part in mesh.facets.items()})
     with pytest.raises(InvalidArgumentError, match="bottom has facets of 2 nodes; expected 3, as the cells have"):
         fem.mesh_problem(bare, **GOOD)
 
@@ -438,7 +438,7 @@ def test_a_folded_boundary_has_no_normal():
     """Both sides of a cut share its end."""
     points = [[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]]
     cells = [[0, 1, 4], [1, 2, 4], [2, 3, 4]]
-    mesh = fem.parts.PartedMesh(np.array(points), np.array(cells), {"cut": np.array([[3, 4], [4, 0]])})
+    mesh = fem.PartedMesh(np.array(points), np.array(cells), {"cut": np.array([[3, 4], [4, 0]])})
     problem = fem.mesh_problem(
         mesh, **STEEL, contact="cut", displacement={"cut": ("free", "free")}, spring={"cut": (1, 1)}
     )

@@ -396,7 +396,7 @@ def test_arguments(tmp_path):
 CHILD = textwrap.dedent("""
     import signal, sys
     from enumsol import enumerate_roots, gallery
-    from enumsol.search import forms
+    from enumsol.search import form_policy as forms
     forms.NODES = 100
     path, at, resume = sys.argv[1], int(sys.argv[2]), sys.argv[3] == "resume"
     def wait(progress):
