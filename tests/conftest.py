@@ -1,7 +1,11 @@
 """Set-up of the whole suite."""
 
+import os
 import signal
 from collections import defaultdict
+
+# two workers on two cores, each with a thread for every core, would wait for each other; read when numpy is loaded
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import pytest

@@ -451,9 +451,11 @@ def test_units_in_which_everything_overflows_prove_nothing(exponents):
     assert not judge("triangle", records)
 
 
-def test_whole_proofs_have_the_arcs_of_exact_algebra():
+@pytest.mark.few(1)
+@pytest.mark.parametrize("part", range(3))
+def test_whole_proofs_have_the_arcs_of_exact_algebra(part):
     whole = 0
-    for seed in range(40):
+    for seed in range(14 * part, 14 * part + 14):
         rng = np.random.default_rng(seed)
         problem = generic_problem(rng, int(rng.integers(1, 3)), ("friction", "load", "both")[seed % 3])
         if seed % 4 == 3:
@@ -463,4 +465,4 @@ def test_whole_proofs_have_the_arcs_of_exact_algebra():
         assert report.ok
         whole += report.complete
         assert not report.complete or report.arcs == len(graph.arcs)
-    assert whole > 20
+    assert whole > 6

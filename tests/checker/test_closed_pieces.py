@@ -389,7 +389,8 @@ def widened(records):
     return changed
 
 
-@pytest.mark.parametrize("wide", [pytest.param(False, marks=pytest.mark.slow), True])
+@pytest.mark.slow
+@pytest.mark.parametrize("wide", [False, True])
 def test_the_form_is_asked_of_every_arc(wide):
     """Numbers that serve one of two arcs over a piece, and not the other."""
     body, records = proven("everything")

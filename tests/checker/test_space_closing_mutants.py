@@ -280,7 +280,7 @@ def test_a_root_among_several_is_never_the_only_one(name):
 def test_random_mutants_are_refused_or_true(name):
     rng, (problem, records), judge = np.random.default_rng(9), proven(name), Judge(name)
     accepted = 0
-    for _ in range(120):
+    for _ in range(50):
         changed = copied(records)
         for _ in range(int(rng.integers(1, 4))):
             entry = int(rng.choice([_NUMBERS, _NUMBERS, _MID, _RAD]))
@@ -294,7 +294,7 @@ def test_random_mutants_are_refused_or_true(name):
             assert report.complete
             assert report.roots == 1
             assert judge.right(changed[1])
-    assert 0 < accepted < 90
+    assert 0 < accepted < 40
 
 
 def test_the_leaf_of_another_problem():

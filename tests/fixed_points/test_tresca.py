@@ -26,7 +26,7 @@ def random_2d(rng):
 @pytest.mark.few(1)
 @pytest.mark.parametrize("make", [random_2d, random_3d])
 def test_three_solvers_agree(rng, make):
-    for _ in range(25):
+    for _ in range(10):
         problem, bound = make(rng)
         newton = enumsol.solve_tresca(problem, bound, 0)
         clarabel = enumsol.solve_tresca(problem, bound, 0, solver="clarabel")

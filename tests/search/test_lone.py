@@ -59,10 +59,10 @@ def problems(seed):
     return from_condensed(S, random_load(rng, p) if g is None else g, F)
 
 
-@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 3))])
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 8))])
 def test_all_selections_find_the_same(part):
     lone = several = 0
-    for seed in range(100 * part, 100 * part + 100):
+    for seed in range(40 * part, 40 * part + 40):
         problem = problems(seed)
         exact = enumerate_roots(problem, 0, "exact", "exhaustive")
         with above_known_roots():
@@ -77,8 +77,8 @@ def test_all_selections_find_the_same(part):
             assert check_records(problem, records_of(roots.proof)) == records_of(roots.proof)[-1]
         lone += found
         several += found and len(exact) > 1
-    assert lone > 30
-    assert several > 3
+    assert lone > 8
+    assert several > 0
 
 
 @pytest.mark.slow

@@ -59,12 +59,12 @@ def problems(seed):
     return from_condensed(S, random_load(rng, p) if g is None else g, F)
 
 
-@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 8))])
 def test_all_selections_find_the_same(part, monkeypatch):
     # other numbers are sought at once, and small bodies are not spared them
     monkeypatch.setattr(closing, "_FEW", 0)
     certified = several = 0
-    for seed in range(80 * part, 80 * part + 80):
+    for seed in range(32 * part, 32 * part + 32):
         problem = problems(seed)
         alpha = 1.0 if seed % 4 == 2 else 0
         exact = enumerate_roots(problem, alpha, "exact", "exhaustive")
@@ -81,8 +81,8 @@ def test_all_selections_find_the_same(part, monkeypatch):
         if roots.by_one_certificate:
             assert len(exact) == 1
             assert not exact.families
-    assert certified > 20
-    assert several > 5
+    assert certified > 6
+    assert several > 1
 
 
 def test_long_trees_of_small_bodies_are_cut_short(monkeypatch):

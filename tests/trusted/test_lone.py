@@ -99,10 +99,10 @@ def cases(seeds):
                     yield rng, case, codes, root[0], given
 
 
-@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 3))])
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 8))])
 def test_what_is_proven_is_so(part):
     proven = squares = several = 0
-    for _, case, codes, selection, given in cases(range(120 * part, 120 * part + 120)):
+    for _, case, codes, selection, given in cases(range(45 * part, 45 * part + 45)):
         root = lone_root(case.system, codes, selection, *given)
         if root is None:
             continue
@@ -111,9 +111,9 @@ def test_what_is_proven_is_so(part):
         squares += bool(loose)
         several += len(case.roots) > 1
         assert case.judged(codes, selection, *given) is None
-    assert proven > 60
-    assert squares > 20
-    assert several > 20
+    assert proven > 15
+    assert squares > 4
+    assert several > 4
 
 
 def changed(rng, case, codes, given):
@@ -137,10 +137,10 @@ def changed(rng, case, codes, given):
     return tuple(codes), [weights, strengths, rows, values]
 
 
-@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 3))])
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 8))])
 def test_what_is_changed_is_refused_or_true(part):
     refused = accepted = 0
-    for rng, case, codes, selection, given in cases(range(120 * part, 120 * part + 120)):
+    for rng, case, codes, selection, given in cases(range(45 * part, 45 * part + 45)):
         for _ in range(3):
             others = changed(rng, case, codes, given)
             if lone_root(case.system, others[0], selection, *others[1]) is None:
@@ -148,8 +148,8 @@ def test_what_is_changed_is_refused_or_true(part):
                 continue
             accepted += 1
             assert case.judged(others[0], selection, *others[1]) is None
-    assert refused > 60
-    assert accepted > 60
+    assert refused > 15
+    assert accepted > 15
 
 
 @pytest.mark.slow
