@@ -50,7 +50,7 @@ class RenewedPool(Executor):
             # one is started for every task that waits; that one died already the search finds out
             with suppress(BrokenExecutor):
                 for _ in range(self._max_workers):
-                    self._pool.submit(int)
+                    self.submit(int)
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
         """The future of a call.
@@ -59,10 +59,18 @@ class RenewedPool(Executor):
         ------
         BrokenExecutor
             A process died; `renew` starts others.
+        OSError
+            The system starts no more processes.
         """
         if self._pool is None:
             raise BrokenExecutor("there are no processes")
-        return self._pool.submit(function, *arguments, **named)
+        try:
+            return self._pool.submit(function, *arguments, **named)
+        except OSError as error:
+            if error.errno is not None:
+                raise
+            # not the system's: the pool closed its pipes while this call was using them, because a process died
+            raise BrokenExecutor("a process died") from error
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Stop the processes."""
