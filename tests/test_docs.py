@@ -104,11 +104,27 @@ def test_references_in_documents(path):
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_equations_referred_to_inside_documents(path):
     text = path.read_text(encoding="utf-8")
-    body = THEORY_REFERENCE.sub(
-        "", joined(re.sub(r"^    [^\n]*$|^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL))
-    )
+    blocks = r"^    [^\n]*$|^```.*?^```|^\$\$$.*?^\$\$$"
+    body = THEORY_REFERENCE.sub("", joined(re.sub(blocks, "", text, flags=re.MULTILINE | re.DOTALL)))
     # pairs of data, such as (1.5, -4), have no such form
     assert set(re.findall(r"\((\d+\.\d+)\)", body)) <= set(labels(text))
+
+
+def test_numbers_of_equations_are_read_from_both_kinds_of_blocks():
+    text = "Let\n\n$$\nx = 1\n\\tag{5.1}\n$$\n\nand\n\n    y = 2      (5.2)\n\nby (5.3). $z$ as in (5.4)\n"
+    assert labels(text) == ["5.1", "5.2"]
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_formulas_of_their_own_stand_between_lines(path):
+    """Dollars in pairs; a formula's number ends it."""
+    text = re.sub(r"^```.*?^```|^    [^\n]*$|`[^`\n]*`", "", path.read_text(encoding="utf-8"), flags=re.M | re.S)
+    between = re.split(r"^\$\$$", text, flags=re.MULTILINE)
+    assert len(between) % 2 == 1
+    assert not any("$$" in part or "\\tag" in part or part.count("$") % 2 for part in between[::2])
+    for formula in between[1::2]:
+        assert re.fullmatch(r"\n([^\n$]+\n)+?(\\tag\{\d+\.\d+\}\n)?", formula), formula
+        assert formula.count("\\tag") <= 1, formula
 
 
 def test_numbering_of_the_theory():

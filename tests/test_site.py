@@ -14,7 +14,7 @@ from references import places
 
 BUILD = 'pip install -e ".[docs]" && python -m sphinx -W docs site/html'
 NOTEBOOK = ROOT / "docs" / "notebook.ipynb"
-missing = [name for name in ("sphinx", "myst_nb", "furo") if find_spec(name) is None]
+missing = [name for name in ("sphinx", "myst_nb", "furo", "math_core") if find_spec(name) is None]
 
 
 @pytest.mark.slow
@@ -29,7 +29,9 @@ def test_the_site_is_built(tmp_path):
     assert done.returncode == 0, done.stderr
     assert complaints(site) == []
     theory, roots = (site / name for name in ("theory.html", "reference/roots.html"))
+    assert theory.read_text(encoding="utf-8").count('id="equation-1.1"') == 1
     assert 'id="equation-6.7"' in theory.read_text(encoding="utf-8")
+    assert '<a class="eqno" href="#equation-1.1">(1.1)</a>' in theory.read_text(encoding="utf-8")
     assert 'href="../theory.html#section-5.4"' in roots.read_text(encoding="utf-8")
     notebook = (site / "notebook.html").read_text(encoding="utf-8")
     assert "complete: yes (proven)" in notebook
@@ -75,6 +77,24 @@ def test_what_a_page_loads_is_found(tmp_path):
     found = [line for line in complaints(tmp_path) if "loads" in line]
     assert found == ["index.html loads https://cdn.example/x.js", "site.css loads https://fonts.example/f.css"]
     assert f"{public_names()[0]} is not in the reference" in complaints(tmp_path)
+
+
+def test_what_styles_in_a_page_load_is_found(tmp_path):
+    (tmp_path / "index.html").write_text(
+        "<style>@import 'https://fonts.example/f.css';</style><p style='background: url(//example.org/a.png)'>a</p>"
+    )
+    found = [line for line in complaints(tmp_path) if "loads" in line]
+    assert found == ["index.html loads https://fonts.example/f.css", "index.html loads //example.org/a.png"]
+
+
+@pytest.mark.parametrize(
+    "left", ["$x$ is", "with \\lambda_n in it", "\\(x\\)", "<div class='math'>\\[x\\]</div>", "&#36;x&#36;"]
+)
+def test_a_formula_that_is_not_rendered_is_found(left, tmp_path):
+    (tmp_path / "index.html").write_text(f"<code>$HOME</code><pre>\\n</pre><p>{left}</p>")
+    found = [line for line in complaints(tmp_path) if "formula" in line]
+    assert len(found) == 1
+    assert found[0].startswith("index.html has a formula that is not rendered: ")
 
 
 @pytest.mark.parametrize(

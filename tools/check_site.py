@@ -1,6 +1,6 @@
 """Whether a built site of the documents is whole: python tools/check_site.py SITE.
 
-Its pages load nothing from the network, and every public name is in the reference.
+Its pages load nothing from the network, every formula is MathML, and every public name is in the reference.
 """
 
 from __future__ import annotations
@@ -18,16 +18,23 @@ from enumsol import fem, gallery
 LOADED = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src", "video": "src"}
 #: Styles load this way.
 IN_STYLES = re.compile(r"(?:url\(|@import)\s*[\"']?((?:https?:)?//[^\"')\s]+)")
+#: LaTeX in a running text.
+LATEX = re.compile(r"\$|\\[A-Za-z]+|\\[(\[]")
+#: Elements whose text may look like LaTeX.
+NOT_PROSE = {"code", "pre", "script", "style"}
 
 
 class Page(HTMLParser):
-    """What a page loads, and its anchors."""
+    """What a page loads, its anchors, and LaTeX that was left in its texts."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
         self.loaded: list[str] = []
         self.anchors: set[str] = set()
+        self.latex: list[str] = []
+        self._open: list[str] = []
         self.feed(text)
+        self.close()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         """Note an element."""
@@ -37,6 +44,21 @@ class Page(HTMLParser):
         value = given.get(LOADED.get(tag, ""))
         if value and not (tag == "link" and given.get("rel") in {"next", "prev", "canonical", "index", "search"}):
             self.loaded.append(value)
+        self.loaded += IN_STYLES.findall(given.get("style") or "")
+        if tag in NOT_PROSE:
+            self._open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        """Note the end of an element."""
+        if tag in self._open:
+            self._open.remove(tag)
+
+    def handle_data(self, data: str) -> None:
+        """Note a text."""
+        if "style" in self._open:
+            self.loaded += IN_STYLES.findall(data)
+        elif not self._open and LATEX.search(data):
+            self.latex.append(" ".join(data.split()))
 
 
 def public_names() -> list[str]:
@@ -54,6 +76,7 @@ def complaints(site: Path) -> list[str]:
         anchors |= page.anchors
         loaded = [item for item in page.loaded if re.match(r"(?:https?:)?//", item)]
         found += [f"{file.relative_to(site)} loads {item}" for item in loaded]
+        found += [f"{file.relative_to(site)} has a formula that is not rendered: {text}" for text in page.latex]
     for file in sorted(site.rglob("*.css")):
         loaded = IN_STYLES.findall(file.read_text(encoding="utf-8"))
         found += [f"{file.relative_to(site)} loads {item}" for item in loaded]
@@ -63,7 +86,8 @@ def complaints(site: Path) -> list[str]:
 def main() -> int:
     site = Path(sys.argv[1])
     found = complaints(site)
-    print("\n".join(found) or f"{len(list(site.rglob('*.html')))} pages, nothing from the network")
+    pages = len(list(site.rglob("*.html")))
+    print("\n".join(found) or f"{pages} pages, nothing from the network, no formula left in LaTeX")
     return bool(found)
 
 

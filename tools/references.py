@@ -19,6 +19,9 @@ THEORY_REFERENCE = re.compile(rf"theory, {_ITEM}(?:(?:, | and |; ){_ITEM})*")
 OWN_REFERENCE = re.compile(rf"\b(?:{_SECTIONS})")
 _OWN_ITEM = re.compile(rf"\b(?:{_SECTIONS})|{_EQUATIONS}")
 _PAGE = re.compile(r"docs/(\w+)\.md")
+#: The number of an equation in LaTeX.
+TAG = r"\\tag\{(\d+\.\d+)\}"
+#: The number of an equation in an indented block ends its line.
 _LABEL = re.compile(r"\((\d+\.\d+)\)$", re.MULTILINE)
 _HEADING = re.compile(rf"({NUMBER})\.? ")
 #: Pages with numbered sections.
@@ -31,8 +34,8 @@ def headings(text: str) -> list[str]:
 
 
 def labels(text: str) -> list[str]:
-    """Numbers of the equations of a document, in order: each ends a line of an indented block."""
-    return re.findall(r"^    .*\((\d+\.\d+)\)$", text, re.MULTILINE)
+    """Numbers of the equations of a document, in order."""
+    return [tag or label for tag, label in re.findall(rf"{TAG}|^    .*\((\d+\.\d+)\)$", text, re.MULTILINE)]
 
 
 def places(text: str, page: str) -> Iterator[tuple[int, int, str, str]]:
@@ -73,6 +76,8 @@ def _add_anchors(app: Any, document: Any) -> None:
             section["ids"].append(f"section-{number[1]}")
     for block in document.findall(nodes.literal_block):
         block["ids"] += [f"equation-{number}" for number in _LABEL.findall(block.astext())]
+    for block in document.findall(nodes.math_block):
+        block["ids"] += [f"equation-{number}" for number in re.findall(TAG, block.astext())]
 
 
 def _add_links(app: Any, document: Any, page: str) -> None:
@@ -87,7 +92,7 @@ def _add_links(app: Any, document: Any, page: str) -> None:
         if named and named[1] in app.env.found_docs:
             literal.replace_self(link(named[1], "", literal.deepcopy()))
     for block in list(document.findall(lambda node: isinstance(node, nodes.TextElement))):
-        if isinstance(block, (nodes.FixedTextElement, nodes.literal, nodes.reference, nodes.title)):
+        if isinstance(block, (nodes.FixedTextElement, nodes.literal, nodes.math, nodes.reference, nodes.title)):
             continue
         _join_texts(block)
         for child in list(block.children):
