@@ -87,6 +87,19 @@ def test_what_styles_in_a_page_load_is_found(tmp_path):
     assert found == ["index.html loads https://fonts.example/f.css", "index.html loads //example.org/a.png"]
 
 
+def test_a_link_to_a_formula_that_is_not_there_is_found(tmp_path):
+    (tmp_path / "theory.html").write_text("<div id='equation-5.1'></div><a href='#equation-5.2'>(5.2)</a>")
+    (tmp_path / "reference").mkdir()
+    (tmp_path / "reference" / "roots.html").write_text(
+        "<a href='../theory.html#equation-5.1'>(5.1)</a><a href='../theory.html#equation-5.3'>(5.3)</a>"
+        "<a href='https://example.org#a'>a</a><a href='roots.html'>here</a><a href='#'>top</a>"
+    )
+    assert [line for line in complaints(tmp_path) if "link" in line] == [
+        "reference/roots.html has a link to ../theory.html#equation-5.3, which is not there",
+        "theory.html has a link to #equation-5.2, which is not there",
+    ]
+
+
 @pytest.mark.parametrize(
     "left", ["$x$ is", "with \\lambda_n in it", "\\(x\\)", "<div class='math'>\\[x\\]</div>", "&#36;x&#36;"]
 )

@@ -1,6 +1,7 @@
 """Whether a built site of the documents is whole: python tools/check_site.py SITE.
 
-Its pages load nothing from the network, every formula is MathML, and every public name is in the reference.
+Its pages load nothing from the network, every formula is MathML, every link inside the site has its anchor, and every
+public name is in the reference.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import re
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from urllib.parse import unquote, urldefrag
 
 import enumsol
 from enumsol import fem, gallery
@@ -25,12 +27,13 @@ NOT_PROSE = {"code", "pre", "script", "style"}
 
 
 class Page(HTMLParser):
-    """What a page loads, its anchors, and LaTeX that was left in its texts."""
+    """What a page loads, its anchors and links, and LaTeX that was left in its texts."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
         self.loaded: list[str] = []
         self.anchors: set[str] = set()
+        self.links: list[str] = []
         self.latex: list[str] = []
         self._open: list[str] = []
         self.feed(text)
@@ -44,6 +47,8 @@ class Page(HTMLParser):
         value = given.get(LOADED.get(tag, ""))
         if value and not (tag == "link" and given.get("rel") in {"next", "prev", "canonical", "index", "search"}):
             self.loaded.append(value)
+        if tag == "a":
+            self.links.append(str(given.get("href") or ""))
         self.loaded += IN_STYLES.findall(given.get("style") or "")
         if tag in NOT_PROSE:
             self._open.append(tag)
@@ -68,15 +73,28 @@ def public_names() -> list[str]:
     return [f"{home.__name__}.{name}" for home, name in names if not inspect.ismodule(getattr(home, name))]
 
 
+def broken_links(file: Path, pages: dict[Path, Page]) -> list[str]:
+    """Links of a page to anchors that a page of the site does not have."""
+    broken = []
+    for link in sorted(set(pages[file].links)):
+        to, anchor = urldefrag(unquote(link))
+        target = pages.get((file.parent / to).resolve() if to else file)
+        if anchor and target and anchor not in target.anchors:
+            broken.append(link)
+    return broken
+
+
 def complaints(site: Path) -> list[str]:
     """What is wrong with the site, a line each."""
+    pages = {file.resolve(): Page(file.read_text(encoding="utf-8")) for file in sorted(site.rglob("*.html"))}
     found, anchors = [], set()
-    for file in sorted(site.rglob("*.html")):
-        page = Page(file.read_text(encoding="utf-8"))
+    for file, page in pages.items():
+        name = file.relative_to(site.resolve())
         anchors |= page.anchors
         loaded = [item for item in page.loaded if re.match(r"(?:https?:)?//", item)]
-        found += [f"{file.relative_to(site)} loads {item}" for item in loaded]
-        found += [f"{file.relative_to(site)} has a formula that is not rendered: {text}" for text in page.latex]
+        found += [f"{name} loads {item}" for item in loaded]
+        found += [f"{name} has a formula that is not rendered: {text}" for text in page.latex]
+        found += [f"{name} has a link to {link}, which is not there" for link in broken_links(file, pages)]
     for file in sorted(site.rglob("*.css")):
         loaded = IN_STYLES.findall(file.read_text(encoding="utf-8"))
         found += [f"{file.relative_to(site)} loads {item}" for item in loaded]
