@@ -28,10 +28,9 @@ What checker and search share
       solutions are the same; ``trusted.uniqueness_in_contact``, the test that a root is alone below an assignment;
       ``trusted.uniqueness_weights``, the form of both, and ``arithmetic.ball_arrays``, their linear systems of balls;
     - for the arcs of branch graphs: ``trusted.selection``, the numbers of unknowns and conditions;
-      ``trusted.arcs.selection_balls``, ``trusted.arcs.series``, ``trusted.arcs.series`` and
-      ``trusted.arcs.over_parts``, a selection over an interval as a series with bounds of its error;
-      ``trusted.arcs.precise`` and ``trusted.arcs.many_digits``, the same with many digits, loaded only where a box asks
-      for it; ``trusted.arcs.only_branch``, the test by which the roots of arcs are the only solutions over a piece;
+      ``trusted.arcs.selection_balls``, ``trusted.arcs.series`` and ``trusted.arcs.over_parts``, a selection over an
+      interval as a series with bounds of its error; ``trusted.arcs.precise`` and ``trusted.arcs.many_digits``, the same
+      with many digits, loaded only where a box asks for it; ``trusted.arcs.only_branch``, the test by which the roots of arcs are the only solutions over a piece;
       ``arithmetic.ball_arrays`` (in 3D, too);
     - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings and
       the exclusion inequality; ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds
@@ -42,10 +41,11 @@ What checker and search share
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
       search whether it does at all (then there is no proof); ``condensation.affine``: F(alpha) and f(alpha) without
       rounding; of ``arithmetic.rationals`` the pivots of a definite matrix, and floats as rationals;
-    - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file; a search that goes on
-      with an earlier proof reads its multipliers and forms by ``proof.reading``, ``proof.reading_space``,
-      ``proof.form_records`` and ``proof.root_records``, too, from what ``proof.begun`` finds, and proves them again
-      before ``proof.writer`` and ``proof.compressed_parts`` have them;
+    - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file;
+    - ``proof.records`` and, for problems in 3D, ``proof.space_records``: what a record of each kind may say. The search
+      writes records by these classes, the checkers read them by the same ones, strictly, and so does a search that
+      resumes from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer`` and
+      ``proof.compressed_parts`` have it. What a record makes of a leaf is not in these classes: a checker tests it;
     - ``model.problem``, ``model.body2d``, ``model.contact_body``, ``condensation.data``, ``condensation.condensed``,
       ``condensation.factorization``, ``support.immutable``, ``support.arguments``, ``support.array_arguments``,
       ``support.files``, ``support.messages`` and ``errors``: the data, their checks and their fingerprint, the
@@ -55,7 +55,7 @@ What checker and search share
     They are shared because the two must agree. A leaf is written when its inequality is proven positive, and a second
     set of bounds, right but not the same, would refuse true proofs near a degeneracy; whether a number is zero has to
     be decided alike. What is shared knows nothing of a search, and the tests hold it against rational arithmetic that
-    uses none of it. The checker's own are what a search gets wrong: the strict reading of the file, that the leaves
+    uses none of it. The checker's own are what a search gets wrong: the order of the file's records, that the leaves
     cover all selections and the pieces the interval, which leaf or part of an arc proves what, which events are the
     same point, the counts, the joining of root sets, and for degenerate leaves the condensation and the root sets in
     rationals.

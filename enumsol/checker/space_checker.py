@@ -14,25 +14,29 @@ from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.condensation.space_condensed import EnclosedSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of
-from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, rational_from, shown, shown_alpha
-from enumsol.proof.reading_space import multipliers_in_space
+from enumsol.proof.reading import RefusedError, data_of, exponents_from, rational_from, shown_alpha
+from enumsol.proof.records import Limits, NoRoot, RegularRoot
+from enumsol.proof.space_records import LEAVES, ExcludedInSpace, OnlyRoot
 from enumsol.trusted.space.leaves import Open, distinct_roots, settle
-from enumsol.trusted.space.sector_rows import CONTACT, UNDECIDED, children_of, exclusion_margin
+from enumsol.trusted.space.sector_rows import UNDECIDED, children_of, exclusion_margin
 from enumsol.trusted.space.space_uniqueness import only_root, only_solution
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from enumsol.checker.walk import Codes, Test
+    from enumsol.proof.records import Enclosure, Record
     from enumsol.trusted.space.leaves import SpaceRoot
     from enumsol.trusted.space.space_uniqueness import OnlySolution
 
-#: Entries of a leaf's record, by its kind.
-_ENTRIES = {"x": 3, "n": 1, "r": 4, "z": 1, "u": 2, "m": 6}
+_OPEN = "what it holds is not proven"
 
 
 @dataclass
 class SpaceChecker(TreeChecker):
     """Checks one proof of a problem in 3D."""
+
+    kinds = LEAVES
 
     roots: list[tuple[tuple[int, ...], SpaceRoot]] = field(default_factory=list)
     doubtful: int = 0
@@ -63,7 +67,7 @@ class SpaceChecker(TreeChecker):
             raise RefusedError("S is not proven positive definite")
         return enclosed
 
-    def _coverings(self, code: int, node: int) -> tuple[tuple[int, ...], ...]:
+    def _coverings(self, node: int, code: int) -> tuple[tuple[int, ...], ...]:
         if code > SECTORS and level_of(code - SECTORS) > DEEPEST:
             return ()
         children = children_of(code, self.tangents[node])
@@ -71,67 +75,61 @@ class SpaceChecker(TreeChecker):
 
     # -- leaves ----------------------------------------------------------------------------------------------------
 
-    def _leaf(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        kind = record[0]
-        if not isinstance(kind, str) or kind not in _ENTRIES:
-            return f"unknown kind of record {shown(kind)}"
-        if len(record) != _ENTRIES[kind]:
-            return f"its record has {len(record)} entries; expected {_ENTRIES[kind]}"
-        if kind == "x":
-            rows, values = multipliers_in_space(record[1], record[2], self.problem.p)
-            positive = exclusion_margin(self.system, codes, rows, values) > 0
-            return None if positive else "its multipliers do not exclude it"
-        if kind == "u":
-            self.undecided += 1
-            return None if isinstance(record[1], str) else "its reason is no text"
-        if kind == "z":
-            unloaded = all(code == UNDECIDED for code in codes) and self.problem.is_unloaded(self.alpha)
-            # g = 0: the energy bound reads y' S y <= 0
-            self.regular += 1
-            return None if unloaded else "the problem is not unloaded"
-        if kind == "m":
-            return self._only(codes, record)
-        if any(code in (CONTACT, UNDECIDED) for code in codes):
-            return "a root or a solved selection is claimed where statuses are still open"
-        return self._settled(codes, record)
+    def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
+        whole = kind is OnlyRoot and all(code == UNDECIDED for code in codes)
+        return Limits(codes, components=len(self.system.g) if whole else 0)
 
-    def _settled(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+    def _tests(self) -> dict[type[Record], Test]:
+        return {
+            ExcludedInSpace: self._excluded,
+            NoRoot: self._no_root,
+            RegularRoot: self._regular_root,
+            OnlyRoot: self._only,
+        }
+
+    def _at_rest(self) -> None:
+        self.regular += 1
+
+    def _excluded(self, codes: Codes, said: ExcludedInSpace) -> str | None:
+        positive = exclusion_margin(self.system, codes, said.rows, said.values) > 0
+        return None if positive else "its multipliers do not exclude it"
+
+    def _no_root(self, codes: Codes, said: NoRoot) -> str | None:
+        del said
         found = settle(self.system, codes)
         if isinstance(found, Open):
-            return "what it holds is not proven"
-        if record[0] == "n":
-            return None if found is None else "it holds a root"
+            return _OPEN
+        return None if found is None else "it holds a root"
+
+    def _regular_root(self, codes: Codes, said: RegularRoot) -> str | None:
+        found = settle(self.system, codes)
+        if isinstance(found, Open):
+            return _OPEN
         if found is None:
             return "it holds no root"
         self.roots.append((codes, found))
-        return self._placed(found, record[1:])
+        return self._placed(found, said.enclosure)
 
-    def _only(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+    def _only(self, codes: Codes, said: OnlyRoot) -> str | None:
         """The only solution of all."""
-        if any(code != UNDECIDED for code in codes):
-            return "its only solution is claimed below the root of the tree"
-        system, p, m = self.system, self.problem.p, len(self.system.g)
-        _, values, leaf, mid, *_ = record
-        numbers, centre = numbers_from(values, p + 2 * m), numbers_from(mid, m)
-        if not isinstance(leaf, list) or not all(type(code) is int for code in leaf):
-            return "its leaf is no list of codes"
+        del codes
         found: OnlySolution | SpaceRoot | None
-        found = only_root(system, numbers, tuple(leaf)) if leaf else only_solution(system, numbers, centre[:p])
+        if said.leaf:
+            found = only_root(self.system, said.numbers, said.leaf)
+        else:
+            found = only_solution(self.system, said.numbers, said.force[: self.problem.p])
         if found is None:
             return "its solution is not proven to be the only one"
         self.regular += 1
-        return self._placed(found, record[3:])
+        return self._placed(found, said.enclosure)
 
-    def _placed(self, found: SpaceRoot | OnlySolution, said: list[Any]) -> str | None:
+    def _placed(self, found: SpaceRoot | OnlySolution, said: Enclosure) -> str | None:
         """Why the ball and the index that are said to be those of a root are not, or None."""
-        mid, rad, index = said
-        centre, radius = (numbers_from(values, len(found.y.mid)) for values in (mid, rad))
+        centre, radius = said.numbers(len(found.y.mid))
         with np.errstate(over="ignore", invalid="ignore"):
             unit = self.system.unit
             inside = (np.abs(centre - found.y.mid * unit) + found.y.rad * unit) * SAFE <= radius
-        if not np.all(inside):
-            return "its enclosure does not hold the root"
-        return None if type(index) is int and index == found.index else "its index is wrong"
+        return said.refusal(found.index, inside=bool(np.all(inside)))
 
     # -- counting --------------------------------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.verify import Checker, verify
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.model.problem import ContactProblem
-from enumsol.proof.root_records import LoneRoot
+from enumsol.proof import records
 from enumsol.support.arguments import instance_of
 from enumsol.trusted.at_alpha import exclusion_margins, solve_selection
 from enumsol.trusted.uniqueness_in_contact import lone_root
@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.checker.form_tables import FormLeaves
+    from enumsol.checker.walk import Codes, Test
     from enumsol.proof.proof_file import Proof
+    from enumsol.proof.records import Record
 
 #: Largest radius that is tried; below 1 a positive friction coefficient stays positive.
 LARGEST = 0.5
@@ -161,40 +163,38 @@ class _WidenedChecker(Checker):
         if not self._passes(lambda system: not leaves.failing(system)):
             self.fail("multipliers with forms do not exclude their leaves")
 
-    def _solved(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        self.regular += record[0] == "r"
+    def _tests(self) -> dict[type[Record], Test]:
+        """Only leaves of some kinds may hold for other data than those given."""
+        kept = records.Excluded, records.ExcludedByForm, records.NoRoot, records.RegularRoot
+        return {kind: test for kind, test in super()._tests().items() if kind in (*kept, records.Closed, records.Alone)}
 
-        def holds(system: EnclosedSystem) -> bool:
-            ball = solve_selection(system, codes)
-            return ball is not None and (ball.is_root if record[0] == "r" else ball.is_excluded)
-
-        return None if self._passes(holds) else "it does not hold for all data"
-
-    def _rational_exclusion(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+    def _untested(self) -> str:
         self.radius = 0.0
         return "it was proven for the given data alone"
 
-    def _closed(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+    def _no_root(self, codes: Codes, said: records.NoRoot) -> str | None:
+        del said
+        return self._for_all(lambda system: (ball := solve_selection(system, codes)) is not None and ball.is_excluded)
+
+    def _regular_root(self, codes: Codes, said: records.RegularRoot) -> str | None:
+        del said
+        self.regular += 1
+        return self._for_all(lambda system: (ball := solve_selection(system, codes)) is not None and ball.is_root)
+
+    def _closed(self, codes: Codes, said: records.Closed) -> str | None:
         from enumsol.checker.fathomed_subtrees import one_regular_root
 
-        reason = super()._closed(codes, record)
-        if reason is None and not self._passes(lambda system: one_regular_root(system, record, self.force)):
-            self.radius, reason = 0.0, "it was proven for the given data alone"
+        reason = super()._closed(codes, said)
+        if reason is None and not self._passes(lambda system: one_regular_root(system, said, self.force)):
+            reason = self._untested()
         return reason
 
-    def _alone(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        lone = LoneRoot.read(record, codes, [F > 0 for F in self.friction])
+    def _alone(self, codes: Codes, said: records.Alone) -> str | None:
         self.regular += 1
-        holds = self._passes(lambda system: lone_root(system, codes, *lone.arguments) is not None)
-        return None if holds else "it does not hold for all data"
+        return self._for_all(lambda system: lone_root(system, codes, *said.arguments) is not None)
 
-    def _closed_in_rationals(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        self.radius = 0.0
-        return "it was proven for the given data alone"
-
-    def _rational_selection(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        self.radius = 0.0
-        return "it was proven for the given data alone"
+    def _for_all(self, holds: Callable[[EnclosedSystem], bool]) -> str | None:
+        return None if self._passes(holds) else "it does not hold for all data"
 
 
 def _sturdiest(

@@ -21,21 +21,12 @@ from enumsol.checker.reports import GraphVerificationReport, VerificationReport
 from enumsol.checker.walk import TreeChecker
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.model.problem import ContactProblem
+from enumsol.proof import records
 from enumsol.proof.proof_file import Proof, fraction_text
-from enumsol.proof.reading import (
-    RefusedError,
-    data_of,
-    friction_at,
-    multipliers_from,
-    numbers_from,
-    rational_from,
-    shown,
-    units_from,
-)
-from enumsol.proof.root_records import LoneRoot
+from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
 from enumsol.support.arguments import instance_of, optional_callable
 from enumsol.trusted.at_alpha import exclusion_margins, holds_no_root, solve_selection
-from enumsol.trusted.status_rows import FRICTIONLESS, ROW_KINDS, UNDECIDED, coverings_of, row_signs
+from enumsol.trusted.status_rows import ROW_KINDS, UNDECIDED, coverings_of, row_signs
 from enumsol.trusted.uniqueness_in_contact import lone_root
 
 if TYPE_CHECKING:
@@ -44,7 +35,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.checker.rational import RationalSystem
+    from enumsol.checker.walk import Codes, Test
     from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.proof.records import Enclosure, Record
     from enumsol.trusted.at_alpha import VerifiedSelection
     from enumsol.trusted.uniqueness import ClosedSolution
 
@@ -53,8 +46,6 @@ if TYPE_CHECKING:
 
 #: Exclusion leaves checked together.
 _BATCH = 256
-#: Entries of a leaf's record, by its kind.
-_ENTRIES = {"x": 3, "X": 3, "n": 1, "r": 4, "N": 1, "D": 3, "z": 1, "u": 2, "M": 4}
 #: Covers underflow of one product.
 _SUBNORMAL = 2.0**-1070
 
@@ -105,10 +96,10 @@ def verify(
         from enumsol.checker.space_checker import SpaceChecker  # with its kernel, for problems in 3D only
 
         return SpaceChecker(problem, progress).run(proof)
-    records = proof.records()
-    header = next(records, None)
+    lines = proof.records()
+    header = next(lines, None)
     if isinstance(header, dict) and header.get("kind") == "graph":
-        return GraphChecker(cast("ContactProblem", problem), header, progress).run(records)
+        return GraphChecker(cast("ContactProblem", problem), header, progress).run(lines)
     return Checker(problem, progress).run(proof)
 
 
@@ -123,6 +114,8 @@ def _is_in_space(problem: object) -> bool:
 @dataclass
 class Checker(TreeChecker):
     """Checks one proof of a problem in 2D."""
+
+    kinds = records.LEAVES
 
     polytopes: list[Polytope] = field(default_factory=list)
     closed: dict[tuple[int, ...], ClosedSolution] = field(default_factory=dict)
@@ -198,10 +191,23 @@ class Checker(TreeChecker):
         for number in leaves.failing(self.system):
             self.fail(f"leaf {number}: its form and multipliers do not exclude it")
 
-    def _declare(self, record: list[Any]) -> None:
-        self._by_forms.declare(record, self.problem.p)
+    def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:
+        if not issubclass(kind, records.Closing):
+            return records.Limits(codes, self.friction, self._by_forms.declared)
+        # as the kernel has it
+        friction = (self.system.F > 0).tolist()
+        if kind is records.ClosedInRationals:
+            _ = self.rational  # refused before the record is read
+        return records.Limits(codes, friction)
 
-    def _coverings(self, code: int, node: int) -> tuple[tuple[int, ...], ...]:
+    def _declare(self, record: list[Any]) -> None:
+        try:
+            form = records.DeclaredForm.read(record, records.Limits((UNDECIDED,) * self.problem.p))
+        except ValueError as error:
+            raise RefusedError(str(error)) from None
+        self._by_forms.declared.append(form)
+
+    def _coverings(self, node: int, code: int) -> tuple[tuple[int, ...], ...]:
         return coverings_of(code, friction=self.friction[node])
 
     def _claim(self, isolated: int, families: int) -> dict[str, int]:
@@ -210,103 +216,98 @@ class Checker(TreeChecker):
 
     # -- leaves ----------------------------------------------------------------------------------------------------
 
-    def _leaf(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        """Check one leaf; the reason when it proves nothing."""
-        kind = record[0]
-        if kind == "f":
-            return self._by_forms.add(self.leaves, codes, record)
-        if not isinstance(kind, str) or kind not in (*_ENTRIES, "m", "a"):
-            return f"unknown kind of record {shown(kind)}"
-        if kind == "m":
-            return self._closed(codes, record)
-        if kind == "a":
-            return self._alone(codes, record)
-        if len(record) != _ENTRIES[kind]:
-            return f"its record has {len(record)} entries; expected {_ENTRIES[kind]}"
-        if kind == "x":
-            self._waiting.append((self.leaves, codes, *multipliers_from(record[1:], ROW_KINDS * self.problem.p)))
-            return None
-        if kind == "X":
-            return self._rational_exclusion(codes, record)
-        if kind == "u":
-            self.undecided += 1
-            return None if isinstance(record[1], str) else "its reason is no text"
-        if kind == "M":
-            return self._closed_in_rationals(codes, record)
-        if kind == "z":
-            unloaded = all(c == UNDECIDED for c in codes) and self.problem.is_unloaded(self.alpha)
-            # g = 0: the energy bound reads lambda' S lambda <= 0
-            self.polytopes.append(((0,) * self.problem.p, [tuple([Fraction(0)] * (2 * self.problem.p))], 0))
-            return None if unloaded else "the problem is not unloaded"
-        if any(code > FRICTIONLESS for code in codes):
-            return "a root or a solved selection is claimed where statuses are still open"
-        return self._solved(codes, record) if kind in ("n", "r") else self._rational_selection(codes, record)
+    def _tests(self) -> dict[type[Record], Test]:
+        return {
+            records.Excluded: self._excluded,
+            records.ExcludedByForm: self._excluded_by_form,
+            records.ExcludedInRationals: self._rational_exclusion,
+            records.NoRoot: self._no_root,
+            records.RegularRoot: self._regular_root,
+            records.NoRootInRationals: self._no_rational_root,
+            records.RootSet: self._root_set,
+            records.Closed: self._closed,
+            records.ClosedInRationals: self._closed_in_rationals,
+            records.Alone: self._alone,
+        }
 
-    def _solved(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+    def _at_rest(self) -> None:
+        self.polytopes.append(((0,) * self.problem.p, [tuple([Fraction(0)] * (2 * self.problem.p))], 0))
+
+    def _excluded(self, codes: Codes, said: records.Excluded) -> str | None:
+        self._waiting.append((self.leaves, codes, said.rows, said.values))
+        return None
+
+    def _excluded_by_form(self, codes: Codes, said: records.ExcludedByForm) -> str | None:
+        self._by_forms.add(self.leaves, codes, said)
+        return None
+
+    def _no_root(self, codes: Codes, said: records.NoRoot) -> str | None:
+        del said
+        if holds_no_root(self.system, codes, solve_selection(self.system, codes)):
+            return None
+        return "its candidate does not break a condition strictly, nor do its equations contradict each other"
+
+    def _regular_root(self, codes: Codes, said: records.RegularRoot) -> str | None:
         ball = solve_selection(self.system, codes)
-        if record[0] == "n":
-            if holds_no_root(self.system, codes, ball):
-                return None
-            return "its candidate does not break a condition strictly, nor do its equations contradict each other"
         if ball is None:
             return "its selection is not proven regular"
         if not ball.is_root:
             return "its candidate is not proven to be a root"
-        return self._regular(codes, ball, *record[1:])
+        return self._regular(codes, ball, said.enclosure)
 
-    def _regular(self, codes: tuple[int, ...], ball: VerifiedSelection, mid: Any, rad: Any, index: Any) -> str | None:
+    def _regular(self, codes: Codes, ball: VerifiedSelection, said: Enclosure) -> str | None:
         """Count a regular root, and look at what is said of it."""
         self.regular += 1
         self.strict.append(codes)
-        centre, radius = (numbers_from(values, len(ball.force)) for values in (mid, rad))
+        centre, radius = said.numbers(len(ball.force))
         with np.errstate(over="ignore", invalid="ignore"):
             reach = np.abs(centre - ball.force * self.force) + ball.force_rad * self.force
             inside = reach * SAFE + np.where(ball.force_rad > 0, _SUBNORMAL, 0.0) <= radius
-        if not np.all(inside):
-            return "its enclosure does not hold the root"
-        return None if type(index) is int and index == ball.det_sign else "its index is wrong"
+        return said.refusal(ball.det_sign, inside=bool(np.all(inside)))
 
-    def _closed(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+    def _closed(self, codes: Codes, said: records.Closed) -> str | None:
         from enumsol.checker.fathomed_subtrees import closed_by_balls
 
-        reason, ball = closed_by_balls(self.system, codes, record, self.force)
+        reason, ball = closed_by_balls(self.system, said, self.force)
         if ball is not None:
             self.closed[ball.core] = ball
         return reason
 
-    def _alone(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        lone = LoneRoot.read(record, codes, [F > 0 for F in self.friction])
-        root = lone_root(self.system, codes, *lone.arguments)
+    def _alone(self, codes: Codes, said: records.Alone) -> str | None:
+        root = lone_root(self.system, codes, *said.arguments)
         return (
-            "its root is not proven to be alone" if root is None else self._regular(lone.selection, root, *record[-3:])
+            "its root is not proven to be alone"
+            if root is None
+            else self._regular(said.selection, root, said.enclosure)
         )
 
-    def _closed_in_rationals(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+    def _closed_in_rationals(self, codes: Codes, said: records.ClosedInRationals) -> str | None:
         from enumsol.checker.fathomed_subtrees import closed_in_rationals
 
-        reason, selection, points = closed_in_rationals(self.system, self.rational, codes, record)
-        self.polytopes += [(selection, points, 0)] if points else []
+        reason, points = closed_in_rationals(self.system, self.rational, codes, said)
+        self.polytopes += [(said.selection, points, 0)] if points else []
         return reason
 
-    def _rational_exclusion(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+    def _rational_exclusion(self, codes: Codes, said: records.ExcludedInRationals) -> str | None:
         p = self.problem.p
-        rows, values = multipliers_from(record[1:], ROW_KINDS * p)
         signs = row_signs(np.array(codes), np.array(self.friction, dtype=float))
         units = [Fraction(self.length[r % p] if r // p < 4 else self.force[r % p]) for r in range(ROW_KINDS * p)]
-        positive = self.rational.energy_bound_positive(signs, rows.tolist(), values.tolist(), units)
+        positive = self.rational.energy_bound_positive(signs, said.rows.tolist(), said.values.tolist(), units)
         return None if positive else "its multipliers do not exclude it in rational arithmetic"
 
-    def _rational_selection(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
+    def _no_rational_root(self, codes: Codes, said: records.NoRootInRationals) -> str | None:
         from enumsol.checker.hull import hull_of_selections
 
-        if record[0] == "N":
-            return "it holds a root" if hull_of_selections(self.rational, codes).points else None
-        _, points, dimension = record
-        _check_points(points, 2 * self.problem.p)
+        del said
+        return "it holds a root" if hull_of_selections(self.rational, codes).points else None
+
+    def _root_set(self, codes: Codes, said: records.RootSet) -> str | None:
+        from enumsol.checker.hull import hull_of_selections
+
         hull = hull_of_selections(self.rational, codes)
         # in lowest terms a number has one text: the texts in a file need no conversion
         found = [[fraction_text(x.numerator, x.denominator) for x in point] for point in hull.points]
-        if not found or sorted(points) != sorted(found) or type(dimension) is not int or dimension != hull.dimension:
+        if not found or sorted(said.points) != sorted(found) or not same(said.dimension, hull.dimension):
             return "its roots are not those that are claimed"
         self.polytopes.append((codes, hull.points, hull.dimension))
         return None
@@ -352,11 +353,3 @@ class Checker(TreeChecker):
         from enumsol.checker.hull import hull_of_selections
 
         return bool(hull_of_selections(self.rational, self.polytopes[k][0], self.polytopes[m][0]).points)
-
-
-def _check_points(points: Any, size: int) -> None:
-    """Raise ValueError unless it is a list of points, each a list of that many texts."""
-    if not isinstance(points, list) or not all(isinstance(point, list) and len(point) == size for point in points):
-        raise ValueError(f"expected points of {size} fractions")
-    if not all(isinstance(x, str) for point in points for x in point):
-        raise ValueError("a coordinate is no text")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from enumsol.checker.reports import MAX_FAILURES, VerificationReport
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.proof.reading import RefusedError, same, shown
+from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, Undecided, Unloaded, kind_of
 from enumsol.trusted.status_rows import UNDECIDED
 
 if TYPE_CHECKING:
@@ -17,6 +19,11 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.data import Data
     from enumsol.proof.proof_file import Proof
+    from enumsol.proof.records import Record
+
+    Codes = tuple[int, ...]
+    #: Checks what a leaf of one kind says; the reason when it proves nothing.
+    Test = Callable[[Codes, Any], str | None]
 
 _REPORT_EVERY = 256
 _END = object()
@@ -37,6 +44,9 @@ class TreeChecker:
     undecided: int = 0
     leaves: int = 0
     data: Data = "problem"
+
+    #: Kinds of leaves, by their letters.
+    kinds: ClassVar[dict[str, type[Record]]]
 
     def run(self, proof: Proof) -> VerificationReport:
         """Check all records.
@@ -83,12 +93,20 @@ class TreeChecker:
     def _read_header(self, header: Any) -> None:
         raise NotImplementedError
 
-    def _coverings(self, code: int, node: int) -> tuple[tuple[int, ...], ...]:
+    def _coverings(self, node: int, code: int) -> tuple[tuple[int, ...], ...]:
         """All ways to cover a partial code by others; none for a final one."""
         raise NotImplementedError
 
-    def _leaf(self, codes: tuple[int, ...], record: list[Any]) -> str | None:
-        """Check one leaf; the reason when it proves nothing."""
+    def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
+        """What a record of this kind may say that stands at this assignment."""
+        raise NotImplementedError
+
+    def _tests(self) -> dict[type[Record], Test]:
+        """How the other leaves are checked, by their kinds."""
+        raise NotImplementedError
+
+    def _at_rest(self) -> None:
+        """Count the root of the unloaded body."""
         raise NotImplementedError
 
     def _declare(self, record: list[Any]) -> None:
@@ -116,9 +134,12 @@ class TreeChecker:
             record = next(records, _END)
             if not isinstance(record, list) or not record:
                 raise RefusedError(f"{len(stack) + 1} subtrees are not accounted for: the tree breaks off")
-            if record[0] == "b":
-                stack.extend(reversed(self._children(codes, record)))
-            elif record[0] == "q":
+            if record[0] == Branching.kind:
+                try:
+                    stack.extend(reversed(Branching.covering(record, codes, self._coverings).below(codes)))
+                except RecordError as error:
+                    raise RefusedError(str(error)) from None
+            elif record[0] == DeclaredForm.kind:
                 if not survey:
                     self._declare(record)
                 stack.append(codes)
@@ -139,10 +160,7 @@ class TreeChecker:
     def _walk(self, records: Iterator[Any]) -> None:
         for codes, record in self._leaves(records):
             self.leaves += 1
-            try:
-                problem = self._leaf(codes, record)
-            except ValueError as error:
-                problem = f"its record cannot be followed ({error})"
+            problem = self._leaf(codes, record)
             if problem is not None:
                 self.fail(f"leaf {self.leaves}: {problem}")
             self._flush(last=False)
@@ -150,13 +168,44 @@ class TreeChecker:
                 self.progress(self.leaves)
         self._flush(last=True)
 
-    def _children(self, codes: tuple[int, ...], record: list[Any]) -> list[tuple[int, ...]]:
-        _, node, children = record if len(record) == 3 else (None, None, None)
-        if type(node) is int and 0 <= node < self.problem.p and isinstance(children, list):
-            coverings = map(sorted, self._coverings(codes[node], node))
-            if all(type(code) is int for code in children) and sorted(children) in coverings:
-                return [(*codes[:node], code, *codes[node + 1 :]) for code in children]
-        raise RefusedError(f"a branching {shown(record)} does not cover the assignment that it splits")
+    # -- leaves ----------------------------------------------------------------------------------------------------
+
+    def _leaf(self, codes: Codes, record: list[Any]) -> str | None:
+        """Check one leaf; the reason when it proves nothing."""
+        kind = kind_of(record, self.kinds)
+        if kind is None:
+            return f"unknown kind of record {shown(record[0])}"
+        try:
+            test = self.tests.get(kind)
+            if test is None:
+                kind.check(record, Limits(codes))
+                return self._untested()
+            return test(codes, kind.read(record, self._limits(codes, kind)))
+        except RecordError as error:
+            return str(error)
+        except ValueError as error:
+            return f"its record cannot be followed ({error})"
+
+    def _untested(self) -> str:
+        """What is said of a leaf for whose kind there is no test."""
+        raise NotImplementedError
+
+    @cached_property
+    def tests(self) -> dict[type[Record], Test]:
+        """Those of this checker, one for each kind."""
+        return {**self._tests(), Undecided: self._undecided, Unloaded: self._unloaded}
+
+    def _undecided(self, codes: Codes, said: Undecided) -> str | None:
+        del codes
+        self.undecided += 1
+        return None if isinstance(said.reason, str) else "its reason is no text"
+
+    def _unloaded(self, codes: Codes, said: Unloaded) -> str | None:
+        del said
+        unloaded = all(code == UNDECIDED for code in codes) and self.problem.is_unloaded(self.alpha)
+        # g = 0: by the energy bound nothing but lambda = 0 solves
+        self._at_rest()
+        return None if unloaded else "the problem is not unloaded"
 
     def fail(self, message: str) -> None:
         """Take note of a failure.

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from enumsol.errors import InvalidArgumentError
 from enumsol.proof.proof_file import EXPANSION, MAGIC, SMALL, ProofFormatError, decoded, lines_of
 from enumsol.proof.reading import same, shown
+from enumsol.proof.records import Undecided
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 #: Bytes that are expanded at once: what is lost before a damaged place.
 _CHUNK = 512
 #: How an undecided leaf and the footer begin: what needs no proof, and is found out anew.
-_OPEN = (b'["u"', b"{")
+_OPEN = (f'["{Undecided.kind}"'.encode(), b"{")
 
 
 class BegunProof:

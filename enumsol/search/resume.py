@@ -13,13 +13,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from enumsol.model.statuses import CONTACT, SLIDING, UNDECIDED
-from enumsol.proof.form_records import DeclaredForm
-from enumsol.proof.reading import multipliers_from
-from enumsol.proof.root_records import LoneRoot
+from enumsol.proof import records
 from enumsol.search.fathoming_in_contact import LoneProposal
 from enumsol.search.tree import TreeNode
 from enumsol.trusted.quadratic_forms import EnclosedForm
-from enumsol.trusted.status_rows import ROW_KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -34,8 +31,6 @@ if TYPE_CHECKING:
 
 #: Progress is reported after so many nodes.
 _REPORT_EVERY = 64
-#: Kinds of leaves (docs/proof_format.md): excluded by multipliers, closed by a solution, solved selections.
-_EXCLUDED, _CLOSED, _SOLVED, _ALONE = ("x", "X", "f"), ("m", "M"), ("n", "r", "N", "D"), "a"
 
 
 @dataclass(frozen=True)
@@ -79,14 +74,14 @@ class PlaneReader:
     """
 
     def __init__(self, friction: Sequence[bool], enclosed: EnclosedSystem | None) -> None:
-        self._p, self._friction, self._enclosed = len(friction), friction, enclosed
-        self._declared: list[DeclaredForm] = []
+        self._friction, self._enclosed = friction, enclosed
+        self._declared: list[records.DeclaredForm] = []
         #: Forms that were used, the last one last.
-        self._used: dict[DeclaredForm, EnclosedForm] = {}
+        self._used: dict[records.DeclaredForm, EnclosedForm] = {}
 
     def declare(self, record: list[Any]) -> None:
         """Take note of a form; ValueError where the record makes no sense."""
-        said = DeclaredForm.read(record, self._p)
+        said = records.DeclaredForm.read(record, records.Limits((UNDECIDED,) * len(self._friction)))
         # parts of one search declare the same form
         self._declared.append(next((known for known in self._used if known.same(said)), said))
 
@@ -96,29 +91,25 @@ class PlaneReader:
 
     def bound(self, codes: Codes, record: list[Any]) -> Bound:
         """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
-        form = None
-        if record[0] == "f":
-            form, record = self._form(codes, record), record[1:]
-        return RecordedBound(*multipliers_from(record[1:], ROW_KINDS * self._p), form)
+        limits = records.Limits(codes, self._friction, self._declared)
+        if record[0] != records.ExcludedByForm.kind:
+            plain = records.Excluded.read(record, limits)
+            return RecordedBound(plain.rows, plain.values)
+        said = records.ExcludedByForm.read(record, limits)
+        return RecordedBound(said.rows, said.values, self._enclosed_form(self._declared[-said.back]))
 
     def lone(self, codes: Codes, record: list[Any]) -> tuple[LoneProposal, Bound]:
         """What is said to show that a root is alone below it; ValueError where the record makes no sense."""
-        said = LoneRoot.read(record, codes, self._friction)
+        said = records.Alone.read(record, records.Limits(codes, self._friction))
         return LoneProposal(said.selection, said.weights, said.strengths), RecordedBound(said.rows, said.values)
 
-    def _form(self, codes: Codes, record: list[Any]) -> EnclosedForm:
-        back = record[1] if len(record) > 1 else None
-        if self._enclosed is None or type(back) is not int or not 1 <= back <= len(self._declared):
-            raise ValueError("its form was not declared")
-        said = self._declared[-back]
-        if not said.holds(codes):
-            raise ValueError("its form was made for another assignment")
-        form = self._used.get(said)
-        if form is None:
+    def _enclosed_form(self, said: records.DeclaredForm) -> EnclosedForm:
+        if self._enclosed is None:
+            raise ValueError("there are no balls")
+        if said not in self._used:
             with np.errstate(over="ignore", invalid="ignore"):
-                form = EnclosedForm.of(self._enclosed, said.codes, said.multipliers, said.weight)
-            self._used[said] = form
-        return form
+                self._used[said] = EnclosedForm.of(self._enclosed, said.codes, said.multipliers, said.weight)
+        return self._used[said]
 
 
 def resume(search: TreeSearch, reader: Reader, begun: BegunProof, passed: Callable[[], None]) -> None:
@@ -176,55 +167,46 @@ class Replay:
     def _take(self, stack: list[TreeNode], record: list[Any]) -> bool:
         """Take one record; False if it and what follows make no sense."""
         search = self._search
-        if record[0] == "q":
+        if record[0] == records.DeclaredForm.kind:
             try:
                 self._reader.declare(record)
             except ValueError:
                 return False
             return True
         item = stack.pop()
-        if record[0] != "b":
+        if record[0] != records.Branching.kind:
             if self._proven(item, record):
                 search.outcome.resumed += 1
             else:
                 self._below(item)
             return True
-        children = self._children(item.codes, record)
-        if not children:
+        try:
+            split = records.Branching.covering(record, item.codes, search.splitting.coverings)
+        except records.RecordError:
             stack.append(item)
             return False
-        node, weight = record[1], item.weight / len(children)
-        search.certifier.branching(node, children)
+        search.certifier.branching(split.node, split.children)
         search.outcome.resumed += 1
-        for code in reversed(children):
-            codes = (*item.codes[:node], code, *item.codes[node + 1 :])
-            stack.append(TreeNode(None, codes, node, last=False, weight=weight))
+        weight = item.weight / len(split.children)
+        below = reversed(split.below(item.codes))
+        stack += [TreeNode(None, codes, split.node, last=False, weight=weight) for codes in below]
         return True
-
-    def _children(self, codes: Codes, record: list[Any]) -> list[int]:
-        """The codes of a branching; none where they do not cover the assignment."""
-        _, node, children = record if len(record) == 3 else (None, None, None)
-        if type(node) is not int or not 0 <= node < len(codes) or not isinstance(children, list):
-            return []
-        coverings = map(sorted, self._search.splitting.coverings(node, codes[node]))
-        fits = all(type(code) is int for code in children) and sorted(children) in coverings
-        return children if fits else []
 
     def _proven(self, item: TreeNode, record: list[Any]) -> bool:
         """Whether a leaf is proven again, and written."""
-        kind, search = record[0], self._search
-        if kind in _EXCLUDED:
+        kind, search = records.kind_of(record, records.LEAVES) or records.Record, self._search
+        if issubclass(kind, records.Exclusion):
             try:
                 bound = self._reader.bound(item.codes, record)
             except ValueError:
                 return False
             return search.excluded(item, bound)
-        if kind == _ALONE:
+        if issubclass(kind, records.Alone):
             try:
                 return search.alone(item, *self._reader.lone(item.codes, record))
             except ValueError:
                 return False
-        if kind in _CLOSED:
+        if issubclass(kind, records.Closing):
             return search.closed(item, search.relaxed(item.codes), again=True)
         partial = any(code in (CONTACT, UNDECIDED, *SLIDING) for code in item.codes)
-        return kind in _SOLVED and not partial and search.settled(item)
+        return issubclass(kind, records.Solved) and not partial and search.settled(item)

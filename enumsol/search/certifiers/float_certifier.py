@@ -44,9 +44,8 @@ class FastCertifier(WithoutProof):
     changes its bound by the multipliers times the shift; a pruning that does not survive it is branched on.
     """
 
-    hard = False
     # with other numbers forms are definite where they nearly are not: several points may hold within the tolerance
-    exactly, plain, lone = True, True, False
+    plain = True
 
     def __init__(self, selections: FloatSelections) -> None:
         self._selections = selections

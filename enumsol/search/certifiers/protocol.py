@@ -157,6 +157,8 @@ class WithoutProof:
     """Base of certifiers that write no proof."""
 
     recorder: Recorder = Unrecorded()
+    hard = False
+    exactly, plain, lone = True, False, False
 
     def __init__(self) -> None:
         self.sliding: dict[int, int] = {}

@@ -34,9 +34,6 @@ _NEWTON_STEPS = 8
 class ExactCertifier(WithoutProof):
     """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, (6.1))."""
 
-    hard = False
-    exactly, plain, lone = True, False, False
-
     def __init__(
         self, selections: ExactSelections, scaled: ScaledSystem, enclosed: EnclosedSystem | None = None
     ) -> None:

@@ -6,15 +6,17 @@ problem is small enough, otherwise the selection is left undecided with the reas
 
 from __future__ import annotations
 
-import enum
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.model.statuses import CONDITIONS, RowKind
-from enumsol.proof.proof_file import fraction_text, packed, shortened
+from enumsol.proof import records
+from enumsol.proof.proof_file import fraction_text, shortened
 from enumsol.search.certifiers.margins import energy_margin, margin_of_form
 from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
+from enumsol.search.certifiers.recording import WIDEN, RecordingCertifier
 from enumsol.search.fathoming import propose, without_load
 from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.compressed_parts import Recorder
+    from enumsol.proof.records import Enclosure, Record
     from enumsol.search.certifiers.margins import Margin
     from enumsol.search.certifiers.protocol import Bound
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
@@ -40,27 +43,6 @@ if TYPE_CHECKING:
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
     Array = NDArray[np.float64]
-
-#: The balls written into a proof are wider than those found by this factor, so that a checker's own balls fit in.
-_WIDEN = 4.0
-
-
-class Leaf(enum.StrEnum):
-    """Kinds of leaves in a proof (docs/proof_format.md); a checker keeps its own list."""
-
-    EXCLUDED = "x"
-    EXCLUDED_IN_RATIONALS = "X"
-    EXCLUDED_BY_FORM = "f"
-    NO_ROOT = "n"
-    NO_ROOT_IN_RATIONALS = "N"
-    REGULAR_ROOT = "r"
-    POLYTOPE = "D"
-    UNLOADED = "z"
-    UNDECIDED = "u"
-    CLOSED = "m"
-    ALONE = "a"
-    CLOSED_IN_RATIONALS = "M"
-
 
 _ROW_NAMES = {
     RowKind.NORMAL_FORCE: "the normal force of node {}",
@@ -72,15 +54,11 @@ _ROW_NAMES = {
 }
 #: Bounds above this are hardly lowered by rounding the multipliers: of a wedge's 28,196 ten are halved.
 _CLEAR = 1e-6
-#: Begins the record of a branching, which is not a leaf.
-_BRANCHING = "b"
 #: How often the error bound of an exclusion with a form is subtracted.
 _FORM_ERRORS = 4.0
-#: Begins the record of a form, which is none either.
-_FORM = "q"
 
 
-class VerifiedCertifier:
+class VerifiedCertifier(RecordingCertifier):
     """Proves prunings and complete selections, and writes the proof.
 
     Parameters
@@ -105,21 +83,18 @@ class VerifiedCertifier:
         recorder: Recorder,
         node_ids: Sequence[Any],
     ) -> None:
+        super().__init__(recorder)
         self._scaled = scaled
         self._enclosed = enclosed
         self._margin = None if enclosed is None else energy_margin(enclosed)
         self._exact = exact
-        self.recorder = recorder
         self._node_ids = node_ids
         self._escalations = Escalations()
-        self._verified: dict[Codes, VerifiedSelection | ClosedSolution] = {}
-        self._leaves = 0
         #: Forms in the order in which they were written.
         self._forms: dict[EnclosedForm, int] = {}
         self._form_margins: dict[EnclosedForm, Margin] = {}
         #: A complete selection was not decided by balls.
         self.hard = False
-        self.sliding: dict[int, int] = {}
         #: Selections of the roots found in rationals.
         self._known: list[Codes] = []
 
@@ -136,16 +111,14 @@ class VerifiedCertifier:
         if self._margin is not None:
             if (proven := _proven(self._margin, codes, rows, values)) is not None:
                 self._escalations.balls += 1
-                self._leaf(Leaf.EXCLUDED, *packed(rows, proven))
+                self._leaf(records.Excluded(rows, proven))
                 return True
         elif (certifier := self._exact()) is not None and certifier.excluded(codes, relaxation):
             # no balls for an S that is positive definite only within rounding
             self._escalations.rationals += 1
             # the certifier passes over multipliers that prove nothing, a checker refuses them
-            kind, node = np.divmod(rows, self._scaled.p)
-            signs = row_signs(np.array(codes), self._scaled.F)[node, kind]
-            keep = (signs == FREE) | ((signs == NONNEGATIVE) & (values > 0))
-            self._leaf(Leaf.EXCLUDED_IN_RATIONALS, *packed(rows[keep], values[keep]))
+            kept = self._allowed(codes, rows, values)
+            self._leaf(records.ExcludedInRationals(*kept))
             return True
         self._escalations.refined += 1
         return False
@@ -161,20 +134,17 @@ class VerifiedCertifier:
             return False
         if form not in self._forms:
             self._forms[form] = len(self._forms)
-            codes_text = "".join(map(str, form.codes))
-            self.recorder.write([_FORM, codes_text, *form.multipliers.tolist(), form.weight])
+            self.recorder.write(records.DeclaredForm(form.codes, form.multipliers, form.weight).write())
         self._escalations.balls += 1
-        self._leaf(Leaf.EXCLUDED_BY_FORM, len(self._forms) - self._forms[form], *packed(rows, proven))
+        self._leaf(records.ExcludedByForm(len(self._forms) - self._forms[form], rows, proven))
         return True
 
-    def branching(self, node: int, children: Sequence[int]) -> None:
-        """Write a branching of the tree."""
-        self.recorder.write([_BRANCHING, node, list(children)])
-
-    def skipped(self, codes: Codes, reason: str) -> None:
-        """Write a subtree that was not examined."""
-        del codes
-        self._leaf(Leaf.UNDECIDED, reason)
+    def _allowed(self, codes: Codes, rows: NDArray[np.intp], values: Array) -> tuple[NDArray[np.intp], Array]:
+        """Those rows and multipliers that may prove something."""
+        kind, node = np.divmod(rows, self._scaled.p)
+        signs = row_signs(np.array(codes), self._scaled.F)[node, kind]
+        keep = (signs == FREE) | ((signs == NONNEGATIVE) & (values > 0))
+        return rows[keep], values[keep]
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in a complete selection."""
@@ -184,7 +154,7 @@ class VerifiedCertifier:
             return self._regular(codes, ball)
         if self._enclosed is not None and holds_no_root(self._enclosed, codes, ball):
             self._escalations.balls += 1
-            self._leaf(Leaf.NO_ROOT)
+            self._leaf(records.NoRoot())
             return None
         self.hard = True
         certifier = self._exact()
@@ -197,13 +167,13 @@ class VerifiedCertifier:
             return self._undecided(codes, solution.reason, solution.hint)
         self._escalations.rationals += 1
         if solution is None:
-            self._leaf(Leaf.NO_ROOT_IN_RATIONALS)
+            self._leaf(records.NoRootInRationals())
         else:
             self._known.append(codes)
             if ball is not None:
                 self._take_note(ball.force, ball.w)
             points = [[_fraction(v) for v in vertex] for vertex in solution.vertices]
-            self._leaf(Leaf.POLYTOPE, points, solution.dimension)
+            self._leaf(records.RootSet(points, solution.dimension))
         return solution
 
     # -- subtrees closed by their only possible solution (theory, section 6.11) ---------------------------------------
@@ -224,7 +194,7 @@ class VerifiedCertifier:
             closing, solutions = exact
             self._known += [solution.codes for solution in solutions]
             self._escalations.rationals += 1
-            self._leaf(Leaf.CLOSED_IN_RATIONALS, closing.selection, closing.numbers, len(solutions))
+            self._leaf(records.ClosedInRationals(closing.selection, closing.numbers, len(solutions)))
             return solutions
         found = None if proposal is None or ball is None or ball.is_wide else self._closed_by(proposal, ball)
         if found and proposal is not None and certifier is not None:
@@ -238,18 +208,13 @@ class VerifiedCertifier:
         """The root of what is proposed, if it is proven to be the only one below a partial assignment; else None."""
         if self._enclosed is None:
             return None
-        rows, values = bound.multipliers()
-        kind, node = np.divmod(rows, self._scaled.p)
-        signs = row_signs(np.array(codes), self._scaled.F)[node, kind]
-        keep = (signs == FREE) | ((signs == NONNEGATIVE) & (values > 0))
-        rows, values = rows[keep], values[keep]
-        given = proposal.selection, proposal.weights, proposal.strengths
-        root = lone_root(self._enclosed, codes, *given, rows, values)
+        terms = self._allowed(codes, *bound.multipliers())
+        given = (proposal.selection, proposal.weights, proposal.strengths, *terms)
+        root = lone_root(self._enclosed, codes, *given)
         if root is None:
             return None
         self._escalations.balls += 1
-        numbers = [proposal.weights.tolist(), proposal.strengths.ravel().tolist(), *packed(rows, values)]
-        return [self._regular(proposal.selection, root, Leaf.ALONE, proposal.selection, *numbers)]
+        return [self._regular(proposal.selection, root, partial(records.Alone, *given))]
 
     def _take_note(self, force: Array, w: Array) -> None:
         """Take note of nodes that slide without load at a solution."""
@@ -277,15 +242,10 @@ class VerifiedCertifier:
 
     def _closed_by(self, proposal: Proposal, ball: ClosedSolution) -> list[SelectionSolution] | None:
         """Write a leaf and give its solutions; None where a root could not be told from another one."""
-        record = [
-            proposal.named,
-            proposal.free,
-            proposal.numbers,
-            (ball.force * self._scaled.force).tolist(),
-        ]
+        record = proposal.named, proposal.free, proposal.numbers, ball.force * self._scaled.force
         if ball.is_excluded:
             self._escalations.balls += 1
-            self._leaf(Leaf.CLOSED, *record)
+            self._leaf(records.Closed(*record))
             return []
         solution = self._regular_one(ball)
         if solution is None:
@@ -298,8 +258,7 @@ class VerifiedCertifier:
                 ball.core, (ball.force,), 0, 0, strict=False, index=ball.sign, possible=ball.possible
             )
         self._escalations.balls += 1
-        radius = ball.force_rad * self._scaled.force * _WIDEN
-        self._leaf(Leaf.CLOSED, *record, radius.tolist(), ball.sign)
+        self._leaf(records.Closed(*record, self._ball(ball, ball.sign)))
         return [solution]
 
     def _regular_one(self, ball: ClosedSolution) -> SelectionSolution | None:
@@ -313,40 +272,36 @@ class VerifiedCertifier:
         self._verified[codes] = regular
         return SelectionSolution(codes, (regular.force,), 0, regular.det_sign, strict=True)
 
-    def unloaded(self) -> None:
-        """Write the proof of the unloaded body."""
-        self._leaf(Leaf.UNLOADED)
-
     def add(self, part: Certified) -> None:
         """Take over what the certifier of a subtree has proven."""
-        self._verified |= part.verified
-        self._leaves += part.leaves
-        self.sliding |= part.sliding
+        super().add(part)
         if part.escalations is not None:
             self._escalations.add(part.escalations)
 
     def forget(self) -> None:
         """Forget what was proven."""
-        self._verified, self._escalations, self._leaves = {}, Escalations(), 0
+        super().forget()
+        self._escalations = Escalations()
         self._forms.clear()
         self._known.clear()
 
-    def _regular(self, codes: Codes, ball: VerifiedSelection, *leaf: Any) -> SelectionSolution:
-        """Write a leaf with a regular root; ``leaf`` is what comes before its enclosure."""
+    def _regular(
+        self, codes: Codes, ball: VerifiedSelection, leaf: Callable[[Enclosure], Record] = records.RegularRoot
+    ) -> SelectionSolution:
+        """Write a leaf with a regular root, made of its enclosure."""
         self._verified[codes] = ball
-        force = ball.force * self._scaled.force
-        radius = ball.force_rad * self._scaled.force * _WIDEN
-        self._leaf(*(leaf or (Leaf.REGULAR_ROOT,)), force.tolist(), radius.tolist(), ball.det_sign)
+        self._leaf(leaf(self._ball(ball, ball.det_sign)))
         return SelectionSolution(codes, (ball.force,), 0, ball.det_sign, strict=True)
 
     def _undecided(self, codes: Codes, reason: str, hint: str) -> UndecidedPart:
         self._escalations.undecided += 1
-        self._leaf(Leaf.UNDECIDED, reason)
+        self._leaf(records.Undecided(reason))
         return UndecidedPart(codes, reason, hint, examined=True)
 
-    def _leaf(self, kind: Leaf, *record: Any) -> None:
-        self._leaves += 1
-        self.recorder.write([kind, *record])
+    def _ball(self, found: VerifiedSelection | ClosedSolution, index: int | None) -> Enclosure:
+        """Where a root is, in the problem's units."""
+        force = self._scaled.force
+        return records.Enclosure(found.force * force, found.force_rad * force * WIDEN, index)
 
 
 def _proven(margin: Margin, codes: Codes, rows: NDArray[np.intp], values: Array) -> Array | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,10 +9,12 @@ import numpy as np
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.sectors import DEEPEST, SECTORS, direction, end_number, level_of
 from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.proof.reading_space import multipliers_in_space
+from enumsol.proof.records import Enclosure, Limits, NoRoot, RegularRoot, Undecided
+from enumsol.proof.space_records import ExcludedInSpace, OnlyRoot
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart
+from enumsol.search.certifiers.recording import WIDEN, RecordingCertifier
 from enumsol.search.resume import RecordedBound
 from enumsol.trusted.space.leaves import Cause, Open, SpaceRoot, settle
 from enumsol.trusted.space.sector_rows import exclusion_margin, row_terms
@@ -105,16 +106,15 @@ class SpaceReader:
     def bound(self, codes: Codes, record: list[Any]) -> Bound:
         """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
         engine, p = self._engine, len(codes)
-        if len(record) != 3:
-            raise ValueError("no three entries")
-        rows, values = multipliers_in_space(record[1], record[2], p)
+        said = ExcludedInSpace.read(record, Limits(codes))
+        rows = said.rows
         for row in rows:
             row_terms(row, engine.system.tau, len(engine.system.g))  # there is such a row
         slots = [engine.slot(row) for row in rows]
         numbers = [slot * p + row[1] for slot, row in zip(slots, rows, strict=True) if slot is not None]
         if len(numbers) < len(rows):
             raise ValueError("no room for its rows")
-        return RecordedBound(np.array(numbers, dtype=np.intp), values)
+        return RecordedBound(np.array(numbers, dtype=np.intp), said.values)
 
 
 def _towards(code: int, vector: np.ndarray) -> float:
@@ -124,7 +124,7 @@ def _towards(code: int, vector: np.ndarray) -> float:
     return float(middle @ vector / np.linalg.norm(middle))
 
 
-class SpaceCertifier:
+class SpaceCertifier(RecordingCertifier):
     """Proves prunings and leaves by the kernel, and writes the proof.
 
     Parameters
@@ -136,15 +136,13 @@ class SpaceCertifier:
     """
 
     def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, recorder: Recorder) -> None:
-        self._engine, self.enclosed, self.recorder = engine, enclosed, recorder
-        self._roots: dict[Codes, SpaceRoot | OnlySolution] = {}
-        self.sliding: dict[int, int] = {}
-        self._leaves = 0
+        super().__init__(recorder)
+        self._engine, self.enclosed = engine, enclosed
 
     @property
     def certified(self) -> Certified:
         """What was proven so far."""
-        return Certified(self._roots, None, self._leaves)
+        return Certified(self._verified, None, self._leaves)
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
@@ -154,33 +152,23 @@ class SpaceCertifier:
         rows = [self._engine.rows[number] for number in numbers.tolist()]
         if not exclusion_margin(self.enclosed, codes, rows, values, errors=2.0) > 0:
             return False
-        self._leaf("x", [list(row) for row in rows], base64.b64encode(values.astype("<f8").tobytes()).decode())
+        self._leaf(ExcludedInSpace(rows, values))
         return True
-
-    def branching(self, node: int, children: Sequence[int]) -> None:
-        """Write a branching of the tree."""
-        self.recorder.write(["b", node, list(children)])
-
-    def skipped(self, codes: Codes, reason: str) -> None:
-        """Write a subtree that was not examined."""
-        del codes
-        self._leaf("u", reason)
 
     def selection(self, codes: Codes) -> SpaceRoot | UndecidedPart | Refine | None:
         """The root of a leaf, a sector to halve, or why the leaf stays open."""
         answer = settle(self.enclosed, codes)
         if answer is None:
-            self._leaf("n")
+            self._leaf(NoRoot())
         elif isinstance(answer, Open):
             if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
                 return Refine(answer.node)
-            self._leaf("u", answer.cause.value)
+            self._leaf(Undecided(answer.cause.value))
             hint = _HOLD if answer.cause is Cause.ROUNDING else _PERTURB
             return UndecidedPart(codes, answer.cause.value, hint, examined=True)
         else:
-            self._roots[codes] = answer
-            unit = self.enclosed.unit
-            self._leaf("r", (answer.y.mid * unit).tolist(), (4.0 * answer.y.rad * unit).tolist(), answer.index)
+            self._verified[codes] = answer
+            self._leaf(RegularRoot(self._ball(answer)))
         return answer
 
     def close(self, numbers: Array, codes: Codes | None, normal: Array) -> list[SpaceRoot | OnlySolution] | None:
@@ -202,25 +190,12 @@ class SpaceCertifier:
             return None
         if found is None or not np.max(found.y.rad) <= _PLACED * np.max(np.abs(found.y.mid), initial=_SMALL_FORCE):
             return None
-        self._roots[codes or (UNDECIDED,) * len(normal)] = found
-        unit = self.enclosed.unit
-        ball = (found.y.mid * unit).tolist(), (4.0 * found.y.rad * unit).tolist()
-        self._leaf("m", numbers.tolist(), list(codes or ()), *ball, found.index)
+        self._verified[codes or (UNDECIDED,) * len(normal)] = found
+        ball = self._ball(found)
+        self._leaf(OnlyRoot(numbers, codes or (), ball.mid, ball))
         return [found]
 
-    def unloaded(self) -> None:
-        """Write the proof of the unloaded body."""
-        self._leaf("z")
-
-    def add(self, part: Certified) -> None:
-        """Take over what the certifier of a subtree has proven."""
-        self._roots |= part.verified
-        self._leaves += part.leaves
-
-    def forget(self) -> None:
-        """Forget what was proven."""
-        self._roots, self._leaves = {}, 0
-
-    def _leaf(self, kind: str, *record: object) -> None:
-        self._leaves += 1
-        self.recorder.write([kind, *record])
+    def _ball(self, found: SpaceRoot | OnlySolution) -> Enclosure:
+        """Where a root is, in the problem's units."""
+        unit = self.enclosed.unit
+        return Enclosure(found.y.mid * unit, WIDEN * found.y.rad * unit, found.index)

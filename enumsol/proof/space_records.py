@@ -1,0 +1,110 @@
+"""Leaves of proofs about problems in 3D, and the table of their kinds (see ``proof.records``)."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.model.sectors import DEEPEST
+from enumsol.proof.reading import bytes_from, numbers_from, shown
+from enumsol.proof.records import (
+    Enclosure,
+    Exclusion,
+    Limits,
+    NoRoot,
+    Record,
+    RecordError,
+    RegularRoot,
+    Undecided,
+    Unloaded,
+    by_kind,
+)
+from enumsol.trusted.space.sector_rows import FORCE, GAP, RIGHT, UNDECIDED
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.trusted.space.sector_rows import Row
+
+    Array = NDArray[np.float64]
+
+#: Numbers of directions and sectors in rows are less: tangents may be two levels finer than the finest sector.
+_NUMBERS = 1 << (DEEPEST + 3)
+
+
+@dataclass(frozen=True, eq=False)
+class ExcludedInSpace(Exclusion):
+    """Multipliers of rows exclude the assignment."""
+
+    kind, sizes = "x", (3,)
+
+    rows: list[Row]
+    values: Array
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> ExcludedInSpace:
+        """Rows and as many multipliers."""
+        rows, text = entries
+        if not all((isinstance(rows, list), isinstance(text, str))):
+            raise ValueError("its multipliers are no list of rows and a text")
+        values = np.frombuffer(bytes_from(text), dtype="<f8").astype(np.float64)
+        if len(rows) != len(values):
+            raise ValueError(f"{len(rows)} rows and {len(values)} multipliers")
+        return cls([_row(row, limits.p) for row in rows], values)
+
+    def entries(self) -> Iterable[Any]:
+        """Rows, and the multipliers as a text."""
+        return self.rows, base64.b64encode(self.values.astype("<f8").tobytes()).decode()
+
+
+@dataclass(frozen=True, eq=False)
+class OnlyRoot(Record):
+    """The whole tree: the problem has this solution only.
+
+    Attributes
+    ----------
+    numbers : of the form, as ``trusted.space.space_uniqueness.Numbers.of`` takes them
+    leaf : codes of a leaf that holds the solution, or none
+    force : midpoint of the enclosure
+    enclosure : Enclosure
+    """
+
+    kind, sizes = "m", (6,)
+
+    numbers: Array
+    leaf: tuple[int, ...]
+    force: Array
+    enclosure: Enclosure
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> OnlyRoot:
+        """Numbers and codes, at the root of the tree."""
+        if any(code != UNDECIDED for code in limits.codes):
+            raise RecordError("its only solution is claimed below the root of the tree")
+        values, leaf, mid, *_ = entries
+        numbers, force = numbers_from(values, limits.p + 2 * limits.components), numbers_from(mid, limits.components)
+        if not isinstance(leaf, list) or not all(type(code) is int for code in leaf):
+            raise RecordError("its leaf is no list of codes")
+        return cls(numbers, tuple(leaf), force, Enclosure(*entries[2:]))
+
+    def entries(self) -> Iterable[Any]:
+        """The enclosure has the midpoint."""
+        return self.numbers, self.leaf, *self.enclosure
+
+
+#: All kinds of leaves in 3D.
+LEAVES = by_kind(ExcludedInSpace, NoRoot, RegularRoot, OnlyRoot, Unloaded, Undecided)
+
+
+def _row(row: Any, p: int) -> Row:
+    if not isinstance(row, list) or len(row) != 3 or not all(type(x) is int for x in row):
+        raise ValueError(f"{shown(row)} is no row")
+    kind, node, number = row
+    known = 0 <= kind <= RIGHT and 0 <= node < p and -1 <= number < _NUMBERS
+    if not known or (kind in (GAP, FORCE) and number):
+        raise ValueError(f"row {shown(row)} does not exist")
+    return kind, node, number
