@@ -30,8 +30,8 @@ What checker and search share
     - for the arcs of branch graphs: ``trusted.selection``, the numbers of unknowns and conditions;
       ``trusted.arcs.selection_balls``, ``trusted.arcs.series`` and ``trusted.arcs.over_parts``, a selection over an
       interval as a series with bounds of its error; ``trusted.arcs.precise`` and ``trusted.arcs.many_digits``, the same
-      with many digits, loaded only where a box asks for it; ``trusted.arcs.only_branch``, the test by which the roots of arcs are the only solutions over a piece;
-      ``arithmetic.ball_arrays`` (in 3D, too);
+      with many digits, loaded only where a box asks for it; ``trusted.arcs.only_branch``, the test by which the roots
+      of arcs are the only solutions over a piece; ``arithmetic.ball_arrays`` (in 3D, too);
     - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings and
       the exclusion inequality; ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds
       and which leaves share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution
@@ -44,8 +44,8 @@ What checker and search share
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file;
     - ``proof.records`` and, for problems in 3D, ``proof.space_records``: what a record of each kind may say. The search
       writes records by these classes, the checkers read them by the same ones, strictly, and so does a search that
-      resumes from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer`` and
-      ``proof.compressed_parts`` have it. What a record makes of a leaf is not in these classes: a checker tests it;
+      resumes from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer``
+      and ``proof.compressed_parts`` have it. What a record makes of a leaf is not in these classes: a checker tests it;
     - ``model.problem``, ``model.body2d``, ``model.contact_body``, ``condensation.data``, ``condensation.condensed``,
       ``condensation.factorization``, ``support.immutable``, ``support.arguments``, ``support.array_arguments``,
       ``support.files``, ``support.messages`` and ``errors``: the data, their checks and their fingerprint, the
