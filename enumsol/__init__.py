@@ -60,11 +60,11 @@ if TYPE_CHECKING:
     )
     from enumsol.io import read_problem, write_problem
     from enumsol.io.vtu import write_vtu
-    from enumsol.model.body2d import PlaneMesh
-    from enumsol.model.body3d import BodyMesh, SlipMean
     from enumsol.model.friction import FrictionTable
+    from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.slip_mean import SlipMean
     from enumsol.model.statuses import ContactStatus, sign_array
     from enumsol.proof.proof_file import Proof, ProofFormatError
     from enumsol.report import write_report
@@ -79,8 +79,6 @@ if TYPE_CHECKING:
 #: Where the public names are at home. A module is loaded when a name of it is first used, so that a program loads what
 #: it works with and no more: sparse matrices come with a problem, networkx and rational arithmetic with a branch graph.
 _HOMES = {
-    "enumsol.model.body2d": ("PlaneMesh",),
-    "enumsol.model.body3d": ("BodyMesh", "SlipMean"),
     "enumsol.branches": ("BranchGraph", "branch_graph", "link_samples", "multiplicity_table"),
     "enumsol.checker.verify": ("verify",),
     "enumsol.proof.proof_file": ("Proof", "ProofFormatError"),
@@ -122,6 +120,8 @@ _HOMES = {
         "successive_approximations",
     ),
     "enumsol.model.friction": ("FrictionTable",),
+    "enumsol.model.mesh": ("BodyMesh",),
+    "enumsol.model.slip_mean": ("SlipMean",),
     "enumsol.report": ("write_report",),
     "enumsol.model.problem": ("ContactProblem",),
     "enumsol.model.problem3d": ("ContactProblem3D",),
@@ -175,7 +175,6 @@ __all__ = [
     "OutputError",
     "Path",
     "PiecewiseSmoothEquation",
-    "PlaneMesh",
     "Polytope",
     "Proof",
     "ProofFormatError",

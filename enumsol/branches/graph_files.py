@@ -22,7 +22,7 @@ from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.body2d import PlaneMesh
+from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import ContactProblem
 from enumsol.model.statuses import ContactStatus
 from enumsol.roots.root import Polytope, RootFamily
@@ -131,7 +131,7 @@ def _problem_record(problem: ContactProblem) -> dict[str, Any]:
     }
 
 
-def _mesh_record(mesh: PlaneMesh | None) -> dict[str, Any] | None:
+def _mesh_record(mesh: BodyMesh | None) -> dict[str, Any] | None:
     if mesh is None:
         return None
     offset = None if mesh.offset is None else mesh.offset.tolist()
@@ -163,7 +163,7 @@ def _problem(record: dict[str, Any]) -> ContactProblem:
         coordinates=record["coordinates"],
         mesh=None
         if (mesh := record.get("mesh")) is None
-        else PlaneMesh(mesh["points"], mesh["cells"], matrix(mesh["motion"]), mesh["offset"]),
+        else BodyMesh(mesh["points"], mesh["cells"], matrix(mesh["motion"]), mesh["offset"]),
     )
 
 

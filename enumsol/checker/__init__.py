@@ -36,8 +36,8 @@ What checker and search share
       the exclusion inequality; ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds
       and which leaves share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution
       only; ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the variables
-      in which friction is isotropic; ``model.problem3d``, ``model.body3d`` and ``model.friction``, the data and their
-      checks;
+      in which friction is isotropic; ``model.problem3d``, ``model.slip_mean`` and ``model.friction``, the data and
+      their checks;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
       search whether it does at all (then there is no proof); ``condensation.affine``: F(alpha) and f(alpha) without
       rounding; of ``arithmetic.rationals`` the pivots of a definite matrix, and floats as rationals;
@@ -46,10 +46,10 @@ What checker and search share
       writes records by these classes, the checkers read them by the same ones, strictly, and so does a search that
       resumes from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer``
       and ``proof.compressed_parts`` have it. What a record makes of a leaf is not in these classes: a checker tests it;
-    - ``model.problem``, ``model.body2d``, ``model.contact_body``, ``condensation.data``, ``condensation.condensed``,
-      ``condensation.factorization``, ``support.immutable``, ``support.arguments``, ``support.array_arguments``,
-      ``support.files``, ``support.messages`` and ``errors``: the data, their checks and their fingerprint, the
-      factorization of A (no bound assumes that it is accurate), S and g as computed;
+    - ``model.problem``, ``model.mesh``, ``model.cells``, ``model.contact_body``, ``condensation.data``,
+      ``condensation.condensed``, ``condensation.factorization``, ``support.immutable``, ``support.arguments``,
+      ``support.array_arguments``, ``support.files``, ``support.messages`` and ``errors``: the data, their checks and
+      their fingerprint, the factorization of A (no bound assumes that it is accurate), S and g as computed;
     - numpy, scipy and python-flint.
 
     They are shared because the two must agree. A leaf is written when its inequality is proven positive, and a second

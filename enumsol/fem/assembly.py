@@ -12,13 +12,14 @@ plain arrays::
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import FLAT, nodal_basis
+from enumsol.fem.construction import axes_of, problem_of
 from enumsol.fem.mesh_checks import (
     elements,
     held_mask,
@@ -31,14 +32,16 @@ from enumsol.fem.mesh_checks import (
     vectors_of_all,
 )
 from enumsol.fem.numbering import gathered
-from enumsol.fem.restrained import ContactNodes, Supports, check_axes, movable, plain_dofs, restrained
-from enumsol.model.body2d import PlaneMesh
-from enumsol.model.problem import ContactProblem
+from enumsol.fem.restrained import Supports, movable, plain_dofs
+from enumsol.model.cells import numbers_of_nodes
+from enumsol.model.mesh import BodyMesh
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
+
+    from enumsol.model.problem import ContactProblem
 
 
 def stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) -> sp.csc_array:
@@ -85,7 +88,7 @@ def plane_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[NDArray[np.float64]
         They are not of the form that `stiffness` takes.
     """
     nodes = positions(points, 2)
-    return nodes, elements(cells, "cells", (3, 4, 6, 8, 9), len(nodes))
+    return nodes, elements(cells, "cells", numbers_of_nodes(2), len(nodes))
 
 
 def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> NDArray[np.float64]:
@@ -273,52 +276,20 @@ def contact_problem(
     if springs is not None:
         A = sp.csc_array(A + sp.diags_array(spring_stiffnesses(springs, nodes.shape).ravel()))
     normal = unit_vectors(vectors_of_all(normals, "normals", (len(touching), 2)), "normals")
-    return plane_problem(
+    contact_nodes = movable(touching, normal, supports)
+    problem = problem_of(
         A,
         nodal_vectors(forces, "forces", nodes.shape),
         None if forces_slope is None else nodal_vectors(forces_slope, "forces_slope", nodes.shape),
         plain_dofs(nodes.shape),
-        movable(touching, normal, supports),
+        contact_nodes,
+        axes_of(tangents, contact_nodes.normals),
         supports,
-        tangents,
         gap=gap,
         friction=friction,
         slip_offset=slip_offset,
         node_ids=[int(node) for node in touching] if node_ids is None else node_ids,
         coordinates=nodes[touching],
-        mesh=lambda left: PlaneMesh.of_dofs(nodes, bodies, left),
+        mesh=lambda left: BodyMesh.of_dofs(nodes, bodies, left),
     )
-
-
-def plane_problem(
-    A: sp.csc_array,
-    forces: NDArray[np.float64],
-    forces_slope: NDArray[np.float64] | None,
-    dofs: NDArray[np.int64],
-    contact: ContactNodes,
-    supports: Supports,
-    tangents: ArrayLike | None,
-    mesh: Callable[[NDArray[np.int64]], PlaneMesh] | None = None,
-    **more: Any,
-) -> ContactProblem:
-    """The problem of a body with these contact nodes; ``more`` as in `ContactProblem`, the rest as in `restrained`.
-
-    ``mesh`` makes what the problem keeps of its mesh from the degrees of freedom that are left.
-    """
-    tangent = _tangents(tangents, contact.normals)
-    check_axes(contact, (tangent,))
-    body = restrained(A, forces, forces_slope, dofs, supports, contact.apart)
-    Bn, Bt = (body.rows(contact, direction, dofs) for direction in (contact.normals, tangent))
-    kept = None if mesh is None else mesh(body.left)
-    return ContactProblem(body.A, Bn, Bt, body.f, load_slope=body.load_slope, mesh=kept, **more)
-
-
-def _tangents(tangents: ArrayLike | None, normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    if tangents is None:
-        return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-    tangent = unit_vectors(vectors_of_all(tangents, "tangents", normal.shape), "tangents")
-    skew = np.abs(np.sum(tangent * normal, axis=1))
-    if np.any(skew > 1e-12):  # of unit vectors, the cosine of the angle between them, up to rounding
-        k = int(np.argmax(skew))
-        raise InvalidArgumentError(f"tangents row {k} is not perpendicular to normals row {k}; expected right angles")
-    return tangent
+    return cast("ContactProblem", problem)

@@ -13,9 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.cells import KINDS
 from enumsol.fem.mesh_checks import check_every_node_is_used
-from enumsol.model.facets import by_kind
+from enumsol.model.cells import KINDS, by_kind
 
 if TYPE_CHECKING:
     from collections.abc import Callable

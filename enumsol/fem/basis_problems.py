@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.assembly import plane_problem
 from enumsol.fem.bases import between_corners, facet_basis
+from enumsol.fem.construction import axes_of, problem_of
 from enumsol.fem.mesh_checks import unit_vectors, vectors_of_all
-from enumsol.fem.restrained import ContactNodes, Supports, check_axes, movable, restrained
+from enumsol.fem.restrained import Supports, movable
 from enumsol.support.arguments import shown
 from enumsol.support.array_arguments import plain_array, real_array, real_matrix
 
@@ -121,41 +120,9 @@ def basis_contact_problem(
     more = {"gap": [gap(place) for place in at] if callable(gap) else gap, "coordinates": at, **more}
     more.setdefault("node_ids", nodes.nodes.tolist())
     slope = None if forces_slope is None else _vector(forces_slope, "forces_slope", dofs.size)
-    build = plane_problem if dofs.shape[1] == 2 else space_problem
-    return build(A, _vector(forces, "forces", dofs.size), slope, dofs, nodes, supports, tangents, **more)
-
-
-def space_problem(
-    A: sp.csc_array,
-    forces: Floats,
-    forces_slope: Floats | None,
-    dofs: Integers,
-    contact: ContactNodes,
-    supports: Supports,
-    tangents: Any,
-    **more: Any,
-) -> ContactProblem3D:
-    """As `plane_problem`, in 3D; ``mesh`` may be a function of the degrees of freedom that are left."""
-    from enumsol.fem.surfaces import default_axes  # not for problems in 2D
-    from enumsol.model.problem3d import ContactProblem3D
-
-    if tangents is None:
-        axes = default_axes(contact.normals)
-    else:
-        if not (isinstance(tangents, (tuple, list)) and len(tangents) == 2):
-            raise InvalidArgumentError(f"tangents is {shown(tangents)}; expected a pair of directions (t1, t2)")
-        shape = contact.normals.shape
-        one, two = (unit_vectors(vectors_of_all(axis, "tangents", shape), "tangents") for axis in tangents)
-        products = [np.sum(a * b, axis=1) for a, b in ((one, two), (one, contact.normals), (two, contact.normals))]
-        if np.max(np.abs(products)) > 1e-10:
-            raise InvalidArgumentError("tangents are not perpendicular to each other and to the normals")
-        axes = (one, two)
-    check_axes(contact, axes)
-    body = restrained(A, forces, forces_slope, dofs, supports, contact.apart)
-    if callable(mesh := more.get("mesh")):
-        more["mesh"] = mesh(body.left)
-    Bn, Bt1, Bt2 = (body.rows(contact, direction, dofs) for direction in (contact.normals, *axes))
-    return ContactProblem3D(body.A, Bn, Bt1, Bt2, body.f, load_slope=body.load_slope, **more)
+    return problem_of(
+        A, _vector(forces, "forces", dofs.size), slope, dofs, nodes, axes_of(tangents, nodes.normals), supports, **more
+    )
 
 
 def _nodes_of(basis: Any) -> tuple[Integers, Floats]:

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.cells import completed
-from enumsol.model.body2d import as_quadrilaterals
-from enumsol.model.facets import CELL_FACETS, boundary_facets
+from enumsol.model.cells import KINDS, TRIANGLES, as_quadrilaterals, boundary_facets, numbers_of_nodes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,28 +15,22 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
 
-#: By dimension: the facets of each kind of cell.
-FACET_OF = {
-    2: {"triangle": "line", "quad": "line", "triangle6": "line3", "quad8": "line3", "quad9": "line3"},
-    3: {
-        "tetra": "triangle",
-        "hexahedron": "quad",
-        "tetra10": "triangle6",
-        "hexahedron20": "quad8",
-        "hexahedron27": "quad9",
-    },
-}
-#: Kinds that may come together.
-_TOGETHER = ({"triangle", "quad"}, {"triangle6", "quad8"}, {"triangle6", "quad9"})
+#: By dimension: the facets of each kind of cell. Hexahedra with 20 nodes become such with 27.
+FACET_OF = {d: {kind.file_name: kind.file_facets for (e, _), kind in KINDS.items() if e == d} for d in (2, 3)}
+FACET_OF[3]["hexahedron20"] = "quad8"
 #: Nodes of a quadrilateral.
-_NODES = {"quad": 4, "quad8": 8, "quad9": 9}
+_NODES = {KINDS[2, nodes].file_name: nodes for nodes in TRIANGLES}
+#: Kinds that may come together: quadrilaterals with the triangles that they may be.
+_TOGETHER = [{KINDS[2, nodes].file_name, KINDS[2, len(own)].file_name} for nodes, own in TRIANGLES.items()]
 #: By dimension: other cells that files may hold.
 _IGNORED = {2: ("vertex",), 3: ("vertex", "line")}
 _EXPECTED = {
     2: "triangle and quad with line, or triangle6 and either quad8 or quad9 with line3",
-    3: "one of tetra, tetra10, hexahedron, hexahedron20, hexahedron27 with triangle, triangle6, quad, quad8, quad9",
+    3: f"one of {', '.join(FACET_OF[3])} with {', '.join(FACET_OF[3].values())}",
 }
 _BODIES = {2: "triangles or quadrilaterals", 3: "tetrahedra or hexahedra"}
+#: Facets of a hexahedron.
+_SIDES = KINDS[3, 27].facets
 #: Why gmsh leaves cells out.
 GROUPS_ONLY = "gmsh writes only what is in physical groups, if there are any:"
 #: What makes gmsh write other cells.
@@ -104,7 +96,23 @@ def solid_cells(points: Floats, cells: Integers) -> tuple[Floats, Integers]:
 
     if cells.shape[1] == 20:
         points, cells = completed(points, cells)
-    return solid_mesh(points, cells, (4, 8, 10, 27))
+    return solid_mesh(points, cells, numbers_of_nodes(3))
+
+
+def completed(points: Floats, cells: Integers) -> tuple[Floats, Integers]:
+    """Hexahedra with 20 nodes as such with 27 of the same shape; the new nodes have the last numbers.
+
+    On facets with eight nodes a uniform pressure pulls at the corners; on those with nine it presses on every node.
+    """
+    corners, between = cells[:, :8], cells[:, 8:]
+    sides = np.sort(corners[:, _SIDES[:, :4]], axis=2).reshape(-1, 4)
+    _, first, number = np.unique(sides, axis=0, return_index=True, return_inverse=True)
+    at = points[corners][:, _SIDES[:, :4]].sum(axis=2), points[between][:, _SIDES[:, 4:8] - 8].sum(axis=2)
+    centres = (0.5 * at[1] - 0.25 * at[0]).reshape(-1, 3)[first]
+    inside = 0.25 * (points[between].sum(axis=1) - points[corners].sum(axis=1))
+    of_sides = len(points) + number.reshape(-1, 6)
+    of_cells = len(points) + len(centres) + np.arange(len(cells))
+    return np.concatenate([points, centres, inside]), np.concatenate([cells, of_sides, of_cells[:, None]], axis=1)
 
 
 def with_centres(facets: Integers, cells: Integers, name: str) -> Integers:
@@ -115,7 +123,7 @@ def with_centres(facets: Integers, cells: Integers, name: str) -> Integers:
     InvalidArgumentError
         One is no facet of a cell.
     """
-    every = cells[:, CELL_FACETS[3, 27]].reshape(-1, 9)
+    every = cells[:, _SIDES].reshape(-1, 9)
     known = {tuple(key): row for row, key in enumerate(np.sort(every[:, :4], axis=1).tolist())}
     rows = [known.get(tuple(key), -1) for key in np.sort(facets[:, :4], axis=1).tolist()]
     if -1 in rows:

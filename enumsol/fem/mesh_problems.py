@@ -11,16 +11,16 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.fem.assembly import plane_problem
 from enumsol.fem.bases import nodal_basis
-from enumsol.fem.basis_problems import outward_normal, pressed, space_problem
-from enumsol.fem.cells import contact_nodes
+from enumsol.fem.basis_problems import outward_normal, pressed
 from enumsol.fem.conditions import Held, Obstacle, by_part, check_held, names_of, part_forces, part_springs
+from enumsol.fem.construction import axes_of, problem_of
 from enumsol.fem.mesh_checks import lame, unit_vectors
 from enumsol.fem.mesh_files import read_mesh
 from enumsol.fem.named_parts import PartedMesh
 from enumsol.fem.restrained import ContactNodes, movable, plain_dofs
-from enumsol.model.body2d import PlaneMesh
+from enumsol.model.cells import contact_nodes
+from enumsol.model.mesh import BodyMesh
 from enumsol.support.arguments import exact_number, file_path, finite_number, shown
 from enumsol.support.array_arguments import short_vector
 from enumsol.support.files import unreadable
@@ -122,8 +122,8 @@ def mesh_problem(
     Returns
     -------
     ContactProblem or ContactProblem3D
-        With ``coordinates`` and, as ``node_ids``, the numbers of the nodes in the mesh; in 3D also with ``areas`` and,
-        unless a part is displaced, ``mesh``.
+        With ``coordinates``, ``mesh`` and, as ``node_ids``, the numbers of the nodes in the mesh; in 3D also with
+        ``areas``.
 
     Raises
     ------
@@ -161,17 +161,23 @@ def mesh_problem(
         "coordinates": parted.points[nodes.nodes],
         **_coefficients(dimension, friction, friction2),
     }
+    surface = None
     if dimension == 3:
-        more |= _space_fields(body, parted, facets, nodes, displaced=bool(np.any(held.supports.values)))
-    else:
-        more["mesh"] = lambda left: PlaneMesh.of_dofs(parted.points, parted.cells, left, held.supports.values)
+        from enumsol.fem.solid_geometry import outward  # not for plane bodies
+
+        surface = outward(facets, parted.cells)
+        more["areas"] = body.on_part(facets, "contact", lambda v, _: v[0], lumped=True)[nodes.nodes, 0]
+    offset = held.supports.values
     springs = part_springs(body, parted, spring)
     check_held(parted, held.supports, springs)
     A = sp.csc_array(body.stiffness(*lame(young, poisson, plane)) + springs)
-    build = plane_problem if dimension == 2 else space_problem
-    dofs, tangents = plain_dofs(parted.points.shape), _axes(nodes, axis, dimension)
+    axes = _axes(nodes, axis, dimension)
     slopes = slope.ravel() if np.any(slope) else None
-    return build(A, forces.ravel(), slopes, dofs, nodes, held.supports, tangents, **more)
+    return problem_of(
+        *(A, forces.ravel(), slopes, plain_dofs(parted.points.shape), nodes, axes, held.supports),
+        mesh=lambda left: BodyMesh.of_dofs(parted.points, parted.cells, left, offset, surface),
+        **more,
+    )
 
 
 def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProblem3D:
@@ -330,9 +336,9 @@ def _line(value: Any, name: str) -> tuple[float, float]:
     return float(F0), float(F1)
 
 
-def _axes(nodes: ContactNodes, axis: Any, dimension: int) -> Any:
+def _axes(nodes: ContactNodes, axis: Any, dimension: int) -> tuple[Floats, ...]:
     if axis is None:
-        return None
+        return axes_of(None, nodes.normals)
     if dimension == 2:
         raise InvalidArgumentError("axis is given for a plane body, which has one tangent; expected it in 3D")
     direction = short_vector(axis, "axis", 3)
@@ -341,18 +347,3 @@ def _axes(nodes: ContactNodes, axis: Any, dimension: int) -> Any:
         raise InvalidArgumentError(f"axis is {shown(axis)}, a normal of the contact boundary; expected a tangent")
     first = unit_vectors(first, "axis")
     return first, np.cross(nodes.normals, first)
-
-
-def _space_fields(
-    body: NodalBasis, mesh: PartedMesh, facets: Integers, nodes: ContactNodes, *, displaced: bool
-) -> dict[str, Any]:
-    """Areas, and the mesh as a function of the degrees of freedom that are left."""
-    from enumsol.fem.solid_geometry import outward
-    from enumsol.model.body3d import BodyMesh  # not for plane bodies
-
-    areas = body.on_part(facets, "contact", lambda v, _: v[0], lumped=True)[:, 0]
-    surface = outward(facets, mesh.cells)
-    return {
-        "areas": areas[nodes.nodes],
-        "mesh": None if displaced else lambda left: BodyMesh(mesh.points, mesh.cells, left, surface),
-    }

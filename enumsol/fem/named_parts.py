@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.cells import KINDS
-from enumsol.model.facets import by_kind
+from enumsol.model.cells import KINDS, by_kind
 from enumsol.support.arguments import shown
 
 if TYPE_CHECKING:

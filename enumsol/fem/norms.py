@@ -13,7 +13,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import nodal_basis
 from enumsol.model.problem3d import ContactProblem3D
 from enumsol.support.arguments import instance_of
-from enumsol.support.array_arguments import real_array
+from enumsol.support.array_arguments import vector_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -54,17 +54,17 @@ class MeshNorms:
 
     def of_displacement(self, u: ArrayLike) -> float:
         """||u||_1 for u of shape (n,)."""
-        v = _vector(u, "u", self.G.shape[0])
+        v = vector_of(u, "u", self.G.shape[0])
         return float(np.sqrt(v @ (self.G @ v)))
 
     def of_force(self, mu: ArrayLike) -> float:
         """||mu||_(-1/2,h) for normal forces mu of shape (p,): the supremum of mu' Bn v over ||v||_1 = 1."""
-        v = _vector(mu, "mu", len(self.areas))
+        v = vector_of(mu, "mu", len(self.areas))
         return float(np.sqrt(v @ self.dual @ v))
 
     def of_slip(self, phi: ArrayLike) -> float:
         """||phi||_0 for slips of shape (p,), the root of sum_i m_i phi_i^2 (theory, (11.4))."""
-        v = _vector(phi, "phi", len(self.areas))
+        v = vector_of(phi, "phi", len(self.areas))
         return float(np.sqrt(self.areas @ v**2))
 
 
@@ -100,13 +100,6 @@ def h1_norms(problem: ContactProblem3D) -> MeshNorms:
 
     # products of linear functions have degree two: exact on tetrahedra and parallelepipeds
     body = nodal_basis(problem.mesh.points, problem.mesh.cells, degree=2)
-    G = body.matrix(BilinearForm(product))
-    dofs = problem.mesh.dofs
-    return MeshNorms(sp.csc_array(G[dofs][:, dofs]), problem.Bn, problem.areas)
-
-
-def _vector(value: ArrayLike, name: str, size: int) -> NDArray[np.float64]:
-    array = real_array(value, name, error=InvalidArgumentError)
-    if array.shape != (size,):
-        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected ({size},)")
-    return array
+    motion = problem.mesh.motion
+    G = sp.csc_array(motion.T @ body.matrix(BilinearForm(product)) @ motion)
+    return MeshNorms(G, problem.Bn, problem.areas)

@@ -47,23 +47,36 @@ class Supports:
 
 
 @dataclass(frozen=True)
-class ContactNodes:
-    """Contact nodes that can move, and their normals.
+class ContactRows:
+    """What the p contact rows stand for.
 
     Attributes
     ----------
-    nodes : (p,) int array
+    means : (p, N) csr_array
+        The displacement of each row as a weighted mean of nodal ones.
     normals : (p, dimension) array
         Of length one.
     apart : (N, dimension) bool array
         Fixed components that stay in the problem.
+    """
+
+    means: sp.csr_array
+    normals: Floats
+    apart: Mask
+
+
+@dataclass(frozen=True)
+class ContactNodes(ContactRows):
+    """Contact nodes that can move: each row stands for one.
+
+    Attributes
+    ----------
+    nodes : (p,) int array
     kept : (p,) int array
         Which of the nodes that were asked for these are.
     """
 
     nodes: Integers
-    normals: Floats
-    apart: Mask
     kept: Integers
 
 
@@ -92,11 +105,18 @@ def movable(nodes: Integers, normals: Floats, supports: Supports) -> ContactNode
     normals[touched] /= np.linalg.norm(normals[touched], axis=1)[:, None]
     apart = np.zeros_like(supports.fixed)
     apart[nodes] = fixed
-    return ContactNodes(nodes, normals, apart, kept)
+    return ContactNodes(means_of_nodes(nodes, len(apart)), normals, apart, nodes, kept)
 
 
-def check_axes(contact: ContactNodes, tangents: tuple[Floats, ...]) -> None:
+def means_of_nodes(nodes: Integers, count: int) -> sp.csr_array:
+    """Displacements of these nodes among ``count``, (p, count)."""
+    return sp.csr_array((np.ones(len(nodes)), (np.arange(len(nodes)), nodes)), shape=(len(nodes), count))
+
+
+def check_axes(contact: ContactRows, tangents: tuple[Floats, ...]) -> None:
     """Refuse tangential axes at planes of symmetry that are neither along nor across them."""
+    if not isinstance(contact, ContactNodes):
+        return  # of rows that stand for patches nothing is held in some components only
     apart = contact.apart[contact.nodes]
     for tangent in tangents:
         across = np.linalg.norm(np.where(apart, tangent, 0.0), axis=1)
@@ -124,11 +144,17 @@ class Restrained:
     load_slope: Floats | None
     left: Integers
 
-    def rows(self, contact: ContactNodes, directions: Floats, dofs: Integers) -> sp.csr_array:
-        """Displacements of the contact nodes along directions (p, dimension)."""
-        places = np.searchsorted(self.left, dofs[contact.nodes])
-        rows = np.repeat(np.arange(len(contact.nodes)), dofs.shape[1])
-        return sp.csr_array((directions.ravel(), (rows, places.ravel())), shape=(len(contact.nodes), len(self.left)))
+
+def displacements_along(means: sp.csr_array, directions: Floats, dofs: Integers, left: Integers) -> sp.csr_array:
+    """Components along directions (k, dimension) of the means (k, N) of nodal displacements, by what is left."""
+    entries = means.tocoo()
+    row, node = entries.coords
+    data = entries.data[:, None] * directions[row]
+    shape, columns = (means.shape[0], dofs.size), dofs[node]
+    every = sp.csr_array((data.ravel(), (np.repeat(row, dofs.shape[1]), columns.ravel())), shape=shape)
+    rows = sp.csr_array(every[:, left])
+    rows.eliminate_zeros()
+    return rows
 
 
 def restrained(

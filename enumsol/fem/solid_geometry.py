@@ -11,9 +11,8 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import FLAT
-from enumsol.fem.cells import HEXAHEDRON, KINDS
 from enumsol.fem.mesh_checks import check_every_node_is_used, elements, positions
-from enumsol.model.facets import boundary_facets
+from enumsol.model.cells import HEXAHEDRON, KINDS, boundary_facets
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -21,11 +20,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
 
-#: Nodes of a tetrahedron, and of a hexahedron, of the other orientation, by the number of corners.
-_TURNED = {
-    4: [0, 2, 1, 3, 6, 5, 4, 7, 9, 8],
-    8: [0, 3, 2, 1, 4, 7, 6, 5, 11, 10, 9, 8, 15, 14, 13, 12, 16, 19, 18, 17, 22, 23, 20, 21, 24, 25, 26],
-}
 _GAUSS_2 = (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)), (0.5, 0.5)
 _GAUSS_3 = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)), (5 / 18, 8 / 18, 5 / 18)
 
@@ -42,12 +36,12 @@ def solid_mesh(points: ArrayLike, cells: ArrayLike, kinds: tuple[int, ...] = (4,
     """
     nodes = positions(points, 3)
     bodies = elements(cells, "cells", kinds, len(nodes))
-    corners = nodes[bodies[:, : KINDS[3, bodies.shape[1]].corners]]
+    kind = KINDS[3, bodies.shape[1]]
+    corners = nodes[bodies[:, : kind.corners]]
     size = np.max(np.ptp(corners, axis=1), axis=1) ** 3
-    count = corners.shape[1]
-    volumes = _tetrahedron_volumes(corners)[:, None] if count == 4 else _corner_volumes(corners)
+    volumes = _tetrahedron_volumes(corners)[:, None] if kind.corners == 4 else _corner_volumes(corners)
     turned = np.all(volumes < 0, axis=1)
-    bodies[turned] = bodies[turned][:, _TURNED[count][: bodies.shape[1]]]
+    bodies[turned] = bodies[turned][:, kind.turned]
     volumes[turned] *= -1
     _refuse(np.max(np.abs(volumes), axis=1) <= FLAT * size, "has no volume; expected proper cells")
     _refuse(

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.cells import KINDS
 from enumsol.fem.mesh_checks import elements, positions
 from enumsol.fem.named_parts import PartedMesh
-from enumsol.model.facets import boundary_facets
+from enumsol.model.cells import KINDS, boundary_facets
 from enumsol.support.arguments import one_of, positive_integer, shown
 from enumsol.support.array_arguments import short_vector
 

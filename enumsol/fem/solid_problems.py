@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.construction import problem_of
 from enumsol.fem.mesh_checks import elements, held_mask, nodal_vectors, spring_stiffnesses
+from enumsol.fem.restrained import ContactRows, Supports, displacements_along, plain_dofs
 from enumsol.fem.solid_geometry import outward, solid_mesh
 from enumsol.fem.solid_meshes import blocks
 from enumsol.fem.solids import solid_stiffness
 from enumsol.fem.surfaces import ContactSurface, Multipliers, local_axes, on_nodes, on_patches
-from enumsol.model.body3d import BodyMesh, SlipMean
-from enumsol.model.problem3d import ContactProblem3D
+from enumsol.model.mesh import BodyMesh
+from enumsol.model.slip_mean import SlipMean
 from enumsol.support.arguments import one_of, positive_integer
 from enumsol.support.array_arguments import plain_array, real_array
 
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
+
+    from enumsol.model.problem3d import ContactProblem3D
 
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
@@ -120,32 +124,31 @@ def solid_contact_problem(
     A = solid_stiffness(nodes, bodies, lame)
     if springs is not None:
         A = sp.csc_array(A + sp.diags_array(spring_stiffnesses(springs, nodes.shape).ravel()))
-    free = np.flatnonzero(~mask.ravel())
-    mean = None
-    if rows.rows_of_facets is not None:
-        of_facets = rows.rows_of_facets
+    dofs, free = plain_dofs(nodes.shape), np.flatnonzero(~mask.ravel())
+    of_facets, mean = rows.rows_of_facets, None
+    if of_facets is not None:
         weights = sp.csr_array(rows.means[:, surface.nodes] @ surface.return_operator())
-        mean = SlipMean(
-            *_slips(surface, of_facets, (first, second), real_array(slip_offset, "slip_offset"), free), weights
-        )
-    Bn, Bt1, Bt2 = (_displacements(rows.means, direction, free) for direction in (normal, first, second))
-    return ContactProblem3D(
-        sp.csc_array(A[free][:, free]),
-        Bn,
-        Bt1,
-        Bt2,
-        nodal_vectors(forces, "forces", nodes.shape)[free],
+        offset = real_array(slip_offset, "slip_offset")
+        mean = SlipMean(*_slips(surface, of_facets, (first, second), offset, dofs, free), weights)
+    problem = problem_of(
+        A,
+        nodal_vectors(forces, "forces", nodes.shape),
+        None if forces_slope is None else nodal_vectors(forces_slope, "forces_slope", nodes.shape),
+        dofs,
+        ContactRows(rows.means, normal, np.zeros_like(mask)),
+        (first, second),
+        Supports.held(mask),
+        mesh=lambda left: BodyMesh.of_dofs(nodes, bodies, left, None, surface.facets, of_facets),
         gap=gap,
         friction=friction,
         friction_slope=friction_slope,
-        load_slope=None if forces_slope is None else nodal_vectors(forces_slope, "forces_slope", nodes.shape)[free],
         slip_offset=slip_offset,
         node_ids=rows.labels if node_ids is None else node_ids,
         coordinates=rows.places,
         areas=rows.areas,
-        mesh=BodyMesh(nodes, bodies, free, surface.facets, rows.rows_of_facets),
         slip_mean=mean,
     )
+    return cast("ContactProblem3D", problem)
 
 
 def _contact_facets(contact: ArrayLike, count: int) -> Integers:
@@ -166,26 +169,19 @@ def _rows(surface: ContactSurface, held: NDArray[np.bool_], kind: str, ratio: in
     return on_patches(surface, labels, held)
 
 
-def _displacements(means: sp.csr_array, directions: Floats, free: Integers) -> sp.csr_array:
-    """Components along ``directions`` (k, 3) of the means (k, N) of nodal displacements, by free components."""
-    entries = means.tocoo()
-    row, node = entries.coords
-    columns = 3 * node[:, None] + np.arange(3)
-    data = entries.data[:, None] * directions[row]
-    shape = (means.shape[0], 3 * means.shape[1])
-    rows = sp.csr_array(sp.csr_array((data.ravel(), (np.repeat(row, 3), columns.ravel())), shape=shape)[:, free])
-    rows.eliminate_zeros()
-    return rows
-
-
 def _slips(
-    surface: ContactSurface, of_facets: Integers, axes: tuple[Floats, Floats], offset: Floats, free: Integers
+    surface: ContactSurface,
+    of_facets: Integers,
+    axes: tuple[Floats, ...],
+    offset: Floats,
+    dofs: Integers,
+    free: Integers,
 ) -> tuple[sp.csr_array, sp.csr_array, Floats]:
     """T1, T2 and the offset of a SlipMean at all quadrature points; patches that are held entirely have slip 0."""
     values = surface.interpolation()
     patch = np.repeat(of_facets, values.shape[0] // len(surface.facets))
     moving = (patch >= 0)[:, None]
-    T1, T2 = (_displacements(values, np.where(moving, axis[patch], 0.0), free) for axis in axes)
+    T1, T2 = (displacements_along(values, np.where(moving, axis[patch], 0.0), dofs, free) for axis in axes)
     if offset.shape != (len(axes[0]), 2):
         offset = np.zeros((len(axes[0]), 2))  # ContactProblem3D refuses a wrong shape
     return T1, T2, np.where(moving, offset[patch], 0.0)

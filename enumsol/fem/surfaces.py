@@ -10,7 +10,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.fem.construction import default_axes
 from enumsol.fem.mesh_checks import unit_vectors, vectors_of_all
+from enumsol.fem.restrained import means_of_nodes
 from enumsol.fem.solid_geometry import facet_quadrature, facet_vectors
 from enumsol.support.array_arguments import plain_array, real_array
 
@@ -25,8 +27,6 @@ if TYPE_CHECKING:
 
 #: How far axes may be from right angles and length one, for rounding.
 AXES_TOLERANCE = 1e-10
-#: Normals nearer to the x axis than this cosine take the y axis for the default of t1.
-_NEAR_X = 0.9
 
 
 @dataclass(frozen=True)
@@ -144,8 +144,7 @@ def on_nodes(surface: ContactSurface, held: NDArray[np.bool_]) -> Multipliers:
     for corner in range(surface.facets.shape[1]):
         np.add.at(areas, surface.facets[:, corner], surface.shares[:, corner])
         np.add.at(vectors, surface.facets[:, corner], surface.vectors)
-    means = sp.csr_array((np.ones(len(free)), (np.arange(len(free)), free)), shape=(len(free), count))
-    return Multipliers(means, areas[free], surface.points[free], vectors[free], free.tolist())
+    return Multipliers(means_of_nodes(free, count), areas[free], surface.points[free], vectors[free], free.tolist())
 
 
 def on_patches(surface: ContactSurface, patches: ArrayLike, held: NDArray[np.bool_]) -> Multipliers:
@@ -238,13 +237,6 @@ def local_axes(multipliers: Multipliers, normals: ArrayLike | None, axes: Any) -
             if not np.all(off <= AXES_TOLERANCE):
                 raise _not_orthonormal(i, j, int(np.argmax(off)), one, two)
     return normal, given[0], given[1] if len(given) == 2 else np.cross(normal, given[0])
-
-
-def default_axes(normal: Floats) -> tuple[Floats, Floats]:
-    """Axes t1, t2 for normals (p, 3): the x axis projected, or the y axis where the normal is near the x axis."""
-    start = np.where(np.abs(normal[:, :1]) > _NEAR_X, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
-    first = unit_vectors(start - np.sum(start * normal, axis=1)[:, None] * normal, "axes")
-    return first, np.cross(normal, first)
 
 
 def _field(value: Any, places: Floats) -> Floats:

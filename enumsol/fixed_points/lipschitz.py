@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from enumsol.fixed_points.system import Problem
-    from enumsol.model.body3d import SlipMean
+    from enumsol.model.slip_mean import SlipMean
     from enumsol.support.arguments import Alpha, AlphaLike
 
     Vector = NDArray[np.float64]

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from enumsol import fem
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.mesh_checks import lame_coefficients
-from enumsol.model.body2d import PlaneMesh
+from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import finite_number, nonnegative_number, positive_integer, positive_number, shown
 from enumsol.support.array_arguments import short_vector
@@ -131,7 +131,7 @@ def two_node_square(
         friction=friction,
         load_slope=slope,
         coordinates=corners[:2],
-        mesh=PlaneMesh(corners, [[0, 1, 2], [1, 3, 2]], np.vstack([turn.T, np.zeros((4, 4))])),
+        mesh=BodyMesh(corners, [[0, 1, 2], [1, 3, 2]], np.vstack([turn.T, np.zeros((4, 4))])),
     )
 
 
@@ -331,14 +331,14 @@ def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.
     return ContactProblem(sp.csc_array(A), dofs[0::2], dofs[1::2], load, coordinates=mesh.points[::3], mesh=mesh)
 
 
-def _triangles(count: int) -> PlaneMesh:
+def _triangles(count: int) -> BodyMesh:
     """Triangles with legs of length one, half a leg apart; only their corners at the right angle move."""
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     first = np.stack([1.5 * np.arange(count), np.zeros(count)], axis=1)
     # u_n = -u_y, u_t = u_x
     turn = sp.csr_array(np.vstack([[[0.0, 1.0], [-1.0, 0.0]], np.zeros((4, 2))]))
     points = (first[:, None, :] + corners).reshape(-1, 2)
-    return PlaneMesh(points, np.arange(3 * count).reshape(-1, 3), sp.kron(sp.eye_array(count), turn))
+    return BodyMesh(points, np.arange(3 * count).reshape(-1, 3), sp.kron(sp.eye_array(count), turn))
 
 
 def _one_node_stiffness(lame: Pair) -> NDArray[np.float64]:

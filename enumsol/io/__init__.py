@@ -16,8 +16,9 @@ The first three hold the arrays of `ContactProblem` or of `ContactProblem3D` by 
       friction1, each a number or a (p,) array, 0 when left out. With none of them F = alpha, as in `ContactProblem`.
     - ``gap``, ``load_slope``, ``slip_offset``, ``coordinates``: as in `ContactProblem`.
     - ``node_ids``: (p,) integers, floats or strings.
-    - ``mesh_points`` (N, 2), ``mesh_cells`` (M, k), ``mesh_motion`` (2 N, n; dense or in sparse parts): a `PlaneMesh`,
-      all or none; with it ``mesh_offset`` (N, 2).
+    - ``mesh_points`` (N, d), ``mesh_cells`` (M, k) and either ``mesh_motion`` (d N, n; dense or in sparse parts) or
+      ``mesh_dofs`` (n,): a `BodyMesh`, or the arguments of ``BodyMesh.of_dofs``, all or none; with it ``mesh_offset``
+      (N, d) and in 3D ``mesh_facets`` (k, m) and ``mesh_rows`` (k,).
     - ``enumsol_format``: version of this layout, now 1; taken as 1 when left out.
 
     Names that begin with an underscore are ignored; any other name is refused, since it may be a misspelt one.
@@ -33,8 +34,6 @@ In 3D both take ``Bt1`` and ``Bt2`` instead of ``Bt``, which tell a problem in 3
   none of them F = 0.5, as in `ContactProblem3D`. A friction given by a callable cannot be written.
 - ``friction_slope_1``, ``friction_slope_2``: derivatives with respect to alpha, 0 when left out.
 - ``gap``, ``load_slope``, ``slip_offset`` (p, 2), ``coordinates`` (p, 3), ``areas`` (p,), ``node_ids``.
-- ``mesh_points`` (N, 3), ``mesh_cells`` (M, k), ``mesh_dofs`` (n,): a `BodyMesh`, all or none; with it ``mesh_facets``
-  (k, m) and ``mesh_rows`` (k,).
 - ``slip_mean_T1``, ``slip_mean_T2``, ``slip_mean_offset``, ``slip_mean_weights``: a `SlipMean`, all or none; like the
   other matrices dense or in sparse parts.
 

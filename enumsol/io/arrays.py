@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from enumsol.errors import InvalidProblemError
-from enumsol.io.layouts import LAYOUT_2D, LAYOUT_3D, PLANE_MESH, Layout, constant_friction
-from enumsol.model.body2d import PlaneMesh
+from enumsol.io.layouts import LAYOUT_2D, LAYOUT_3D, Layout, constant_friction
+from enumsol.io.mesh_arrays import arrays_of_mesh, mesh_from_arrays
 from enumsol.model.problem import ContactProblem
 
 if TYPE_CHECKING:
@@ -30,12 +29,7 @@ def problem_from_arrays(arrays: Mapping[str, Any], layout: Layout) -> ContactPro
         options["friction"] = (arrays.get("friction0", 0.0), arrays.get("friction1", 0.0))
     if "node_ids" in arrays:
         options["node_ids"] = arrays["node_ids"]
-    missing = [name for name in PLANE_MESH if name not in arrays]
-    if not missing:
-        points, cells, motion = (arrays[name] for name in PLANE_MESH)
-        options["mesh"] = PlaneMesh(points, cells, motion, arrays.get("mesh_offset"))
-    elif len(missing) < len(PLANE_MESH) or "mesh_offset" in arrays:
-        raise InvalidProblemError(f"{', '.join(missing)} is missing; expected {', '.join(PLANE_MESH)}, all or none")
+    options["mesh"] = mesh_from_arrays(arrays)
     return ContactProblem(*(arrays[name] for name in layout.required), **options)
 
 
@@ -61,8 +55,4 @@ def _vectors_of(problem: ContactProblem) -> dict[str, Any]:
         arrays["load_slope"] = problem.load_slope
     if problem.coordinates is not None:
         arrays["coordinates"] = problem.coordinates
-    if (mesh := problem.mesh) is not None:
-        arrays |= dict(zip(PLANE_MESH, (mesh.points, mesh.cells, mesh.motion), strict=True))
-        if mesh.offset is not None:
-            arrays["mesh_offset"] = mesh.offset
-    return arrays
+    return arrays | arrays_of_mesh(problem.mesh)

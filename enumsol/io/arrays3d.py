@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidProblemError
-from enumsol.io.layouts import LAYOUT_3D, MEAN, MESH, SURFACE, TABLE, constant_friction
-from enumsol.model.body3d import BodyMesh, SlipMean
+from enumsol.io.layouts import LAYOUT_3D, MEAN, TABLE, constant_friction
+from enumsol.io.mesh_arrays import arrays_of_mesh, mesh_from_arrays
 from enumsol.model.friction import ConstantFriction, FrictionTable
 from enumsol.model.problem3d import ContactProblem3D
+from enumsol.model.slip_mean import SlipMean
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 def problem_from_arrays_3d(arrays: Mapping[str, Any]) -> ContactProblem3D:
     """The problem made of arrays whose names have been checked."""
-    for parts in (MESH, MEAN, TABLE):
+    for parts in (MEAN, TABLE):
         missing = [name for name in parts if name not in arrays]
         if 0 < len(missing) < len(parts):
             raise InvalidProblemError(f"{', '.join(missing)} is missing; expected {', '.join(parts)}, all or none")
@@ -28,13 +29,9 @@ def problem_from_arrays_3d(arrays: Mapping[str, Any]) -> ContactProblem3D:
     if friction is not None:
         options["friction"] = friction
     options["friction_slope"] = tuple(arrays.get(f"friction_slope_{axis}", 0.0) for axis in (1, 2))
-    if "mesh_points" in arrays:
-        points, cells, dofs = (arrays[name] for name in MESH)
-        options["mesh"] = BodyMesh(points, cells, dofs, *(arrays.get(name) for name in SURFACE))
-    elif extra := [name for name in SURFACE if name in arrays]:
-        raise InvalidProblemError(f"{extra[0]} has no mesh; expected {', '.join(MESH)} as well")
     if "slip_mean_T1" in arrays:
         options["slip_mean"] = SlipMean(*(arrays[name] for name in MEAN))
+    options["mesh"] = mesh_from_arrays(arrays)
     return ContactProblem3D(*(arrays[name] for name in LAYOUT_3D.required), **options)
 
 
@@ -70,9 +67,7 @@ def arrays_of_3d(problem: ContactProblem3D) -> dict[str, Any]:
         for name in ("load_slope", "coordinates", "areas")
         if getattr(problem, name) is not None
     }
-    if (mesh := problem.mesh) is not None:
-        arrays |= dict(zip(MESH, (mesh.points, mesh.cells, mesh.dofs), strict=True))
-        arrays |= {name: part for name, part in zip(SURFACE, (mesh.facets, mesh.rows), strict=True) if part is not None}
+    arrays |= arrays_of_mesh(problem.mesh)
     if (mean := problem.slip_mean) is not None:
         arrays |= dict(zip(MEAN, (mean.T1, mean.T2, mean.offset, mean.weights), strict=True))
     return arrays

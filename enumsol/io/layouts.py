@@ -78,33 +78,34 @@ _SYNONYMS = {
     "coords": "coordinates",
 }
 _COMMON = ("gap", "friction", "load_slope", "slip_offset", "node_ids", "coordinates")
-#: Names of the required arrays of a PlaneMesh.
-PLANE_MESH = ("mesh_points", "mesh_cells", "mesh_motion")
+#: Names of the arrays of a BodyMesh: one of "mesh_motion" and "mesh_dofs" is required, and all of MESH.
+MESH, SURFACE = ("mesh_points", "mesh_cells"), ("mesh_offset", "mesh_facets", "mesh_rows")
+_MESH = (*MESH, "mesh_motion", "mesh_dofs", *SURFACE)
+_MESH_TABLES = (*MESH, "mesh_offset", "mesh_facets")
 LAYOUT_2D = Layout(
     contact=("A", "Bn", "Bt"),
-    matrices=("A", "Bn", "Bt", PLANE_MESH[2]),
-    tables=("coordinates", *PLANE_MESH[:2], "mesh_offset"),
+    matrices=("A", "Bn", "Bt", "mesh_motion"),
+    tables=("coordinates", *_MESH_TABLES),
     broadcast=("gap", "friction", "friction0", "friction1", "slip_offset"),
-    optional=(*_COMMON, "friction0", "friction1", *PLANE_MESH, "mesh_offset"),
+    optional=(*_COMMON, "friction0", "friction1", *_MESH),
     frictions=(("friction",), ("friction0", "friction1")),
     synonyms=_SYNONYMS
     | {"bt": "Bt", "t": "Bt", "tangential": "Bt"}
     | {"f0": "friction0", "mu0": "friction0", "f1": "friction1", "mu1": "friction1"},
 )
 _TANGENTS = {"bt1": "Bt1", "t1": "Bt1", "tangential1": "Bt1", "bt2": "Bt2", "t2": "Bt2", "tangential2": "Bt2"}
-#: Names of the arrays of a BodyMesh, required and optional, of a SlipMean and of a FrictionTable.
-MESH, SURFACE = ("mesh_points", "mesh_cells", "mesh_dofs"), ("mesh_facets", "mesh_rows")
+#: Names of the arrays of a SlipMean and of a FrictionTable.
 MEAN = ("slip_mean_T1", "slip_mean_T2", "slip_mean_offset", "slip_mean_weights")
 TABLE = ("friction_table_slip", "friction_table_1", "friction_table_2")
 _SLOPES = ("friction_slope_1", "friction_slope_2")
 LAYOUT_3D = Layout(
     contact=("A", "Bn", "Bt1", "Bt2"),
-    matrices=("A", "Bn", "Bt1", "Bt2", *MEAN[:2], MEAN[3]),
-    tables=("coordinates", "slip_offset", "mesh_points", "mesh_cells", "mesh_facets", "slip_mean_offset", *TABLE[1:]),
+    matrices=("A", "Bn", "Bt1", "Bt2", *MEAN[:2], MEAN[3], "mesh_motion"),
+    tables=("coordinates", "slip_offset", *_MESH_TABLES, "slip_mean_offset", *TABLE[1:]),
     broadcast=("gap", "friction", "friction_1", "friction_2", *_SLOPES),
     optional=(
         *_COMMON,
-        *("friction_1", "friction_2", *_SLOPES, *TABLE, "areas", *MESH, *SURFACE, *MEAN),
+        *("friction_1", "friction_2", *_SLOPES, *TABLE, "areas", *_MESH, *MEAN),
     ),
     frictions=(("friction",), ("friction_1", "friction_2"), TABLE),
     synonyms=_SYNONYMS

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
-from enumsol.model.body2d import triangles_apart
+from enumsol.model.cells import KINDS, by_kind
 from enumsol.model.problem import ContactProblem
 from enumsol.model.problem3d import ContactProblem3D
 from enumsol.model.shapes import body_shape
@@ -21,13 +21,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.model.body3d import BodyMesh
+    from enumsol.model.mesh import BodyMesh
 
     Floats = NDArray[np.float64]
 
-#: Names that meshio has for cells and facets, by their nodes; a quadrilateral has as many as a tetrahedron.
-_CELLS = {4: "tetra", 8: "hexahedron", 10: "tetra10", 27: "hexahedron27"}
-_FACETS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
 _PLANE_STATUS = {status.value: float(code) for code, status in enumerate(STATUSES)}
 _STATUS = {"open": 0.0, "stick": 1.0}
 _SLIPS = 2.0
@@ -149,7 +146,7 @@ def _plane(meshio: Any, problem: ContactProblem, state: State) -> Any:
     forces = shape.contact_forces(problem, data["lambda_n"], data["lambda_t"])
     point_data = {"displacement": _in_space(moves), "contact_force": _in_space(forces)}
     point_data |= {name: _spread(values, nodes, count) for name, values in data.items()}
-    cells = [(_FACETS[part.shape[1]], part) for _, part in triangles_apart(shape.cells)]
+    cells = [(KINDS[2, part.shape[1]].file_name, part) for _, part in by_kind(2, shape.cells)]
     return meshio.Mesh(_in_space(shape.points), cells, point_data=point_data)
 
 
@@ -193,8 +190,7 @@ def _row_data(problem: ContactProblem3D, state: State) -> dict[str, Floats]:
 
 def _vectors(problem: ContactProblem3D, mesh: BodyMesh, data: dict[str, Floats]) -> dict[str, Floats]:
     """Vectors of the contact rows in global axes, each (p, 3); none where the rows do not tell their directions."""
-    axes = np.eye(3)[mesh.dofs % 3]
-    sums = np.stack([rows @ axes for rows in (problem.Bt1, problem.Bt2, problem.Bn)], axis=1)
+    sums = np.stack([mesh.directions(rows) for rows in (problem.Bt1, problem.Bt2, problem.Bn)], axis=1)
     lengths = np.linalg.norm(sums, axis=2, keepdims=True)
     frames = np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > 0)
     if np.max(np.abs(frames @ frames.transpose(0, 2, 1) - np.eye(3))) > _ORTHONORMAL:
@@ -210,9 +206,10 @@ def _vectors(problem: ContactProblem3D, mesh: BodyMesh, data: dict[str, Floats])
 
 
 def _body(meshio: Any, problem: ContactProblem3D, mesh: BodyMesh, u: Floats, data: dict[str, Floats]) -> Any:
-    cells = [(_CELLS[mesh.cells.shape[1]], mesh.cells)]
+    kind = KINDS[3, mesh.cells.shape[1]]
+    cells = [(kind.file_name, mesh.cells)]
     if mesh.facets is not None:
-        cells.append((_FACETS[mesh.facets.shape[1]], mesh.facets))
+        cells.append((kind.file_facets, mesh.facets))
     point_data, cell_data = (
         {"displacement": u},
         {"contact_surface": [np.full(len(c), k) for k, (_, c) in enumerate(cells)]},

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.model.body2d import PlaneMesh
 from enumsol.model.contact_body import ContactBody, friction_values, span, vector
+from enumsol.model.mesh import BodyMesh
 from enumsol.support.arguments import alpha_value, exact_number, instance_of, shown
 from enumsol.support.messages import counted
 
@@ -61,7 +61,7 @@ class ContactProblem(ContactBody):
         Labels of the contact nodes for frames and messages; default 0 .. p-1.
     coordinates : (p, 2) array_like or None
         Positions of the contact nodes, for plots [length].
-    mesh : PlaneMesh or None
+    mesh : BodyMesh or None
         The mesh the problem was made of, for pictures of deformed bodies; no part of the fingerprint.
 
     Raises
@@ -93,12 +93,12 @@ class ContactProblem(ContactBody):
         slip_offset: ArrayLike = 0.0,
         node_ids: Any = None,
         coordinates: ArrayLike | None = None,
-        mesh: PlaneMesh | None = None,
+        mesh: BodyMesh | None = None,
     ) -> None:
         super().__init__(A, {"Bn": Bn, "Bt": Bt}, f, gap, load_slope, node_ids, coordinates)
         self.friction = _friction(friction, self.p)
         self.slip_offset = vector(slip_offset, "slip_offset", self.p, broadcast=True)
-        self.mesh = None if mesh is None else instance_of(mesh, PlaneMesh, "mesh").check(self.n)
+        self.mesh = None if mesh is None else instance_of(mesh, BodyMesh, "mesh").check(self.n, self.p, 2)
         self._freeze()
         self.factorization.check_positive_definite()
 

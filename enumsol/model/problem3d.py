@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.model.body3d import BodyMesh, SlipMean
 from enumsol.model.contact_body import ContactBody, friction_values, span, vector
 from enumsol.model.friction import ConstantFriction, friction_law, friction_pair
+from enumsol.model.mesh import BodyMesh
+from enumsol.model.slip_mean import SlipMean
 from enumsol.support.arguments import alpha_value, instance_of
 from enumsol.support.array_arguments import real_array
 from enumsol.support.immutable import sealed
@@ -123,7 +124,7 @@ class ContactProblem3D(ContactBody):
         self._slope = sealed(friction_pair(friction_slope, "friction_slope", p))
         self.slip_offset = _slip_offset(slip_offset, p)
         self.areas = None if areas is None else _areas(areas, p)
-        self.mesh = None if mesh is None else instance_of(mesh, BodyMesh, "mesh").check(self.n, p)
+        self.mesh = None if mesh is None else instance_of(mesh, BodyMesh, "mesh").check(self.n, p, 3)
         self.slip_mean = None if slip_mean is None else instance_of(slip_mean, SlipMean, "slip_mean").check(self.n, p)
         if isinstance(self.law, ConstantFriction) and not np.any(self._slope):
             _check_signs(self.law.values, self.node_ids, "")

@@ -76,19 +76,14 @@ def body_shape(problem: Any) -> BodyShape:
     mesh = problem.mesh
     if mesh is None:
         raise InvalidArgumentError("the problem has no mesh; expected one made by enumsol.fem, or with mesh=")
-    points = mesh.points
-    if points.shape[1] == 2:
-        motion, offset = mesh.motion, np.zeros_like(points) if mesh.offset is None else mesh.offset
-    else:
-        count = len(mesh.dofs)
-        motion = sp.csr_array((np.ones(count), (mesh.dofs, np.arange(count))), shape=(points.size, count))
-        offset = np.zeros_like(points)
+    points, motion = mesh.points, mesh.motion
+    offset = np.zeros_like(points) if mesh.offset is None else mesh.offset
     by_node = sp.csr_array(abs(problem.Bn) @ abs(motion).T)
     dimension = points.shape[1]
     gather = sp.kron(sp.eye_array(len(points)), np.ones((dimension, 1)))
     weights = sp.csr_array(by_node @ gather)
     scale = 1.0 / np.asarray(weights.sum(axis=1)).ravel()
-    return BodyShape(points, mesh.cells, sp.csr_array(motion), offset, sp.csr_array(sp.diags_array(scale) @ weights))
+    return BodyShape(points, mesh.cells, motion, offset, sp.csr_array(sp.diags_array(scale) @ weights))
 
 
 def round_scale(largest: float, size: float, share: float = _MOVED) -> float:

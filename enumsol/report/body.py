@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.model.body2d import OUTLINES
+from enumsol.model.cells import KINDS
 from enumsol.model.shapes import BodyShape, body_shape
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def body_record(problem: ContactProblem) -> dict[str, Any] | str:
         return "The problem has no mesh"
     shape = body_shape(problem)
     columns = 2 * problem.p + 2
-    cells = shape.cells[:, list(OUTLINES[shape.cells.shape[1]])]
+    cells = shape.cells[:, KINDS[2, shape.cells.shape[1]].outline]
     lines = None
     nodes = np.arange(len(shape.points))
     if shape.points.size * columns > _MOST_NUMBERS:

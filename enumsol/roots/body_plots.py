@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.body2d import OUTLINES
-from enumsol.model.facets import boundary_facets, outlines
+from enumsol.model.cells import KINDS, boundary_facets, facet_outlines
 from enumsol.model.shapes import BodyShape, arrow_scale, body_shape, round_scale
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.arguments import positive_number
@@ -127,7 +126,7 @@ def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, factors: tuple[flo
 def _plane(ax: Any, shape: BodyShape, points: Floats) -> None:
     from matplotlib.collections import PolyCollection
 
-    cells = shape.cells[:, list(OUTLINES[shape.cells.shape[1]])]
+    cells = shape.cells[:, KINDS[2, shape.cells.shape[1]].outline]
     ax.add_collection(
         PolyCollection(list(shape.points[cells]), facecolors="none", edgecolors="#dcdcdc", linewidths=0.5)
     )
@@ -139,7 +138,7 @@ def _plane(ax: Any, shape: BodyShape, points: Floats) -> None:
 def _solid(ax: Any, shape: BodyShape, points: Floats) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    faces = outlines(boundary_facets(3, shape.cells))
+    faces = facet_outlines(boundary_facets(3, shape.cells))
     body = Poly3DCollection(list(points[faces]), facecolors=_BODY, edgecolors=_EDGE, linewidths=0.4, alpha=0.35)
     ax.add_collection3d(body)
     ax.auto_scale_xyz(*points.T)

@@ -55,6 +55,4 @@ def _axes(problem: ContactProblem3D, shown: NDArray[np.intp]) -> NDArray[np.floa
     """The local axes t1, t2 of every contact row in global axes, (p, 2, 3); those shown where no mesh tells them."""
     if problem.mesh is None:
         return np.tile(np.eye(3)[shown], (problem.p, 1, 1))
-    component = problem.mesh.dofs % 3
-    sums = np.eye(3)[component]
-    return np.stack([problem.Bt1 @ sums, problem.Bt2 @ sums], axis=1)
+    return np.stack([problem.mesh.directions(rows) for rows in (problem.Bt1, problem.Bt2)], axis=1)

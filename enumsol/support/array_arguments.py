@@ -258,6 +258,20 @@ def short_vector(value: Any, name: str, size: int) -> NDArray[np.float64]:
     return array
 
 
+def vector_of(value: Any, name: str, size: int) -> NDArray[np.float64]:
+    """Value as a finite array of shape (size,).
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is not that.
+    """
+    array = real_array(value, name, error=InvalidArgumentError)
+    if array.shape != (size,):
+        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected ({size},)")
+    return array
+
+
 def _place(matrix: sp.csc_array, k: int) -> tuple[int, int]:
     """Row and column of the k-th stored entry."""
     return int(matrix.indices[k]), int(np.searchsorted(matrix.indptr, k, side="right")) - 1

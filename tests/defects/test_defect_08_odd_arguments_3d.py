@@ -50,6 +50,11 @@ CALLS = [
     (by_axes, {"value": (1, 0, 0)}, "value"),
     (
         enumsol.BodyMesh,
+        {name: getattr(BLOCK.mesh, name) for name in ("points", "cells", "motion", "offset", "facets", "rows")},
+        "points cells motion offset facets rows",
+    ),
+    (
+        enumsol.BodyMesh.of_dofs,
         {name: getattr(BLOCK.mesh, name) for name in ("points", "cells", "dofs", "facets", "rows")},
         "points cells dofs facets rows",
     ),

@@ -85,7 +85,7 @@ def test_the_callers_arrays_are_copied():
     mesh = gallery.block3d(2, 1, 1).mesh
     given = {name: np.array(getattr(mesh, name)) for name in ("points", "cells", "dofs", "facets")}
     weights, rows, offset = np.array([[0.5, 0.5]]), np.eye(4)[:2], np.zeros((2, 2))
-    made, mean = enumsol.BodyMesh(**given), enumsol.SlipMean(rows, rows, offset, weights)
+    made, mean = enumsol.BodyMesh.of_dofs(**given), enumsol.SlipMean(rows, rows, offset, weights)
     slips = np.array([0.0, 1.0, 2.0])
     table = enumsol.FrictionTable(slips, slips)
     for array in (*given.values(), weights, rows, offset, slips):

@@ -333,7 +333,9 @@ def test_a_quarter_of_a_block_in_3d():
         mesh, **STEEL, contact="bottom", symmetry=["left", "right", "front", "back"],
         displacement={"top": ("free", None, -0.01)}, friction=0.3,
     )  # fmt: skip
-    assert problem.mesh is None
+    moved = problem.mesh.displacements(np.zeros(problem.n))
+    assert np.array_equal(moved[mesh.nodes("top"), 2], [-0.01] * 9)
+    assert np.count_nonzero(moved) == 9
     lam, mu = fem.lame(**STEEL)
     found = enumsol.successive_approximations(problem, 0)
     assert np.allclose(found.lambda_n, (lam + 2 * mu) * 0.01 * problem.areas, rtol=1e-7)

@@ -6,7 +6,7 @@ import pytest
 from enumsol import fem
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.solid_geometry import facet_vectors, solid_mesh
-from enumsol.model.facets import boundary_facets
+from enumsol.model.cells import boundary_facets
 
 KINDS = ("hexahedra", "tetrahedra")
 NORMALS = {

@@ -146,7 +146,7 @@ def no_mesh(problem):
 def no_facets(problem):
     names, mesh = ("A", "Bn", "Bt1", "Bt2", "f"), problem.mesh
     return ContactProblem3D(
-        *(getattr(problem, name) for name in names), mesh=BodyMesh(mesh.points, mesh.cells, mesh.dofs)
+        *(getattr(problem, name) for name in names), mesh=BodyMesh.of_dofs(mesh.points, mesh.cells, mesh.dofs)
     )
 
 

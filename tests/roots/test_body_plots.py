@@ -6,8 +6,8 @@ from parted_meshes import grid
 from parted_solids import solid
 
 import enumsol
-from enumsol import InvalidArgumentError, PlaneMesh, fem
-from enumsol.model.facets import boundary_facets, outlines
+from enumsol import BodyMesh, InvalidArgumentError, fem
+from enumsol.model.cells import boundary_facets, facet_outlines
 from enumsol.model.shapes import body_shape, round_scale
 
 
@@ -97,7 +97,7 @@ def test_in_space():
 @pytest.mark.parametrize(("kind", "nodes"), [(4, 3), (8, 4), (10, 6), (27, 8)])
 def test_outlines_of_the_boundary_enclose_the_body(kind, nodes):
     mesh = solid((3, 2, 2), kind)
-    faces = outlines(boundary_facets(3, mesh.cells))
+    faces = facet_outlines(boundary_facets(3, mesh.cells))
     corners = mesh.points[faces]
     # every face lies in one of the six sides of the box
     flat = [np.all(corners[:, :, axis] == side, axis=1) for axis in range(3) for side in (0.0, 1.0)]
@@ -152,7 +152,7 @@ def test_without_a_mesh_the_picture_is_refused():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"points": np.zeros((4, 3))}, "mesh_points has shape"),
+        ({"points": np.zeros((4, 1))}, "mesh_points has shape"),
         ({"cells": [[0, 1]]}, "mesh_cells has shape"),
         ({"cells": [[0, 1, 4]]}, "other numbers than 0 .. 3"),
         ({"cells": [[0, 1, 0.5]]}, "other numbers than 0 .. 3"),
@@ -164,11 +164,11 @@ def test_without_a_mesh_the_picture_is_refused():
 def test_a_mesh_that_does_not_fit_is_refused(change, message):
     parts = {"points": np.zeros((4, 2)), "cells": [[0, 1, 2]], "motion": np.eye(8)[:, :4], "offset": None}
     with pytest.raises(enumsol.InvalidProblemError, match=message):
-        PlaneMesh(**{**parts, **change})
+        BodyMesh(**{**parts, **change})
     square = enumsol.gallery.two_node_square()
     with pytest.raises(enumsol.InvalidProblemError, match="expected n = 4"):
         enumsol.ContactProblem(
-            square.A, square.Bn, square.Bt, square.f, mesh=PlaneMesh(np.zeros((1, 2)), [[0, 0, 0]], np.eye(2))
+            square.A, square.Bn, square.Bt, square.f, mesh=BodyMesh(np.zeros((1, 2)), [[0, 0, 0]], np.eye(2))
         )
 
 
@@ -176,7 +176,7 @@ def test_a_mesh_that_does_not_fit_is_refused(change, message):
 def test_files_keep_the_mesh(tmp_path, place):
     square = enumsol.gallery.two_node_square()
     offset = np.arange(8.0).reshape(4, 2)
-    mesh = PlaneMesh(square.mesh.points, square.mesh.cells, square.mesh.motion, offset)
+    mesh = BodyMesh(square.mesh.points, square.mesh.cells, square.mesh.motion, offset)
     problem = enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f, mesh=mesh)
     enumsol.write_problem(problem, tmp_path / place)
     back = enumsol.read_problem(tmp_path / place).mesh
@@ -217,7 +217,7 @@ def test_vtu_of_a_plane_body(wedge, tmp_path):
 
 def test_prescribed_displacements_move_nodes_too():
     points, offset = [[0, 0], [1, 0], [0, 1]], [[0, 0], [0.5, 0], [0, 0]]
-    mesh = PlaneMesh.of_dofs(points, [[0, 1, 2]], [0, 5], offset)
+    mesh = BodyMesh.of_dofs(points, [[0, 1, 2]], [0, 5], offset)
     assert mesh.displacements([2.0, 3.0]).tolist() == [[2, 0], [0.5, 0], [0, 3]]
     problem = enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 1], mesh=mesh)
     assert body_shape(problem).displacements(np.array([2.0, 3.0])).tolist() == [[2, 0], [0.5, 0], [0, 3]]

@@ -1,0 +1,185 @@
+"""What a problem keeps of its discretization: the mesh, for pictures, files and norms."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.model.cells import KINDS, numbers_of_nodes
+from enumsol.support.array_arguments import real_array, real_matrix, vector_of
+from enumsol.support.immutable import Immutable, SealedMatrix, sealed
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
+
+#: How far products of the columns of a motion may be from those of orthonormal ones.
+_ORTHONORMAL = 1e-8
+
+
+class BodyMesh(Immutable):
+    """The mesh that a problem was made of; the displacements of its nodes are ``motion @ u + offset``.
+
+    Parameters
+    ----------
+    points : (N, d) array_like
+        Positions of the nodes, d = 2 or 3 [length].
+    cells : (M, k) array_like of int
+        Triangles (k = 3 or 6), quadrilaterals (4, 8 or 9), tetrahedra (4 or 10) or hexahedra (8 or 27), in the order of
+        VTK; a triangle among quadrilaterals names its last corner twice.
+    motion : (d N, n) array_like or sparse
+        Row ``d node + component`` gives that component of the node's displacement from u, in global axes; its columns
+        are orthonormal, so that its transpose takes nodal forces to the problem's right-hand side.
+    offset : (N, d) array_like or None
+        Prescribed displacements [length]; None: no node is moved.
+    facets : (k, m) array_like of int or None
+        In 3D, the contact surface: corners counterclockwise as seen from outside, then the nodes between them and
+        inside.
+    rows : (k,) array_like of int or None
+        Where contact rows stand for patches, the row of each facet (-1: held); None where they stand for nodes.
+
+    Raises
+    ------
+    InvalidProblemError
+        An array is not of that form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> mesh = enumsol.gallery.clamped_block(2, 1).mesh
+    >>> mesh.points.shape, mesh.cells.shape, mesh.motion.shape
+    ((6, 2), (4, 3), (12, 8))
+    """
+
+    def __init__(
+        self,
+        points: ArrayLike,
+        cells: ArrayLike,
+        motion: ArrayLike | sp.sparray | sp.spmatrix,
+        offset: ArrayLike | None = None,
+        facets: ArrayLike | None = None,
+        rows: ArrayLike | None = None,
+    ) -> None:
+        self.points = sealed(real_array(points, "mesh_points"))
+        if self.points.ndim != 2 or self.points.shape[1] not in (2, 3):
+            raise InvalidProblemError(f"mesh_points has shape {self.points.shape}; expected (N, 2) or (N, 3)")
+        count, d = self.points.shape
+        self.cells = _elements(cells, "mesh_cells", numbers_of_nodes(d), count)
+        self._motion = SealedMatrix.of(sp.csr_array(real_matrix(motion, "mesh_motion")))
+        if self._motion.shape[0] != d * count:
+            raise InvalidProblemError(
+                f"mesh_motion has shape {self._motion.shape}; expected {d} N = {d * count} rows, {d} for each node"
+            )
+        off = sp.csr_array(self.motion.T @ self.motion - sp.eye_array(self._motion.shape[1]))
+        if np.max(np.abs(off.data), initial=0.0) > _ORTHONORMAL:
+            raise InvalidProblemError("mesh_motion has columns that are not orthonormal; expected orthonormal ones")
+        self.offset = None if offset is None else sealed(real_array(offset, "mesh_offset"))
+        if self.offset is not None and self.offset.shape != self.points.shape:
+            raise InvalidProblemError(f"mesh_offset has shape {self.offset.shape}; expected (N, {d}) = ({count}, {d})")
+        of_facets = (KINDS[d, self.cells.shape[1]].facets.shape[1],)
+        self.facets = None if facets is None else _elements(facets, "mesh_facets", of_facets, count)
+        self.rows = None if rows is None else sealed(_numbers(rows, "mesh_rows", None, least=-1))
+        if self.rows is not None and (self.facets is None or self.rows.shape != self.facets.shape[:1]):
+            raise InvalidProblemError(
+                f"mesh_rows has shape {self.rows.shape}; expected (k,), one for each of mesh_facets"
+            )
+        self._freeze()
+
+    @classmethod
+    def of_dofs(
+        cls,
+        points: ArrayLike,
+        cells: ArrayLike,
+        dofs: ArrayLike,
+        offset: ArrayLike | None = None,
+        facets: ArrayLike | None = None,
+        rows: ArrayLike | None = None,
+    ) -> BodyMesh:
+        """The mesh of a problem whose entries of u are the components ``d node + component`` in ``dofs``, (n,).
+
+        Raises
+        ------
+        InvalidProblemError
+            They are not distinct components, or another array is not of the form above.
+        """
+        size = real_array(points, "mesh_points").size
+        columns = _numbers(dofs, "mesh_dofs", size)
+        if columns.ndim != 1 or len(np.unique(columns)) != len(columns):
+            raise InvalidProblemError(
+                f"mesh_dofs has shape {columns.shape} or repeats a number; expected (n,) distinct ones"
+            )
+        count = len(columns)
+        motion = sp.csr_array((np.ones(count), (columns, np.arange(count))), shape=(size, count))
+        return cls(points, cells, motion, offset, facets, rows)
+
+    @property
+    def motion(self) -> sp.csr_array:
+        """Displacements of the nodes from u, sparse (d N, n); a new object, whose parts are read-only."""
+        return self._motion.matrix()
+
+    @property
+    def dofs(self) -> Integers:
+        """The component ``d node + component`` that each entry of u is, (n,).
+
+        Raises
+        ------
+        InvalidArgumentError
+            An entry is none: supports turn the axes of its node.
+        """
+        columns = sp.csc_array(self.motion)
+        if np.any(np.diff(columns.indptr) != 1) or np.any(columns.data != 1.0):
+            raise InvalidArgumentError("the mesh has nodes whose axes are turned; expected entries of u along x, y, z")
+        return np.asarray(columns.indices, dtype=np.int64)
+
+    def directions(self, rows: sp.csr_array) -> Floats:
+        """Directions (p, d) in global axes of rows (p, n) that stand for the displacement of one point each."""
+        d = self.points.shape[1]
+        axes = np.tile(np.eye(d), (len(self.points), 1))
+        return np.asarray(rows @ (self.motion.T @ axes))
+
+    def displacements(self, u: ArrayLike) -> Floats:
+        """Displacement of every node, shape (N, d), for u of shape (n,) [length].
+
+        Raises
+        ------
+        InvalidArgumentError
+            u is not that.
+        """
+        moved = np.asarray(self.motion @ vector_of(u, "u", self._motion.shape[1])).reshape(self.points.shape)
+        return moved if self.offset is None else moved + self.offset
+
+    def check(self, n: int, p: int, dimension: int) -> BodyMesh:
+        """The mesh, which has to be one of a problem with n degrees of freedom and p contact rows."""
+        if self.points.shape[1] != dimension:
+            raise InvalidProblemError(f"mesh_points has shape {self.points.shape}; expected (N, {dimension})")
+        if self._motion.shape[1] != n:
+            raise InvalidProblemError(f"mesh moves by {self._motion.shape[1]} degrees of freedom; expected n = {n}")
+        if self.rows is not None:
+            _numbers(self.rows, "mesh_rows", p, least=-1)
+        return self
+
+    def __repr__(self) -> str:
+        return f"BodyMesh of {len(self.points)} nodes and {len(self.cells)} cells"
+
+
+def _numbers(value: ArrayLike, name: str, count: int | None, least: int = 0) -> Integers:
+    array = real_array(value, name)
+    most = 2**53 if count is None else count
+    if np.any(array != np.round(array)) or np.any(array < least) or np.any(array >= most):
+        found = f"{least} or more" if count is None else f"{least} .. {count - 1}"
+        raise InvalidProblemError(f"{name} holds other numbers than {found}; expected whole ones in that range")
+    return array.astype(np.int64)
+
+
+def _elements(value: ArrayLike, name: str, sizes: tuple[int, ...], count: int) -> Integers:
+    array = _numbers(value, name, count)
+    if array.ndim != 2 or array.shape[1] not in sizes:
+        raise InvalidProblemError(
+            f"{name} has shape {array.shape}; expected (k, m) with m among {', '.join(map(str, sizes))}"
+        )
+    return sealed(array)
