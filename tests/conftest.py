@@ -50,7 +50,7 @@ UNTRACED = {
     "test_arc_mutants",
     "test_arcs",
     "test_cut_short_results",
-    "test_defect_07_hostile_proofs",
+    "test_hostile_proofs",
     "test_degenerate_problems",
     "test_graph_mutants",
     "test_precise",

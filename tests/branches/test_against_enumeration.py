@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from branches.problems import assert_balanced, assert_same_roots, generic_problem, integer_problem
+from path_problems import assert_balanced, assert_same_roots, generic_problem, integer_problem
 
 from enumsol import enumerate_roots, gallery
 from enumsol.branches import branch_graph

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from branches.problems import assert_balanced, one_node
+from path_problems import assert_balanced, one_node
 
 from enumsol.branches import branch_graph
 from enumsol.model.statuses import ContactStatus

@@ -5,9 +5,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from branches.problems import generic_problem
 from branches.test_lower_bounds import KINDS, case, padded
 from generators import through_the_unloaded_state
+from path_problems import generic_problem
 from trees import by_the_tree
 
 import enumsol.branches.enclosed.single_branches

@@ -6,7 +6,7 @@ from math import isqrt
 
 import numpy as np
 import pytest
-from branches.problems import assert_balanced, assert_same_roots, mirrored_problem, one_node
+from path_problems import assert_balanced, assert_same_roots, mirrored_problem, one_node
 
 from enumsol import ContactProblem, enumerate_roots
 from enumsol.branches import branch_graph

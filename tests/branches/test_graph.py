@@ -6,7 +6,7 @@ from fractions import Fraction
 import networkx as nx
 import numpy as np
 import pytest
-from branches.problems import assert_balanced, assert_same_roots, one_node
+from path_problems import assert_balanced, assert_same_roots, one_node
 
 from enumsol import ContactProblem, enumerate_roots, gallery
 from enumsol.branches import BranchGraph, branch_graph

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from branches.problems import assert_balanced, integer_problem
+from path_problems import assert_balanced, integer_problem
 
 import enumsol
 from enumsol import BranchGraph, ContactProblem, branch_graph, enumerate_roots

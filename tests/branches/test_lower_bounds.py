@@ -14,7 +14,8 @@ from math import inf, nextafter
 
 import numpy as np
 import pytest
-from branches.problems import (
+from branches.test_degenerate import uncoupled
+from path_problems import (
     generic_problem,
     grazing_problem,
     integer_problem,
@@ -23,7 +24,6 @@ from branches.problems import (
     together,
     without_friction_somewhere,
 )
-from branches.test_degenerate import uncoupled
 from trees import by_the_tree
 
 from enumsol import BranchGraph, ContactProblem, branch_graph, enumerate_roots, gallery

@@ -5,7 +5,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import numpy as np
 import pandas as pd
 import pytest
-from branches.problems import generic_problem
+from path_problems import generic_problem
 
 from enumsol import gallery
 from enumsol.branches import branch_graph, link_samples, multiplicity_table

@@ -4,7 +4,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from branches.problems import (
+from branches.test_degenerate import pair, uncoupled
+from generators import through_the_unloaded_state, vanishing_problem
+from path_problems import (
     generic_problem,
     grazing_problem,
     integer_problem,
@@ -13,9 +15,7 @@ from branches.problems import (
     together,
     without_friction_somewhere,
 )
-from branches.test_degenerate import pair, uncoupled
-from branches.two_graphs import differences, steps, two_graphs
-from generators import through_the_unloaded_state, vanishing_problem
+from two_graphs import differences, steps, two_graphs
 
 from enumsol import ContactProblem, branch_graph, verify
 from enumsol.branches import construction

@@ -7,10 +7,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from branches.problems import generic_problem, one_node, planted_corner, together
+from arc_oracle import ArcOracle, arc_count, claims
 from branches.test_degenerate import pair
-from checker.arc_oracle import ArcOracle, arc_count, claims
 from checker.test_graph_mutants import PATHS
+from path_problems import generic_problem, one_node, planted_corner, together
 from proof_tools import copied, proof_of, records_of
 
 from enumsol import branch_graph, gallery, verify

@@ -1,48 +1,22 @@
-import contextlib
 import csv
 import io
 import json
-import os
-import pty
-import select
 import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from command_line import assert_refused, call, on_terminal, run
 from typer.testing import CliRunner
 
 from enumsol import Proof, gallery, read_problem, verify, write_problem
-from enumsol.cli import main
 from enumsol.cli.app import app
 from enumsol.relaxation.active_set import ActiveSetEngine
 
 A = np.array([[2.0, -0.5, 0.0, 0.0], [-0.5, 2.0, -0.5, 0.0], [0.0, -0.5, 2.0, -0.5], [0.0, 0.0, -0.5, 2.0]])
 DENSE = {"A": A, "Bn": np.eye(4)[[0, 2]], "Bt": np.eye(4)[[1, 3]], "f": np.array([1.0, -2.0, 0.5, 1.0])}
-
-
-def run(capsys, *arguments):
-    status = main([str(argument) for argument in arguments])
-    out, err = capsys.readouterr()
-    return status, out, err
-
-
-def call(*arguments, **options):
-    command = [sys.executable, "-m", "enumsol", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **options)
-
-
-def assert_refused(status, out, err, *parts):
-    assert status == 2
-    assert out == ""
-    assert err.startswith("enumsol: error: ")
-    assert err.count("\n") == 1
-    assert not err.endswith(".\n")
-    for part in parts:
-        assert part in err
 
 
 # -- what is printed ---------------------------------------------------------------------------------------------------
@@ -461,31 +435,6 @@ def test_warnings_are_lines_without_source_code(capsys, monkeypatch):
 
 
 # -- interruption and progress -----------------------------------------------------------------------------------------
-
-
-@contextlib.contextmanager
-def on_terminal(*arguments):
-    """The command with a terminal for its stderr, and a reader of that terminal."""
-    master, slave = pty.openpty()
-    command = [sys.executable, "-m", "enumsol", *map(str, arguments)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=slave, text=True)
-    os.close(slave)
-    shown = bytearray()
-
-    def wait_for(pattern, seconds=60.0):
-        end = time.monotonic() + seconds
-        while time.monotonic() < end and pattern not in shown:
-            if select.select([master], [], [], 0.2)[0]:
-                shown.extend(os.read(master, 4096))
-        assert pattern in shown, shown.decode(errors="replace")
-
-    try:
-        yield process, wait_for
-    finally:
-        process.kill()
-        process.wait()
-        process.stdout.close()
-        os.close(master)
 
 
 @pytest.mark.parametrize(

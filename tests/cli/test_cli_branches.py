@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 from branches.test_degenerate import pair
-from cli.test_cli import assert_refused, call, on_terminal, run
+from command_line import assert_refused, call, on_terminal, run
 
 from enumsol import BranchGraph, gallery, write_problem
 

@@ -6,7 +6,7 @@ import sys
 
 import pandas as pd
 import pytest
-from cli.test_cli import assert_refused, on_terminal, run
+from command_line import assert_refused, on_terminal, run
 
 from enumsol import ContactProblem, Interrupted, branch_graph, enumerate_roots, follow, gallery, write_problem
 

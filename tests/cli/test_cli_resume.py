@@ -3,8 +3,8 @@
 import json
 
 import pytest
-from cli.test_cli import assert_refused, run
 from cli.test_cli_solve import BODY, OPTIONS
+from command_line import assert_refused, run
 
 from enumsol import Proof, gallery, verify
 

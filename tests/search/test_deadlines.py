@@ -6,7 +6,7 @@ from itertools import count
 
 import numpy as np
 import pytest
-from defects.cut_short import false_claims_of_graph
+from cut_short import false_claims_of_graph
 from graph_proofs import triangle
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify

@@ -5,8 +5,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from branches.problems import generic_problem, one_node
 from flint import fmpq
+from path_problems import generic_problem, one_node
 
 from enumsol import ContactProblem, gallery
 from enumsol.branches import branch_graph, construction

@@ -4,10 +4,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from branches.problems import generic_problem
 from generators import through_the_unloaded_state
 from graph_proofs import copied, forms_at_once, of_kind, refused, replaced, without_arcs
 from oracles import exact_solutions
+from path_problems import generic_problem
 from proof_tools import proof_of, records_of
 from rational_checker import check_records
 

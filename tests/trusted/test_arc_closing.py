@@ -9,9 +9,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from branches.problems import generic_problem, integer_problem, without_friction_somewhere
 from branches.test_lower_bounds import KINDS
 from flint import fmpq
+from path_problems import generic_problem, integer_problem, without_friction_somewhere
 from rational_arcs import Selection
 from rational_forms import Data, Forms, exact
 from rational_pieces import _Along

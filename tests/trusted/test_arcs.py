@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from trusted.exact_arcs import Truth, arc_system, beside, exact_of, interval_at, random_data, two_zeros, widened
+from exact_arcs import Truth, arc_system, beside, exact_of, interval_at, random_data, two_zeros, widened
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.trusted.arcs.over_parts import expansions, over_parts

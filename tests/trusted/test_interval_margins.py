@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from branches.problems import generic_problem
+from path_problems import generic_problem
 
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.search.certifiers._margin import Margins

@@ -4,9 +4,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from branches.problems import generic_problem
+from exact_arcs import Truth, beside, exact_of, interval_at, precise_system, random_data, two_zeros
 from flint import arb, arb_mat
-from trusted.exact_arcs import Truth, beside, exact_of, interval_at, precise_system, random_data, two_zeros
+from path_problems import generic_problem
 
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.gallery import wedge

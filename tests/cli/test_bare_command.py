@@ -1,7 +1,7 @@
-"""Line 12: bare `enumsol` prints help."""
+"""Bare `enumsol` prints help."""
 
 import pytest
-from cli.test_cli import call
+from command_line import call
 
 
 @pytest.mark.few(1)

@@ -1,4 +1,4 @@
-"""Part F, line 2: an audit claims nothing about points that it did not compare, nor against a graph that has holes."""
+"""An audit claims nothing about points that it did not compare, nor against a graph that has holes."""
 
 import json
 import re
@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from cli.test_cli import assert_refused, run
+from command_line import assert_refused, run
 
 import enumsol
 from enumsol import BranchGraph, ContactProblem, audit, branch_graph, follow, follow_all, gallery, link_samples, newton

@@ -3,7 +3,7 @@
 from concurrent.futures import ProcessPoolExecutor
 
 import pytest
-from cli.test_cli import assert_refused, run
+from command_line import assert_refused, run
 
 from enumsol.cli import common
 

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
-from cli.test_cli import run
+from command_line import run
 from test_imports import modules_after
 
 import enumsol

@@ -1,4 +1,4 @@
-"""Part F, line 9, for what part H brought: what a problem in 3D or a fixed point holds cannot be written to."""
+"""What a problem in 3D or a fixed point holds cannot be written to."""
 
 import copy
 import pickle

@@ -1,4 +1,4 @@
-"""Part F, line 8: any object as any argument is accepted, or refused by an error of ours in one sentence."""
+"""Any object as any argument is accepted, or refused by an error of ours in one sentence."""
 
 import numpy as np
 import pytest

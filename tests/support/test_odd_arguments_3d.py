@@ -1,4 +1,4 @@
-"""Part H: any object as any argument of what 3D brought is accepted, or refused by an error of ours in one sentence."""
+"""Any object as any argument of what 3D brought is accepted, or refused by an error of ours in one sentence."""
 
 import matplotlib.pyplot as plt
 import numpy as np

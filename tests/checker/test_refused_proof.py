@@ -1,4 +1,4 @@
-"""Line 12: a refused proof says what was refused and why, and not that its leaves cover all selections."""
+"""A refused proof says what was refused and why, and not that its leaves cover all selections."""
 
 import numpy as np
 import pytest

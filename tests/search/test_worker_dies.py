@@ -1,4 +1,4 @@
-"""Line 10: a worker that dies costs time and nothing else: its tasks are done again."""
+"""A worker that dies costs time and nothing else: its tasks are done again."""
 
 import os
 import pickle

@@ -1,4 +1,4 @@
-"""Line 7: what stands in a proof file is read within bounds, header first, and refused in words."""
+"""What stands in a proof file is read within bounds, header first, and refused in words."""
 
 import base64
 import functools

@@ -1,4 +1,4 @@
-"""Part F, line 9: what a problem or a result holds cannot be written to, so that no answer changes behind a proof."""
+"""What a problem or a result holds cannot be written to, so that no answer changes behind a proof."""
 
 import copy
 import pickle

@@ -1,4 +1,4 @@
-"""Line 12: an attribute that does not exist is an error for mypy (`enumsol.enumerate_root`)."""
+"""An attribute that does not exist is an error for mypy (`enumsol.enumerate_root`)."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Line 6: every printed number lies in its enclosure, that of the unloaded body among them."""
+"""Every printed number lies in its enclosure, that of the unloaded body among them."""
 
 import json
 import re
@@ -6,8 +6,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from branches.problems import integer_problem as integer_path
 from generators import integer_problem, random_problem, singular_problem, through_the_unloaded_state
+from path_problems import integer_problem as integer_path
 
 from enumsol import ContactProblem, ContactStatus, branch_graph, enumerate_roots, gallery
 from enumsol.cli import main

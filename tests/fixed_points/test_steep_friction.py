@@ -1,4 +1,4 @@
-"""Part H: coefficients that depend on the slip, where they are steep, and where slips are means at other places."""
+"""Coefficients that depend on the slip, where they are steep, and where slips are means at other places."""
 
 import warnings
 

@@ -1,4 +1,4 @@
-"""Line 4: a branch graph whose load g vanishes exactly inside its interval has a proof, and the checker accepts it."""
+"""A branch graph whose load g vanishes exactly inside its interval has a proof, and the checker accepts it."""
 
 from fractions import Fraction
 

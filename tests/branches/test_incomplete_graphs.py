@@ -1,4 +1,4 @@
-"""Line 1: a branch graph that is not complete says what it found and lower bounds, and nothing more."""
+"""A branch graph that is not complete says what it found and lower bounds, and nothing more."""
 
 import json
 import re

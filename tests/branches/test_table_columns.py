@@ -1,8 +1,8 @@
-"""Line 12: the table's open, stick and slip columns and its header "alpha to alpha" say what they are."""
+"""The table's open, stick and slip columns and its header "alpha to alpha" say what they are."""
 
 import re
 
-from cli.test_cli import run
+from command_line import run
 
 TABLE = ("table", "gallery:two-node-6.4", "--from", 0, "--to", 10)
 CAPTION = "open, stick, slip+, slip-: how many of the roots have a node in that status"

@@ -11,7 +11,7 @@ import numpy as np
 from enumsol import fem
 from enumsol.cli import main
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 _BLOCK = re.compile(
     r"^```(\w+)\n((?:[^\n]*\n)*?)```$|^    (?:[^\n]* && )?((?:\.venv/bin/)?enumsol (?:[^\n]*\\\n)*[^\n]*)$",

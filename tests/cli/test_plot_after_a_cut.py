@@ -1,7 +1,7 @@
 """Line 10: `graph --plot` after a cut does not end in a traceback."""
 
 import pytest
-from cli.test_cli import run
+from command_line import run
 
 #: Among them graphs without any arc, with arcs that end in the middle, and with a continuum.
 NAMES = ("one-node-6.1", "one-node-6.3", "two-node-6.4", "two-node-6.7-minus", "clamped-block-8")

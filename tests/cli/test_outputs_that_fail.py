@@ -7,7 +7,7 @@ import sys
 
 import pandas as pd
 import pytest
-from cli.test_cli import run
+from command_line import run
 
 import enumsol
 from enumsol import gallery

@@ -1,7 +1,7 @@
-"""Line 12: an unknown name close to a gallery name says which."""
+"""An unknown name close to a gallery name says which."""
 
 import pytest
-from cli.test_cli import assert_refused, run
+from command_line import assert_refused, run
 
 from enumsol import gallery, write_problem
 

@@ -1,4 +1,4 @@
-"""Part F, line 8: matrices and arrays are accepted as the numbers that they are, or refused in one sentence."""
+"""Matrices and arrays are accepted as the numbers that they are, or refused in one sentence."""
 
 import array
 import math

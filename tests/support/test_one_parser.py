@@ -1,4 +1,4 @@
-"""Part F, line 8: one parser for alpha and its intervals, everywhere, with one style of error."""
+"""One parser for alpha and its intervals, everywhere, with one style of error."""
 
 import math
 from decimal import Decimal

@@ -1,11 +1,11 @@
-"""Part F, line 3: an audit names points by path and row, explains its tolerance, and reads columns by label."""
+"""An audit names points by path and row, explains its tolerance, and reads columns by label."""
 
 import json
 
 import numpy as np
 import pandas as pd
 import pytest
-from cli.test_cli import assert_refused, call, run
+from command_line import assert_refused, call, run
 
 import enumsol
 from enumsol import ContactProblem, audit, branch_graph, follow_all, gallery, write_problem

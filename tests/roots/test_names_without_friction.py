@@ -1,4 +1,4 @@
-"""Line 5: names, `active` and `signs` follow from enclosures or rationals, never from a float tolerance."""
+"""Names, `active` and `signs` follow from enclosures or rationals, never from a float tolerance."""
 
 import itertools
 from fractions import Fraction
