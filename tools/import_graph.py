@@ -45,7 +45,7 @@ def read_imports(source: Path, package: str) -> tuple[dict[str, int], list[Impor
         module = ".".join([package, *(parts[:-1] if parts[-1] == "__init__" else parts)])
         text = path.read_text(encoding="utf-8")
         texts[module] = texts.get(module, "") + text
-        statements = _cython_statements(text) if path.suffix == ".pyx" else _python_statements(text)
+        statements = _cython_statements(text) if path.suffix == ".pyx" else _python_statements(text, module)
         found.update((module, base, name, line) for base, name, line in statements)
     imports = {
         Import(importer, imported, line)
@@ -55,17 +55,21 @@ def read_imports(source: Path, package: str) -> tuple[dict[str, int], list[Impor
     return {module: len(text.splitlines()) for module, text in texts.items()}, sorted(imports)
 
 
-def _python_statements(text: str) -> Iterator[tuple[str, str, int]]:
-    """(module, name, line) of all imports; the name is empty for ``import module``."""
+def _python_statements(text: str, module: str) -> Iterator[tuple[str, str, int]]:
+    """(module, name, line) of all imports; the name is empty for ``import module``.
+
+    Relative are those of a package's ``__init__.pyi`` only, which lazy_loader reads.
+    """
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield alias.name, "", node.lineno
         elif isinstance(node, ast.ImportFrom):
-            if node.level:
+            if node.level > 1:
                 raise ValueError(f"line {node.lineno} has a relative import; expected absolute ones only")
+            base = ".".join(filter(None, (module if node.level else "", node.module)))
             for alias in node.names:
-                yield node.module or "", alias.name, node.lineno
+                yield base, alias.name, node.lineno
 
 
 def _cython_statements(text: str) -> Iterator[tuple[str, str, int]]:

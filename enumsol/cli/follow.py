@@ -198,8 +198,7 @@ class _Followed:
 
     def _follow(self, number: int, root: Root, sign: int, *, alone: bool) -> bool:
         """One path; whether it closed."""
-        from enumsol.continuation import AmbiguousStart
-        from enumsol.continuation import follow as follow_path
+        from enumsol.continuation import AmbiguousStart, follow as follow_path
 
         try:
             path = follow_path(self.problem, root, sign, self.interval, self.options, tangent=self.tangent)

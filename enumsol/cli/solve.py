@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from inspect import Parameter, signature
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -22,64 +23,146 @@ from enumsol.cli.roots import (
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
 
 _BODY, _SUPPORT, _LOAD = "Body and contact", "Supports", "Loads"
 
 
-def _text(name: str, metavar: str, text: str, panel: str) -> Any:
-    return typer.Option(name, metavar=metavar, help=text, rich_help_panel=panel, show_default=False)
+class Given(NamedTuple):
+    """How an option of `fem.mesh_problem` is given on the command line.
+
+    Attributes
+    ----------
+    panel, metavar, help : in the help
+    read : function of the text, or of the texts, and the option's name
+    repeated : whether it may be given several times
+    """
+
+    panel: str
+    metavar: str
+    help: str
+    read: Callable[[Any, str], Any]
+    repeated: bool = False
 
 
-Part = Annotated[list[str] | None, _text("--contact", "NAME", "Part in contact; may be repeated.", _BODY)]
-Young = Annotated[str | None, _text("--young", "E", "Young's modulus [force / length^2].", _BODY)]
-Poisson = Annotated[str | None, _text("--poisson", "NU", "Poisson's ratio.", _BODY)]
-Plane = Annotated[
-    Literal["strain", "stress"] | None, _text("--plane", "strain|stress", "In 2D; default: strain.", _BODY)
-]
-Friction = Annotated[
-    str | None, _text("--friction", "F0[,F1]", "Coefficient F0 + alpha F1; default 0,1: alpha itself.", _BODY)
-]
-Friction2 = Annotated[str | None, _text("--friction2", "F0[,F1]", "In 3D, along the second axis.", _BODY)]
-Axis = Annotated[str | None, _text("--axis", "x,y,z", "In 3D, direction of the first axis of friction.", _BODY)]
-Gap = Annotated[str | None, _text("--gap", "LENGTH", "Initial gap; negative is a press fit.", _BODY)]
-Obstacle = Annotated[
-    str | None,
-    _text(
-        "--obstacle",
+def _entry(part: str, option: str, text: str) -> Any:
+    if part.strip() == "free" and option == "--displacement":
+        return "free"
+    try:
+        return float(part)
+    except ValueError:
+        raise InvalidArgumentError(f"{option} is {text}; expected numbers such as 0.5, with commas between") from None
+
+
+def _as_given(value: Any, option: str) -> Any:
+    del option
+    return value
+
+
+def _number(text: str, option: str) -> Any:
+    return _entry(text, option, text)
+
+
+def _numbers(text: str, option: str) -> list[Any]:
+    return [_entry(part, option, text) for part in text.split(",")]
+
+
+def _one_or_two(text: str, option: str) -> Any:
+    numbers = _numbers(text, option)
+    return numbers[0] if len(numbers) == 1 else numbers
+
+
+def _plane(text: str, option: str) -> str:
+    if text not in ("strain", "stress"):
+        raise InvalidArgumentError(f"{option} is {text}; expected strain or stress")
+    return text
+
+
+def _by_part(texts: list[str], option: str, read: Callable[[str, str], Any] = _numbers) -> dict[str, Any]:
+    """Values by the names of parts, of texts NAME=VALUES."""
+    found: dict[str, Any] = {}
+    for text in texts:
+        name, sign, numbers = text.rpartition("=")
+        if not sign or not name:
+            raise InvalidArgumentError(f"{option} is {text}; expected NAME=NUMBERS")
+        if name in found:
+            raise InvalidArgumentError(f"{option} is given twice for {name}; expected it once")
+        found[name] = read(numbers, option)
+    return found
+
+
+def _number_by_part(texts: list[str], option: str) -> dict[str, Any]:
+    return _by_part(texts, option, _number)
+
+
+def _obstacle(text: str, option: str) -> dict[str, Any]:
+    return _by_part([text], option)
+
+
+_FORCE = "Force per area (in 2D per length, unit thickness)."
+_PULL = "NAME=fx,fy[,fz]"
+#: By their names in `fem.mesh_problem`.
+MESH_OPTIONS = {
+    "contact": Given(_BODY, "NAME", "Part in contact; may be repeated.", _as_given, True),
+    "young": Given(_BODY, "E", "Young's modulus [force / length^2].", _number),
+    "poisson": Given(_BODY, "NU", "Poisson's ratio.", _number),
+    "plane": Given(_BODY, "strain|stress", "In 2D; default: strain.", _plane),
+    "friction": Given(_BODY, "F0[,F1]", "Coefficient F0 + alpha F1; default 0,1: alpha itself.", _one_or_two),
+    "friction2": Given(_BODY, "F0[,F1]", "In 3D, along the second axis.", _one_or_two),
+    "axis": Given(_BODY, "x,y,z", "In 3D, direction of the first axis of friction.", _numbers),
+    "gap": Given(_BODY, "LENGTH", "Initial gap; negative is a press fit.", _number),
+    "obstacle": Given(
+        _BODY,
         "KIND=NUMBERS",
         "plane=x,y,nx,ny (normal towards the body), circle=x,y,r, hole=x,y,r; in 3D plane=x,y,z,nx,ny,nz, "
         "sphere=x,y,z,r, hole=x,y,z,r. Default: the contact part itself, moved by the gap.",
-        _BODY,
+        _obstacle,
     ),
-]
-Groups = Annotated[str | None, _text("--groups", "NAME", "Cell data that groups facets, without names.", _BODY)]
-Clamp = Annotated[list[str] | None, _text("--clamp", "NAME", "Part that is held; may be repeated.", _SUPPORT)]
-Symmetry = Annotated[
-    list[str] | None, _text("--symmetry", "NAME", "Part on a plane of symmetry, or on rollers.", _SUPPORT)
-]
-Displacement = Annotated[
-    list[str] | None,
-    _text("--displacement", "NAME=ux,uy[,uz]", "Given displacements; `free` for a component that is not.", _SUPPORT),
-]
-Spring = Annotated[
-    list[str] | None, _text("--spring", "NAME=kn,kt", "Springs per area along the normal and across it.", _SUPPORT)
-]
-Load = Annotated[
-    list[str] | None, _text("--load", "NAME=fx,fy[,fz]", "Force per area (in 2D per length, unit thickness).", _LOAD)
-]
-LoadSlope = Annotated[list[str] | None, _text("--load-slope", "NAME=fx,fy[,fz]", "The same, times alpha.", _LOAD)]
-Pressure = Annotated[list[str] | None, _text("--pressure", "NAME=P", "Force per area into the body.", _LOAD)]
-PressureSlope = Annotated[list[str] | None, _text("--pressure-slope", "NAME=P", "The same, times alpha.", _LOAD)]
-BodyForce = Annotated[str | None, _text("--body-force", "fx,fy[,fz]", "Force per volume, such as the weight.", _LOAD)]
+    "groups": Given(_BODY, "NAME", "Cell data that groups facets, without names.", _as_given),
+    "clamp": Given(_SUPPORT, "NAME", "Part that is held; may be repeated.", _as_given, True),
+    "symmetry": Given(_SUPPORT, "NAME", "Part on a plane of symmetry, or on rollers.", _as_given, True),
+    "displacement": Given(
+        _SUPPORT, "NAME=ux,uy[,uz]", "Given displacements; `free` for a component that is not.", _by_part, True
+    ),
+    "spring": Given(_SUPPORT, "NAME=kn,kt", "Springs per area along the normal and across it.", _by_part, True),
+    "load": Given(_LOAD, _PULL, _FORCE, _by_part, True),
+    "load_slope": Given(_LOAD, _PULL, "The same, times alpha.", _by_part, True),
+    "pressure": Given(_LOAD, "NAME=P", "Force per area into the body.", _number_by_part, True),
+    "pressure_slope": Given(_LOAD, "NAME=P", "The same, times alpha.", _number_by_part, True),
+    "body_force": Given(_LOAD, "fx,fy[,fz]", "Force per volume, such as the weight.", _numbers),
+}
+
+
+def _with_mesh_options(command: Callable[..., None]) -> Callable[..., None]:
+    """The command, whose ``**texts`` are options of their own in its signature, which typer reads."""
+    own = signature(command, eval_str=True)
+    mesh, *others, _ = own.parameters.values()
+    options = [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=_annotation(name, given))
+        for name, given in MESH_OPTIONS.items()
+    ]
+    command.__signature__ = own.replace(parameters=[mesh, *options, *others])  # type: ignore[attr-defined]
+    command.__annotations__ |= {option.name: option.annotation for option in options}
+    return command
+
+
+def _annotation(name: str, given: Given) -> Any:
+    flag = "--" + name.replace("_", "-")
+    how = typer.Option(flag, metavar=given.metavar, help=given.help, rich_help_panel=given.panel, show_default=False)
+    return Annotated[list[str] | None, how] if given.repeated else Annotated[str | None, how]
+
+
 AtAlpha = Annotated[
     str | None,
-    _text(
+    typer.Option(
         "--alpha",
-        "NUMBER",
-        "Parameter value, a number or a fraction such as 8/3; needed where friction or load depend on it.",
-        LIMITS,
+        metavar="NUMBER",
+        help="Parameter value, a number or a fraction such as 8/3; needed where friction or load depend on it.",
+        rich_help_panel=LIMITS,
+        show_default=False,
     ),
 ]
 Output = Annotated[
@@ -94,6 +177,7 @@ Output = Annotated[
 ]
 
 
+@_with_mesh_options
 def solve(
     mesh: Annotated[
         str,
@@ -101,25 +185,7 @@ def solve(
             metavar="MESH", help="A mesh with named parts (.msh, .vtu, ...), or a .toml file.", show_default=False
         ),
     ],
-    contact: Part = None,
-    young: Young = None,
-    poisson: Poisson = None,
-    plane: Plane = None,
-    friction: Friction = None,
-    friction2: Friction2 = None,
-    axis: Axis = None,
-    gap: Gap = None,
-    obstacle: Obstacle = None,
-    groups: Groups = None,
-    clamp: Clamp = None,
-    symmetry: Symmetry = None,
-    displacement: Displacement = None,
-    spring: Spring = None,
-    load: Load = None,
-    load_slope: LoadSlope = None,
-    pressure: Pressure = None,
-    pressure_slope: PressureSlope = None,
-    body_force: BodyForce = None,
+    *,
     alpha: AtAlpha = None,
     arithmetic: HowExact = "verified",
     stop_after: StopAfter = None,
@@ -132,6 +198,7 @@ def solve(
     csv_file: CsvFile = None,
     output: Output = None,
     quiet: Quiet = False,
+    **texts: Any,
 ) -> None:
     """Make a contact problem of MESH and find all its solutions.
 
@@ -142,29 +209,13 @@ def solve(
     Exit status: as enumsol roots.
     """
     given = {
-        "contact": contact,
-        "young": _number(young, "--young"),
-        "poisson": _number(poisson, "--poisson"),
-        "plane": plane,
-        "friction": _one_or_two(friction, "--friction"),
-        "friction2": _one_or_two(friction2, "--friction2"),
-        "axis": _numbers(axis, "--axis"),
-        "gap": _number(gap, "--gap"),
-        "obstacle": _by_part([obstacle] if obstacle else None, "--obstacle"),
-        "groups": groups,
-        "clamp": clamp,
-        "symmetry": symmetry,
-        "displacement": _by_part(displacement, "--displacement"),
-        "spring": _by_part(spring, "--spring"),
-        "load": _by_part(load, "--load"),
-        "load_slope": _by_part(load_slope, "--load-slope"),
-        "pressure": _by_part(pressure, "--pressure", single=True),
-        "pressure_slope": _by_part(pressure_slope, "--pressure-slope", single=True),
-        "body_force": _numbers(body_force, "--body-force"),
+        name: MESH_OPTIONS[name].read(text, "--" + name.replace("_", "-"))
+        for name, text in texts.items()
+        if text is not None
     }
     check_files(proof_file, json_file, csv_file, resume=resume)
     value = None if alpha is None else parse_alpha(alpha)
-    problem = _problem(mesh, {name: entry for name, entry in given.items() if entry is not None})
+    problem = _problem(mesh, given)
     if _at_rest(problem):
         note("nothing acts on the body: it has no load, press fit or given displacement, and rests")
     if output is not None:
@@ -211,40 +262,3 @@ def _write(problem: ContactProblem | ContactProblem3D, place: str) -> None:
 
     write_problem(problem, place)
     note(f"wrote a problem with {problem.n} degrees of freedom and {problem.p} contact nodes to {place}")
-
-
-def _by_part(texts: list[str] | None, option: str, *, single: bool = False) -> dict[str, Any] | None:
-    """Values by the names of parts, of texts NAME=VALUES."""
-    if texts is None:
-        return None
-    found: dict[str, Any] = {}
-    for text in texts:
-        name, sign, numbers = text.rpartition("=")
-        if not sign or not name:
-            raise InvalidArgumentError(f"{option} is {text}; expected NAME=NUMBERS")
-        if name in found:
-            raise InvalidArgumentError(f"{option} is given twice for {name}; expected it once")
-        found[name] = _number(numbers, option) if single else _numbers(numbers, option)
-    return found
-
-
-def _numbers(text: str | None, option: str) -> list[Any] | None:
-    return None if text is None else [_entry(part, option, text) for part in text.split(",")]
-
-
-def _one_or_two(text: str | None, option: str) -> Any:
-    numbers = _numbers(text, option)
-    return numbers[0] if numbers is not None and len(numbers) == 1 else numbers
-
-
-def _number(text: str | None, option: str) -> Any:
-    return None if text is None else _entry(text, option, text)
-
-
-def _entry(part: str, option: str, text: str) -> Any:
-    if part.strip() == "free" and option == "--displacement":
-        return "free"
-    try:
-        return float(part)
-    except ValueError:
-        raise InvalidArgumentError(f"{option} is {text}; expected numbers such as 0.5, with commas between") from None

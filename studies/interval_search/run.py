@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING
 import enumsol
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
-from enumsol.search.interval import interval_tree
-from enumsol.search.interval import subintervals as interval
+from enumsol.search.interval import interval_tree, subintervals as interval
 
 if TYPE_CHECKING:
     from shared.results import Run

@@ -20,9 +20,7 @@ from time import process_time
 from typing import TYPE_CHECKING
 
 import enumsol
-from search_in_3d.degenerate import CASES, SMOKE_NODES
-from search_in_3d.degenerate import MAX_NODES as MOST_DEGENERATE
-from search_in_3d.degenerate import row as degenerate_row
+from search_in_3d.degenerate import CASES, MAX_NODES as MOST_DEGENERATE, SMOKE_NODES, row as degenerate_row
 
 if TYPE_CHECKING:
     from shared.results import Run

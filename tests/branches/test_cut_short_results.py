@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from cut_short import false_claims_of_graph, false_claims_of_roots
-from generators import integer_problem as integer_data
-from generators import random_problem, singular_problem
+from generators import integer_problem as integer_data, random_problem, singular_problem
 from path_problems import generic_problem, integer_problem, mirrored_problem
 
 from enumsol import branch_graph, enumerate_roots, gallery, multiplicity_table

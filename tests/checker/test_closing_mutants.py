@@ -13,8 +13,7 @@ from trees import above_known_roots
 
 from enumsol import enumerate_roots, verify
 from enumsol.checker.stability import stability_radius
-from enumsol.search import fathoming as closing
-from enumsol.search import solvers
+from enumsol.search import fathoming as closing, solvers
 
 MUTANTS = 150
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from generators import through_the_unloaded_state
 from graph_proofs import forms_at_once, without_arcs
-from hypothesis import HealthCheck, assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, assume, given, settings, strategies as st
 from oracles import exact_solutions
 from proof_tools import copied, multipliers, proof_of, records_of, with_multipliers
 from rational_checker import check_records

@@ -8,8 +8,7 @@ import struct
 import numpy as np
 import pytest
 from generators import integer_problem
-from hypothesis import HealthCheck, assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, assume, given, settings, strategies as st
 from proof_tools import Judge, bytes_of, copied, multipliers, proof_of, records_of, with_multipliers
 from rational_checker import check_records
 

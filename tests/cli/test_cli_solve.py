@@ -2,6 +2,7 @@
 
 import json
 import os
+from inspect import signature
 
 import pytest
 from typer.testing import CliRunner
@@ -9,6 +10,7 @@ from typer.testing import CliRunner
 from enumsol import enumerate_roots, fem, read_problem
 from enumsol.cli import main
 from enumsol.cli.app import app
+from enumsol.cli.solve import MESH_OPTIONS
 
 BODY = """$MeshFormat
 2.2 0 8
@@ -216,3 +218,8 @@ def test_help_names_every_option_of_mesh_problem():
 
     names = [name for name in signature(fem.mesh_problem).parameters if name != "mesh"]
     assert [name for name in names if f"--{name.replace('_', '-')} " not in said] == []
+
+
+def test_every_option_of_mesh_problem_can_be_given():
+    taken = [name for name, of in signature(fem.mesh_problem).parameters.items() if of.kind is of.KEYWORD_ONLY]
+    assert list(MESH_OPTIONS) == sorted(taken, key=list(MESH_OPTIONS).index)

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import scipy.sparse as sp
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from enumsol import ContactProblem, EnumsolError, InvalidArgumentError, InvalidProblemError, fem, gallery, read_problem
 from enumsol.support.array_arguments import real_array, real_matrix

@@ -10,8 +10,7 @@ from generators import random_problem, singular_problem
 
 import enumsol
 from enumsol import gallery
-from enumsol.relaxation import active_set
-from enumsol.relaxation import interior_point as fallback
+from enumsol.relaxation import active_set, interior_point as fallback
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.tree import TreeSearch
 from enumsol.selections.float_selections import FloatSelections

@@ -11,8 +11,7 @@ import pytest
 import enumsol
 from enumsol import InvalidArgumentError, MissingDependencyError, branch_graph, enumerate_roots, gallery, write_report
 from enumsol.cli import main
-from enumsol.report import body as bodies
-from enumsol.report import content
+from enumsol.report import body as bodies, content
 from enumsol.report.body import body_record
 from enumsol.report.content import rounded, slider_alphas
 

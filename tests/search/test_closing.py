@@ -11,8 +11,7 @@ from touching import beside_a_loaded_node, row_of_discs, touching_problem
 
 from enumsol import ContactProblem, enumerate_roots, verify
 from enumsol.model.statuses import BACKWARD, FORWARD
-from enumsol.search import fathoming as closing
-from enumsol.search import solvers
+from enumsol.search import fathoming as closing, solvers
 
 
 @pytest.mark.parametrize("slides", [False, True])

@@ -13,8 +13,7 @@ from trees import above_known_roots, by_the_tree
 
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.checker.stability import stability_radius
-from enumsol.search import fathoming as closing
-from enumsol.search import parallel
+from enumsol.search import fathoming as closing, parallel
 from enumsol.search.fathoming_in_contact import KnownRoot
 
 

@@ -13,8 +13,7 @@ from trees import by_the_tree
 
 from enumsol import InvalidArgumentError, enumerate_roots, gallery, is_unique, verify
 from enumsol.model.statuses import UNDECIDED
-from enumsol.search import descent, reduction
-from enumsol.search import fathoming as closing
+from enumsol.search import descent, fathoming as closing, reduction
 from enumsol.search.definite import Nodes
 from enumsol.search.reduction import Reduction
 from enumsol.support.deadlines import TimeOverError

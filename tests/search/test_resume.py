@@ -14,8 +14,7 @@ import pytest
 import scipy.sparse as sp
 from compare import differences
 from generators import from_condensed, integer_problem
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from problems3d import forces
 from proof_fuzz import mutant
 from proof_tools import bytes_of, copied, multipliers, proof_of, records_of, with_multipliers

@@ -8,8 +8,7 @@ from compare import differences
 from proof_tools import bytes_of, records_of
 
 from enumsol import Interrupted, enumerate_roots, gallery, verify
-from enumsol.search import form_policy as policy
-from enumsol.search import parallel
+from enumsol.search import form_policy as policy, parallel
 from enumsol.support.workers import Crew
 
 

@@ -10,8 +10,7 @@ from rational_forms import Data, Forms, Refused, exact
 from touching import touching_problem
 
 from enumsol.condensation.enclosure import CondensedEnclosure
-from enumsol.search.fathoming_in_contact import KnownRoot
-from enumsol.search.fathoming_in_contact import Lone as Proposed
+from enumsol.search.fathoming_in_contact import KnownRoot, Lone as Proposed
 from enumsol.search.splitting import ImposedRows, PlaneSplitting
 from enumsol.search.tree import make_engine
 from enumsol.trusted import uniqueness_in_contact as lone

@@ -1,0 +1,23 @@
+"""Where the names are at home."""
+
+from .assembly import (
+    body_forces as body_forces,
+    contact_problem as contact_problem,
+    edge_forces as edge_forces,
+    stiffness as stiffness,
+    triangle_stiffness as triangle_stiffness,
+)
+from .basis_problems import basis_contact_problem as basis_contact_problem
+from .mesh_checks import lame as lame
+from .mesh_files import read_mesh as read_mesh, read_solid as read_solid
+from .mesh_problems import mesh_problem as mesh_problem, read_mesh_problem as read_mesh_problem
+from .meshes import Mesh as Mesh, edges_along as edges_along, rectangle as rectangle, trapezoid as trapezoid
+from .named_parts import PartedMesh as PartedMesh
+from .norms import MeshNorms as MeshNorms, h1_norms as h1_norms
+from .solid_meshes import SolidMesh as SolidMesh, blocks as blocks, box as box
+from .solid_problems import solid_contact_problem as solid_contact_problem
+from .solids import (
+    facet_forces as facet_forces,
+    solid_body_forces as solid_body_forces,
+    solid_stiffness as solid_stiffness,
+)
