@@ -47,10 +47,11 @@ class RenewedPool(Executor):
             self._pool = concurrent.futures.ProcessPoolExecutor(
                 self._max_workers, mp_context=context, initializer=_end_with_parent
             )
-            # one is started for every task that waits; that one died already the search finds out
-            with suppress(BrokenExecutor):
-                for _ in range(self._max_workers):
-                    self.submit(int)
+            # all start with the first task, before the thread that watches them: one that died while another was being
+            # started would end that thread with a traceback
+            setattr(self._pool, "_safe_to_dynamically_spawn_children", False)  # noqa: B010 (not in the stubs)
+            with suppress(BrokenExecutor):  # that one died already the search finds out
+                self.submit(int)
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
         """The future of a call.

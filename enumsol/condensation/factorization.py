@@ -55,7 +55,10 @@ class Factorization(Immutable):
     def check_positive_definite(self) -> None:
         """Raise InvalidProblemError unless every pivot is positive and above rounding."""
         pivots = self._pivots
-        if not np.array_equal(self._lu.perm_r, self._lu.perm_c) or np.min(pivots) < -PIVOT_TOLERANCE:
+        # rows are exchanged where a pivot is zero: in an indefinite matrix, and in a singular one, whose last pivots
+        # are what rounding leaves
+        exchanged = not np.array_equal(self._lu.perm_r, self._lu.perm_c) and np.min(np.abs(pivots)) > PIVOT_TOLERANCE
+        if exchanged or np.min(pivots) < -PIVOT_TOLERANCE:
             raise InvalidProblemError(
                 "A is not positive definite (an elimination pivot is negative); expected the stiffness of a stable body"
             )
