@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -83,7 +84,8 @@ def test_a_problem_in_2d_loads_nothing_of_3d():
     code += "assert enumsol.verify(problem, roots.proof).complete and len(enumsol.multiplicity_table(problem, [1]))\n0"
     modules = {name.removeprefix("enumsol.") for name in modules_after(code) if name.startswith("enumsol.")}
     assert {"search.parallel", "search.solvers", "roots.enumeration"} <= modules
-    of_space = {"sectors", "friction", "body3d", "problem3d", "kernel.leaves", "roots.root3d"}
+    of_space = {"model.sectors", "model.friction", "model.slip_mean", "model.problem3d"}
+    assert all((Path(enumsol.__file__).parent / f"{name.replace(chr(46), chr(47))}.py").exists() for name in of_space)
     assert not modules & of_space
     assert not [name for name in modules if "space" in name]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fixed_points.state import ContactState
+from enumsol.fixed_points.state import TrescaState
 from enumsol.fixed_points.system import contact_problem
 from enumsol.support.arguments import alpha_value, file_path, optional_count, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array
@@ -60,10 +60,10 @@ class Outcome(enum.Enum):
 
 
 @dataclass(frozen=True)
-class FixedPoint(ContactState):
+class FixedPoint(TrescaState):
     """The last iterate of successive approximations: a solution of Coulomb's problem if ``converged``.
 
-    Forces and displacements are those of the last Tresca problem (see ContactState), ``slip_bound`` and
+    Forces and displacements are those of the last Tresca problem (see TrescaState), ``slip_bound`` and
     ``coefficients`` what it was solved with.
 
     Attributes

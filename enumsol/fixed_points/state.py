@@ -31,7 +31,7 @@ STATUS_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
-class ContactState(Sealed):
+class TrescaState(Sealed):
     """Contact forces and displacements of a problem in 2D (d = 1) or 3D (d = 2) under given slip bounds.
 
     Attributes

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from enumsol.errors import EnumsolError, InvalidArgumentError
-from enumsol.fixed_points.state import ContactState, scaled_forces
+from enumsol.fixed_points.state import TrescaState, scaled_forces
 from enumsol.fixed_points.system import ContactSystem, contact_problem
 from enumsol.fixed_points.tresca_newton import ACCEPTED, TrescaData
 from enumsol.support.arguments import one_of
@@ -34,8 +34,8 @@ class TrescaNotSolved(EnumsolError, ArithmeticError):  # noqa: N818 (reads as wh
 
 
 @dataclass(frozen=True)
-class TrescaSolution(ContactState):
-    """The solution of a Tresca problem (see ContactState for its forces and displacements).
+class TrescaSolution(TrescaState):
+    """The solution of a Tresca problem (see TrescaState for its forces and displacements).
 
     Attributes
     ----------

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus, sign_array
 from enumsol.roots.local_branch import branch_test
 from enumsol.support.immutable import Sealed, sealed
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.condensation.condensed import CondensedProblem
+    from enumsol.condensation.condensed import CondensedProblem, CondensedProblem3D
     from enumsol.roots.linearisation import SelectionTangent
     from enumsol.roots.local_branch import LocalBranchTest
     from enumsol.roots.slip_signs import SlipSigns
@@ -35,8 +36,8 @@ class Enclosure(Sealed):
     Attributes
     ----------
     lambda_n, lambda_t : (p, 2) arrays
-        Lower and upper bounds [force].
-    u_n, u_t : (p, 2) arrays
+        Lower and upper bounds [force]; in 3D those of lambda_t have the shape (p, 2, 2), the bounds last.
+    u_n, u_t : arrays of the same shapes
         Lower and upper bounds of u_n = Bn u - gap and u_t = Bt u - slip_offset [length].
 
     Examples
@@ -62,12 +63,12 @@ class ContactState(Sealed):
     ----------
     alpha : float or Fraction
     statuses : tuple of p ContactStatus
-        Where several hold, the first of OPEN, STICK, SLIP_PLUS, SLIP_MINUS.
+        Where several hold, the first of OPEN, STICK, SLIP_PLUS, SLIP_MINUS; in 3D of OPEN, STICK, SLIP.
     active : tuple of p frozensets of ContactStatus
         All statuses that hold at the node.
-    lambda_n, lambda_t : (p,) arrays
+    lambda_n, lambda_t : (p,) arrays; in 3D lambda_t is (p, 2), along the local axes
         Contact forces on the nodes (nodal forces, not pressures) [force].
-    u_n, u_t : (p,) arrays
+    u_n, u_t : arrays of the same shapes
         Bn u - gap <= 0 and Bt u - slip_offset [length].
     """
 
@@ -82,7 +83,7 @@ class ContactState(Sealed):
 
 @dataclass(frozen=True, kw_only=True)
 class Root(ContactState):
-    """An isolated solution at one alpha: a ContactState with its index.
+    """An isolated solution at one alpha, in 2D or 3D: a ContactState with its index.
 
     At a node with F = 0 in contact the sign of u_t names its status: in verified and exact arithmetic that of the
     enclosure, or in rationals. ``active`` then holds all names that this sign does not exclude (of a body too large for
@@ -90,18 +91,23 @@ class Root(ContactState):
 
     A root at which more than one status may hold, of a body too large for rationals or where they do not apply, may be
     known by its enclosure only (theory, section 6.11): it exists and is the only one there, and ``active`` holds all
-    statuses that its enclosure does not exclude.
+    statuses that its enclosure does not exclude. In 3D a root that is not regular is known as the only solution
+    (theory, section 12.6), and a node in contact whose coefficients are both 0 slips wherever u_t is not 0.
 
     Attributes
     ----------
     alpha : float or Fraction
     statuses, active : tuples of p ContactStatus, and of p frozensets of them
         The first and all that hold at every node.
-    lambda_n, lambda_t, u_n, u_t : (p,) arrays
+    lambda_n, lambda_t, u_n, u_t : (p,) arrays; in 3D lambda_t and u_t are (p, 2)
         Contact forces [force], Bn u - gap and Bt u - slip_offset [length]; see ContactState.
+    slip_angle : (p, 2) array or None
+        In 3D, bounds of the angle of F u_t in the local axes, the lower one in [-pi, pi); nan where the node does not
+        slip against friction [radians].
     index : int or None
-        Local degree (theory, section 6.7): sign det of the selection at a regular root. It says nothing about physical
-        stability. None when it could not be found within the limits of the local analysis.
+        Local degree (theory, section 6.7): sign det of the selection at a regular root, in 3D of the Jacobian of the
+        normal map (theory, section 12.4). It says nothing about physical stability. None when it could not be found
+        within the limits of the local analysis.
     regular : bool
         Exactly one status holds at every node, strictly, and the selection is not singular.
     enclosure : Enclosure or None
@@ -124,25 +130,41 @@ class Root(ContactState):
     regular: bool
     margin: float
     enclosure: Enclosure | None = field(repr=False, compare=False)
-    _condensed: CondensedProblem = field(repr=False, compare=False)
-    _tangent: SelectionTangent | None = field(repr=False, compare=False)
+    _condensed: CondensedProblem | CondensedProblem3D = field(repr=False, compare=False)
+    slip_angle: NDArray[np.float64] | None = field(default=None, compare=False)
+    _tangent: SelectionTangent | None = field(repr=False, compare=False, default=None)
     _slips: SlipSigns | None = field(repr=False, compare=False, default=None)
 
     @cached_property
     def condition(self) -> float:
-        """Condition number of the selection's matrix after scaling; infinite unless the root is regular."""
+        """In 2D, the condition number of the selection's matrix after scaling; infinite unless the root is regular.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The problem is one in 3D.
+        """
+        self._in_2d("condition")
         return np.inf if self._tangent is None else self._tangent.condition()
 
     @cached_property
     def dlambda_dalpha(self) -> NDArray[np.float64] | None:
-        """Derivatives of (lambda_n, lambda_t) along the branch, shape (p, 2); None unless the root is regular."""
+        """In 2D, derivatives of (lambda_n, lambda_t) along the branch, shape (p, 2); None unless the root is regular.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The problem is one in 3D.
+        """
+        self._in_2d("dlambda_dalpha")
         derivative = None if self._tangent is None else self._tangent.derivative()
         return None if derivative is None else sealed(derivative)
 
     @property
     def u(self) -> NDArray[np.float64]:
         """Displacement of all degrees of freedom, shape (n,) [length]; computed at every access."""
-        return self._condensed.displacement(self.alpha, np.concatenate([self.lambda_n, self.lambda_t]))
+        forces = np.concatenate([self.lambda_n, self.lambda_t.ravel(order="F")])
+        return self._condensed.displacement(self.alpha, forces)
 
     def local_branch_test(self) -> LocalBranchTest:
         """Whether a local Lipschitz branch of solutions passes through the root (theory, section 3.2).
@@ -155,13 +177,41 @@ class Root(ContactState):
         ------
         TooLargeError
             Too many selections hold at the root to examine each of them.
+        InvalidArgumentError
+            The problem is one in 3D.
         """
-        return branch_test(self._condensed, self)
+        return branch_test(self._in_2d("local_branch_test"), self)
 
     @property
     def problem(self) -> Any:
         """The problem that it solves."""
         return self._condensed.problem
+
+    def plot(self, ax: Any = None) -> Any:
+        """The deformed body; in 3D also statuses and directions of slip on the contact surface.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes or None
+            In 3D plane ones: the contact surface alone is drawn there. None: all in a new figure.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Notebooks show it.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The problem has no mesh, or in 3D no coordinates.
+        MissingDependencyError
+            matplotlib is not installed.
+        """
+        if self.lambda_t.ndim == 1:
+            return self.plot_body(ax)
+        from enumsol.roots.space_plots import draw_root  # matplotlib comes with the first picture
+
+        return draw_root(self, self.problem, ax)
 
     def plot_body(self, ax: Any = None, *, scale: float | None = None) -> Any:
         """The deformed body with contact forces as arrows and contact nodes by status.
@@ -169,7 +219,7 @@ class Root(ContactState):
         Parameters
         ----------
         ax : matplotlib Axes or None
-            Draw there; None: in a new figure.
+            Draw there, in 3D with ``projection="3d"``; None: in a new figure.
         scale : float, optional
             Displacements are multiplied by it; default so that they can be seen. The title tells it.
 
@@ -189,18 +239,30 @@ class Root(ContactState):
 
         return draw_body(self, self.problem, ax, scale)
 
+    def _in_2d(self, name: str) -> CondensedProblem:
+        """The condensed problem, if it is one in 2D."""
+        if self.lambda_t.ndim == 2:
+            raise InvalidArgumentError(f"{name} is asked of a root in 3D; expected one in 2D")
+        return cast("CondensedProblem", self._condensed)
+
     def _slip_sign(self, node: int) -> int:
         sign = None if self._slips is None else self._slips.sign(node)
         return int(np.sign(self.u_t[node])) if sign is None else sign
 
     @property
     def signs(self) -> NDArray[np.int8]:
-        """Signs of the test functions at the root, shape (p, 3); 0 where a test function vanishes.
+        """In 2D, signs of the test functions at the root, shape (p, 3); 0 where a test function vanishes.
 
         At an open node theta2 and theta3 have the sign of u_t. In verified and exact arithmetic it follows from the
         enclosure or from rationals; of a body too large for these (n > 250) whose enclosure holds zero, it is that of
         the computed value.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The problem is one in 3D.
         """
+        self._in_2d("signs")
         signs = sign_array(self.statuses)
         for i, holds in enumerate(self.active):
             if ContactStatus.OPEN in holds:
@@ -214,10 +276,10 @@ class Root(ContactState):
         return signs
 
     def __repr__(self) -> str:
-        return "\n".join([root_heading(self), *node_table(self, self._condensed.problem.node_ids)])
+        return "\n".join([root_heading(self), *node_table(self, self.problem.node_ids)])
 
     def _repr_html_(self) -> str:
-        return root_html(self, self._condensed.problem.node_ids)
+        return root_html(self, self.problem.node_ids)
 
 
 @dataclass(frozen=True)
@@ -293,14 +355,14 @@ class RootFamily:
         return html_lines([heading]) + html_table(heads, rows[:_PRINTED_NODES])
 
 
-def root_heading(root: Any) -> str:
-    """The first line of a printed root, in 2D or 3D."""
+def root_heading(root: Root) -> str:
+    """The first line of a printed root."""
     index = "?" if root.index is None else f"{root.index:+d}"
     regular = "regular" if root.regular else "not regular"
     return f"Root at alpha = {float(root.alpha):g}: index {index}, {regular}, margin {root.margin:.2e}"
 
 
-def root_html(root: Any, labels: tuple[Any, ...]) -> str:
+def root_html(root: Root, labels: tuple[Any, ...]) -> str:
     """A root in a notebook: its heading, and a table over the contact nodes; of many the first."""
     shown = min(len(labels), _PRINTED_NODES)
     heads = _node_heads(1 if root.lambda_t.ndim == 1 else 2)

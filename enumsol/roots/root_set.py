@@ -44,10 +44,10 @@ class Undecided(Sealed):
         Parts of the search tree that this is. In 3D those that touch are one region: the root that it may hold, or the
         continuum of them, may belong to any (theory, section 12.5).
     slip_angle : (p, 2) array or None
-        In 3D: bounds of the angles of F u_t that a root in it has, as in Root3D; nan where it does not slip.
+        In 3D: bounds of the angles of F u_t that a root in it has, as in Root; nan where it does not slip.
     bounds : Enclosure or None
         In 3D, arithmetic "verified": proven bounds of the forces and displacements of every root in it, with the shapes
-        of Root3D. None where the search did not get there.
+        of Root. None where the search did not get there.
 
     Examples
     --------

@@ -8,6 +8,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus
+from enumsol.roots.body_plots import draw_body
 from enumsol.support.plotting import axes_or_none, figure_of, new_figure
 
 if TYPE_CHECKING:
@@ -22,8 +23,18 @@ _MARKS = {
 }
 
 
+def draw_root(root: Any, problem: ContactProblem3D, ax: Any) -> Any:
+    """See Root.plot."""
+    if axes_or_none(ax) is not None or problem.mesh is None:
+        return draw_slips(root, problem, ax)
+    figure = new_figure(figsize=(11.0, 5.0))
+    draw_body(root, problem, figure.add_subplot(121, projection="3d"))
+    draw_slips(root, problem, figure.add_subplot(122))
+    return figure
+
+
 def draw_slips(root: Any, problem: ContactProblem3D, ax: Any) -> Any:
-    """See Root3D.plot."""
+    """Statuses and directions of slip on the contact surface."""
     if problem.coordinates is None:
         raise InvalidArgumentError("the problem has no coordinates; expected a problem made with coordinates=")
     places = problem.coordinates
@@ -42,7 +53,7 @@ def draw_slips(root: Any, problem: ContactProblem3D, ax: Any) -> Any:
         d = moves[slides] / size[slides, None]
         colours = {"cmap": "viridis", "clim": (0.0, np.max(size[slides]))}  # equal slips in the same colour
         ax.quiver(*places[slides][:, shown].T, *d.T, size[slides], angles="xy", width=0.005, **colours)
-    ax.set_aspect("equal", adjustable="datalim")
+    ax.set_aspect("equal", adjustable="box")
     ax.margins(0.15)
     ax.set_xlabel("xyz"[shown[0]])
     ax.set_ylabel("xyz"[shown[1]])

@@ -14,8 +14,7 @@ from enumsol.arithmetic.balls import SAFE, UNIT
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus
 from enumsol.roots.enumeration import Enumeration
-from enumsol.roots.root import Enclosure
-from enumsol.roots.root3d import Root3D
+from enumsol.roots.root import Enclosure, Root
 from enumsol.roots.root_set import RootSet, Undecided
 from enumsol.roots.space_regions import loose_angles, regions_of, slip_angles, with_zeros
 from enumsol.search.space.space_setup import SpaceSolvers
@@ -88,7 +87,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
     # -- in the user's terms ---------------------------------------------------------------------------------------
 
-    def _root(self, codes: Codes, found: SpaceRoot) -> Root3D:
+    def _root(self, codes: Codes, found: SpaceRoot) -> Root:
         system, p = self.system, self.system.p
         forces, F = found.y.mid, system.F
         lambda_n = forces[:p] * system.force
@@ -97,7 +96,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         closed = np.array([code != OPEN for code in codes])
         u_n = np.where(closed, 0.0, np.minimum(u_n, 0.0))
         u_t = np.where((np.array(codes) == STICK)[:, None] & (F > 0), 0.0, u_t)
-        return Root3D(
+        return Root(
             alpha=self.alpha,
             statuses=tuple(_status(code, u_t[i]) for i, code in enumerate(codes)),
             active=tuple(frozenset((_status(code, u_t[i]),)) for i, code in enumerate(codes)),
@@ -113,7 +112,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             _condensed=self.problem.condensed,
         )
 
-    def _only(self, found: OnlySolution) -> Root3D:
+    def _only(self, found: OnlySolution) -> Root:
         """The only solution, whose statuses need not be known."""
         system, p = self.system, self.system.p
         bounds = self._enclosure(found.y, Ball(found.w.mid, np.where(found.w.rad > 0, np.inf, 0.0)))
@@ -123,7 +122,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         u_n, u_t = (np.clip(u, b[..., 0], b[..., 1]) for u, b in ((u_n, bounds.u_n), (u_t, bounds.u_t)))
         active = tuple(frozenset(_possible(found, i, u_t[i], rubs=bool(np.any(system.tau[i] >= 0)))) for i in range(p))
         order = (ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP)
-        return Root3D(
+        return Root(
             alpha=self.alpha,
             statuses=tuple(next(status for status in order if status in held) for held in active),
             active=active,
@@ -190,13 +189,13 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         # displacements are those of the forces
         return self._enclosure(y, Ball(w.mid, np.where(w.rad > 0, np.inf, 0.0)))
 
-    def _rest(self) -> Root3D:
+    def _rest(self) -> Root:
         """The unloaded body: nothing moves, and every status holds."""
         p = self.problem.p
         zero, plane = np.zeros(p), np.zeros((p, 2))
         every = frozenset((ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP))
         bounds = Enclosure(*(np.zeros(shape) for shape in ((p, 2), (p, 2, 2)) * 2))
-        return Root3D(
+        return Root(
             alpha=self.alpha,
             statuses=(ContactStatus.OPEN,) * p,
             active=(every,) * p,

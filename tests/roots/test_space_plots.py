@@ -5,12 +5,16 @@ import pytest
 from problems3d import from_compliance
 
 import enumsol
+from enumsol.support.plotting import new_figure
 
 
 def test_arrows_point_along_the_slips():
     problem = enumsol.gallery.get("block3d-9").build()
     root = enumsol.enumerate_roots(problem, 0.5)[0]
-    (ax,) = root.plot().axes
+    body, ax = root.plot().axes
+    assert body.name == "3d"
+    (alone,) = root.plot(new_figure().subplots()).axes
+    assert alone.name != "3d"
     slides = [str(status) == "slip" for status in root.statuses]
     (arrows,) = [part for part in ax.collections if hasattr(part, "U")]
     # the axes of the gallery's block are x and -y
@@ -32,3 +36,19 @@ def test_without_coordinates_there_is_no_picture():
     root = enumsol.enumerate_roots(from_compliance(np.eye(3), np.ones(3), 0.3), 0)[0]
     with pytest.raises(enumsol.InvalidArgumentError, match="the problem has no coordinates"):
         root.plot()
+
+
+def test_what_is_known_in_2d_only_is_refused():
+    root = enumsol.enumerate_roots(enumsol.gallery.one_node_3d(), 0)[0]
+    assert isinstance(root, enumsol.Root)
+    for name in ("condition", "dlambda_dalpha", "signs"):
+        with pytest.raises(enumsol.InvalidArgumentError, match=f"{name} is asked of a root in 3D; expected one in 2D"):
+            getattr(root, name)
+    with pytest.raises(enumsol.InvalidArgumentError, match="local_branch_test is asked of a root in 3D"):
+        root.local_branch_test()
+
+
+def test_a_root_in_2d_is_plotted_as_its_body():
+    root = enumsol.enumerate_roots(enumsol.gallery.two_node_square(), 3.5)[0]
+    assert root.slip_angle is None
+    assert [ax.get_title() for ax in root.plot().axes] == [ax.get_title() for ax in root.plot_body().axes]
