@@ -10,7 +10,7 @@ from flint import fmpq, fmpq_mat, fmpq_poly
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, integer_polynomial, merge, rational_between, real_roots
 from enumsol.arithmetic.number_field import exact_value
-from enumsol.branches.exact.selection_arcs import Cell, Event, SelectionArcs
+from enumsol.branches.exact.selection_arcs import Cell, SelectionArcs, SelectionEvent
 from enumsol.selections.functions import SelectionFunctions
 from enumsol.selections.ordered_field import FiberSelections, row_reduce
 from enumsol.selections.solution import MAX_BASES, VertexLimitError
@@ -40,7 +40,7 @@ def sheet_arcs(exact: ExactCondensed, codes: Codes, a: Any, b: Any) -> Selection
     points = [CriticalAlpha.rational(end) for end in ((a, b) if a != b else (a,))]
     for poly in _critical_polynomials(exact, codes):
         points += real_roots(poly, a, b)
-    events = [Event(codes, group[0], singular=True) for group in merge(points)]
+    events = [SelectionEvent(codes, group[0], singular=True) for group in merge(points)]
     patterns = []
     for event in events:
         pattern = _pattern(exact, codes, exact_value(event.alpha))

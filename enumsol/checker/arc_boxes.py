@@ -7,7 +7,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from enumsol.proof.reading import rational_from, shown
+from enumsol.proof.reading import quoted, rational_from
 from enumsol.trusted.arcs.over_parts import expansions, over_parts
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class BoxSelection:
             if isinstance(bound, float):
                 signs.append(self.plain.sign_at(bound, condition))
             else:
-                found = self.precise.signs_at(number(bound))
+                found = self.precise.signs_at(alpha_number(bound))
                 signs.append(0 if found is None else int(found[condition]))
         return signs == _expected(part)
 
@@ -91,8 +91,8 @@ class Boxes:
     def add(self, selection: BoxSelection, low: Any, high: Any, said: list[Said], *, precise: bool) -> None:
         """Test a box, at once or together with others; ValueError if it can not be tested at all."""
         if precise:
-            expansion = selection.precise.expansion(number(low), number(high))
-            known = [expansion and expansion.over(number(x), number(y)) for _, x, y in said]
+            expansion = selection.precise.expansion(alpha_number(low), alpha_number(high))
+            known = [expansion and expansion.over(alpha_number(x), alpha_number(y)) for _, x, y in said]
             for one, what in zip(said, known, strict=True):
                 self._test(selection, one, what, [])
             return
@@ -125,14 +125,14 @@ class Boxes:
     ) -> None:
         """Fail where a part's claim does not follow from what is known of the part, and at bounds of its zero."""
         part, low, high = one
-        if known is None or not _proven(known, part, number(low), number(high)):
-            where = f"[{float(number(low))}, {float(number(high))}]"
+        if known is None or not _proven(known, part, alpha_number(low), alpha_number(high)):
+            where = f"[{float(alpha_number(low))}, {float(alpha_number(high))}]"
             self._fail(f"selection {_text(selection)}: what is said of {where} is not proven")
         if part[0] != "e":
             return
         seen = [int(found.ends[0][part[3]]) for found in bounds] == _expected(part)
         if not seen and not selection.signs_differ(part):
-            near = float(number(low))
+            near = float(alpha_number(low))
             self._fail(f"selection {_text(selection)}: bounds of an event near {near} are not proven")
 
 
@@ -141,8 +141,8 @@ def _questions(one: Said) -> Iterator[tuple[Any, Any]]:
     part, low, high = one
     yield low, high
     if part[0] == "e" and all(isinstance(bound, float) for bound in part[5:7]):
-        zero = number(part[5]), number(part[6])
-        if inside(zero, (number(low), number(high))):
+        zero = alpha_number(part[5]), alpha_number(part[6])
+        if inside(zero, (alpha_number(low), alpha_number(high))):
             yield from ((bound, bound) for bound in part[5:7])
 
 
@@ -167,7 +167,7 @@ def _proven(known: OverInterval, part: list[Any], low: Fraction, high: Fraction)
         and not any(k < 0 for k in known.conditions.tolist())
         and int(known.slopes[condition]) == (1 if part[4] else -1)
         and [int(end[condition]) for end in known.ends] == _expected(part)
-        and inside((number(part[5]), number(part[6])), (low, high))
+        and inside((alpha_number(part[5]), alpha_number(part[6])), (low, high))
     )
 
 
@@ -175,7 +175,7 @@ def check_entries(part: Any, conditions: int) -> None:
     """Refuse what is no part, or has entries that its kind has not."""
     kind = part[0] if isinstance(part, list) and part else None
     if not isinstance(kind, str) or kind not in _ENTRIES or len(part) != _ENTRIES[kind]:
-        raise ValueError(f"{shown(part)} is no part of a box")
+        raise ValueError(f"{quoted(part)} is no part of a box")
     if kind in ("h", "e") and (type(part[2]) is not int or part[2] not in (-1, 1)):
         raise ValueError("an index is neither 1 nor -1")
     if kind == "e" and not (
@@ -189,7 +189,7 @@ def inside(zero: tuple[Fraction, Fraction], part: tuple[Fraction, Fraction]) -> 
     return part[0] <= zero[0] < zero[1] <= part[1]
 
 
-def number(value: Any) -> Fraction:
+def alpha_number(value: Any) -> Fraction:
     """An alpha: a float, or a fraction as text."""
     if type(value) is float or isinstance(value, Fraction):
         return Fraction(value)
@@ -198,7 +198,7 @@ def number(value: Any) -> Fraction:
 
 def _plain(value: Any) -> float | Fraction:
     """An alpha for an expansion in double arithmetic, as a float if it is one."""
-    return value if isinstance(value, float) else number(value)
+    return value if isinstance(value, float) else alpha_number(value)
 
 
 def _text(selection: BoxSelection) -> str:

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checker.arc_boxes import Boxes, BoxSelection, check_entries, inside, number
-from enumsol.checker.only_branches import Arc, Event
-from enumsol.proof.reading import RefusedError, codes_from, names_only, same, shown, units_from
+from enumsol.checker.arc_boxes import Boxes, BoxSelection, alpha_number, check_entries, inside
+from enumsol.checker.only_branches import ClaimedArc, ClaimedEvent
+from enumsol.proof.reading import RefusedError, codes_from, names_only, quoted, same, units_from
 from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
 from enumsol.trusted.selection import (
     CONE_MINUS,
@@ -104,8 +104,8 @@ class ArcChecker:
         self._due = {(codes, *span) for codes, where in pieces.items() for span in self._spans(where)}
         self._systems: dict[int, ArcSystem] = {}
         self._closed = closed
-        self._events: list[Event] = []
-        self._arcs: list[Arc] = []
+        self._events: list[ClaimedEvent] = []
+        self._arcs: list[ClaimedArc] = []
         self._count = ArcCount()
         self._boxes = Boxes(fail)
         self.traces = 0
@@ -132,7 +132,7 @@ class ArcChecker:
                 raise RefusedError(f"trace {self.traces} cannot be read: {error}") from None
         self._boxes.check()
         if not same(head["traces"], self.traces):
-            self._fail(f"there are {self.traces} traces; the arcs begin with {shown(head['traces'])}")
+            self._fail(f"there are {self.traces} traces; the arcs begin with {quoted(head['traces'])}")
         if self._due:
             self._fail(f"{len(self._due)} of the selections handed on are not traced")
         self._pair()
@@ -165,9 +165,9 @@ class ArcChecker:
     def _trace(self, record: list[Any], records: Iterator[Any]) -> Any:
         """Check a trace and follow its arcs; gives the record after it."""
         if len(record) != 5 or record[0] != "t" or type(record[4]) is not int or record[4] not in (-1, 0, 1):
-            raise ValueError(f"{shown(record)} begins no trace")
+            raise ValueError(f"{quoted(record)} begins no trace")
         codes = tuple(codes_from([record[1]], self._problem.p)[0].tolist())
-        low, high, side = number(record[2]), number(record[3]), record[4]
+        low, high, side = alpha_number(record[2]), alpha_number(record[3]), record[4]
         spans = (d for d in self._due if d[0] == codes and d[3] == side)
         due = next((d for d in spans if _is_next(-low, -d[1]) and _is_next(high, d[2])), None)
         if due is None:
@@ -191,8 +191,8 @@ class ArcChecker:
     def _box(self, record: list[Any], selection: BoxSelection, follower: _Follower, start: Fraction) -> Fraction:
         """Follow the arcs through the parts of a box, and keep what they say; the end of the last one."""
         if len(record) != 5 or type(record[3]) is not int or record[3] not in (0, 1) or not isinstance(record[4], list):
-            raise ValueError(f"{shown(record)} is no box")
-        low, high = number(record[1]), number(record[2])
+            raise ValueError(f"{quoted(record)} is no box")
+        low, high = alpha_number(record[1]), alpha_number(record[2])
         if not low == start < high or not 0 < len(record[4]) <= _MOST_PARTS:
             raise ValueError("a box does not begin where the one before ends, or has no parts or too many")
         end: Any = record[1]
@@ -200,7 +200,7 @@ class ArcChecker:
         for part in record[4]:
             check_entries(part, len(selection.conditions))
             before, end = end, part[1]
-            first, last = number(before), number(end)
+            first, last = alpha_number(before), alpha_number(end)
             if not first < last <= high:
                 raise ValueError("the parts of a box are not in order")
             if part[0] != "u":
@@ -208,7 +208,7 @@ class ArcChecker:
             follower.part(part[0], part, (first, last))
         if said:
             self._boxes.add(selection, record[1], record[2], said, precise=bool(record[3]))
-        return number(end)
+        return alpha_number(end)
 
     # -- all of them -----------------------------------------------------------------------------------------------
 
@@ -218,7 +218,7 @@ class ArcChecker:
             return alpha >= self._origin if upper else alpha <= self._origin
         return alpha >= self._interval[1] if upper else alpha <= self._interval[0]
 
-    def arc(self, arc: Arc, index: int, starts: int | None) -> None:
+    def arc(self, arc: ClaimedArc, index: int, starts: int | None) -> None:
         """Keep an arc; one that begins at an end of the interval, or where g vanishes, with its side."""
         self._arcs.append(arc)
         self._count.arcs += 1
@@ -229,7 +229,7 @@ class ArcChecker:
         """Count an interval that was left open."""
         self._count.open += 1
 
-    def event(self, event: Event) -> None:
+    def event(self, event: ClaimedEvent) -> None:
         """Keep an event for pairing."""
         self._events.append(event)
 
@@ -252,7 +252,7 @@ class ArcChecker:
 
     def _pair(self) -> None:
         """Pair events; each belongs to exactly one other, unless something beside it was left open."""
-        by_codes: dict[tuple[Codes, int, tuple[int, int]], list[Event]] = {}
+        by_codes: dict[tuple[Codes, int, tuple[int, int]], list[ClaimedEvent]] = {}
         for event in self._events:
             by_codes.setdefault((event.codes, event.side, event.condition), []).append(event)
         for event in self._events:
@@ -292,7 +292,7 @@ class _Follower:
         self.codes, self._conditions = codes, conditions
         self._checker, self._side, self._ends = checker, side, ends
         self._index, self._first, self._open = 0, True, False
-        self._arc: Arc | None = None
+        self._arc: ClaimedArc | None = None
 
     def part(self, kind: str, part: list[Any], ends: tuple[Fraction, Fraction]) -> None:
         """Go on through a part."""
@@ -312,9 +312,9 @@ class _Follower:
         """A part in which the selection holds somewhere."""
         event = None
         if kind == "e":
-            zero = (number(part[5]), number(part[6]))
+            zero = (alpha_number(part[5]), alpha_number(part[6]))
             condition = self._conditions[part[3]]
-            event = Event(self.codes, self._side, condition, ends, zero, part[4] == 1, part[2], [])
+            event = ClaimedEvent(self.codes, self._side, condition, ends, zero, part[4] == 1, part[2], [])
             self._checker.event(event)
         rising = event is not None and event.rising
         if rising and self._arc is not None:
@@ -323,10 +323,10 @@ class _Follower:
             starts = self._first and self._checker.end_at(self._ends[0], self._side, upper=False)
             if not starts and not self._open:
                 self._checker.fail(self.codes, ends[0])
-            self._arc = Arc(self.codes, self._side, ends[0], ends[0])
+            self._arc = ClaimedArc(self.codes, self._side, ends[0], ends[0])
             self._checker.arc(self._arc, part[2], self._side if starts else None)
         elif event is not None and rising:
-            self._arc = Arc(self.codes, self._side, event.zero[1], event.zero[1], event)
+            self._arc = ClaimedArc(self.codes, self._side, event.zero[1], event.zero[1], event)
             self._checker.arc(self._arc, part[2], None)
         elif part[2] != self._index:
             self._checker.fail(self.codes, ends[0])

@@ -38,9 +38,9 @@ from enumsol.proof.reading import (
     multipliers_from,
     names_only,
     numbers_from,
+    quoted,
     rational_from,
     same,
-    shown,
     units_from,
 )
 from enumsol.trusted.over_interval import (
@@ -185,7 +185,7 @@ class GraphChecker:
         elif self._closed:
             self._fail("pieces are said to be decided by their arcs, but there are none")
         if not same(record, claim):
-            found = shown(record) if isinstance(record, (dict, list)) else "missing"
+            found = quoted(record) if isinstance(record, (dict, list)) else "missing"
             self._fail(f"the counts at the end are {found}; the pieces give {claim!r}")
         if next(records, _END) is not _END:
             self._fail("records follow after the end of the proof")
@@ -275,7 +275,7 @@ class GraphChecker:
         for record in batch:
             kind = record[0] if record else None
             if not isinstance(kind, str) or kind not in _ENTRIES:
-                raise ValueError(f"unknown kind of record {shown(kind)}")
+                raise ValueError(f"unknown kind of record {quoted(kind)}")
             if len(record) != _ENTRIES[kind]:
                 raise ValueError(f"a record of kind {kind!r} has {len(record)} entries; expected {_ENTRIES[kind]}")
         if not batch:
@@ -334,7 +334,7 @@ class GraphChecker:
 
 def _interval_from(ends: Any) -> tuple[Fraction, Fraction]:
     if not isinstance(ends, list) or len(ends) != 2:
-        raise ValueError(f"{shown(ends)} is no interval")
+        raise ValueError(f"{quoted(ends)} is no interval")
     a, b = (rational_from(end) for end in ends)
     if not a < b:
         raise ValueError("an interval is empty")

@@ -27,7 +27,7 @@ _ENTRIES = 4
 
 
 @dataclass(eq=False)
-class Event:
+class ClaimedEvent:
     """A point at which one condition of a selection vanishes."""
 
     codes: tuple[int, ...]
@@ -37,11 +37,11 @@ class Event:
     zero: tuple[Fraction, Fraction]
     rising: bool
     index: int
-    partners: list[Event]
+    partners: list[ClaimedEvent]
 
 
 @dataclass(eq=False)
-class Arc:
+class ClaimedArc:
     """Where a trace shows a root of its selection at every alpha.
 
     Attributes
@@ -51,7 +51,7 @@ class Arc:
         Of the alpha at which g vanishes.
     low, high : Fraction
         It holds from here to there at least.
-    tail, head : Event or None
+    tail, head : ClaimedEvent or None
         Where it begins, and where it ends.
     """
 
@@ -59,8 +59,8 @@ class Arc:
     side: int
     low: Fraction
     high: Fraction
-    tail: Event | None = None
-    head: Event | None = None
+    tail: ClaimedEvent | None = None
+    head: ClaimedEvent | None = None
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class ClosedPiece:
             raise ValueError("a number mu or kappa is not positive")
         return cls(a, b, numbers)
 
-    def failure(self, arcs: Sequence[Arc], systems: dict[int, ArcSystem], origin: Fraction | None) -> str | None:
+    def failure(self, arcs: Sequence[ClaimedArc], systems: dict[int, ArcSystem], origin: Fraction | None) -> str | None:
         """Why the arcs are not shown to hold all its solutions, or None. Events have their partners."""
         side = 0 if origin is None else 1 if self.b > origin else -1
         chain = self._chain([arc for arc in arcs if arc.side == side])
@@ -94,7 +94,7 @@ class ClosedPiece:
             spans.append((ArcSelection(systems[side], arc.codes), _below(low), -_below(-high)))
         return None if all(only_roots(spans, self.numbers)) else "its arcs are not proven to hold all its solutions"
 
-    def _chain(self, arcs: Sequence[Arc]) -> list[Arc] | None:
+    def _chain(self, arcs: Sequence[ClaimedArc]) -> list[ClaimedArc] | None:
         """Arcs one after another, of which one holds at every alpha of the piece."""
         begins = {arc.tail: arc for arc in arcs if arc.tail is not None}
         arc = next((arc for arc in arcs if arc.low <= self.a and self.a <= _end(arc)), None)
@@ -109,7 +109,7 @@ class ClosedPiece:
         return None
 
 
-def _end(arc: Arc) -> Fraction:
+def _end(arc: ClaimedArc) -> Fraction:
     return arc.high if arc.head is None else arc.head.zero[1]
 
 

@@ -18,14 +18,14 @@ from enumsol.proof.reading import RefusedError, data_of, exponents_from, rationa
 from enumsol.proof.records import Limits, NoRoot, RegularRoot
 from enumsol.proof.space_records import LEAVES, ExcludedInSpace, OnlyRoot
 from enumsol.trusted.space.leaves import Open, distinct_roots, settle
-from enumsol.trusted.space.sector_rows import UNDECIDED, children_of, exclusion_margin
-from enumsol.trusted.space.space_uniqueness import only_root, only_solution
+from enumsol.trusted.space.sector_rows import UNDECIDED, sector_children, sector_margin
+from enumsol.trusted.space.space_uniqueness import only_root, only_solution_in_space
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.checker.walk import Codes, Test
-    from enumsol.proof.records import Enclosure, Record
+    from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.trusted.space.leaves import SpaceRoot
     from enumsol.trusted.space.space_uniqueness import OnlySolution
 
@@ -70,7 +70,7 @@ class SpaceChecker(TreeChecker):
     def _coverings(self, node: int, code: int) -> tuple[tuple[int, ...], ...]:
         if code > SECTORS and level_of(code - SECTORS) > DEEPEST:
             return ()
-        children = children_of(code, self.tangents[node])
+        children = sector_children(code, self.tangents[node])
         return (children,) if children else ()
 
     # -- leaves ----------------------------------------------------------------------------------------------------
@@ -91,7 +91,7 @@ class SpaceChecker(TreeChecker):
         self.regular += 1
 
     def _excluded(self, codes: Codes, said: ExcludedInSpace) -> str | None:
-        positive = exclusion_margin(self.system, codes, said.rows, said.values) > 0
+        positive = sector_margin(self.system, codes, said.rows, said.values) > 0
         return None if positive else "its multipliers do not exclude it"
 
     def _no_root(self, codes: Codes, said: NoRoot) -> str | None:
@@ -117,13 +117,13 @@ class SpaceChecker(TreeChecker):
         if said.leaf:
             found = only_root(self.system, said.numbers, said.leaf)
         else:
-            found = only_solution(self.system, said.numbers, said.force[: self.problem.p])
+            found = only_solution_in_space(self.system, said.numbers, said.force[: self.problem.p])
         if found is None:
             return "its solution is not proven to be the only one"
         self.regular += 1
         return self._placed(found, said.enclosure)
 
-    def _placed(self, found: SpaceRoot | OnlySolution, said: Enclosure) -> str | None:
+    def _placed(self, found: SpaceRoot | OnlySolution, said: EnclosureRecord) -> str | None:
         """Why the ball and the index that are said to be those of a root are not, or None."""
         centre, radius = said.numbers(len(found.y.mid))
         with np.errstate(over="ignore", invalid="ignore"):

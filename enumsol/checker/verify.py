@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from enumsol.checker.rational import RationalSystem
     from enumsol.checker.walk import Codes, Test
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.proof.records import Enclosure, Record
+    from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.trusted.at_alpha import VerifiedSelection
     from enumsol.trusted.uniqueness import ClosedSolution
 
@@ -192,7 +192,7 @@ class Checker(TreeChecker):
             self.fail(f"leaf {number}: its form and multipliers do not exclude it")
 
     def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:
-        if not issubclass(kind, records.Closing):
+        if not issubclass(kind, records.ClosingRecord):
             return records.Limits(codes, self.friction, self._by_forms.declared)
         # as the kernel has it
         friction = (self.system.F > 0).tolist()
@@ -224,7 +224,7 @@ class Checker(TreeChecker):
             records.NoRoot: self._no_root,
             records.RegularRoot: self._regular_root,
             records.NoRootInRationals: self._no_rational_root,
-            records.RootSet: self._root_set,
+            records.RootSetRecord: self._root_set,
             records.Closed: self._closed,
             records.ClosedInRationals: self._closed_in_rationals,
             records.Alone: self._alone,
@@ -255,7 +255,7 @@ class Checker(TreeChecker):
             return "its candidate is not proven to be a root"
         return self._regular(codes, ball, said.enclosure)
 
-    def _regular(self, codes: Codes, ball: VerifiedSelection, said: Enclosure) -> str | None:
+    def _regular(self, codes: Codes, ball: VerifiedSelection, said: EnclosureRecord) -> str | None:
         """Count a regular root, and look at what is said of it."""
         self.regular += 1
         self.strict.append(codes)
@@ -301,7 +301,7 @@ class Checker(TreeChecker):
         del said
         return "it holds a root" if hull_of_selections(self.rational, codes).points else None
 
-    def _root_set(self, codes: Codes, said: records.RootSet) -> str | None:
+    def _root_set(self, codes: Codes, said: records.RootSetRecord) -> str | None:
         from enumsol.checker.hull import hull_of_selections
 
         hull = hull_of_selections(self.rational, codes)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from enumsol.checker.reports import MAX_FAILURES, VerificationReport
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.proof.reading import RefusedError, same, shown
-from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, Undecided, Unloaded, kind_of
+from enumsol.proof.reading import RefusedError, quoted, same
+from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, UndecidedRecord, Unloaded, kind_of
 from enumsol.trusted.status_rows import UNDECIDED
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class TreeChecker:
             isolated, families = self._count()
             claim = self._claim(isolated, families)
             if not same(footer, claim):
-                self.fail(f"the counts at the end are {shown(footer)}; the leaves give {claim}")
+                self.fail(f"the counts at the end are {quoted(footer)}; the leaves give {claim}")
         except RefusedError as refusal:
             self.failures.append(str(refusal))
         except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
@@ -85,7 +85,7 @@ class TreeChecker:
 
     @property
     def _doubtful(self) -> int:
-        """Undecided parts besides undecided leaves."""
+        """UndecidedRecord parts besides undecided leaves."""
         return 0
 
     # -- what a checker adds ---------------------------------------------------------------------------------------
@@ -111,7 +111,7 @@ class TreeChecker:
 
     def _declare(self, record: list[Any]) -> None:
         """Take note of what later leaves refer to."""
-        raise RefusedError(f"a record {shown(record)} that no leaf of this proof can refer to")
+        raise RefusedError(f"a record {quoted(record)} that no leaf of this proof can refer to")
 
     def _flush(self, *, last: bool) -> None:
         """Check what waits, at the end or when it has become much."""
@@ -151,7 +151,7 @@ class TreeChecker:
         leaves = sum(1 for _ in self._leaves(records, survey=True))
         footer = next(records, _END)
         if not isinstance(footer, dict) or footer.get("leaves") != leaves:
-            found = "missing" if footer is _END else shown(footer)
+            found = "missing" if footer is _END else quoted(footer)
             raise RefusedError(f"the counts at the end are {found}; the tree has {leaves} leaves")
         if next(records, _END) is not _END:
             raise RefusedError("records follow after the end of the proof")
@@ -174,7 +174,7 @@ class TreeChecker:
         """Check one leaf; the reason when it proves nothing."""
         kind = kind_of(record, self.kinds)
         if kind is None:
-            return f"unknown kind of record {shown(record[0])}"
+            return f"unknown kind of record {quoted(record[0])}"
         try:
             test = self.tests.get(kind)
             if test is None:
@@ -193,9 +193,9 @@ class TreeChecker:
     @cached_property
     def tests(self) -> dict[type[Record], Test]:
         """Those of this checker, one for each kind."""
-        return {**self._tests(), Undecided: self._undecided, Unloaded: self._unloaded}
+        return {**self._tests(), UndecidedRecord: self._undecided, Unloaded: self._unloaded}
 
-    def _undecided(self, codes: Codes, said: Undecided) -> str | None:
+    def _undecided(self, codes: Codes, said: UndecidedRecord) -> str | None:
         del codes
         self.undecided += 1
         return None if isinstance(said.reason, str) else "its reason is no text"

@@ -98,7 +98,7 @@ def graph(
         (plot_file, lambda path: write_figure(path, found.plot(**drawn))),
         json_file=json_file,
         csv_file=csv_file,
-        text=lambda: as_text(found),
+        text=lambda: graph_as_text(found),
         content=lambda: as_json({"problem": problem, **as_content(found)}),
         frame=found.to_frame,
     )
@@ -174,7 +174,7 @@ def _same_problem(a: ContactProblem, b: ContactProblem) -> bool:
     return all(np.array_equal(x, y) for x, y in [*pairs, *zip(a.friction, b.friction, strict=True), tuple(slopes)])
 
 
-def as_text(found: BranchGraph) -> str:
+def graph_as_text(found: BranchGraph) -> str:
     """The printed graph, and before its closing line the answers that users ask for."""
     *lines, closing = repr(found).splitlines()
     lines += found.claims.sentences(found.uniqueness_bound)

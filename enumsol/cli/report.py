@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_interval, so_far
-from enumsol.cli.graph import HowExact, as_content, as_text, build, parse_units, write_proof
+from enumsol.cli.graph import HowExact, as_content, build, graph_as_text, parse_units, write_proof
 from enumsol.cli.options import (
     OUTPUT,
     FirstAlpha,
@@ -79,7 +79,7 @@ def report(
         (output, write),
         json_file=json_file,
         csv_file=None,
-        text=lambda: as_text(found),
+        text=lambda: graph_as_text(found),
         content=lambda: as_json({"problem": problem, "report": output, **as_content(found)}),
         frame=found.to_frame,
     )

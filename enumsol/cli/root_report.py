@@ -18,7 +18,7 @@ _STATS = ("nodes", "pruned", "selections", "qps", "fallback_qps", "closed", "sec
 _FIELDS = ("lambda_n", "lambda_t", "u_n", "u_t")
 
 
-def as_text(found: RootSet) -> str:
+def roots_as_text(found: RootSet) -> str:
     """The printed RootSet, and before its closing lines nothing else; small ones with a table over contact nodes."""
     rows = (len(found) + sum(len(family.vertices) for family in found.families)) * len(found.node_ids)
     if not 0 < rows <= _ROWS:
@@ -60,7 +60,7 @@ def uniqueness(found: RootSet) -> str:
     return f"unique: no ({what}, proven; --unique looks for no more)"
 
 
-def as_json(found: RootSet, problem: str) -> str:
+def roots_as_json(found: RootSet, problem: str) -> str:
     """The whole result; numbers read back as the same float64, what is not finite is null."""
     stats = found.stats
     content = {

@@ -136,8 +136,8 @@ def answer(
     deliver(
         json_file=json_file,
         csv_file=csv_file,
-        text=lambda: root_report.uniqueness(found) if unique else root_report.as_text(found),
-        content=lambda: root_report.as_json(found, name),
+        text=lambda: root_report.uniqueness(found) if unique else root_report.roots_as_text(found),
+        content=lambda: root_report.roots_as_json(found, name),
         frame=found.to_frame,
     )
     if csv_file is not None and found.families:

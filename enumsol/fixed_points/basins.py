@@ -9,8 +9,8 @@ import numpy as np
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.fixed_points.state import scaled_forces, slips_of
 from enumsol.fixed_points.successive import successive_approximations
-from enumsol.fixed_points.system import ContactSystem, contact_problem
-from enumsol.fixed_points.tresca import node_values, solve
+from enumsol.fixed_points.system import ContactSystem, checked_problem
+from enumsol.fixed_points.tresca import node_values, solve_scaled
 from enumsol.fixed_points.tresca_newton import TrescaData
 from enumsol.support.arguments import alpha_value, positive_integer, positive_number, shown
 from enumsol.support.array_arguments import plain_array, real_array
@@ -48,7 +48,7 @@ def fixed_point_residual(problem: Problem, root: Any) -> float:
     InvalidArgumentError
         The root has no forces, or belongs to another problem (its arrays have other shapes).
     """
-    body = contact_problem(problem)
+    body = checked_problem(problem)
     if not hasattr(root, "alpha"):
         raise InvalidArgumentError(
             f"root is a {type(root).__name__} without alpha; expected a root of enumerate_roots or a fixed point"
@@ -58,7 +58,7 @@ def fixed_point_residual(problem: Problem, root: Any) -> float:
     slip = system.scaled(node_values(slips_of(root, body.p, "root"), "slip", body.p), system.length, "slip")
     corrected, _ = system.corrected(forces)
     data = TrescaData(corrected, np.maximum(system.split(forces)[0], 0.0), system.coefficients(slip))
-    image, _, _ = solve(data, forces)
+    image, _, _ = solve_scaled(data, forces)
     return float(np.max(np.abs(image - forces)))
 
 
@@ -144,7 +144,7 @@ def basin_table(
     """
     import pandas as pd  # for frames only
 
-    body = contact_problem(problem)
+    body = checked_problem(problem)
     alpha = _common_alpha(roots)
     distance = positive_number(distance, "distance")
     system = ContactSystem.at(body, alpha)

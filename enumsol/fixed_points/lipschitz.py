@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 
 from enumsol.condensation.condensed import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
-from enumsol.fixed_points.system import ContactSystem, contact_problem
+from enumsol.fixed_points.system import ContactSystem, checked_problem
 from enumsol.fixed_points.tresca import node_values
 from enumsol.model.friction import FrictionTable
 from enumsol.model.problem3d import ContactProblem3D
@@ -162,7 +162,7 @@ def lipschitz_estimate(
     >>> estimate.unique, round(estimate.C1, 3), round(0.5 * estimate.factor, 3)  # unique for F below that
     (True, 0.577, 0.866)
     """
-    body = contact_problem(problem)
+    body = checked_problem(problem)
     p = body.p
     known = body.areas if areas is None and isinstance(body, ContactProblem3D) else areas
     m = np.ones(p) if known is None else _relative(node_values(known, "areas", p))

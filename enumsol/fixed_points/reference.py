@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import MissingDependencyError
-from enumsol.fixed_points.system import contact_problem
+from enumsol.fixed_points.system import checked_problem
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,7 +39,7 @@ class TrescaReference:
     """
 
     def __init__(self, problem: Problem) -> None:
-        problem = contact_problem(problem)
+        problem = checked_problem(problem)
         try:
             import cvxpy
         except ImportError as error:

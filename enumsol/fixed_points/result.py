@@ -11,7 +11,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.state import TrescaState
-from enumsol.fixed_points.system import contact_problem
+from enumsol.fixed_points.system import checked_problem
 from enumsol.support.arguments import alpha_value, file_path, optional_count, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array
 from enumsol.support.files import read_arrays, reading, write_arrays
@@ -189,7 +189,7 @@ class FixedPoint(TrescaState):
         InvalidArgumentError
             The file cannot be read, or is about another problem (another number of contact nodes, other labels).
         """
-        body = contact_problem(problem)
+        body = checked_problem(problem)
         place = file_path(path, "path")
         with reading(place, "a fixed point", "FixedPoint.save"):
             found, kept = read_arrays(place, _FORMAT, _ARRAYS)

@@ -13,8 +13,8 @@ from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.fixed_points.anderson import AndersonMixing
 from enumsol.fixed_points.result import FixedPoint, Outcome
 from enumsol.fixed_points.state import scaled_forces, slips_of
-from enumsol.fixed_points.system import ContactSystem, contact_problem
-from enumsol.fixed_points.tresca import TrescaNotSolved, node_values, solve
+from enumsol.fixed_points.system import ContactSystem, checked_problem
+from enumsol.fixed_points.tresca import TrescaNotSolved, node_values, solve_scaled
 from enumsol.fixed_points.tresca_newton import TrescaData
 from enumsol.model.friction import warn_of_jumps
 from enumsol.model.problem3d import ContactProblem3D
@@ -128,7 +128,7 @@ def successive_approximations(
     converged ['open'] [0.]
     converged ['stick'] [1.5]
     """
-    body = contact_problem(problem)
+    body = checked_problem(problem)
     tolerance = positive_number(tolerance, "tolerance")
     limit = positive_integer(max_iterations, "max_iterations")
     depth = positive_integer(anderson, "anderson", least=0, most=MOST_DEPTH)
@@ -188,7 +188,7 @@ class _Iteration:
         """How the iteration with this system ends, and the length of a cycle."""
         while len(self.increments) < limit:
             self.data = TrescaData(self.system, self.bound, self.system.coefficients(self.slip))
-            self.forces, _, _ = solve(self.data, self.forces)
+            self.forces, _, _ = solve_scaled(self.data, self.forces)
             image, image_slip = self._image(self.data, self.forces)
             if self._increment(self.data, self.slip, image, image_slip) <= 1.0:
                 return Outcome.CONVERGED, None

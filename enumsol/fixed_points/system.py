@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _LARGEST = 1e100
 
 
-def contact_problem(value: Any) -> Problem:
+def checked_problem(value: Any) -> Problem:
     """Value as a contact problem in 2D or 3D.
 
     Raises

@@ -9,7 +9,7 @@ import numpy as np
 
 from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.fixed_points.state import TrescaState, scaled_forces
-from enumsol.fixed_points.system import ContactSystem, contact_problem
+from enumsol.fixed_points.system import ContactSystem, checked_problem
 from enumsol.fixed_points.tresca_newton import ACCEPTED, TrescaData
 from enumsol.support.arguments import one_of
 from enumsol.support.array_arguments import real_array
@@ -111,7 +111,7 @@ def solve_tresca(
     >>> enumsol.solve_tresca(problem, slip_bound=1, alpha=3)  # slides: |lambda_t| = 3
     TrescaSolution at alpha = 3 on 1 contact node: sum of lambda_n 1, residual ..., by newton
     """
-    body = contact_problem(problem)
+    body = checked_problem(problem)
     one_of(solver, "solver", SOLVERS)
     system = ContactSystem.at(body, alpha)
     bound = system.scaled(node_values(slip_bound, "slip_bound", body.p), system.force, "slip_bound")
@@ -120,7 +120,7 @@ def solve_tresca(
     if solver == "cvxpy":
         return _by_cvxpy(data)
     guess = np.zeros(len(system.g)) if start is None else scaled_forces(system, start)
-    forces, residual, used = solve(data, guess, first="clarabel" if solver == "clarabel" else "newton")
+    forces, residual, used = solve_scaled(data, guess, first="clarabel" if solver == "clarabel" else "newton")
     return TrescaSolution.of(data, forces, residual=residual, solver=used)
 
 
@@ -144,7 +144,7 @@ def node_values(value: ArrayLike, name: str, p: int) -> Vector:
     return array
 
 
-def solve(data: TrescaData, start: Vector, first: str = "newton") -> tuple[Vector, float, str]:
+def solve_scaled(data: TrescaData, start: Vector, first: str = "newton") -> tuple[Vector, float, str]:
     """Scaled forces that solve a Tresca problem, their residual, and what found them.
 
     Raises

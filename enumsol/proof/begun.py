@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.proof.proof_file import EXPANSION, MAGIC, SMALL, ProofFormatError, decoded, lines_of
-from enumsol.proof.reading import same, shown
-from enumsol.proof.records import Undecided
+from enumsol.proof.reading import quoted, same
+from enumsol.proof.records import UndecidedRecord
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 #: Bytes that are expanded at once: what is lost before a damaged place.
 _CHUNK = 512
 #: How an undecided leaf and the footer begin: what needs no proof, and is found out anew.
-_OPEN = (f'["{Undecided.kind}"'.encode(), b"{")
+_OPEN = (f'["{UndecidedRecord.kind}"'.encode(), b"{")
 
 
 class BegunProof:
@@ -106,10 +106,12 @@ def begun_proof(place: Path, header: dict[str, Any]) -> BegunProof | None:
     if not isinstance(found, dict) or found.get("format") != header["format"]:
         raise _refusal(place, "is no proof")
     if not same(found.get("kind", ()), header.get("kind", ())):
-        raise _refusal(place, f"is a proof of another kind, {shown(found.get('kind', 'point'))}")
+        raise _refusal(place, f"is a proof of another kind, {quoted(found.get('kind', 'point'))}")
     for name, words in _NAMES.items():
         if not same(found.get(name), header[name]):
-            raise _refusal(place, f"belongs to another {words} ({shown(found.get(name))}; here {shown(header[name])})")
+            raise _refusal(
+                place, f"belongs to another {words} ({quoted(found.get(name))}; here {quoted(header[name])})"
+            )
     if not same(found, header):
         raise _refusal(place, "was written with other units of force and length")
     return begun

@@ -67,7 +67,7 @@ def packed(rows: NDArray[np.intp], values: NDArray[np.float64]) -> tuple[str, st
     )
 
 
-def shortened(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def coarse(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """The same to 21 binary digits: the lower half of their bits is zero, which compresses well."""
     return ((values.view(np.uint64) + _HALF) & _UPPER).view(np.float64)
 

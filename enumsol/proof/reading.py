@@ -60,7 +60,7 @@ def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
     if not same(header.get("p"), problem.p) or header.get("data") not in ("problem", "condensed"):
         raise RefusedError("the header does not fit the problem")
     if ("kind" in header) != (kind is not None) or header.get("kind") != kind:
-        raise RefusedError(f"the header names an unknown kind of proof, {shown(header.get('kind'))}")
+        raise RefusedError(f"the header names an unknown kind of proof, {quoted(header.get('kind'))}")
     return "problem" if header["data"] == "problem" else "condensed"
 
 
@@ -76,7 +76,7 @@ def same(found: Any, expected: Any) -> bool:
 def names_only(record: dict[str, Any], names: Collection[str]) -> None:
     """Raise ValueError unless an object has exactly these names."""
     if record.keys() != set(names):
-        raise ValueError(f"the names {shown(sorted(record))} are not {', '.join(names)}")
+        raise ValueError(f"the names {quoted(sorted(record))} are not {', '.join(names)}")
 
 
 def rational_text(value: Fraction, name: str) -> str:
@@ -104,7 +104,7 @@ def rational_from(text: Any) -> Fraction:
     digits each, there is no exponent, and the value is within the range of float64.
     """
     if not isinstance(text, str) or _RATIONAL.fullmatch(text) is None:
-        raise ValueError(f"{shown(text)} is no fraction of at most {MOST_DIGITS} digits")
+        raise ValueError(f"{quoted(text)} is no fraction of at most {MOST_DIGITS} digits")
     numerator, _, denominator = text.partition("/")
     if denominator and not int(denominator):
         raise ValueError("a fraction's denominator is zero")
@@ -192,7 +192,7 @@ def friction_at(problem: ContactProblem, alpha: Fraction) -> list[Fraction]:
     return exact
 
 
-def shown(value: Any) -> str:
+def quoted(value: Any) -> str:
     """Any value from a proof as a short text."""
     return _SHORT.repr(value)
 

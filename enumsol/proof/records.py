@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from enumsol.proof.proof_file import packed
-from enumsol.proof.reading import codes_from, multipliers_from, numbers_from, shown
+from enumsol.proof.reading import codes_from, multipliers_from, numbers_from, quoted
 from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, ROW_KINDS, UNDECIDED, final_codes, refines
 from enumsol.trusted.uniqueness_in_contact import numbers_of
 
@@ -102,7 +102,7 @@ class Record:
         return [getattr(self, field.name) for field in fields(self)]  # type: ignore[arg-type]
 
 
-def by_kind(*records: type[Record]) -> dict[str, type[Any]]:
+def table_of(*records: type[Record]) -> dict[str, type[Any]]:
     """The table of some kinds of records."""
     return {record.kind: record for record in records}
 
@@ -134,7 +134,7 @@ class Branching(Record):
             allowed = map(sorted, coverings(node, codes[node]))
             if all(type(code) is int for code in children) and sorted(children) in allowed:
                 return cls(node, children)
-        raise RecordError(f"a branching {shown(record)} does not cover the assignment that it splits")
+        raise RecordError(f"a branching {quoted(record)} does not cover the assignment that it splits")
 
     def below(self, codes: Codes) -> list[Codes]:
         """The assignments into which it splits one."""
@@ -190,7 +190,7 @@ class DeclaredForm(Record):
 
 
 @dataclass(frozen=True)
-class Undecided(Record):
+class UndecidedRecord(Record):
     """A leaf of which nothing is shown, for this reason."""
 
     kind, sizes = "u", (2,)
@@ -224,7 +224,7 @@ class NoRoot(Solved):
 
 
 @dataclass(frozen=True, eq=False)
-class Enclosure:
+class EnclosureRecord:
     """Where a record says that its root is, and the root's index; read where they are compared with the root's own."""
 
     mid: Any
@@ -252,13 +252,13 @@ class RegularRoot(Solved):
 
     kind, sizes = "r", (4,)
 
-    enclosure: Enclosure
+    enclosure: EnclosureRecord
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> RegularRoot:
         """The enclosure."""
         del limits
-        return cls(Enclosure(*entries))
+        return cls(EnclosureRecord(*entries))
 
     def entries(self) -> Iterable[Any]:
         """Those of the enclosure."""
@@ -329,7 +329,7 @@ class NoRootInRationals(NoRoot):
 
 
 @dataclass(frozen=True, eq=False)
-class RootSet(Solved):
+class RootSetRecord(Solved):
     """In rational arithmetic, the roots of a selection are the hull of these points: lists of fractions as texts."""
 
     kind, sizes = "D", (3,)
@@ -338,7 +338,7 @@ class RootSet(Solved):
     dimension: Any
 
     @classmethod
-    def of(cls, entries: list[Any], limits: Limits) -> RootSet:
+    def of(cls, entries: list[Any], limits: Limits) -> RootSetRecord:
         """The points, lists of texts, one text for each force, and the dimension as it stands."""
         points, size = entries[0], 2 * limits.p
         if not isinstance(points, list) or not all(isinstance(point, list) and len(point) == size for point in points):
@@ -348,12 +348,12 @@ class RootSet(Solved):
         return cls(*entries)
 
 
-class Closing(Record):
+class ClosingRecord(Record):
     """Base of leaves below which there can be one solution only."""
 
 
 @dataclass(frozen=True, eq=False)
-class Closed(Closing):
+class Closed(ClosingRecord):
     """With an enclosure that solution is a root, without one it is none.
 
     Attributes
@@ -362,7 +362,7 @@ class Closed(Closing):
     free : nodes
     weights : numbers of the form
     force : midpoint of the enclosure, or a point near the solution
-    enclosure : Enclosure or None
+    enclosure : EnclosureRecord or None
     """
 
     kind, sizes = "m", (5, 7)
@@ -371,7 +371,7 @@ class Closed(Closing):
     free: Codes
     weights: Any
     force: Array
-    enclosure: Enclosure | None = None
+    enclosure: EnclosureRecord | None = None
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> Closed:
@@ -382,7 +382,7 @@ class Closed(Closing):
         force = numbers_from(entries[3], 2 * limits.p)
         if any(not refines(code, selection[i]) for i, code in enumerate(limits.codes) if i not in free):
             raise RecordError("a node that has a status in its proof has another one in its assignment")
-        return cls(selection, free, weights, force, Enclosure(*entries[3:]) if len(entries) > 4 else None)
+        return cls(selection, free, weights, force, EnclosureRecord(*entries[3:]) if len(entries) > 4 else None)
 
     def entries(self) -> Iterable[Any]:
         """The midpoint is that of the enclosure."""
@@ -390,7 +390,7 @@ class Closed(Closing):
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedInRationals(Closing):
+class ClosedInRationals(ClosingRecord):
     """In rational arithmetic that solution solves this selection; ``count`` says whether it is a root."""
 
     kind, sizes = "M", (4,)
@@ -421,7 +421,7 @@ class Alone(Record):
     ----------
     selection : final codes
     weights, strengths, rows, values : arrays, as ``trusted.uniqueness_in_contact.lone_root`` takes them
-    enclosure : Enclosure
+    enclosure : EnclosureRecord
     """
 
     kind, sizes, unfit = "a", (9,), "its record cannot be followed (it has {} entries; expected {})"
@@ -431,7 +431,7 @@ class Alone(Record):
     strengths: Array
     rows: Rows
     values: Array
-    enclosure: Enclosure
+    enclosure: EnclosureRecord
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> Alone:
@@ -441,7 +441,7 @@ class Alone(Record):
         weights = numbers_from(entries[1], len(nodes) + 3 * int(np.count_nonzero(own)))
         strengths = numbers_from(entries[2], 2 * limits.p).reshape(2, -1)
         terms = multipliers_from(entries[3:5], ROW_KINDS * limits.p)
-        return cls(selection, weights, strengths, *terms, Enclosure(*entries[5:]))
+        return cls(selection, weights, strengths, *terms, EnclosureRecord(*entries[5:]))
 
     def entries(self) -> Iterable[Any]:
         """Strengths as one list, multipliers as two texts."""
@@ -455,9 +455,9 @@ class Alone(Record):
 
 
 #: All kinds of leaves in 2D.
-LEAVES = by_kind(
-    *(Excluded, ExcludedInRationals, ExcludedByForm, NoRoot, NoRootInRationals, RegularRoot, RootSet),
-    *(Closed, ClosedInRationals, Alone, Unloaded, Undecided),
+LEAVES = table_of(
+    *(Excluded, ExcludedInRationals, ExcludedByForm, NoRoot, NoRootInRationals, RegularRoot, RootSetRecord),
+    *(Closed, ClosedInRationals, Alone, Unloaded, UndecidedRecord),
 )
 
 

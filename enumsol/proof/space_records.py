@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.model.sectors import DEEPEST
-from enumsol.proof.reading import bytes_from, numbers_from, shown
+from enumsol.proof.reading import bytes_from, numbers_from, quoted
 from enumsol.proof.records import (
-    Enclosure,
+    EnclosureRecord,
     Exclusion,
     Limits,
     NoRoot,
     Record,
     RecordError,
     RegularRoot,
-    Undecided,
+    UndecidedRecord,
     Unloaded,
-    by_kind,
+    table_of,
 )
 from enumsol.trusted.space.sector_rows import FORCE, GAP, RIGHT, UNDECIDED
 
@@ -70,7 +70,7 @@ class OnlyRoot(Record):
     numbers : of the form, as ``trusted.space.space_uniqueness.Numbers.of`` takes them
     leaf : codes of a leaf that holds the solution, or none
     force : midpoint of the enclosure
-    enclosure : Enclosure
+    enclosure : EnclosureRecord
     """
 
     kind, sizes = "m", (6,)
@@ -78,7 +78,7 @@ class OnlyRoot(Record):
     numbers: Array
     leaf: tuple[int, ...]
     force: Array
-    enclosure: Enclosure
+    enclosure: EnclosureRecord
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> OnlyRoot:
@@ -89,7 +89,7 @@ class OnlyRoot(Record):
         numbers, force = numbers_from(values, limits.p + 2 * limits.components), numbers_from(mid, limits.components)
         if not isinstance(leaf, list) or not all(type(code) is int for code in leaf):
             raise RecordError("its leaf is no list of codes")
-        return cls(numbers, tuple(leaf), force, Enclosure(*entries[2:]))
+        return cls(numbers, tuple(leaf), force, EnclosureRecord(*entries[2:]))
 
     def entries(self) -> Iterable[Any]:
         """The enclosure has the midpoint."""
@@ -97,14 +97,14 @@ class OnlyRoot(Record):
 
 
 #: All kinds of leaves in 3D.
-LEAVES = by_kind(ExcludedInSpace, NoRoot, RegularRoot, OnlyRoot, Unloaded, Undecided)
+LEAVES = table_of(ExcludedInSpace, NoRoot, RegularRoot, OnlyRoot, Unloaded, UndecidedRecord)
 
 
 def _row(row: Any, p: int) -> Row:
     if not isinstance(row, list) or len(row) != 3 or not all(type(x) is int for x in row):
-        raise ValueError(f"{shown(row)} is no row")
+        raise ValueError(f"{quoted(row)} is no row")
     kind, node, number = row
     known = 0 <= kind <= RIGHT and 0 <= node < p and -1 <= number < _NUMBERS
     if not known or (kind in (GAP, FORCE) and number):
-        raise ValueError(f"row {shown(row)} does not exist")
+        raise ValueError(f"row {quoted(row)} does not exist")
     return kind, node, number

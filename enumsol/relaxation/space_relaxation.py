@@ -21,8 +21,8 @@ from enumsol.trusted.space.sector_rows import (
     SLIP,
     TANGENT,
     TAU,
-    children_of,
-    row_terms,
+    sector_children,
+    sector_row_terms,
 )
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ class SpaceEngine:
 
     def _put(self, place: int, row: Row) -> None:
         """Store a row in the units of y and w, scaled so that its largest coefficient stays of size one."""
-        indices, coefficients = row_terms(row, self.system.tau, len(self.system.g))
+        indices, coefficients = sector_row_terms(row, self.system.tau, len(self.system.g))
         units = self.system.row_unit[indices]
         self.scale[place] = 1.0 / np.max(units)
         self.data.put_row(place, indices, (coefficients * (units * self.scale[place])).tolist())
@@ -135,7 +135,7 @@ class SpaceEngine:
 
     def children(self, node: int, code: int) -> tuple[int, ...]:
         """Codes that together cover a partial status of a node."""
-        return children_of(code, self.tangents[node])
+        return sector_children(code, self.tangents[node])
 
     def root(self, rows: list[int], modes: list[int]) -> SpaceRelaxation:
         """The relaxation with the given rows on."""

@@ -71,11 +71,11 @@ def codes(statuses: Sequence[ContactStatus]) -> str:
     return "".join(str(STATUSES.index(status)) for status in statuses)
 
 
-def rounded(values: Any) -> Any:
+def rounded_list(values: Any) -> Any:
     """Numbers of an array to nine digits, as lists."""
     array = np.asarray(values, dtype=np.float64)
     if array.ndim:
-        return [rounded(row) for row in array]
+        return [rounded_list(row) for row in array]
     number = float(f"{float(array):.{_DIGITS}g}")
     return int(number) if number.is_integer() and abs(number) < 1e15 else number
 
@@ -120,7 +120,7 @@ def _arc(arc: Arc, branch: int, curve: Curve | None) -> dict[str, Any]:
         "hi": arc.hi,
     }
     if curve is not None:
-        record |= {"a": curve.alphas.tolist(), "f": rounded(curve.forces), "w": rounded(curve.moves)}
+        record |= {"a": curve.alphas.tolist(), "f": rounded_list(curve.forces), "w": rounded_list(curve.moves)}
     return record
 
 
@@ -133,15 +133,15 @@ def _vertex(v: Vertex, graph: BranchGraph) -> dict[str, Any]:
         "border": v.border,
         "statuses": codes(v.statuses),
         "several": [k for k, holds in enumerate(v.active) if len(holds) > 1],
-        "f": rounded(np.concatenate([v.lambda_n, v.lambda_t])),
-        "w": rounded(np.concatenate([v.u_n, v.u_t])),
+        "f": rounded_list(np.concatenate([v.lambda_n, v.lambda_t])),
+        "w": rounded_list(np.concatenate([v.u_n, v.u_t])),
         "family": None,
     }
     if v.family is not None:
         condensed = graph.problem.condensed
         forces = v.family.vertices.transpose(0, 2, 1).reshape(len(v.family.vertices), 2 * p)
         moves = condensed.g0 + v.alpha * condensed.g1 - forces @ condensed.S
-        record["family"] = {"f": rounded(forces), "w": rounded(moves), "dimension": v.family.dimension}
+        record["family"] = {"f": rounded_list(forces), "w": rounded_list(moves), "dimension": v.family.dimension}
     return record
 
 

@@ -206,7 +206,7 @@ class Replay:
                 return search.alone(item, *self._reader.lone(item.codes, record))
             except ValueError:
                 return False
-        if issubclass(kind, records.Closing):
+        if issubclass(kind, records.ClosingRecord):
             return search.closed(item, search.relaxed(item.codes), again=True)
         partial = any(code in (CONTACT, UNDECIDED, *SLIDING) for code in item.codes)
         return issubclass(kind, records.Solved) and not partial and search.settled(item)

@@ -54,7 +54,7 @@ from enumsol.search.outcome import SearchLimits
 from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import distinct_roots
-from enumsol.trusted.space.sector_rows import LEFT, RIGHT, SLIP, row_terms
+from enumsol.trusted.space.sector_rows import LEFT, RIGHT, SLIP, sector_row_terms
 from search_in_3d_choices.early import early
 
 if TYPE_CHECKING:
@@ -191,7 +191,7 @@ class Counted(DualStep):
         normals = np.zeros((len(rows), size))
         values = np.zeros(len(rows))
         for k, row in enumerate(rows):
-            for i, coefficient in zip(*row_terms(row, system.tau, size), strict=True):
+            for i, coefficient in zip(*sector_row_terms(row, system.tau, size), strict=True):
                 values[k] += coefficient * (self.forces[i] if i < size else self.displacements[i - size])
                 normals[k] += coefficient * (np.eye(size)[i] if i < size else -system.S[i - size])
         values = np.abs(values) if rows[0][0] == SLIP else np.maximum(-values, 0.0)

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from enumsol.cli.graph import as_text
+from enumsol.cli.graph import graph_as_text
 from enumsol.errors import IncompleteGraphError
 
 #: Kinds of vertices that say how arcs meet there.
@@ -104,7 +104,7 @@ def _uniqueness(graph, full):
 
 
 def _texts(graph, full):
-    text = as_text(graph)
+    text = graph_as_text(graph)
     summary = json.loads(json.dumps(graph.summary()))
     if graph.reasons:
         if re.search(r"one solution (throughout|below)|^several solutions from", text, re.MULTILINE):

@@ -7,7 +7,7 @@ from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.sectors import SECTORS, level_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.relaxation.space_relaxation import SpaceEngine
-from enumsol.trusted.space.sector_rows import exclusion_margin
+from enumsol.trusted.space.sector_rows import sector_margin
 
 
 def all_rows(engine, codes):
@@ -56,7 +56,7 @@ def test_branching_takes_a_node_of_which_all_children_but_one_are_excluded():
                 if child.pruned:
                     numbers, values = child.multipliers()
                     rows = [engine.rows[number] for number in numbers.tolist()]
-                    assert exclusion_margin(balls, with_code(codes, node, code), rows, values) > 0
+                    assert sector_margin(balls, with_code(codes, node, code), rows, values) > 0
                     assert len(child.forces) == len(child.displacements) == len(g)
                     given += 1
             stack += left[node]

@@ -13,7 +13,7 @@ from enumsol import InvalidArgumentError, MissingDependencyError, branch_graph, 
 from enumsol.cli import main
 from enumsol.report import body as bodies, content
 from enumsol.report.body import body_record
-from enumsol.report.content import rounded, slider_alphas
+from enumsol.report.content import rounded_list, slider_alphas
 
 pytest.importorskip("plotly")
 HOSTILE = '</script><script>alert("2")</script>'
@@ -176,8 +176,8 @@ def test_a_graph_of_many_arcs_is_drawn_more_coarsely(wedge, monkeypatch):
 
 
 def test_numbers_are_short_and_finite():
-    assert rounded([1 / 3, 2.0, -0.0, 1e20]) == [0.333333333, 2, 0, 1e20]
-    assert json.dumps(rounded(np.eye(2))) == "[[1, 0], [0, 1]]"
+    assert rounded_list([1 / 3, 2.0, -0.0, 1e20]) == [0.333333333, 2, 0, 1e20]
+    assert json.dumps(rounded_list(np.eye(2))) == "[[1, 0], [0, 1]]"
 
 
 def test_words_and_tables(wedge, wedge_page):

@@ -22,7 +22,7 @@ from enumsol import enumerate_roots, gallery, verify
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search.space.space_fathoming import SpaceCloser
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.trusted.space.space_uniqueness import is_complete, only_root, only_solution
+from enumsol.trusted.space.space_uniqueness import is_complete, only_root, only_solution_in_space
 
 
 def closed(problem, alpha=0):
@@ -264,7 +264,7 @@ def test_no_numbers_close_a_problem_with_several_roots(name):
             nu = rng.uniform(-0.7, 0.7, (system.p, 2)) * mu[:, None] * rng.integers(0, 2)
             theta = served(root, F) * rng.choice([1.0, 1.0, 0.5, 0.0], (system.p, 1))
             numbers = np.concatenate([mu, kappa, np.zeros(system.p), nu[places], theta[places]])
-            assert only_solution(solvers.enclosed, numbers, root.lambda_n / system.force) is None
+            assert only_solution_in_space(solvers.enclosed, numbers, root.lambda_n / system.force) is None
             assert all(only_root(solvers.enclosed, numbers, codes) is None for codes in leaves)
 
 

@@ -172,9 +172,9 @@ def test_a_region_on_the_command_line_and_in_tables():
     problem = from_compliance(*beside([STUCK_AT_ITS_LIMIT]), 1.0)
     roots = enumerate_roots(problem, 0)
     assert "undecided region 0: contact (2 leaves of the tree); a root in it has max lambda_n from 5 to 5" in (
-        root_report.as_text(roots)
+        root_report.roots_as_text(roots)
     )
-    (entry,) = json.loads(root_report.as_json(roots, "here"))["undecided"]
+    (entry,) = json.loads(root_report.roots_as_json(roots, "here"))["undecided"]
     assert entry["statuses"] == ["contact"]
     assert entry["leaves"] == 2
     np.testing.assert_allclose(entry["bounds"]["lambda_t"], [[[4, 4], [3, 3]]], atol=1e-10)
@@ -182,7 +182,7 @@ def test_a_region_on_the_command_line_and_in_tables():
     table = enumsol.multiplicity_table(problem, [0])
     assert table["undecided"].tolist() == [1]
     plane = enumerate_roots(gallery.two_node_square(), 3.5, max_nodes=2)
-    assert set(json.loads(root_report.as_json(plane, "here"))["undecided"][0]) == {"statuses", "reason", "hint"}
+    assert set(json.loads(root_report.roots_as_json(plane, "here"))["undecided"][0]) == {"statuses", "reason", "hint"}
 
 
 @pytest.mark.parametrize("seed", range(4))

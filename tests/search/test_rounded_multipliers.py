@@ -4,7 +4,7 @@ import numpy as np
 from proof_tools import leaves_of, multipliers, proof_of, records_of
 
 from enumsol import enumerate_roots, gallery, verify
-from enumsol.proof.proof_file import shortened
+from enumsol.proof.proof_file import coarse
 from enumsol.search.resume import RecordedBound
 from enumsol.search.solvers import Solvers
 from enumsol.selections.float_selections import SIGN_TOLERANCE
@@ -15,13 +15,13 @@ def test_shortened():
         [np.random.default_rng(1).normal(size=1000) * 10.0 ** np.arange(-300, 300, 0.6), [0.0, 1.5]]
     )
     values.flags.writeable = False
-    short = shortened(values)
+    short = coarse(values)
     assert np.all(np.abs(short - values) <= 2.0**-21 * np.abs(values))
     assert np.array_equal(np.sign(short), np.sign(values))
     assert not np.any(short.view(np.uint64) & np.uint64(0xFFFFFFFF))
-    assert np.array_equal(shortened(short), short)
-    assert shortened(np.array([1 - 2.0**-53])) == 1.0
-    assert shortened(np.array([np.finfo(float).max])) == np.inf
+    assert np.array_equal(coarse(short), short)
+    assert coarse(np.array([1 - 2.0**-53])) == 1.0
+    assert coarse(np.array([np.finfo(float).max])) == np.inf
 
 
 def test_a_proof_has_rounded_multipliers():
@@ -30,7 +30,7 @@ def test_a_proof_has_rounded_multipliers():
     found = enumerate_roots(problem, entry.alpha)
     values = np.concatenate([multipliers(record)[1] for record in records_of(found.proof)[1:-1] if record[0] == "x"])
     assert len(values) > 5000
-    assert np.mean(values == shortened(values)) > 0.9
+    assert np.mean(values == coarse(values)) > 0.9
     assert verify(problem, found.proof).complete
 
 
@@ -62,7 +62,7 @@ def test_multipliers_that_exclude_only_as_they_are_stay_as_they_are():
         if np.array_equal(stored, given):
             kept += 1
         else:
-            assert np.array_equal(stored, shortened(given))
+            assert np.array_equal(stored, coarse(given))
             rounded += 1
     assert kept > 10
     assert rounded > 10

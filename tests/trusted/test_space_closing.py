@@ -16,7 +16,7 @@ from enumsol.trusted.space.space_uniqueness import (
     SpaceWeights,
     _Form,
     only_root,
-    only_solution,
+    only_solution_in_space,
 )
 
 
@@ -71,7 +71,7 @@ def test_solutions_for_all_data_lie_in_the_balls(degenerate):
         S, g = solvers.enclosed.S, solvers.enclosed.g
         enclosed = replace(solvers.enclosed, S_rad=np.full_like(S, width), g_rad=np.full_like(g, width))
         for numbers, codes, normal in proposed(solvers):
-            found = only_root(enclosed, numbers, codes) if codes else only_solution(enclosed, numbers, normal)
+            found = only_root(enclosed, numbers, codes) if codes else only_solution_in_space(enclosed, numbers, normal)
             if found is None:
                 continue
             concluded[type(found)] += 1
@@ -170,11 +170,11 @@ def test_numbers_are_refused_where_they_make_no_sense():
 def test_points_that_make_no_sense():
     solvers = SpaceSolvers(from_compliance(np.eye(3), np.array([1.0, 0.1, 0]), 0.5), 0.0, "verified")
     (numbers, _, normal) = proposed(solvers)[-1]
-    assert only_solution(solvers.enclosed, numbers, normal) is not None
+    assert only_solution_in_space(solvers.enclosed, numbers, normal) is not None
     for point in ([np.nan], [np.inf], [1.0, 1.0], []):
-        assert only_solution(solvers.enclosed, numbers, np.array(point)) is None
+        assert only_solution_in_space(solvers.enclosed, numbers, np.array(point)) is None
     # a point far away is as good, but for the width of the balls
-    far = only_solution(solvers.enclosed, numbers, normal + 0.3)
+    far = only_solution_in_space(solvers.enclosed, numbers, normal + 0.3)
     assert far is None or np.all(np.abs(far.y.mid[0] - normal) <= far.y.rad[0])
 
 
@@ -185,4 +185,4 @@ def test_units_beyond_the_largest_are_refused():
     assert only_root(solvers.enclosed, numbers, codes) is not None
     for units in (unit, 1.0 / unit):
         assert only_root(replace(solvers.enclosed, unit=units), numbers, codes) is None
-        assert only_solution(replace(solvers.enclosed, unit=units), numbers, normal) is None
+        assert only_solution_in_space(replace(solvers.enclosed, unit=units), numbers, normal) is None

@@ -35,10 +35,10 @@ from enumsol.trusted.space.sector_rows import (
     TANGENT,
     TAU,
     UNDECIDED,
-    children_of,
-    exclusion_margin,
     row_sign,
-    row_terms,
+    sector_children,
+    sector_margin,
+    sector_row_terms,
 )
 
 TAU_ONE = np.array([[1, 2]])
@@ -69,7 +69,7 @@ def exact_terms(kind, number):
 @pytest.mark.parametrize("kind", [TANGENT, CHORD, LEFT, RIGHT])
 def test_coefficients_are_off_by_few_units(kind):
     for number in sectors():
-        _, found = row_terms((kind, 0, number), TAU_ONE, 3)
+        _, found = sector_row_terms((kind, 0, number), TAU_ONE, 3)
         for value, exact in zip(found, exact_terms(kind, number), strict=True):
             assert abs(Fraction(value) - exact) <= 16 * Fraction(1, 1 << 53) * abs(exact)
 
@@ -91,7 +91,7 @@ def test_boxes_of_angles_cover_their_sectors():
 
 def test_halves_of_sectors_are_those_that_they_hold():
     for number in (4, 7, 9, 100):
-        first, second = children_of(SECTORS + number, 2)
+        first, second = sector_children(SECTORS + number, 2)
         assert start_of(first - SECTORS) == start_of(number)
         assert start_of(second - SECTORS) == start_of(end_number(first - SECTORS))
         assert start_of(end_number(second - SECTORS)) == start_of(end_number(number))
@@ -135,7 +135,7 @@ def test_rows_are_what_the_solutions_of_a_status_satisfy(code):
     for _ in range(200):
         z = np.concatenate(sampled(rng, code))
         for row in ROWS:
-            value = sum(c * z[i] for i, c in zip(*row_terms(row, TAU_ONE, 3), strict=True))
+            value = sum(c * z[i] for i, c in zip(*sector_row_terms(row, TAU_ONE, 3), strict=True))
             sign = row_sign(code, row)
             assert sign == FORBIDDEN or value >= -1e-14
             assert sign != FREE or abs(value) <= 1e-14
@@ -157,7 +157,7 @@ def test_rows_of_a_node_with_one_tangent_or_none():
     for code, points in samples.items():
         for row in rows:
             sign = row_sign(code, row)
-            values = [sum(c * z[i] for i, c in zip(*row_terms(row, tau, 2), strict=True)) for z in points]
+            values = [sum(c * z[i] for i, c in zip(*sector_row_terms(row, tau, 2), strict=True)) for z in points]
             assert sign == FORBIDDEN or min(values) >= 0
             assert sign != FREE or not any(values)
             allowed += sign != FORBIDDEN
@@ -167,7 +167,7 @@ def test_rows_of_a_node_with_one_tangent_or_none():
     assert row_sign(FRICTIONLESS, (FORCE, 0, 0)) != FREE
     for row in ((TAU, 0, 0), (SLIP, 0, 1), (END, 0, 1), (TANGENT, 0, 4)):
         with pytest.raises(ValueError, match="no such row"):
-            row_terms(row, none, 1)
+            sector_row_terms(row, none, 1)
 
 
 def test_margins_are_below_the_energy():
@@ -186,7 +186,7 @@ def test_margins_are_below_the_energy():
         rows = [row for row in ROWS if row_sign(code, row) != FORBIDDEN]
         values = np.array([rng.normal() if row_sign(code, row) == FREE else rng.random() for row in rows])
         values *= 10.0 ** rng.integers(-4, 1)
-        margin = exclusion_margin(system, (code,), rows, values)
+        margin = sector_margin(system, (code,), rows, values)
         assert margin <= y @ S @ y - g @ y + 1e-12
         positive += margin > -1
     assert positive
@@ -202,10 +202,10 @@ def test_rows_that_a_status_lacks_or_of_the_wrong_sign():
         (STICK, (TANGENT, 0, 4), -1.0),
         (STICK, (FORCE, 0, 0), np.nan),
     ):
-        assert exclusion_margin(system, (code,), [row], np.array([value])) == -np.inf
+        assert sector_margin(system, (code,), [row], np.array([value])) == -np.inf
     for row in ((END, 0, 1), (ALONG, 0, 1), (TANGENT, 0, 3)):
         with pytest.raises(ValueError, match="no such row"):
-            row_terms(row, TAU_ONE, 3)
+            sector_row_terms(row, TAU_ONE, 3)
 
 
 # -- leaves ------------------------------------------------------------------------------------------------------------

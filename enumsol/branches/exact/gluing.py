@@ -24,7 +24,7 @@ from enumsol.support.deadlines import Deadline, TimeOverError, look, within
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from enumsol.branches.exact.selection_arcs import Event, SelectionArcs
+    from enumsol.branches.exact.selection_arcs import SelectionArcs, SelectionEvent
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.roots.components import RootComponent
     from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
@@ -181,10 +181,10 @@ def _work_out(
 # -- joining events ----------------------------------------------------------------------------------------------------
 
 
-def _joined(known: KnownSelections) -> list[list[Event]]:
+def _joined(known: KnownSelections) -> list[list[SelectionEvent]]:
     """Events at which selections hold, grouped by connected sets of solutions."""
     exact, union, waiting = known.exact, UnionFind(), known.waiting
-    seen: dict[Event, None] = {}
+    seen: dict[SelectionEvent, None] = {}
     waiting += [event for arcs in known.arcs.values() for event in arcs.events if event.holds]
     origin = exact.origin
     if origin is not None and known.a <= origin <= known.b:
@@ -208,13 +208,13 @@ def _joined(known: KnownSelections) -> list[list[Event]]:
         except TimeOverError:
             event.settled, known.late = False, True
     _join_polytopes(known, seen, union)
-    groups: dict[Event, list[Event]] = {}
+    groups: dict[SelectionEvent, list[SelectionEvent]] = {}
     for event in seen:
         groups.setdefault(union[event], []).append(event)
     return list(groups.values())
 
 
-def _hold_everywhere(known: KnownSelections, alpha: CriticalAlpha, union: UnionFind) -> list[Event]:
+def _hold_everywhere(known: KnownSelections, alpha: CriticalAlpha, union: UnionFind) -> list[SelectionEvent]:
     """Join all selections at the alpha where g vanishes; the events that are new."""
     events = [arcs.event_at(alpha) for arcs in known.arcs.values()]
     for event, _ in events:
@@ -223,7 +223,7 @@ def _hold_everywhere(known: KnownSelections, alpha: CriticalAlpha, union: UnionF
     return [event for event, new in events if new]
 
 
-def _join_members(known: KnownSelections, event: Event, active: ActiveSets, union: UnionFind) -> None:
+def _join_members(known: KnownSelections, event: SelectionEvent, active: ActiveSets, union: UnionFind) -> None:
     """Join an event with those of all selections that hold at a point of it."""
     members, whole = known.members(active)
     event.settled = event.settled and whole
@@ -242,9 +242,9 @@ def _join_members(known: KnownSelections, event: Event, active: ActiveSets, unio
         union.union(event, other)
 
 
-def _join_polytopes(known: KnownSelections, events: Iterable[Event], union: UnionFind) -> None:
+def _join_polytopes(known: KnownSelections, events: Iterable[SelectionEvent], union: UnionFind) -> None:
     """Join polytopes at one alpha that meet away from the vertices of both."""
-    by_solver: dict[FiberSelections, list[tuple[Event, SelectionSolution]]] = {}
+    by_solver: dict[FiberSelections, list[tuple[SelectionEvent, SelectionSolution]]] = {}
     for event in events:
         if event.polytope is not None and event.polytope[1].dimension > 0:
             by_solver.setdefault(event.polytope[0], []).append((event, event.polytope[1]))
@@ -263,9 +263,9 @@ def _join_polytopes(known: KnownSelections, events: Iterable[Event], union: Unio
 # -- the graph ---------------------------------------------------------------------------------------------------------
 
 
-def _vertices(groups: Sequence[list[Event]]) -> list[GluedVertex]:
+def _vertices(groups: Sequence[list[SelectionEvent]]) -> list[GluedVertex]:
     """One vertex a group of events, in the order of alpha."""
-    by_alpha: dict[CriticalAlpha, list[list[Event]]] = {}
+    by_alpha: dict[CriticalAlpha, list[list[SelectionEvent]]] = {}
     for events in groups:
         by_alpha.setdefault(events[0].alpha, []).append(events)
     vertices: list[GluedVertex] = []

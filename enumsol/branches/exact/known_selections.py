@@ -7,7 +7,7 @@ from math import prod
 from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.number_field import exact_value
-from enumsol.branches.exact.selection_arcs import Event, SelectionArcs, active_sets, selection_arcs
+from enumsol.branches.exact.selection_arcs import SelectionArcs, SelectionEvent, active_sets, selection_arcs
 from enumsol.branches.sheets import sheet_arcs
 from enumsol.selections.ordered_field import FiberSelections
 from enumsol.selections.solution import VertexLimitError
@@ -34,7 +34,7 @@ class KnownSelections:
         The search was stopped: selections it did not find are left out, and arcs may end without neighbours.
     late : bool
         The time was over before all of them were joined.
-    waiting : list of Event
+    waiting : list of SelectionEvent
         Events at which other selections have not been looked for yet.
     reasons : list of str
         What stayed undecided or contradicts completeness.
@@ -44,7 +44,7 @@ class KnownSelections:
         self.exact, self.a, self.b, self.cut_short = exact, a, b, cut_short
         self.late = False
         self.arcs: dict[Codes, SelectionArcs] = {}
-        self.waiting: list[Event] = []
+        self.waiting: list[SelectionEvent] = []
         self.reasons: list[str] = []
         self._refused: set[Codes] = set()
         self._fibers: list[tuple[CriticalAlpha, FiberSelections]] = []
@@ -87,7 +87,7 @@ class KnownSelections:
         if arcs.empty:
             del self.arcs[codes]
 
-    def solve(self, event: Event) -> bool:
+    def solve(self, event: SelectionEvent) -> bool:
         """Find the polytope of a selection at a singular event; False when it has no solution there."""
         look()
         solver = self._fiber(event.alpha)
@@ -112,7 +112,7 @@ class KnownSelections:
 
     # -- asking ----------------------------------------------------------------------------------------------------
 
-    def active_at(self, event: Event) -> list[ActiveSets]:
+    def active_at(self, event: SelectionEvent) -> list[ActiveSets]:
         """Active sets of the selection's solution at an event: one, or one for every vertex of its polytope."""
         if event.polytope is not None:
             solver, solution = event.polytope

@@ -28,7 +28,7 @@ _DET, _END = -1, -2
 
 
 @dataclass(eq=False)
-class Event:
+class SelectionEvent:
     """A critical point of a selection.
 
     Attributes
@@ -92,7 +92,7 @@ class SelectionArcs:
 
     codes: Codes
     functions: SelectionFunctions
-    events: list[Event] = field(default_factory=list)
+    events: list[SelectionEvent] = field(default_factory=list)
     cells: list[Cell] = field(default_factory=list)
     grazing: bool = False
 
@@ -101,12 +101,12 @@ class SelectionArcs:
         """Whether the selection holds nowhere in the interval."""
         return not any(event.holds for event in self.events)
 
-    def beside(self, event: Event) -> bool:
+    def beside(self, event: SelectionEvent) -> bool:
         """Whether the selection holds in a cell beside the event."""
         k = self.events.index(event)
         return any(self.cells[j].holds for j in (k - 1, k) if 0 <= j < len(self.cells))
 
-    def event_at(self, alpha: CriticalAlpha) -> tuple[Event, bool]:
+    def event_at(self, alpha: CriticalAlpha) -> tuple[SelectionEvent, bool]:
         """The event at this alpha; where there is none, the cell is cut in two (True)."""
         after, high = 0, len(self.events)
         while after < high:
@@ -115,7 +115,7 @@ class SelectionArcs:
             if order == 0:
                 return self.events[middle], False
             after, high = (middle + 1, high) if order < 0 else (after, middle)
-        cell, event = self.cells[after - 1], Event(self.codes, alpha, self.cells[after - 1].holds)
+        cell, event = self.cells[after - 1], SelectionEvent(self.codes, alpha, self.cells[after - 1].holds)
         self.events.insert(after, event)
         left = rational_between(self.events[after - 1].alpha, alpha)
         right = rational_between(alpha, self.events[after + 1].alpha)
@@ -143,7 +143,9 @@ def selection_arcs(exact: ExactCondensed, codes: Codes, a: Any, b: Any) -> Selec
         return arcs
     groups = merge(points)
     vanishing = [{points[number] for number in group} for group in groups]
-    arcs.events = [Event(codes, group[0], singular=_DET in zero) for group, zero in zip(groups, vanishing, strict=True)]
+    arcs.events = [
+        SelectionEvent(codes, group[0], singular=_DET in zero) for group, zero in zip(groups, vanishing, strict=True)
+    ]
     signs = []
     for left, right in pairwise(arcs.events):
         at = rational_between(left.alpha, right.alpha)

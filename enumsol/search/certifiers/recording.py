@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from enumsol.proof.records import Branching, Undecided, Unloaded
+from enumsol.proof.records import Branching, UndecidedRecord, Unloaded
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,7 +40,7 @@ class RecordingCertifier:
     def skipped(self, codes: Codes, reason: str) -> None:
         """Write a subtree that was not examined."""
         del codes
-        self._leaf(Undecided(reason))
+        self._leaf(UndecidedRecord(reason))
 
     def unloaded(self) -> None:
         """Write the proof of the unloaded body."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from enumsol.model.statuses import CONDITIONS, RowKind
 from enumsol.proof import records
-from enumsol.proof.proof_file import fraction_text, shortened
+from enumsol.proof.proof_file import coarse, fraction_text
 from enumsol.search.certifiers.margins import energy_margin, margin_of_form
 from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
 from enumsol.search.certifiers.recording import WIDEN, RecordingCertifier
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.compressed_parts import Recorder
-    from enumsol.proof.records import Enclosure, Record
+    from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.search.certifiers.margins import Margin
     from enumsol.search.certifiers.protocol import Bound
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
@@ -173,7 +173,7 @@ class VerifiedCertifier(RecordingCertifier):
             if ball is not None:
                 self._take_note(ball.force, ball.w)
             points = [[_fraction(v) for v in vertex] for vertex in solution.vertices]
-            self._leaf(records.RootSet(points, solution.dimension))
+            self._leaf(records.RootSetRecord(points, solution.dimension))
         return solution
 
     # -- subtrees closed by their only possible solution (theory, section 6.11) ---------------------------------------
@@ -286,7 +286,7 @@ class VerifiedCertifier(RecordingCertifier):
         self._known.clear()
 
     def _regular(
-        self, codes: Codes, ball: VerifiedSelection, leaf: Callable[[Enclosure], Record] = records.RegularRoot
+        self, codes: Codes, ball: VerifiedSelection, leaf: Callable[[EnclosureRecord], Record] = records.RegularRoot
     ) -> SelectionSolution:
         """Write a leaf with a regular root, made of its enclosure."""
         self._verified[codes] = ball
@@ -295,18 +295,18 @@ class VerifiedCertifier(RecordingCertifier):
 
     def _undecided(self, codes: Codes, reason: str, hint: str) -> UndecidedPart:
         self._escalations.undecided += 1
-        self._leaf(records.Undecided(reason))
+        self._leaf(records.UndecidedRecord(reason))
         return UndecidedPart(codes, reason, hint, examined=True)
 
-    def _ball(self, found: VerifiedSelection | ClosedSolution, index: int | None) -> Enclosure:
+    def _ball(self, found: VerifiedSelection | ClosedSolution, index: int | None) -> EnclosureRecord:
         """Where a root is, in the problem's units."""
         force = self._scaled.force
-        return records.Enclosure(found.force * force, found.force_rad * force * WIDEN, index)
+        return records.EnclosureRecord(found.force * force, found.force_rad * force * WIDEN, index)
 
 
 def _proven(margin: Margin, codes: Codes, rows: NDArray[np.intp], values: Array) -> Array | None:
     """Multipliers that exclude a partial assignment, rounded if these do it as well; None if those given do not."""
-    short = shortened(values)
+    short = coarse(values)
     if margin(codes, rows, short) > _CLEAR:
         return short
     return values if margin(codes, rows, values) > 0 else None

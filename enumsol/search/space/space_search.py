@@ -9,7 +9,7 @@ import numpy as np
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.sectors import DEEPEST, SECTORS, direction, end_number, level_of
 from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.proof.records import Enclosure, Limits, NoRoot, RegularRoot, Undecided
+from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, RegularRoot, UndecidedRecord
 from enumsol.proof.space_records import ExcludedInSpace, OnlyRoot
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine
@@ -17,8 +17,8 @@ from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart
 from enumsol.search.certifiers.recording import WIDEN, RecordingCertifier
 from enumsol.search.resume import RecordedBound
 from enumsol.trusted.space.leaves import Cause, Open, SpaceRoot, settle
-from enumsol.trusted.space.sector_rows import exclusion_margin, row_terms
-from enumsol.trusted.space.space_uniqueness import OnlySolution, only_root, only_solution
+from enumsol.trusted.space.sector_rows import sector_margin, sector_row_terms
+from enumsol.trusted.space.space_uniqueness import OnlySolution, only_root, only_solution_in_space
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -109,7 +109,7 @@ class SpaceReader:
         said = ExcludedInSpace.read(record, Limits(codes))
         rows = said.rows
         for row in rows:
-            row_terms(row, engine.system.tau, len(engine.system.g))  # there is such a row
+            sector_row_terms(row, engine.system.tau, len(engine.system.g))  # there is such a row
         slots = [engine.slot(row) for row in rows]
         numbers = [slot * p + row[1] for slot, row in zip(slots, rows, strict=True) if slot is not None]
         if len(numbers) < len(rows):
@@ -150,7 +150,7 @@ class SpaceCertifier(RecordingCertifier):
             return False
         numbers, values = relaxation.multipliers()
         rows = [self._engine.rows[number] for number in numbers.tolist()]
-        if not exclusion_margin(self.enclosed, codes, rows, values, errors=2.0) > 0:
+        if not sector_margin(self.enclosed, codes, rows, values, errors=2.0) > 0:
             return False
         self._leaf(ExcludedInSpace(rows, values))
         return True
@@ -163,7 +163,7 @@ class SpaceCertifier(RecordingCertifier):
         elif isinstance(answer, Open):
             if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
                 return Refine(answer.node)
-            self._leaf(Undecided(answer.cause.value))
+            self._leaf(UndecidedRecord(answer.cause.value))
             hint = _HOLD if answer.cause is Cause.ROUNDING else _PERTURB
             return UndecidedPart(codes, answer.cause.value, hint, examined=True)
         else:
@@ -183,7 +183,7 @@ class SpaceCertifier(RecordingCertifier):
         found: SpaceRoot | OnlySolution | None
         try:
             if codes is None:
-                found = only_solution(self.enclosed, numbers, normal, errors=2.0)
+                found = only_solution_in_space(self.enclosed, numbers, normal, errors=2.0)
             else:
                 found = only_root(self.enclosed, numbers, codes, errors=2.0)
         except NotEnclosedError:
@@ -195,7 +195,7 @@ class SpaceCertifier(RecordingCertifier):
         self._leaf(OnlyRoot(numbers, codes or (), ball.mid, ball))
         return [found]
 
-    def _ball(self, found: SpaceRoot | OnlySolution) -> Enclosure:
+    def _ball(self, found: SpaceRoot | OnlySolution) -> EnclosureRecord:
         """Where a root is, in the problem's units."""
         unit = self.enclosed.unit
-        return Enclosure(found.y.mid * unit, WIDEN * found.y.rad * unit, found.index)
+        return EnclosureRecord(found.y.mid * unit, WIDEN * found.y.rad * unit, found.index)

@@ -26,7 +26,7 @@ FORBIDDEN, NONNEGATIVE, FREE = range(3)
 Row = tuple[int, int, int]
 
 
-def children_of(code: int, tangents: int) -> tuple[int, ...]:
+def sector_children(code: int, tangents: int) -> tuple[int, ...]:
     """Codes that together cover a partial status of a node with so many components of tau; empty for a final one."""
     if code == UNDECIDED:
         return (OPEN, CONTACT) if tangents else (OPEN, FRICTIONLESS)
@@ -59,7 +59,7 @@ def row_sign(code: int, row: Row) -> int:
     return NONNEGATIVE if code > SECTORS and contains(number, code - SECTORS) else FORBIDDEN
 
 
-def row_terms(row: Row, tau: NDArray[np.intp], size: int) -> tuple[list[int], list[float]]:
+def sector_row_terms(row: Row, tau: NDArray[np.intp], size: int) -> tuple[list[int], list[float]]:
     """A row as a sum over y and, from ``size`` on, over w: indices and coefficients, off by 16 units at most.
 
     Raises
@@ -97,7 +97,7 @@ def _exists(condition: bool) -> None:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def exclusion_margin(
+def sector_margin(
     system: EnclosedSpace, codes: Sequence[int], rows: Sequence[Row], values: Array, errors: float = 1.0
 ) -> float:
     """Proven lower bound on the energy over a partial assignment; positive means that it holds no solution.
@@ -110,7 +110,7 @@ def exclusion_margin(
         sign = row_sign(codes[row[1]], row)
         if sign == FORBIDDEN or (sign == NONNEGATIVE and value < 0) or not np.isfinite(value):
             return -np.inf
-        for i, coefficient in zip(*row_terms(row, system.tau, size), strict=True):
+        for i, coefficient in zip(*sector_row_terms(row, system.tau, size), strict=True):
             # a power of two: nothing is rounded but what underflows, which is less than TINY
             term = value * (coefficient * units[i])
             if i < size:

@@ -54,7 +54,9 @@ class OnlySolution:
     index = 1
 
 
-def only_solution(system: EnclosedSpace, numbers: Array, normal: Array, errors: float = 1.0) -> OnlySolution | None:
+def only_solution_in_space(
+    system: EnclosedSpace, numbers: Array, normal: Array, errors: float = 1.0
+) -> OnlySolution | None:
     """The only solution near a point, or None where that is not proven.
 
     Parameters
@@ -78,7 +80,7 @@ def only_solution(system: EnclosedSpace, numbers: Array, normal: Array, errors: 
 def only_root(system: EnclosedSpace, numbers: Array, codes: Sequence[int], errors: float = 1.0) -> SpaceRoot | None:
     """The regular root of a leaf, if it is proven that it has one and that there is no other solution at all.
 
-    Parameters and errors as for ``only_solution``; ``codes`` are those of the leaf.
+    Parameters and errors as for ``only_solution_in_space``; ``codes`` are those of the leaf.
     """
     if not is_complete(system, codes):
         return None
