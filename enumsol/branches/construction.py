@@ -92,8 +92,8 @@ def branch_graph(
     interval : pair of alphas
         First and last alpha, in increasing order: float, Fraction or whatever enumerate_roots accepts as alpha.
     arithmetic : {"verified", "fast", "exact"}
-        "verified": every leaf of the search is proven empty over its whole piece of the interval, and every selection
-        handed on is followed, by rigorous error bounds for the problem's own matrices (theory, section 7.14). The graph
+        "verified": every leaf of the search is proven empty over its whole piece of the interval, and every surviving
+        selection is followed, by rigorous error bounds for the problem's own matrices (theory, section 7.14). The graph
         is made of these arcs; up to 24 degrees of freedom, and up to 250 if bounds left something open, it is made by
         exact algebra instead, for the same matrices (``graph.data.arcs_by`` says which). Beyond 250, or where exact
         algebra would take more than some minutes, what is left open is a vertex of kind "unsettled", and the graph is

@@ -63,7 +63,7 @@ class BranchGraph(Immutable):
     pieces : tuple of SearchedPiece
         The search's leaves with their multipliers, piece by piece of the interval (empty after ``load``).
     proof : Proof or None
-        In verified arithmetic: the search's leaves and the arcs of the selections handed on, for ``enumsol.verify``
+        In verified arithmetic: the search's leaves and the arcs of the surviving selections, for ``enumsol.verify``
         (None after ``load``, for a search that was cut short, where rationals had to decide about leaves, and without
         any load, where no search is needed: lambda = 0 by (5.3)).
 

@@ -45,7 +45,7 @@ def write_graph_proof(
     pieces: Sequence[SearchedPiece],
     followed: Followed | None,
 ) -> Proof | None:
-    """The leaves of all pieces with their multipliers, and the traces of the selections handed on.
+    """The leaves of all pieces with their multipliers, and the traces of the surviving selections.
 
     None if the end of a piece has too many digits for it.
     """

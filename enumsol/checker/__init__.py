@@ -4,8 +4,8 @@ What a verified proof says
     For the problem's own A, Bn, Bt, f, gap, slip offset and friction, read as exact numbers (or, where the report says
     "S and g as computed", for the condensed data), and for alpha as an exact fraction: the listed roots and families
     solve the problem, and nothing else does. The proof of a branch graph says that every solution for every alpha of an
-    interval lies in the selections handed on and, if it holds arcs, what each of them does along the interval, except
-    for short intervals that it leaves open. All this rests on the energy bound (theory, (5.2)), on branchings that
+    interval lies in the surviving selections and, if it holds arcs, what each of them does along the interval, except
+    for short intervals that it leaves undecided. All this rests on the energy bound (theory, (5.2)), on branchings that
     cover (``trusted.status_rows.children_of``), on the a-priori error bounds of IEEE double arithmetic with rounding to
     nearest in ``arithmetic.balls``, ``condensation.enclosure`` and ``trusted``, and on rational arithmetic in
     ``checker.rational`` and ``checker.hull``. Linear algebra kernels may sum in any order and fuse multiplications and

@@ -1,4 +1,4 @@
-"""What the boxes of a graph's proof say of selections, tested by the trusted kernel, many boxes at once."""
+"""Tests of what the boxes of a graph's proof claim about selections, by the trusted core, for many boxes at once."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""Checker of the arcs of a branch graph: where every selection handed on holds, and how arcs are joined.
+"""Checker of the arcs of a branch graph: where every surviving selection holds, and how arcs are joined.
 
 Records (see docs/proof_format.md, under Arcs): ``{"traces", "force", "length"}``; for every selection and every
-interval on which it was handed on ``["t", codes, low, high, side]``, then its boxes ``["b", low, high, precise,
+interval on which it survives ``["t", codes, low, high, side]``, then its boxes ``["b", low, high, precise,
 parts]``.
 
-Every box is expanded anew by the trusted kernel, and every part of it is tested (``arc_boxes``). Then events are paired
+Every box is expanded anew by the trusted core, and every part of it is tested (``arc_boxes``). Then events are paired
 by the condition that vanishes: each must have exactly one partner, arcs end at events, at the interval's ends or where
 g vanishes, and indices balance. What a proof leaves open is counted.
 """
@@ -83,7 +83,7 @@ class ArcChecker:
     origin : Fraction or None
         The alpha at which g vanishes, if it lies in the interval.
     pieces : mapping of codes to lists of (Fraction, Fraction)
-        Where selections were handed on.
+        Where selections survive.
     closed : sequence of ClosedPiece
         Pieces whose solutions are said to lie on the arcs through them.
     fail : called with a sentence for every failure
@@ -134,7 +134,7 @@ class ArcChecker:
         if not same(head["traces"], self.traces):
             self._fail(f"there are {self.traces} traces; the arcs begin with {quoted(head['traces'])}")
         if self._due:
-            self._fail(f"{len(self._due)} of the selections handed on are not traced")
+            self._fail(f"{len(self._due)} of the surviving selections are not traced")
         self._pair()
         for piece in self._closed:
             failure = piece.failure(self._arcs, self._systems, self._origin)
@@ -171,7 +171,7 @@ class ArcChecker:
         spans = (d for d in self._due if d[0] == codes and d[3] == side)
         due = next((d for d in spans if _is_next(-low, -d[1]) and _is_next(high, d[2])), None)
         if due is None:
-            raise ValueError("it is about no selection that was handed on there, or repeated")
+            raise ValueError("its selection does not survive there, or the trace is repeated")
         self._due.remove(due)
         selection = BoxSelection(self, ArcSelection(self._systems[side], codes), side)
         follower = _Follower(self, selection.conditions, codes, side, (low, high))

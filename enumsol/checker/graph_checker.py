@@ -1,17 +1,17 @@
-"""Checker of a branch graph: every solution in the interval lies in one of the selections handed on, or on its arcs.
+"""Checker of a branch graph: every solution in the interval lies in one of the surviving selections, or on its arcs.
 
 Records (see enumsol.proof.proof_file for the file and the reader): a header ``{"format": "enumsol-proof",
 "version": 1, "kind": "graph", "problem": <fingerprint>, "interval": [a, b], "p": p, "data": "problem" | "condensed"}``;
 for every piece ``{"piece": [a, b], "force", "length", "roots"}``, then its leaves ``["x", codes, rows, multipliers]``
 (no solution anywhere in the piece), ``["f", codes, rows, multipliers]`` (the same by the form declared last, ``["q",
-mu, nu, alpha, beta]``), ``["s", codes]`` (a selection handed on) and ``["c", codes]`` (left to both halves of the
-piece), or ``["m", mu, kappa, nu]`` (all solutions lie on the arcs of the selections handed on); then, if the proof
+mu, nu, alpha, beta]``), ``["s", codes]`` (a surviving selection) and ``["c", codes]`` (left to both halves of the
+piece), or ``["m", mu, kappa, nu]`` (all solutions lie on the arcs of the surviving selections); then, if the proof
 holds them, arcs (see enumsol.checker.arcs); at the end ``{"pieces", "leaves", "selections"}``, with arcs ``"traces"``
 and ``"arcs"``, too. Codes are strings of p digits; ends of pieces are fractions ``"a/b"`` in decimal digits.
 
 What is checked: pieces partition the interval (it is cut first where g vanishes, see ``condensation.unloaded``), with
 the subtrees left by a piece searched in both its halves; the leaves of every piece cover all selections of its roots;
-every exclusion is proven at both ends of the piece. Where the selections handed on hold, and how their arcs are joined,
+every exclusion is proven at both ends of the piece. Where the surviving selections hold, and how their arcs are joined,
 is checked by ``enumsol.checker.arcs``, if the proof says it.
 """
 
@@ -238,9 +238,9 @@ class GraphChecker:
         _check_repetitions(piece)
         handed = piece.leaves("s")
         if np.any(handed >= CONTACT):
-            self._fail(f"piece {number}: a selection handed on is not complete")
+            self._fail(f"piece {number}: a surviving selection is not complete")
         elif np.any((handed != OPEN) & ((handed == FRICTIONLESS) == np.array(self._friction))):
-            self._fail(f"piece {number}: a selection handed on has a status that a node cannot have")
+            self._fail(f"piece {number}: a surviving selection has a status that a node cannot have")
         if piece.closed is not None:
             if np.any(piece.roots != UNDECIDED) or len(handed) < len(piece.leaves()) or piece.declared is not None:
                 self._fail(f"piece {number}: it is decided by its arcs, but not whole, or has other leaves")

@@ -71,7 +71,7 @@ def hull_of_selections(system: RationalSystem, *selections: Sequence[int]) -> Hu
 
 
 def _solution_set(system: RationalSystem, selections: Sequence[Sequence[int]]) -> tuple[list[Any], list[Any]] | None:
-    """A point and the kernel's basis of all equations, or None when they contradict each other."""
+    """A point that solves all equations and a basis of their kernel, or None if they contradict each other."""
     size = 2 * system.p
     table = []
     for codes in selections:

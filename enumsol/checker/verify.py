@@ -93,7 +93,7 @@ def verify(
     optional_callable(progress, "progress")
     proof.check_integrity()
     if in_space:
-        from enumsol.checker.space_checker import SpaceChecker  # with its kernel, for problems in 3D only
+        from enumsol.checker.space_checker import SpaceChecker  # with its trusted core, for problems in 3D only
 
         return SpaceChecker(problem, progress).run(proof)
     lines = proof.records()

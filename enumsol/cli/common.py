@@ -171,7 +171,7 @@ def note(text: str) -> None:
 
 
 def so_far(search: Callable[[], T]) -> tuple[T | Any, EnumsolError | None]:
-    """What a search found, be it ended early, and what ended it."""
+    """What a search found, even if it ended early, and the error that ended it, if any."""
     try:
         return search(), None
     except (Interrupted, OutputError) as error:

@@ -55,7 +55,7 @@ class Display(AbstractContextManager[Any]):
         self._progress.start()
 
     def count(self, unit: str) -> Callable[[int, int], None]:
-        """A callback that is told how many of all are done."""
+        """A callback that takes how many are done, and of how many."""
         return lambda done, of: self.show(done / max(of, 1), f"{done:,} of {of:,} {unit}")
 
     def __exit__(

@@ -73,7 +73,7 @@ class _Guarded:
             self._failure = OutputError(f"{self._name} was closed by its reader before everything was written")
         else:
             self._failure = OutputError(
-                f"{self._name} cannot be written ({error.strerror}); expected a place with room"
+                f"{self._name} cannot be written ({error.strerror}); expected a place with free space"
             )
         self._failure.__cause__ = error
         with contextlib.suppress(OSError, ValueError):

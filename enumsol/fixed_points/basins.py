@@ -122,7 +122,7 @@ def basin_table(
     Returns
     -------
     DataFrame
-        A row a start: ``start``, ``size`` (mean slip bound), ``outcome``, ``iterations``, ``contraction``, ``root``
+        One row per start: ``start``, ``size`` (mean slip bound), ``outcome``, ``iterations``, ``contraction``, ``root``
         (its number, or <NA>) and ``away`` (distance from the nearest root). ``attrs["never"]`` lists the roots that
         no start reached.
 

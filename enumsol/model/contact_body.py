@@ -192,7 +192,7 @@ def span(values: NDArray[np.float64]) -> str:
 
 
 def vector(value: object, name: str, size: int, *, broadcast: bool = False) -> NDArray[np.float64]:
-    """Value as a sealed array of that size; one number stands for all entries if ``broadcast``.
+    """Value as a read-only array of the given size; if ``broadcast``, one number stands for all entries.
 
     Raises
     ------

@@ -131,7 +131,8 @@ class ProofWriter:
             action()
         except OSError as error:
             self.failure = (
-                f"proof_path {self._path} cannot be written to the end ({error.strerror}); expected a place with room"
+                f"proof_path {self._path} cannot be written to the end ({error.strerror}); "
+                "expected a place with free space"
             )
             with contextlib.suppress(OSError):  # the same once more, for what is still in its buffer
                 self._file.close()

@@ -1,4 +1,4 @@
-"""Roots that close subtrees and are known by their enclosures: each once, beside those of single selections."""
+"""Roots that fathom subtrees by uniqueness and are known by enclosures: each once, beside roots of selections."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Kept = tuple[list["SelectionSolution"], list["SelectionSolution"], list["Codes"]
 
 
 def apart(solutions: Iterable[SelectionSolution]) -> Kept:
-    """Solutions of selections, closed roots that are none of them, each once, and the cores of those in doubt.
+    """Solutions of selections; other roots that closed subtrees, each once; the cores of those in doubt.
 
-    Neither depends on the order of the solutions. A closed root that is a degenerate solution of a selection gives it
-    its index; one in doubt may be the same as another one (theory, section 6.11).
+    The results do not depend on the order of the solutions. A root that closed a subtree and is a degenerate solution
+    of a selection gives that solution its index. A root in doubt may be the same as another one (theory, section 6.11).
     """
     single, closed = [], {}
     for solution in solutions:
@@ -28,7 +28,7 @@ def apart(solutions: Iterable[SelectionSolution]) -> Kept:
             single.append(solution)
         else:
             closed[solution.codes] = solution
-    # a strict solution may have closed several subtrees, and be told by balls in one and by rationals in another
+    # a strict solution may have closed several subtrees, decided by balls in one of them and by rationals in another
     strict = {s.codes: s for s in single if s.strict and not s.exact}
     single = [*strict.values(), *(s for s in single if s.codes not in strict)]
     kept: list[SelectionSolution] = []
@@ -52,5 +52,5 @@ def _same(closed: SelectionSolution, other: SelectionSolution) -> bool | None:
 
 
 def closed_component(solution: SelectionSolution) -> RootComponent:
-    """A closed root, of which all is known that ever will be."""
+    """Component of a root known only by its enclosure; nothing further can be computed."""
     return RootComponent((solution,), solution.possible or (), 0, solution.index, whole=True)

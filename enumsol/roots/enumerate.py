@@ -176,7 +176,7 @@ def _not_joined(codes: Codes) -> UndecidedPart:
 
 
 def _alone(solution: SelectionSolution) -> bool:
-    """Whether no other selection's solution is connected with it, or it is told from these otherwise."""
+    """Whether no other selection's solution is connected with it, or it is distinguished from these in another way."""
     return solution.possible is not None or (solution.strict and solution.det_sign != 0)
 
 

@@ -48,8 +48,8 @@ _MANY = 3
 _FEW, _LONG = 48, 512
 #: Assignments above a known root are tried once the tree has so many nodes: a try costs as much as some of them.
 _TALL = 256
-#: After a try above a known root the next one comes when something is told of one more in so many nodes, or the
-#: relaxation's bound is so much nearer to zero.
+#: After a try above a known root, the next one is made once so much more of the contact nodes is decided (one in four),
+#: or once the relaxation's bound is closer to zero by this factor.
 _TRIES, _NEARER = 4, 0.5
 #: With so many the solution is sought along a path, too, before there is a tree.
 _PATH = 24

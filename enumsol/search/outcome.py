@@ -1,4 +1,4 @@
-"""What a search is told, what it tells while it runs, what it found, and why it ended early."""
+"""The limits of a search, its progress reports, what it found, and why it ended early."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class PointValues(Protocol):
         """w = g - S lambda at the point as floats, shape (2p,), unscaled, exact zeros where the status says so."""
 
     def slip_signs(self, point: Any) -> tuple[int, ...]:
-        """Signs of w_t at the point, one a node."""
+        """Signs of w_t at the point, one per node."""
 
     def bounds(self, point: Any) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]] | None:
         """Proven bounds of (lambda, w) at the point, two arrays of shape (4p,); None in an arithmetic without any."""

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
-#: What the operating system says when a file can be opened and not be written to.
+#: Errors of the operating system for a file that can be opened but not written to.
 _NO_ROOM = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EPIPE))
 
 
@@ -26,16 +26,18 @@ def writing(place: Path, name: str) -> Iterator[None]:
     Raises
     ------
     OutputError
-        There is no room for it, or the device failed.
+        There is no space left for it, or the device failed.
     InvalidArgumentError
-        There can be no such file.
+        No such file can be created.
     """
     try:
         yield
     except OSError as error:
         if error.errno in _NO_ROOM:
             reason = os.strerror(error.errno)  # some libraries replace it by a longer text
-            raise OutputError(f"{name} {place} cannot be written ({reason}); expected a place with room") from error
+            raise OutputError(
+                f"{name} {place} cannot be written ({reason}); expected a place with free space"
+            ) from error
         raise InvalidArgumentError(
             f"{name} {place} cannot be written ({error.strerror or error}); expected a path for a new file"
         ) from error

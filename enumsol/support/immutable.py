@@ -1,7 +1,7 @@
 """Data that cannot change: read-only arrays, and objects whose attributes cannot be set.
 
 A proof, a fingerprint and every cached result belong to the data they were computed from. So what a problem or a result
-holds is copied when it is made, and sealed: writing to it raises, and it cannot be made writable again.
+holds is copied when it is made, and made immutable: writing to it raises, and it cannot be made writable again.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def sealed(array: NDArray[Any]) -> NDArray[Any]:
-    """A copy of the array that stays read-only; an array that is sealed already is returned as it is.
+    """A copy of the array that stays read-only; an array that is immutable already is returned as it is.
 
     The copy is held in a bytes object, so that ``setflags(write=True)`` is refused.
     """
@@ -39,7 +39,7 @@ def _is_sealed(array: NDArray[Any]) -> bool:
 
 
 def _sealed_within(value: Any) -> Any:
-    """An array, or the arrays in a tuple, sealed; anything else as it is."""
+    """An array, or the arrays in a tuple, made immutable; anything else as it is."""
     if isinstance(value, np.ndarray):
         return value if value.dtype.hasobject else sealed(value)
     if type(value) is tuple and any(isinstance(item, np.ndarray) for item in value):
@@ -48,7 +48,7 @@ def _sealed_within(value: Any) -> Any:
 
 
 class Sealed:
-    """Base of frozen dataclasses: their arrays are sealed, also in copies and after unpickling."""
+    """Base of frozen dataclasses: their arrays are immutable, also in copies and after unpickling."""
 
     def __post_init__(self) -> None:
         self.__setstate__(self.__dict__)
@@ -85,7 +85,7 @@ class Immutable:
 
 @dataclass(frozen=True, eq=False)
 class SealedMatrix(Sealed):
-    """A sparse matrix whose parts are sealed.
+    """A sparse matrix whose parts are immutable.
 
     The parts of scipy's matrices can be replaced (``matrix.data = other``). So this keeps the parts, and every call of
     ``matrix()`` makes a new object on them without copying: a change to one object does not reach the others.
@@ -115,7 +115,7 @@ class SealedMatrix(Sealed):
         return cls(again.format, again.data, again.indices, again.indptr, again.shape)
 
     def matrix(self) -> Any:
-        """A csc_array or csr_array of the sealed parts."""
+        """A csc_array or csr_array of the immutable parts."""
         kind = sp.csc_array if self.layout == "csc" else sp.csr_array
         matrix = kind((self.data, self.indices, self.indptr), shape=self.shape, copy=False)
         # known here, so that no new object checks it again

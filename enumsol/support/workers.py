@@ -1,4 +1,4 @@
-"""Tasks for the workers of a concurrent.futures executor; a worker that dies costs time and nothing else.
+"""Tasks for the workers of a concurrent.futures executor; if a worker dies, only time is lost.
 
 Executors report a lost worker in many ways: BrokenProcessPool, dask's KilledWorker, a cancelled future. An error that a
 task here raises itself comes back in an `_OwnError`; any other error in a future was raised by the executor.

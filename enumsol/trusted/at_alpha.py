@@ -1,4 +1,4 @@
-"""The trusted kernel: exclusion inequalities and verified solves on an EnclosedSystem (theory, sections 6.2-6.4).
+"""The trusted core: exclusion inequalities and verified solves on an EnclosedSystem (theory, sections 6.2-6.4).
 
 Everything that makes the word "complete" true for a regular problem passes through the functions of this module,
 in the search and in the checker alike. Codes and row kinds are plain integers with the meaning documented in

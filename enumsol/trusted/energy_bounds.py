@@ -53,7 +53,7 @@ def margins(
     signs = allowed[leaf, node, kind]
     bad |= (signs == FORBIDDEN) | ((signs == NONNEGATIVE) & (values < 0))
     refused = np.bincount(leaf[bad], minlength=m) > 0
-    # one table a leaf with a row for each kind; several multipliers of a row add up
+    # one table per leaf with a row for each kind; several multipliers of a row add up
     place, count = leaf * (kinds * p) + rows, kinds * p * m
     table = np.bincount(place, values, minlength=count).reshape(m, kinds, p)
     size = np.bincount(place, np.abs(values), minlength=count).reshape(m, kinds, p)

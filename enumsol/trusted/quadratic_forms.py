@@ -1,4 +1,4 @@
-"""The trusted kernel of quadratic forms other than the energy: bounds over partial assignments (theory, section 6.12).
+"""The trusted core of quadratic forms other than the energy: bounds over partial assignments (theory, section 6.12).
 
 At every solution lambda_n w_n = 0, lambda_t w_n = 0, (lambda_t - F lambda_n) w_t >= 0 and (lambda_t + F lambda_n) w_t
 >= 0, node by node. With multipliers mu, nu and alpha, beta >= 0 of a node, D maps its (lambda_n, lambda_t) to

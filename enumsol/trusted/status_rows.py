@@ -86,8 +86,8 @@ _SLIDING = (FORWARD, STICK, SLIP_MINUS), (BACKWARD, STICK, SLIP_PLUS)
 def coverings_of(code: int, *, friction: bool) -> tuple[tuple[int, ...], ...]:
     """All ways to split a partial status at one alpha; none for a final one.
 
-    An undecided node with friction may also be told from sticking and slipping in one direction: what remains is open
-    or slips in the other.
+    An undecided node with friction may also be split three ways: stick, slip in one direction, or "open or slip in the
+    other direction".
     """
     children = children_of(code, friction=friction)
     return ((children,) if children else ()) + (_SLIDING if code == UNDECIDED and friction else ())

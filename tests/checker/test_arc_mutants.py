@@ -193,7 +193,7 @@ def remove_arc(rng, records):
 
 
 def hide_selection(rng, records):
-    """A selection that was handed on is not, or is left to halves that do not come; its trace may vanish too."""
+    """A surviving selection is removed, or is left to halves that do not follow; its trace may vanish, too."""
     handed = [k for k, record in enumerate(records) if isinstance(record, list) and record and record[0] == "s"]
     if not handed:
         return
@@ -409,7 +409,7 @@ def test_traces_that_reach_beyond_their_pieces_are_refused(place, beyond):
     else:
         records[k + 1][2] = records[k + 1][4][-1][1] = beyond
     report = verify(problem, proof_of(records))
-    assert any("no selection that was handed on there" in failure for failure in report.failures)
+    assert any("its selection does not survive there" in failure for failure in report.failures)
 
 
 def _with_boxes(records, boxes):

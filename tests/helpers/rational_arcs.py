@@ -221,7 +221,7 @@ class Trace:
 
 
 class Arcs:
-    """[6.5] All arcs of a proof on [a, b]; alpha_0 or None; by codes where selections were handed on; closed pieces."""
+    """[6.5] All arcs of a proof on [a, b]; alpha_0 or None; by codes where selections survive; closed pieces."""
 
     def __init__(self, data, interval, origin, handed_on, closed):
         self._data, (self._a, self._b), self._closed = data, interval, closed
@@ -249,7 +249,7 @@ class Arcs:
                 position += 1
             self._traces.append(self._trace(records[start], records[start + 1 : position]))
         need(integer(head["traces"]) == len(self._traces), "another number of traces")
-        need(not self._due, "a selection handed on has no trace")
+        need(not self._due, "a surviving selection has no trace")
         left_open = any(trace.left_open for trace in self._traces)
         alone, pairs = self._paired()
         need(left_open or not alone, "an event has no partner")
@@ -268,7 +268,7 @@ class Arcs:
             for due in self._due
             if "".join(map(str, due[0])) == text and _beside(low, due[1]) and _beside(-high, -due[2]) and due[3] == side
         ]
-        need(belongs, "a trace is about no selection handed on")
+        need(belongs, "a trace is about no surviving selection")
         first = min(belongs, key=lambda due: due[1])
         self._due.remove(first)
         trace = Trace(self._data, first[0], side)

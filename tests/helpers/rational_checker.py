@@ -298,7 +298,7 @@ class Graph(Proof):
         need(min(self.data.friction(self.a) + self.data.friction(self.b)) >= 0, "friction is negative")
         self.origin = self.data.origin()
         self.pieces = self.leaves = 0
-        #: Codes of the selections handed on, with the pieces in which they were.
+        #: Codes of the surviving selections, with the pieces in which they survive.
         self.handed_on, self.closed = {}, []
 
     def run(self, records):
@@ -375,7 +375,7 @@ class Graph(Proof):
             if kind == "c":
                 cut.append(text)
             else:
-                need(max(codes) < 5, "a selection handed on is not complete")
+                need(max(codes) < 5, "a surviving selection is not complete")
                 need(self.selections_below(codes, friction), "a node cannot have its code")
                 self.handed_on.setdefault(codes, []).append((x, y))
         for root in () if closed else roots:

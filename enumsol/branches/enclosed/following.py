@@ -1,4 +1,4 @@
-"""The selections that a search handed on, followed over alpha in ball arithmetic and joined (theory, section 7.14)."""
+"""The selections that survive a search, followed over alpha in ball arithmetic and joined (theory, section 7.14)."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def follow_selections(
     most: int | None = None,
     limits: Limited | None = None,
 ) -> Followed:
-    """Trace all selections handed on, where they were; after a search that was cut short, over the whole interval.
+    """Trace all surviving selections where they survive; after a search that was cut short, over the whole interval.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Pieces of the interval that need no tree: their one branch of solutions is proven to be all (theory, section 7.15).
 
-A branch is followed in floats, selection by selection, and the test of the kernel asked whether the root of each is the
-only solution where it holds. Then the selections are traced, and their arcs must join to one chain over the pieces.
+A branch is followed in floats, selection by selection, and the trusted core tests whether the root of each is the only
+solution where it holds. Then the selections are traced, and their arcs must join to one chain over the pieces.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class ClosedPieces:
     pieces : mapping of Piece to (PieceNumbers, codes)
         In order, with the selections that hold somewhere in them.
     traces : list of Trace
-        Of these selections, where they were handed on.
+        Of these selections, where they survive.
     """
 
     pieces: dict[Piece, tuple[PieceNumbers, list[Codes]]] = field(default_factory=dict)

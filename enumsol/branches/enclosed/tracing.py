@@ -1,8 +1,8 @@
-"""Where selections hold over intervals of alpha, found by the polynomials of the kernel (theory, section 7.14).
+"""Where selections hold over intervals of alpha, found by the polynomials of the trusted core (theory, section 7.14).
 
 An interval is cut into boxes, on each of which the conditions are known with bounds of their errors, and the boxes into
 parts: the selection holds throughout, or nowhere, or exactly one condition changes its sign. What is left stays open.
-Many selections are followed side by side, so that the kernel examines them together.
+Many selections are followed side by side, so that the trusted core examines them together.
 """
 
 from __future__ import annotations

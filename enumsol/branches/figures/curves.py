@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-#: Points at first, by which the range of every quantity is told, and most points of an arc.
+#: Initial number of points, which determine the range of every quantity, and the largest number of points of an arc.
 _FIRST, _MOST = 9, 1025
 
 

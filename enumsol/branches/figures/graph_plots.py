@@ -62,7 +62,7 @@ class DrawnGraph(Protocol):
 
 #: Panels drawn when no nodes are named.
 _MAX_PANELS = 3
-#: A third of a pixel of a large panel; and what no eye can tell from none.
+#: A third of a pixel of a large panel; and the smallest tolerance of use, below what can be seen.
 _TOLERANCE, _LEAST_TOLERANCE = 5e-4, 1e-6
 #: Arcs that coincide are drawn so far apart, and all of them no wider than that [points].
 _BESIDE, _WIDEST = 2.6, 6.0
@@ -91,7 +91,7 @@ def plot_graph(
     file: Any = None,
     figsize: tuple[float, float] | None = None,
 ) -> Any:
-    """A matplotlib figure of the branches: one panel of an overview, or one a node.
+    """A matplotlib figure of the branches: one panel of an overview, or one panel per node.
 
     Branches that coincide in the quantity shown are drawn side by side, which a note says. In overviews the line style
     tells the index, in panels of nodes the status of the node.
@@ -174,7 +174,7 @@ def checked_units(units: Any) -> tuple[str, str] | None:
 
 
 def _rows(graph: DrawnGraph, quantity: Quantity, nodes: Sequence[Any] | None, *, one: bool) -> list[int]:
-    """Columns of the values, one a panel: contact nodes, or the only column of an overview."""
+    """Columns of the values, one per panel: contact nodes, or the only column of an overview."""
     ids = list(graph.problem.node_ids)
     if nodes is not None:
         if not quantity.by_node:

@@ -1,4 +1,4 @@
-"""The exclusion inequalities for the search at one alpha: compiled where that is installed, else the kernel's own."""
+"""The exclusion inequalities for the search at one alpha: compiled if installed, else those of the trusted core."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ _ROW_NAMES = {
     RowKind.SLIP_FORWARD: "the slip condition of node {}",
     RowKind.SLIP_BACKWARD: "the slip condition of node {}",
 }
-#: Bounds above this are hardly lowered by rounding the multipliers: of a wedge's 28,196 ten are halved.
+#: Rounding the multipliers hardly lowers bounds above this: for a wedge, 10 of 28,196 bounds are halved.
 _CLEAR = 1e-6
 #: How often the error bound of an exclusion with a form is subtracted.
 _FORM_ERRORS = 4.0
@@ -185,7 +185,7 @@ class VerifiedCertifier(RecordingCertifier):
         if proposal is not None and proposal.least >= -NEAR:
             self._take_note(proposal.force, self._scaled.g - self._scaled.S @ proposal.force)
         ball = None if proposal is None else self._proven(proposal)
-        # statuses that do not hold strictly are told by rationals, where there are any, and so is a hardly placed root
+        # statuses that do not hold strictly are decided in rationals, where available; so is a root with wide bounds
         told = ball is not None and (ball.is_excluded or self._is_known(ball))
         if proposal is not None and ball is not None and (told or (proposal.strict and not ball.is_wide)):
             return self._closed_by(proposal, ball)

@@ -1,8 +1,8 @@
 """Which selections may hold somewhere in an interval of alpha: the tree search on pieces of it (theory, section 7.8).
 
-Every piece is searched by trees whose leaves cover all selections: a leaf is either proven empty on the whole piece or
-a complete selection that is handed on, or it is left to both halves of the piece. What was proven for the whole piece
-is proven for them too.
+A piece is a subinterval. It is searched by trees whose leaves cover all selections: a leaf is proven empty on the whole
+piece, or it is a complete selection that survives, or it is left to both halves of the piece. What was proven for the
+whole piece is proven for its halves, too.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class SearchedPiece:
     empty : list of EmptyLeaf
         Leaves proven empty on the whole piece.
     selections : list of codes
-        Complete selections, handed on.
+        Complete selections that survive: they may hold somewhere in the piece.
     cut : list of codes
         Subtrees that both halves of the piece take over as their roots; or that a search stopped early left.
     numbers : PieceNumbers or None

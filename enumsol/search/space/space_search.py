@@ -124,8 +124,8 @@ def _towards(code: int, vector: np.ndarray) -> float:
     return float(middle @ vector / np.linalg.norm(middle))
 
 
-class SpaceCertifier(RecordingCertifier):
-    """Proves prunings and leaves by the kernel, and writes the proof.
+class SpaceCertifier:
+    """Proves prunings and leaves with the trusted core, and writes the proof.
 
     Parameters
     ----------

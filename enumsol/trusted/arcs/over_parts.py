@@ -1,4 +1,4 @@
-"""The trusted kernel over alpha: where one selection holds, and where its conditions vanish (theory, section 7.14).
+"""The trusted core over alpha: where one selection holds, and where its conditions vanish (theory, section 7.14).
 
 A selection with unknowns y (lambda_n of the nodes in contact, lambda_t of the sticking ones) asks for M(alpha) y =
 g_R(alpha), both affine in alpha. Here it is written with one unknown more: N(alpha) z = e for z = (y, t), where N has

@@ -1,4 +1,4 @@
-"""The trusted kernel in 3D: what a leaf holds, by Krawczyk's operator on balls (theory, section 12.3).
+"""The trusted core in 3D: what a leaf holds, by Krawczyk's operator on balls (theory, section 12.3).
 
 A leaf gives every node a status: open, in contact without friction, slip+ or slip- along one axis, stick, or a sector
 of slip directions. What is concluded here holds for all data in the balls.
