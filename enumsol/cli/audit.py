@@ -28,7 +28,7 @@ PointsArgument = Annotated[
     str,
     typer.Argument(
         metavar="POINTS",
-        help="CSV with columns alpha, lambda_n_X and lambda_t_X for every contact node X and, for several paths, "
+        help="CSV with the columns alpha, lambda_n_X and lambda_t_X for every contact node X and, for several paths, "
         "path; - is stdin.",
         show_default=False,
     ),
@@ -37,7 +37,7 @@ Tolerance = Annotated[
     float,
     typer.Option(
         metavar="LENGTH",
-        help="Distance from every arc beyond which a point is off the graph, as explained above; without units.",
+        help="Distance from every arc beyond which a point is off the graph, as explained above; dimensionless.",
     ),
 ]
 NamedBy = Annotated[
@@ -50,37 +50,37 @@ def audit(
     points: PointsArgument,
     first: Annotated[str | None, number("--from", "First alpha; default: that of the points.")] = None,
     last: Annotated[str | None, number("--to", "Last alpha; default: that of the points.")] = None,
-    graph_file: Annotated[str | None, file("--graph", "A graph that enumsol graph --save wrote.", None)] = None,
-    arithmetic: Annotated[Arithmetic, typer.Option(help="Of the graph, as in enumsol graph.")] = "verified",
+    graph_file: Annotated[str | None, file("--graph", "A graph written by enumsol graph --save.", None)] = None,
+    arithmetic: Annotated[Arithmetic, typer.Option(help="Arithmetic of the graph, as in enumsol graph.")] = "verified",
     tolerance: Tolerance = 1e-5,
     columns: NamedBy = "auto",
     json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("a point")] = None,
+    csv_file: Annotated[str | None, csv("point")] = None,
     quiet: Quiet = False,
 ) -> None:
     """Check POINTS, from any continuation code, against all solutions of PROBLEM.
 
-    Tells how far every point is from the nearest arc of the branch graph, where a path jumped from one branch to
+    Reports how far every point is from the nearest arc of the branch graph, where a path jumped from one branch to
     another, which arcs in the interval no path visited, and which points could not be compared. Points are named by
     path and row; rows are counted from 0, which is the first one below the names of the columns.
 
-    The X of lambda_n_X is the row number of a contact node or its label, as in --node; a file that fits both is
-    refused, and --columns says which.
+    The X of lambda_n_X is the row number of a contact node or its label, as in --node. A file that fits both is
+    refused unless --columns states which is meant.
 
     Distance: sqrt(e^2 + a^2). e is the energy norm sqrt(d' S d) of the difference d of the contact forces, where S is
     the compliance of the contact nodes, relative to the load, that is to the largest sqrt(g' S^-1 g) in the interval;
     it is at most 1 for the forces of every solution. a is the difference of alpha in twentieths of the interval.
 
     Tolerance: the default suits paths of enumsol follow, which are corrected to a tenth of it. For points of another
-    code give ten times the relative error of its forces: 1e-3 where the solver stops at a relative error of 1e-4, or
-    the file has five digits. Where it stops at a small residual, the error of the forces may be larger. Solutions
-    closer to each other than the tolerance, and jumps between them, are not told apart.
+    code, give ten times the relative error of its forces: 1e-3 if the solver stops at a relative error of 1e-4, or if
+    the file has five digits. If it stops at a small residual, the error of the forces may be larger. Solutions that are
+    closer to each other than the tolerance, and jumps between them, cannot be distinguished.
 
-    Exit status: 0 when every point is on the graph, nothing jumped and no arc was missed; 3 when not, or when the graph
-    is known to be incomplete (in fast arithmetic, which proves nothing: when its degrees do not balance); 4 when points
-    were not compared, whatever else was found: their alpha is outside the interval of the graph, or a graph that is
-    known to be incomplete has no arc there; 2 on bad input; 130 on Ctrl-C; 74 when a result could not be written, 141
-    when nobody read it any more.
+    Exit status: 0 if every point is on the graph, no path jumped and no arc was missed; 3 if not, or if the graph is
+    known to be incomplete (in fast arithmetic, which proves nothing: if its degrees do not balance); 4 if points were
+    not compared, whatever else was found, because their alpha is outside the interval of the graph, or because a graph
+    that is known to be incomplete has no arc there; 2 on bad input; 130 on Ctrl-C; 74 if a result could not be written;
+    141 if the program that read it has ended.
     """
     from enumsol.continuation import audit as check  # numpy and scipy: not for --help
     from enumsol.continuation.audit.graph_map import checked_tolerance

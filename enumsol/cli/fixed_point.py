@@ -29,31 +29,32 @@ def fixed_point(
     problem: ProblemArgument,
     alpha: Annotated[
         str | None,
-        number("--alpha", "Parameter value: a number or a fraction; may be left out where nothing depends on it."),
+        number("--alpha", "Parameter value: a number or a fraction; may be omitted if nothing depends on it."),
     ] = None,
-    start: Annotated[float, typer.Option(metavar="FORCE", help="Slip bound of every node to begin with.")] = 0.0,
+    start: Annotated[float, typer.Option(metavar="FORCE", help="Initial slip bound of every node.")] = 0.0,
     tolerance: Annotated[
-        float, typer.Option(help="Converged when a step is this small, relative to the load.")
+        float, typer.Option(help="Size of a step, relative to the load, at which the iteration has converged.")
     ] = 1e-10,
-    max_iterations: Annotated[int, count("Most Tresca problems solved.")] = 1000,
+    max_iterations: Annotated[int, count("Largest number of Tresca problems that are solved.")] = 1000,
     anderson: Annotated[int, typer.Option(min=0, metavar="N", help="Mix the last N steps (Anderson).")] = 0,
     starts: Annotated[
-        int | None, count("In 2D: try N random starts, and tell which of all solutions they reach.", panel="Starts")
+        int | None, count("In 2D: try N random starts, and report which of all solutions they reach.", panel="Starts")
     ] = None,
     json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("a contact node, or with --starts a start")] = None,
+    csv_file: Annotated[str | None, csv("contact node, or with --starts per start")] = None,
     npz_file: Annotated[str | None, file("--npz", "Write all arrays, for FixedPoint.load.")] = None,
     vtu_file: Annotated[str | None, file("--vtu", "Write the deformed body for ParaView (3D).")] = None,
     plot_file: PlotFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Find one solution of PROBLEM at one ALPHA, as a limit of contact problems with given slip bounds.
+    """Find one solution of PROBLEM at one ALPHA, as the limit of contact problems with given slip bounds.
 
-    The iteration converges for small friction, and where it converges its limit is a solution; there may be others:
-    enumsol roots finds all of them in 2D.
+    The iteration converges for small friction. If it converges, its limit is a solution; there may be others: enumsol
+    roots finds all of them, if the coefficients of friction do not depend on the slip.
 
-    Exit status: 0 when converged (with --starts: from every start); 3 when not; 2 on bad input; 130 on Ctrl-C, after
-    printing the last iterate; 74 when a result could not be written, 141 when nobody read it any more.
+    Exit status: 0 if the iteration converged (with --starts: from every start); 3 if not; 2 on bad input; 130 on
+    Ctrl-C, after printing the last iterate; 74 if a result could not be written; 141 if the program that read it has
+    ended.
     """
     check_outputs(json=json_file, csv=csv_file, npz=npz_file, vtu=vtu_file)
     check_plot(plot_file)

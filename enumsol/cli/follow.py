@@ -44,16 +44,18 @@ if TYPE_CHECKING:
     from enumsol.support.arguments import Alpha
 
 OneRoot = Annotated[
-    int | None, typer.Option(min=0, metavar="K", help="Start from root K of enumsol roots; default: from all.")
+    int | None, typer.Option(min=0, metavar="K", help="Start from root K of enumsol roots; default: from all roots.")
 ]
 Direction = Annotated[
-    str, typer.Option(metavar="+1|-1|both", help="+1: positively oriented; alpha then grows where the index is +1.")
+    str,
+    typer.Option(metavar="+1|-1|both", help="+1: positive orientation, in which alpha grows where the index is +1."),
 ]
 OneTangent = Annotated[
-    int | None, typer.Option(min=0, metavar="K", help="Of several tangents at a degenerate root, the K-th.")
+    int | None, typer.Option(min=0, metavar="K", help="Start along the K-th of several tangents at a degenerate root.")
 ]
 CheckSteps = Annotated[
-    bool, step(None, "Refuse steps that may have left the branch; without, the algorithm as printed.")
+    bool,
+    step(None, "Refuse steps that may have left the branch. Otherwise the algorithm runs as printed in the paper."),
 ]
 #: Ends of a path at which nothing is left to follow.
 _ARRIVED = ("interval left", "closed")
@@ -67,29 +69,31 @@ def follow(
     root: OneRoot = None,
     direction: Direction = "both",
     tangent: OneTangent = None,
-    arithmetic: Annotated[Arithmetic, typer.Option(help="Of the enumeration of the starts.")] = "verified",
+    arithmetic: Annotated[Arithmetic, typer.Option(help="Arithmetic of the enumeration of the starts.")] = "verified",
     h_max: Annotated[float, step("LENGTH", "Longest step.")] = 1.0,
     h_min: Annotated[float, step("LENGTH", "Shortest step.")] = 1e-5,
     h_init: Annotated[float | None, step("LENGTH", "First step; default: 0.05, or h-max.")] = None,
-    eps: Annotated[float, step("NORM", "Convergence of the corrections.")] = 1e-6,
+    eps: Annotated[float, step("NORM", "Convergence tolerance of the corrections.")] = 1e-6,
     max_steps: Annotated[int, count("Stop a path after N steps.", panel=STEPS)] = 5000,
     check_steps: CheckSteps = True,
     json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("a point, for enumsol audit")] = None,
+    csv_file: Annotated[str | None, csv("point, for enumsol audit")] = None,
     plot_file: PlotFile = None,
-    graph_file: Annotated[str | None, file("--graph", "Draw over this graph of enumsol graph --save.", PLOT)] = None,
+    graph_file: Annotated[
+        str | None, file("--graph", "Draw the paths over this graph, written by enumsol graph --save.", PLOT)
+    ] = None,
     quantity: DrawnQuantity = "lambda_n",
     label: Annotated[str | None, node("--node", "LABEL", "Contact node to draw; default: the first.")] = None,
     quiet: Quiet = False,
 ) -> None:
     """Follow branches of solutions of PROBLEM from its roots at one alpha.
 
-    A root on a branch that was followed before is not followed again. Branches that have no root at that alpha are not
-    found: compare with enumsol graph, or enumsol audit.
+    A root on a branch that has already been followed is not followed again. Branches that have no root at that alpha
+    are not found: compare the result with enumsol graph, or use enumsol audit.
 
-    Exit status: 0 when every path left the interval or closed; 3 when one ended otherwise or could not start; 2 on bad
-    input; 130 on Ctrl-C, after printing the paths so far; 74 when a result could not be written, 141 when nobody read
-    it any more.
+    Exit status: 0 if every path left the interval or closed; 3 if a path ended otherwise or could not start; 2 on bad
+    input; 130 on Ctrl-C, after printing the paths so far; 74 if a result could not be written; 141 if the program that
+    read it has ended.
     """
     check_outputs(json=json_file, csv=csv_file)
     check_plot(plot_file)

@@ -13,7 +13,7 @@ from enumsol.cli.output import as_json, check_outputs, deliver, write_text
 if TYPE_CHECKING:
     from enumsol.gallery import GalleryEntry
 
-app = typer.Typer(help="Named problems to try things on.", no_args_is_help=False)
+app = typer.Typer(help="Named problems to experiment with.", no_args_is_help=False)
 
 
 @app.callback(invoke_without_command=True)
@@ -24,7 +24,7 @@ def _gallery(context: typer.Context) -> None:
 
 @app.command("list")
 def list_(json_file: JsonFile = None) -> None:
-    """List the problems, each with an alpha worth a look and the number of its roots there."""
+    """List the problems, each with an alpha of interest and the number of its roots there."""
     from enumsol import gallery  # numpy and scipy: not for --help
 
     check_outputs(json=json_file)
@@ -36,7 +36,7 @@ def list_(json_file: JsonFile = None) -> None:
             return
     rows = [(entry.name, f"{entry.alpha:g}", _count(entry), entry.summary) for entry in gallery.GALLERY.values()]
     if not sys.stdout.isatty():
-        # for other programs: one line a problem, however long
+        # for other programs: one line per problem, however long
         widths = [max(len(row[k]) for row in rows) for k in range(3)]
         # written at once: nothing is left to write when a reader has read enough (| head)
         typer.echo(
@@ -69,19 +69,19 @@ def _count(entry: GalleryEntry) -> str:
 
 @app.command()
 def write(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="As in enumsol gallery list.", show_default=False)],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name as in enumsol gallery list.", show_default=False)],
     file: Annotated[
         str,
         typer.Argument(
             metavar="FILE",
-            help="Where to: .npz, .h5 (fclib), or a directory for MatrixMarket files.",
+            help="File to write: .npz, .h5 (fclib), or a directory for MatrixMarket files.",
             show_default=False,
         ),
     ],
     json_file: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Write the problem NAME to FILE, in a form that read_problem and the other commands take."""
+    """Write the problem NAME to FILE, in a format that read_problem and the other commands accept."""
     from enumsol import gallery  # as above
     from enumsol.io import write_problem
 

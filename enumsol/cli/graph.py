@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 HowExact = Annotated[
     Arithmetic,
     typer.Option(
-        help="verified: rigorous error bounds, proven. fast: the search believes floats, never proven. "
-        "exact: rationals throughout, proven, slow beyond ten contact nodes."
+        help="verified: rigorous error bounds, with proof. fast: the search trusts floats, never proven. "
+        "exact: rationals throughout, with proof, slow beyond ten contact nodes."
     ),
 ]
 
@@ -49,18 +49,18 @@ def graph(
     last: LastAlpha,
     arithmetic: HowExact = "verified",
     max_nodes: MaxNodes = None,
-    time_limit: Annotated[float | None, seconds("Stop after so long.")] = None,
-    jobs: Annotated[int, count("Processes to search with.")] = 1,
+    time_limit: Annotated[float | None, seconds("Stop after this time.")] = None,
+    jobs: Annotated[int, count("Number of processes that search.")] = 1,
     save_file: Annotated[str | None, file("--save", "Write the graph, for enumsol audit and follow.")] = None,
     json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("an arc")] = None,
+    csv_file: Annotated[str | None, csv("arc")] = None,
     proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), for enumsol verify.")] = None,
     graphml_file: Annotated[str | None, file("--graphml", "Write GraphML for other programs.")] = None,
     plot_file: PlotFile = None,
     quantity: Annotated[
         Overview | None,
         typer.Option(
-            help="What is drawn against alpha: an overview (default: norm of the contact forces), or by nodes.",
+            help="Quantity drawn against alpha: an overview (default: norm of the contact forces), or one of nodes.",
             rich_help_panel=PLOT,
         ),
     ] = None,
@@ -72,11 +72,12 @@ def graph(
 ) -> None:
     """Find all solutions of PROBLEM for every alpha of an interval, as branches of arcs.
 
-    Prints branches, folds, bifurcations and continua, and whether the graph is complete.
+    Prints the branches, folds (where two solutions merge and vanish), bifurcations (where branches meet) and continua
+    (connected families of solutions at one alpha), and whether the graph is complete.
 
-    Exit status: 0 when complete (in fast arithmetic, which proves nothing: when the degrees balance at every vertex);
-    3 when the graph is known to be incomplete; 2 on bad input; 130 on Ctrl-C, after printing the graph so far; 74 when
-    a result could not be written, 141 when nobody read it any more.
+    Exit status: 0 if the graph is complete (in fast arithmetic, which proves nothing: if the degrees balance at every
+    vertex); 3 if the graph is known to be incomplete; 2 on bad input; 130 on Ctrl-C, after printing the graph so far;
+    74 if a result could not be written; 141 if the program that read it has ended.
     """
     check_outputs(json=json_file, csv=csv_file)
     for option, path in (("--save", save_file), ("--graphml", graphml_file), ("--proof", proof_file)):

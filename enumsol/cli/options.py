@@ -1,4 +1,4 @@
-"""Arguments and options that commands share, with their texts of help."""
+"""Arguments and options that commands share, with their help texts."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def node(name: str, metavar: str, text: str) -> Any:
 
 
 def csv(text: str) -> Any:
-    """The option --csv; ``text`` says what a row is, and what the file is for."""
-    return file("--csv", f"Write one row {text}; - is stdout.")
+    """The option --csv; ``text`` says what there is one row per, and what the file is for."""
+    return file("--csv", f"Write a table with one row per {text}; - is stdout.")
 
 
 def problem_names(incomplete: str) -> list[str]:
@@ -83,7 +83,7 @@ Quiet = Annotated[
         "--quiet",
         "-q",
         callback=set_quiet,
-        help="Print no result, note or progress; files, JSON, errors and the exit status stay.",
+        help="Print no result, note or progress; files, JSON, errors and the exit status remain.",
         rich_help_panel=OUTPUT,
     ),
 ]

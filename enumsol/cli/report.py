@@ -34,28 +34,29 @@ def report(
     first: FirstAlpha,
     last: LastAlpha,
     output: Annotated[
-        str, typer.Option("--output", "-o", metavar="FILE", help="The page, .html.", rich_help_panel=OUTPUT)
+        str, typer.Option("--output", "-o", metavar="FILE", help="File of the page, .html.", rich_help_panel=OUTPUT)
     ] = "report.html",
     arithmetic: HowExact = "verified",
     max_nodes: MaxNodes = None,
-    time_limit: Annotated[float | None, seconds("Stop after so long.")] = None,
-    jobs: Annotated[int, count("Processes to search with.")] = 1,
+    time_limit: Annotated[float | None, seconds("Stop after this time.")] = None,
+    jobs: Annotated[int, count("Number of processes that search.")] = 1,
     title: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="Heading of the page; default PROBLEM.", rich_help_panel=OUTPUT)
+        str | None, typer.Option(metavar="TEXT", help="Heading of the page; default: PROBLEM.", rich_help_panel=OUTPUT)
     ] = None,
     units: Annotated[
         str | None, typer.Option(metavar="FORCE,LENGTH", help="Units, such as N,mm.", rich_help_panel=OUTPUT)
     ] = None,
-    proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), to hand on with the page.")] = None,
+    proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), to pass on with the page.")] = None,
     json_file: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Find all solutions of PROBLEM for every alpha of an interval, and write one HTML page about them.
 
-    The page needs no network: an interactive diagram of the branches, the deformed body of every solution at any
-    alpha, tables of folds and transitions, what is certified and how to check it. Prints what enumsol graph prints.
+    The page needs no network. It shows an interactive diagram of the branches, the deformed body of every solution at
+    any alpha, tables of folds and transitions, what is certified, and how to check it. Prints what enumsol graph
+    prints.
 
-    Exit status: as enumsol graph; the page is written and says so when the graph is not complete.
+    Exit status: as enumsol graph. If the graph is not complete, the page is written all the same and says so.
     """
     check_outputs(json=json_file)
     for option, path in (("--output", output), ("--proof", proof_file)):

@@ -40,25 +40,27 @@ AtAlpha = Annotated[
 HowExact = Annotated[
     Arithmetic,
     typer.Option(
-        help="verified: rigorous error bounds, proven. fast: floats and a tolerance, never proven. "
-        "exact: rationals throughout, proven, for small problems."
+        help="verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. "
+        "exact: rationals throughout, with proof, for small problems."
     ),
 ]
-HowSearched = Annotated[Method, typer.Option(help="Pruned search; or all 4^p selections, fast or exact, for small p.")]
-
-
-StopAfter = Annotated[int | None, count("Stop at N roots; 2 answers: is it unique?")]
-Unique = Annotated[
-    bool, typer.Option("--unique", help="Only tell whether there is one solution; stops at the second one.")
+HowSearched = Annotated[
+    Method, typer.Option(help="tree: a tree search. exhaustive: all 4^p selections, fast or exact, for small p.")
 ]
-TimeLimit = Annotated[float | None, seconds("Stop after so long.")]
-Jobs = Annotated[int, count("Processes to search with (tree).")]
+
+
+StopAfter = Annotated[int | None, count("Stop at N roots; 2 decides whether the solution is unique.")]
+Unique = Annotated[
+    bool, typer.Option("--unique", help="Only report whether there is one solution; stop at a second one.")
+]
+TimeLimit = Annotated[float | None, seconds("Stop after this time.")]
+Jobs = Annotated[int, count("Number of processes that search (tree).")]
 ProofFile = Annotated[str | None, file("--proof", "Write the proof (verified).")]
 Resume = Annotated[
     bool,
-    typer.Option("--resume", help="Go on with the proof in --proof FILE, if there is any.", rich_help_panel=OUTPUT),
+    typer.Option("--resume", help="Resume from the proof in --proof FILE, if there is one.", rich_help_panel=OUTPUT),
 ]
-CsvFile = Annotated[str | None, csv("a root and contact node")]
+CsvFile = Annotated[str | None, csv("root and contact node")]
 
 
 def roots(
@@ -79,12 +81,13 @@ def roots(
 ) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
 
-    Prints a table of the roots and whether it is complete; lambda_n and lambda_t are nodal forces, not pressures.
+    Prints a table of the roots and whether it is complete; lambda_n and lambda_t are nodal forces, not pressures. The
+    index of a root is the sign of a determinant; the indices of all solutions add up to +1.
 
-    Exit status: 0 when complete (in fast arithmetic, which proves nothing: when the search ran to its end with nothing
-    undecided), with --unique when yes or no is proven; 3 when something stayed undecided, a limit cut the search short,
-    or the indices do not add up to +1; 2 on bad input; 130 on Ctrl-C, after printing what was found so far; 74 when a
-    result could not be written, 141 when nobody read it any more.
+    Exit status: 0 if the result is complete (in fast arithmetic, which proves nothing: if the search ran to its end
+    with nothing undecided), with --unique if yes or no is proven; 3 if something remained undecided, a limit cut the
+    search short, or the indices do not add up to +1; 2 on bad input; 130 on Ctrl-C, after printing what was found so
+    far; 74 if a result could not be written; 141 if the program that read it has ended.
     """
     if jobs > 1 and method != "tree":
         raise InvalidArgumentError(f"--jobs is {jobs} with the exhaustive method; expected 1 job, or the method tree")
@@ -114,7 +117,7 @@ def check_files(proof_file: str | None, json_file: str | None, csv_file: str | N
         raise InvalidArgumentError("--proof is -, but a proof is a binary file; expected the name of a file")
     check_writable(proof_file, "--proof")
     if resume and proof_file is None:
-        raise InvalidArgumentError("--resume is given without --proof; expected the file of the proof to go on with")
+        raise InvalidArgumentError("--resume is given without --proof; expected the file of the proof to resume from")
 
 
 def answer(

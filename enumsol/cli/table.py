@@ -35,33 +35,37 @@ _CAPTION = "{}: how many of the roots have a node in that status"
 #: Longer tables are printed as runs of equal counts.
 _ROWS = 40
 _FIRST, _LAST = "first alpha", "last alpha"
-_RUNS_CAPTION = "a row: all alphas tried from its first to its last, which have equal counts"
+_RUNS_CAPTION = "each row stands for all alphas tried from the first to the last, which have equal counts"
 
 
 def table(
     problem: ProblemArgument,
     first: Annotated[str | None, number("--from", "First alpha.")] = None,
     last: Annotated[str | None, number("--to", "Last alpha.")] = None,
-    samples: Annotated[int, typer.Option(min=2, metavar="N", help="Evenly spaced alphas, both ends included.")] = 21,
+    samples: Annotated[
+        int, typer.Option(min=2, metavar="N", help="Number of evenly spaced alphas, including both ends.")
+    ] = 21,
     alphas: Annotated[
-        str | None, typer.Option(metavar="LIST", help="Instead of these: alphas, such as 1,2.5,8/3.")
+        str | None, typer.Option(metavar="LIST", help="A list of alphas instead, such as 1,2.5,8/3.")
     ] = None,
-    arithmetic: Annotated[Arithmetic, typer.Option(help="Of each enumeration, as in enumsol roots.")] = "verified",
-    max_nodes: Annotated[int | None, count("Most nodes of the tree at one alpha.")] = None,
-    time_limit: Annotated[float | None, seconds("Longest search, per alpha.")] = None,
-    jobs: Annotated[int, count("Processes: alphas searched at a time.")] = 1,
+    arithmetic: Annotated[
+        Arithmetic, typer.Option(help="Arithmetic of each enumeration, as in enumsol roots.")
+    ] = "verified",
+    max_nodes: Annotated[int | None, count("Largest number of nodes of the tree at one alpha.")] = None,
+    time_limit: Annotated[float | None, seconds("Longest time of the search at one alpha.")] = None,
+    jobs: Annotated[int, count("Number of processes, each of which searches one alpha at a time.")] = 1,
     json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("an alpha")] = None,
+    csv_file: Annotated[str | None, csv("alpha")] = None,
     quiet: Quiet = False,
 ) -> None:
     """Count the solutions of PROBLEM at many alphas, by kind of contact.
 
-    What happens between the alphas is not seen; enumsol graph sees it.
+    A table does not show what happens between the alphas; enumsol graph does.
 
-    Exit status: 0 when complete at every alpha (in fast arithmetic, which proves nothing: when every search ran to its
-    end with nothing undecided); 3 when something stayed undecided or the indices do not add up to +1 somewhere; 2 on
-    bad input; 130 on Ctrl-C, after printing what was done so far; 74 when a result could not be written, 141 when
-    nobody read it any more.
+    Exit status: 0 if the result is complete at every alpha (in fast arithmetic, which proves nothing: if every search
+    ran to its end with nothing undecided); 3 if something remained undecided or the indices do not add up to +1
+    somewhere; 2 on bad input; 130 on Ctrl-C, after printing what was done so far; 74 if a result could not be written;
+    141 if the program that read it has ended.
     """
     check_outputs(json=json_file, csv=csv_file)
     values, body = _alphas(first, last, samples, alphas), load_any_problem(problem)

@@ -30,12 +30,12 @@ def verify(
 ) -> None:
     """Check that PROOF shows its list of roots of PROBLEM, or its arcs of a graph, to be complete.
 
-    The checker imports nothing of the search: it computes the condensed problem anew and checks every leaf of the
-    search tree. It rests on the same rigorous bounds; python -m pydoc enumsol.checker lists what the two share.
+    The checker imports nothing from the search: it computes the condensed problem anew and checks every leaf of the
+    search tree. It uses the same rigorous bounds; python -m pydoc enumsol.checker lists what the two share.
 
-    Exit status: 0 when the proof holds and nothing is undecided; 3 when it holds and leaves selections undecided, or of
-    a graph what some of them do, or holds no arcs; 2 when it does not hold or cannot be read; 74 when the report could
-    not be written, 141 when nobody read it any more.
+    Exit status: 0 if the proof holds and nothing is undecided; 3 if it holds but leaves selections undecided or, for a
+    graph, holds no arcs or leaves parts of them undecided; 2 if it does not hold or cannot be read; 74 if the report
+    could not be written; 141 if the program that read it has ended.
     """
     # numpy and scipy: not for --help
     from enumsol.checker.verify import verify as check

@@ -347,7 +347,7 @@ class _Selected(_Enumeration):
 def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None, resume: bool) -> None:
     instance_of(resume, bool, "resume")
     if resume and proof_path is None:
-        raise InvalidArgumentError("resume is True without proof_path; expected the file of the proof to go on with")
+        raise InvalidArgumentError("resume is True without proof_path; expected the file of the proof to resume from")
     if method == "exhaustive" and arithmetic == "verified":
         raise InvalidArgumentError(
             'method is "exhaustive" with arithmetic "verified"; expected "fast" or "exact" arithmetic for the oracle'

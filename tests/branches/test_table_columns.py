@@ -24,7 +24,7 @@ def test_rows_of_several_alphas_say_so(capsys):
     assert lines[0].startswith("first alpha last alpha  roots")
     assert "to alpha" not in out
     assert CAPTION in lines
-    assert "a row: all alphas tried from its first to its last, which have equal counts" in lines
+    assert "each row stands for all alphas tried from the first to the last, which have equal counts" in lines
     assert max(map(len, lines)) <= 90
 
 
