@@ -322,13 +322,13 @@ class BranchGraph(Immutable):
     # -- tables and files ------------------------------------------------------------------------------------------
 
     def to_frame(self) -> pd.DataFrame:
-        """One row an arc: its branch, component, ends and their kinds, index, dimension and statuses (node by node)."""
+        """One row per arc: its branch, component, ends and their kinds, index, dimension and statuses (by node)."""
         from enumsol.branches.graph_text import arcs_frame  # pandas, slow to import
 
         return arcs_frame(self.data, self.components, self.branch_of)
 
     def vertices_frame(self) -> pd.DataFrame:
-        """One row a vertex and contact node: alpha, kind, statuses that hold, and values."""
+        """One row per vertex and contact node: alpha, kind, statuses that hold, and values."""
         from enumsol.branches.graph_text import vertices_frame  # as above
 
         return vertices_frame(self.data)

@@ -90,7 +90,7 @@ def _shape(branch: Branch) -> str:
 
 
 def arcs_frame(data: GraphData, components: Sequence[Component], branch_of: Mapping[int, int]) -> pd.DataFrame:
-    """One row an arc: its branch, component, ends and their kinds, index, dimension and statuses (node by node)."""
+    """One row per arc: its branch, component, ends and their kinds, index, dimension and statuses (by node)."""
     import pandas as pd
 
     place = {arc.number: c.number for c in components for arc in c.arcs}
@@ -116,7 +116,7 @@ def arcs_frame(data: GraphData, components: Sequence[Component], branch_of: Mapp
 
 
 def vertices_frame(data: GraphData) -> pd.DataFrame:
-    """One row a vertex and contact node: alpha, kind, statuses that hold, and values."""
+    """One row per vertex and contact node: alpha, kind, statuses that hold, and values."""
     import pandas as pd
 
     rows = [

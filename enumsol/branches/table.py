@@ -87,7 +87,7 @@ def multiplicity_table(
     Returns
     -------
     pandas.DataFrame
-        One row an alpha, in the order given: alpha, roots, families; with_open, with_stick, with_slip_plus and
+        One row per alpha, in the order given: alpha, roots, families; with_open, with_stick, with_slip_plus and
         with_slip_minus, or in 3D with_slip (isolated roots at which at least one node has the status); index_sum
         (missing where a degree is not known), complete, undecided, stopped (why the search ended early, or missing),
         nodes of the search, and seconds. Where a search was cut short or left something undecided, the counts are

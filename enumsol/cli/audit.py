@@ -110,7 +110,7 @@ def _read_runs(points: str, problem: ContactProblem, columns: Columns) -> Sequen
     source, name = (sys.stdin, "stdin") if points == "-" else (points, points)
     runs = read_points(source, problem, columns=columns, name=name)
     if not runs:
-        raise InvalidArgumentError(f"{name} holds no points; expected one row a point below the names of columns")
+        raise InvalidArgumentError(f"{name} holds no points; expected one row per point below the names of columns")
     return runs
 
 

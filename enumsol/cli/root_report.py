@@ -86,7 +86,7 @@ def roots_as_json(found: RootSet, problem: str) -> str:
 
 
 def _lines(value: Any) -> str:
-    """JSON with one line an entry of a list of objects."""
+    """JSON with one line per entry of a list of objects."""
     if isinstance(value, list) and value and isinstance(value[0], dict):
         return "[\n" + ",\n".join(json.dumps(item, allow_nan=False) for item in value) + "\n]"
     return json.dumps(value, allow_nan=False, default=str)

@@ -64,7 +64,7 @@ class CondensedSystem:
 class ScaledSystem:
     """A CondensedSystem without units, on which all tolerances of float arithmetic act.
 
-    Forces are ``lambda = force * lambda_scaled`` and displacements ``w = length * w_scaled``, one factor a node for
+    Forces are ``lambda = force * lambda_scaled`` and displacements ``w = length * w_scaled``, one factor per node for
     each, so that friction coefficients are unchanged, the compliance has a diagonal near one, and
     ``g' S^{-1} g`` lies in [1, 4) unless g = 0. All factors are powers of two: scaling makes no rounding error.
 

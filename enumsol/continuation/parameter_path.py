@@ -133,7 +133,7 @@ class AffinePath:
 
 
 class CallablePath:
-    """A SmoothPath condensed to the contact nodes; a load given by callables costs 2 p n multiplications an alpha."""
+    """A SmoothPath condensed to the contact nodes; a load given by callables costs 2 p n multiplications per alpha."""
 
     def __init__(self, problem: ContactProblem, smooth: SmoothPath, alpha: float) -> None:
         self.problem = problem

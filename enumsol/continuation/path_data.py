@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 #: |d alpha / ds| below this is a vertical piece of the path: at a regular point it is well above rounding.
 VERTICAL_TOLERANCE = 1e-9
 _PRINTED_TRANSITIONS = 12
-#: The arrays of a path, one row a point.
+#: The arrays of a path, one row per point.
 ARRAYS = ("alpha", "lambda_n", "lambda_t", "u_n", "u_t", "codes", "steps", "corrections", "arclength")
 
 
@@ -212,7 +212,7 @@ class PathData(Sequence[PathPoint], Sealed):
 
     @property
     def selections(self) -> tuple[tuple[ContactStatus, ...], ...]:
-        """The statuses along the path, one entry a piece between transitions."""
+        """The statuses along the path, one entry per piece between transitions."""
         return tuple(name for k, name in enumerate(self._names) if k == 0 or name != self._names[k - 1])
 
     @cached_property
@@ -239,7 +239,7 @@ class PathData(Sequence[PathPoint], Sealed):
     # -- output ------------------------------------------------------------------------------------------------------
 
     def to_frame(self) -> pd.DataFrame:
-        """One row a point: alpha, kind, step, corrections, arclength; of every node X lambda_n_X, .., status_X.
+        """One row per point: alpha, kind, step, corrections, arclength; of every node X lambda_n_X, .., status_X.
 
         X is the node's label, or its row number where two labels are the same text.
         """

@@ -162,7 +162,7 @@ class TrescaState(Sealed):
         return {name: value for name, value in self.__dict__.items() if name != "residuals"}
 
     def to_frame(self) -> pd.DataFrame:
-        """One row a contact node: label, coordinates, status, coefficients, forces and displacements."""
+        """One row per contact node: label, coordinates, status, coefficients, forces and displacements."""
         import pandas as pd  # for frames only
 
         problem, p = self.problem, len(self.lambda_n)

@@ -46,7 +46,7 @@ def checked_problem(value: Any) -> Problem:
 class ContactSystem:
     """w = g - S lambda at one alpha, scaled by powers of two (theory, section 11.2).
 
-    One factor a node makes its compliance of size one, alike in all directions, and one factor for all forces brings
+    One factor per node makes its compliance of size one, alike in all directions, and one factor for all forces brings
     the energy of the load, g' S^-1 g, into [1, 4) unless g = 0. Friction coefficients are unchanged.
 
     Attributes

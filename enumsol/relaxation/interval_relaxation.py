@@ -138,7 +138,7 @@ class PieceForm:
 
     @classmethod
     def of(cls, system: IntervalSystem, multipliers: NDArray[np.float64]) -> PieceForm | None:
-        """The form of four multipliers a node, (4, p), with F_lo in place of F; None where it is hardly convex."""
+        """The form of four multipliers per node, (4, p), with F_lo in place of F; None where it is hardly convex."""
         p = system.p
         mu, nu, alpha, beta = multipliers
         left, right = np.concatenate([mu, nu]), np.concatenate([system.F_lo * (beta - alpha), alpha + beta])

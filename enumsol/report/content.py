@@ -35,7 +35,7 @@ _COMPARED = 300
 def report_content(graph: BranchGraph) -> dict[str, Any]:
     """Everything that the script needs: nodes, quantities, arcs with points along them, vertices, steps, the body.
 
-    Statuses are texts of one digit a node, the codes of `enumsol.model.statuses`. ``f`` and ``w`` are forces and
+    Statuses are texts of one digit per node, the codes of `enumsol.model.statuses`. ``f`` and ``w`` are forces and
     displacements, normal ones first, at the points ``a`` of an arc.
     """
     drawn, tolerance = _sampled(graph)
@@ -67,7 +67,7 @@ def report_content(graph: BranchGraph) -> dict[str, Any]:
 
 
 def codes(statuses: Sequence[ContactStatus]) -> str:
-    """One digit a node."""
+    """One digit per node."""
     return "".join(str(STATUSES.index(status)) for status in statuses)
 
 

@@ -231,7 +231,7 @@ class RootSet(Sequence[Root], Immutable):
         return self._roots[item]
 
     def to_frame(self) -> pd.DataFrame:
-        """One row a root and contact node: alpha, root, node, status, lambda_n, lambda_t, u_n, u_t, index, regular."""
+        """One row per root and node: alpha, root, node, status, lambda_n, lambda_t, u_n, u_t, index, regular."""
         import pandas as pd  # slow to import, used here only
 
         count, p = len(self), len(self.node_ids)

@@ -32,7 +32,7 @@ _SCREEN_RANK = 1e-9
 
 
 def all_codes(F_positive: tuple[bool, ...]) -> Iterator[Codes]:
-    """Every selection: four statuses a node, two (open, in contact) where F = 0."""
+    """Every selection: four statuses per node, two (open, in contact) where F = 0."""
     return product(*(FINAL[positive] for positive in F_positive))
 
 

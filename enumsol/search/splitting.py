@@ -38,7 +38,7 @@ class Splitting(Protocol):
 
 
 class ImposedRows:
-    """The rows of a splitting as engines number them, kind * p + node, asked for once a node and status.
+    """The rows of a splitting as engines number them, kind * p + node, asked for once per node and status.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ class Weights:
 
     Attributes
     ----------
-    mu : one number a node
+    mu : one number per node
     kappa, nu, share, tau : one number for every free node with friction
     slope : Ball
         theta there.

@@ -21,7 +21,7 @@ SEPARATED = 1e-3
 
 
 def overview(measured: Sequence[Measurement]) -> list[dict[str, Any]]:
-    """One row a setting: from which distance on it is right and leaves nothing open, and what it costs."""
+    """One row per setting: from which distance on it is right and leaves nothing open, and what it costs."""
     rows = []
     for setting in SETTINGS:
         items = [item for item in measured if item.setting is setting]

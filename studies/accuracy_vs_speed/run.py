@@ -5,9 +5,9 @@ problems at every distance from a degeneracy down to 1e-16, and exactly on one (
 compared with that of exact arithmetic (``matching.py``), which is itself compared with all 4^p selections and with
 branch graphs.
 
-Read ``accuracy_vs_speed``, one row a setting: ``right from`` is the least distance from which on no answer is wrong,
-``time ratio`` the process time relative to fast arithmetic on the same problem. ``accuracy_enumeration`` has one row a
-setting and distance.
+Read ``accuracy_vs_speed``, one row per setting: ``right from`` is the least distance from which on no answer is wrong,
+``time ratio`` the process time relative to fast arithmetic on the same problem. ``accuracy_enumeration`` has one row
+per setting and distance.
 """
 
 from __future__ import annotations

@@ -125,7 +125,7 @@ def measure_case(case: Case, warm: set[tuple[Scene, Setting]]) -> Iterator[Measu
 
 
 def table(measured: Sequence[Measurement]) -> list[dict[str, object]]:
-    """One row a kind of degeneracy, setting and distance."""
+    """One row per kind of degeneracy, setting and distance."""
     groups: dict[tuple[str, Setting, Fraction], list[Measurement]] = {}
     order = {setting: k for k, setting in enumerate(SETTINGS)}
     for item in sorted(measured, key=lambda item: (item.case.degeneracy, order[item.setting], -item.case.distance)):

@@ -30,7 +30,7 @@ ABSENT = "pyscipopt is not installed: SCIP is left out"
 
 
 def run_problem(name):
-    """One row a formulation."""
+    """One row per formulation."""
     entry = gallery.get(name)
     problem = entry.build()
     system = problem.condensed.at(entry.alpha).scaled  # both sides start from the condensed problem

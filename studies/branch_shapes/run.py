@@ -86,7 +86,7 @@ def symmetric(couplings):
 
 
 def bifurcations(couplings):
-    """One row a bifurcation of a symmetric pair, with what is left after a push on one node."""
+    """One row per bifurcation of a symmetric pair, with what is left after a push on one node."""
     rows = []
     for name, problem in symmetric(couplings):
         graph = branch_graph(problem, SYMMETRIC_INTERVAL, "exact")

@@ -38,7 +38,7 @@ COLOURS = {CHECKED: BLUE, PRINTED: ORANGE}
 
 
 def table(problems, lengths, tolerances):
-    """One row a setting, summed over all paths."""
+    """One row per setting, summed over all paths."""
     rows, known = [], {}
     for study, steps, length in VARIED:
         for value in lengths if study == "h_max" else tolerances:

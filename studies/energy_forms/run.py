@@ -65,7 +65,7 @@ def row(problem, F):
 
 
 def table(blocks, friction):
-    """One row a block, traction and friction coefficient."""
+    """One row per block, traction and friction coefficient."""
     for p, ny, length in blocks:
         for traction in (PRESSED, DRAGGED, STRAIGHT):
             problem = gallery.clamped_block(p, ny, length=length, traction=traction)

@@ -79,7 +79,7 @@ def conclusions(rows: list[dict[str, Any]]) -> Iterator[str]:
     refused = sum(r["reason"].startswith("refused") for r in rows)
     yield f"of the undecided {refused} were refused with a message before any search"
     for verdict in (UNDECIDED, WRONG):
-        # one line a reason: alike cases differ in their figures only
+        # one line per reason: alike cases differ in their figures only
         alike: dict[str, list[str]] = {}
         for r in rows:
             if r["verdict"] == verdict:

@@ -1,4 +1,4 @@
-"""What does a form with four multipliers a node save in long searches, when should it be tried, and what does it cost?
+"""What does a form with four multipliers per node save in long searches, when should it be tried, and at what cost?
 
 Verified searches of clamped blocks and wedges with the energy alone, with a form from the beginning (after 100 nodes),
 and as they are (after 1,000): nodes, seconds, size of the proof, and seconds of its check. Then some of the blocks with
@@ -21,12 +21,12 @@ What else was tried, on prototypes of the same search (nodes with the energy, th
   half of the weight is about as good.
 - one-sided slip work in closed form, as far as the form stays convex, at every fourth decided node: blocks p = 16, 32
   and 64: 208, 735, 4,735 -> 131, 380, 9,628; wedge p = 20: 4,488 -> 4,270. No ascent, but it does not grow with p.
-- the best form of four multipliers a node and all products of rows of a node and its two nearest neighbours, found by
+- the best form of four multipliers per node and all products of rows of a node and its two nearest neighbours, found by
   an interior-point program and handed down: oblique wedge p = 20 4,272 -> 2,392 nodes with one program at the root of
   the tree, 1,551 with 118 at every eighth level, 1,094 with 199 at every fourth; p = 32 23,108 -> 14,230 with one. A
   program took 0.4 s to 1 s at p = 20 and 8 s at p = 32, the whole search with the energy 0.14 s and 1.3 s. To be worth
   it at every eighth level, a program at p = 20 must not take longer than 0.7 ms.
-- such products with the ascent (14 multipliers a node, steps not in logs): wedge p =
+- such products with the ascent (14 multipliers per node, steps not in logs): wedge p =
   14: 894 -> 418 with 75 programs of 18 ms, 60 times as long as the search with the energy; wedge p = 32: 22,606 ->
   17,045 with 1,087.
 - a form at the root of wedges whatever the trial says, found with a bound 32 times as heavy (8 or 12 steps, the better
@@ -34,7 +34,7 @@ What else was tried, on prototypes of the same search (nodes with the energy, th
   pulled straight 1,179, 2,225 and 4,374 -> 1,256, 2,253 and 4,751 in up to 1.3 of it. With the weight in the code p =
   32 takes 21,510.
 - new forms for the subtrees of wedges, four steps each after a quarter or half of the contact nodes is decided, with
-  three weights of the bound: p = 14: 894 -> 877 to 1,031, p = 20: 4,272 -> 4,008 to 4,202. Four multipliers a node do
+  three weights of the bound: p = 14: 894 -> 877 to 1,031, p = 20: 4,272 -> 4,008 to 4,202. Four multipliers per node do
   not tell that the slip of one node rests on the others.
 - with the energy alone p = 256, F = 0.3 and length 4 did not end: from 1,200 nodes on, 70 ms each, bounds of its first
   path were not proven by balls and every node below them was solved from its beginning. Forms are tried before that

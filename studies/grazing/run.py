@@ -1,4 +1,4 @@
-"""What do contact nodes that touch without load cost, if subtrees are closed by their only possible solution?
+"""What do contact nodes that touch without load cost, if subtrees are fathomed by uniqueness?
 
 Where several statuses of k nodes hold at a root, up to 4^k selections do. Searched are chains of nodes in small
 integers of which the first one sticks or slides and k others touch it unloaded (every status holds) or displaced along

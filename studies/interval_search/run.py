@@ -1,4 +1,4 @@
-"""How large is the search over an interval of alpha, and what may a piece spend before its halves take over?
+"""How large is the search over an interval of alpha, and what may a subinterval cost before its halves take over?
 
 The verified search of ``branch_graph`` alone, without arcs, on one core. A partial assignment that is empty at the
 middle of a piece and not proven empty over the whole of it is tried for some more nodes ("at once"), then left to the
@@ -6,8 +6,8 @@ halves; what was left is tried again at the end of the piece ("at the end"). A t
 of it to further trees, which workers can share. The first row of a problem has the values in use.
 
 Read ``nodes`` (relaxations over pieces and at their middles) and ``leaves`` (the size of the proof) against ``handed``,
-the selections handed on, once for every piece: an arc of each is worked out afterwards, and ``selections`` of them
-differ. Without any second look at the end the pieces around an event would be cut without an end.
+the surviving selections, once for every piece (subinterval): an arc of each is worked out afterwards, and
+``selections`` of them differ. Without a second look at the end, the pieces around an event would be cut endlessly.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""From which friction on does a wedge jam, in how many ways, and does the mesh matter?
+"""From which coefficient of friction on does a wedge jam, in how many ways, and does the mesh matter?
 
 A wedge of P1 triangles is pressed into a notch by a negative gap, and pulled out of it at its top, a little sideways;
 weak springs hold it there. It is that of `docs/tutorial.md`. Branch graphs over F = alpha from 0 to 4 on finer and
-finer meshes: ``3 from`` is the friction from which on there are three solutions, ``5 from`` and ``7 from`` likewise.
+finer meshes: ``3 from`` is the coefficient from which on there are three solutions, ``5 from`` and ``7 from`` likewise.
 Pulled free, it is a solution at every alpha; the others are jammed. The picture shows the graph and the bodies at
 alpha = 4 on the mesh of the tutorial.
 """

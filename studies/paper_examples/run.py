@@ -1,4 +1,4 @@
-"""Do the paper's examples come out?
+"""Are the paper's examples reproduced?
 
 Three tables. The first (``one_node.py``) compares the exact branch graphs of the paper's Examples 6.1 to 6.3, and of
 6.3' (a perturbed 6.3), with every printed fact; a fact that fails stops the study. The second (``two_nodes.py``)

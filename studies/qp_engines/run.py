@@ -58,7 +58,7 @@ class Tally:
 
 
 def rows_for(p, effort):
-    """One row a solver."""
+    """One row per solver."""
     tallies = defaultdict(Tally)
     empty = 0
     for loaded in problems(p):

@@ -9,7 +9,7 @@ from shared.figures import BLUE, GREY, panels
 
 
 def merged(now, before):
-    """One row a case; before is a dash where there was nothing measured."""
+    """One row per case; before is a dash where there was nothing measured."""
     for name, case in now["cases"].items():
         old = before["cases"].get(name, {}) if before else {}
         dropped = [library for library in old.get("libraries", ()) if library not in case["libraries"]]

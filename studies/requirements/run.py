@@ -1,4 +1,4 @@
-"""What does a scene make the program do, before and now: modules, time, memory, programs solved, arithmetic?
+"""What does a case make the program do, before and now: modules, time, memory, programs solved, arithmetic?
 
 Every case (``cases.py``) runs in new processes, some rounds of all cases in turn, so that a change of the machine's
 load meets all of them. The figures are medians: process time of ``import enumsol`` and of the whole run from the

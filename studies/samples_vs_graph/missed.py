@@ -39,7 +39,7 @@ def sampled_paths(smoke):
 
 
 def table(problems, samples):
-    """One row a number of samples, and one an arithmetic of the exact graph."""
+    """One row per number of samples, and one per arithmetic of the exact graph."""
     totals = totals_of(problems)
     rows = [{"method": "samples", "samples": count, **sampled(problems, count)} for count in samples]
     rows += [{"method": f"graph, {name}", "samples": "-", **graphs(problems, name)} for name in ARITHMETICS]

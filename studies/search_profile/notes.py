@@ -11,7 +11,7 @@ COLOURS = ("#1f5fa8", "#7fb2e5", "#e8a33d", "#c0392b", "#7b241c", "#4f7f3c", "#a
 
 
 def merged(now, before):
-    """One row a problem: nodes, seconds and the shares of the parts, before and now."""
+    """One row per problem: nodes, seconds and the shares of the parts, before and now."""
     for name, new in now["problems"].items():
         old = before["problems"].get(name) if before else None
         row = {"problem": name, "p": new["p"], "roots": new["roots"]}

@@ -38,7 +38,7 @@ def cut(problem):
 
 @pytest.fixture(scope="module")
 def everything(problem, graph):
-    """All arcs followed, one row a point."""
+    """All arcs followed, one row per point."""
     paths = follow_all(problem, (0.0, 20.0), graph=graph).paths
     return pd.concat([path.to_frame().assign(path=k) for k, path in enumerate(paths)], ignore_index=True)
 

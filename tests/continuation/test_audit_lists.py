@@ -22,7 +22,7 @@ def graph():
 
 @pytest.fixture(scope="module")
 def frame(graph):
-    """All arcs followed, one row a point; paths are named and their rows are mixed."""
+    """All arcs followed, one row per point; paths are named and their rows are mixed."""
     paths = follow_all(graph.problem, (0.0, 20.0), graph=graph).paths
     names = ["up", "down", "left", "right", "more"]
     one = pd.concat([path.to_frame().assign(path=name) for name, path in zip(names, paths, strict=False)])

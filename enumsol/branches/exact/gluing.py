@@ -285,7 +285,7 @@ def _vertices(groups: Sequence[list[SelectionEvent]]) -> list[GluedVertex]:
 
 
 def _edges(known: KnownSelections, vertices: list[GluedVertex]) -> list[GluedArc]:
-    """One arc a cell in which a selection holds; of selections that coincide there, one for all."""
+    """One arc per cell in which a selection holds; of selections that coincide there, one for all."""
     found: dict[tuple[int, int, tuple[Codes, ...]], GluedArc] = {}
     for codes, arcs in known.arcs.items():
         for k, cell in enumerate(arcs.cells):

@@ -239,7 +239,7 @@ class AuditReport:
     # -- output ------------------------------------------------------------------------------------------------------
 
     def to_frame(self) -> pd.DataFrame:
-        """One row a point.
+        """One row per point.
 
         Columns: path, row, alpha, place ("arc", "vertex", "outside" or "none"), number and branch of the place (-1 for
         none), distance, off, compared, reason (why not), jump and unjoined (to the next point).
