@@ -6,8 +6,8 @@ Every method gets the same problem, in the form that it takes:
 - *4^p selections*: ``method="exhaustive"`` of `enumerate_roots`, in floats: solves all selections in blocks; it
   refuses p > 11.
 - *SCIP*: counts the assignments of one binary per status and node that admit a solution (big-M model and energy bounds
-  as in the study against_scip). Where it ends, the points are taken by solving again with each assignment cut off, outside
-  the clock. Needs pyscipopt.
+  as in the study against_scip). Where it ends, the points are taken by solving again with each assignment cut off,
+  outside the clock. Needs pyscipopt.
 - *Siconos*: its enumerative solver for linear complementarity problems (``SICONOS_LCP_ENUM``) tries all 8^p bases of
   the problem with three complementary pairs per node. Its numbering of the bases has 31 bits: p <= 10. Needs Siconos
   (Debian: python3-siconos).
