@@ -69,7 +69,7 @@ class Page(HTMLParser):
 def public_names() -> list[str]:
     """Full names of what a user may call, but for modules."""
     homes = (enumsol, fem, gallery)
-    names = [(home, name) for home in homes for name in home.__all__]
+    names = [(home, name) for home in homes for name in home.__all__ if not name.startswith("__")]
     return [f"{home.__name__}.{name}" for home, name in names if not inspect.ismodule(getattr(home, name))]
 
 

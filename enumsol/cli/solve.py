@@ -48,73 +48,131 @@ class Given(NamedTuple):
     repeated: bool = False
 
 
-Part = Annotated[
-    list[str] | None, _text("--contact", "NAME", "Part of the boundary in contact; may be repeated.", _BODY)
-]
-Young = Annotated[str | None, _text("--young", "E", "Young's modulus [force / length^2].", _BODY)]
-Poisson = Annotated[str | None, _text("--poisson", "NU", "Poisson's ratio.", _BODY)]
-Plane = Annotated[
-    Literal["strain", "stress"] | None,
-    _text("--plane", "strain|stress", "In 2D, plane strain or plane stress; default: strain.", _BODY),
-]
-Friction = Annotated[
-    str | None,
-    _text(
-        "--friction", "F0[,F1]", "Coefficient of friction F0 + alpha F1; default: 0,1, which is alpha itself.", _BODY
+def _entry(part: str, option: str, text: str) -> Any:
+    if part.strip() == "free" and option == "--displacement":
+        return "free"
+    try:
+        return float(part)
+    except ValueError:
+        raise InvalidArgumentError(f"{option} is {text}; expected numbers such as 0.5, with commas between") from None
+
+
+def _as_given(value: Any, option: str) -> Any:
+    del option
+    return value
+
+
+def _number(text: str, option: str) -> Any:
+    return _entry(text, option, text)
+
+
+def _numbers(text: str, option: str) -> list[Any]:
+    return [_entry(part, option, text) for part in text.split(",")]
+
+
+def _one_or_two(text: str, option: str) -> Any:
+    numbers = _numbers(text, option)
+    return numbers[0] if len(numbers) == 1 else numbers
+
+
+def _plane(text: str, option: str) -> str:
+    if text not in ("strain", "stress"):
+        raise InvalidArgumentError(f"{option} is {text}; expected strain or stress")
+    return text
+
+
+def _by_part(texts: list[str], option: str, read: Callable[[str, str], Any] = _numbers) -> dict[str, Any]:
+    """Values by the names of parts, of texts NAME=VALUES."""
+    found: dict[str, Any] = {}
+    for text in texts:
+        name, sign, numbers = text.rpartition("=")
+        if not sign or not name:
+            raise InvalidArgumentError(f"{option} is {text}; expected NAME=NUMBERS")
+        if name in found:
+            raise InvalidArgumentError(f"{option} is given twice for {name}; expected it once")
+        found[name] = read(numbers, option)
+    return found
+
+
+def _number_by_part(texts: list[str], option: str) -> dict[str, Any]:
+    return _by_part(texts, option, _number)
+
+
+def _obstacle(text: str, option: str) -> dict[str, Any]:
+    return _by_part([text], option)
+
+
+_FORCE = "Force per area (in 2D per length and unit thickness)."
+_PULL = "NAME=fx,fy[,fz]"
+#: By their names in `fem.mesh_problem`.
+MESH_OPTIONS = {
+    "contact": Given(_BODY, "NAME", "Part of the boundary in contact; may be repeated.", _as_given, True),
+    "young": Given(_BODY, "E", "Young's modulus [force / length^2].", _number),
+    "poisson": Given(_BODY, "NU", "Poisson's ratio.", _number),
+    "plane": Given(_BODY, "strain|stress", "In 2D, plane strain or plane stress; default: strain.", _plane),
+    "friction": Given(
+        _BODY, "F0[,F1]", "Coefficient of friction F0 + alpha F1; default: 0,1, which is alpha itself.", _one_or_two
     ),
-]
-Friction2 = Annotated[
-    str | None, _text("--friction2", "F0[,F1]", "In 3D, coefficient of friction along the second axis.", _BODY)
-]
-Axis = Annotated[str | None, _text("--axis", "x,y,z", "In 3D, direction of the first axis of friction.", _BODY)]
-Gap = Annotated[str | None, _text("--gap", "LENGTH", "Initial gap; negative is a press fit.", _BODY)]
-Obstacle = Annotated[
-    str | None,
-    _text(
-        "--obstacle",
+    "friction2": Given(_BODY, "F0[,F1]", "In 3D, coefficient of friction along the second axis.", _one_or_two),
+    "axis": Given(_BODY, "x,y,z", "In 3D, direction of the first axis of friction.", _numbers),
+    "gap": Given(_BODY, "LENGTH", "Initial gap; negative is a press fit.", _number),
+    "obstacle": Given(
+        _BODY,
         "KIND=NUMBERS",
         "plane=x,y,nx,ny (normal towards the body), circle=x,y,r, hole=x,y,r; in 3D plane=x,y,z,nx,ny,nz, "
         "sphere=x,y,z,r, hole=x,y,z,r. Default: the contact part itself, moved by the gap.",
         _obstacle,
     ),
-]
-Groups = Annotated[
-    str | None,
-    _text(
-        "--groups", "NAME", "Name of the cell data that groups the facets, for a file without names of parts.", _BODY
+    "groups": Given(
+        _BODY, "NAME", "Name of the cell data that groups the facets, for a file without names of parts.", _as_given
     ),
-]
-Clamp = Annotated[list[str] | None, _text("--clamp", "NAME", "Part that is held; may be repeated.", _SUPPORT)]
-Symmetry = Annotated[
-    list[str] | None, _text("--symmetry", "NAME", "Part on a plane of symmetry, or on rollers.", _SUPPORT)
-]
-Displacement = Annotated[
-    list[str] | None,
-    _text(
-        "--displacement",
+    "clamp": Given(_SUPPORT, "NAME", "Part that is held; may be repeated.", _as_given, True),
+    "symmetry": Given(_SUPPORT, "NAME", "Part on a plane of symmetry, or on rollers.", _as_given, True),
+    "displacement": Given(
+        _SUPPORT,
         "NAME=ux,uy[,uz]",
         "Prescribed displacements; `free` for a component that is not prescribed.",
-        _SUPPORT,
+        _by_part,
+        True,
     ),
-]
-Spring = Annotated[
-    list[str] | None,
-    _text("--spring", "NAME=kn,kt", "Springs per area, along the normal and along the tangents.", _SUPPORT),
-]
-Load = Annotated[
-    list[str] | None, _text("--load", "NAME=fx,fy[,fz]", "Force per area (in 2D per length and unit thickness).", _LOAD)
-]
-LoadSlope = Annotated[list[str] | None, _text("--load-slope", "NAME=fx,fy[,fz]", "The same, times alpha.", _LOAD)]
-Pressure = Annotated[list[str] | None, _text("--pressure", "NAME=P", "Force per area into the body.", _LOAD)]
-PressureSlope = Annotated[list[str] | None, _text("--pressure-slope", "NAME=P", "The same, times alpha.", _LOAD)]
-BodyForce = Annotated[str | None, _text("--body-force", "fx,fy[,fz]", "Force per volume, such as the weight.", _LOAD)]
+    "spring": Given(
+        _SUPPORT, "NAME=kn,kt", "Springs per area, along the normal and along the tangents.", _by_part, True
+    ),
+    "load": Given(_LOAD, _PULL, _FORCE, _by_part, True),
+    "load_slope": Given(_LOAD, _PULL, "The same, times alpha.", _by_part, True),
+    "pressure": Given(_LOAD, "NAME=P", "Force per area into the body.", _number_by_part, True),
+    "pressure_slope": Given(_LOAD, "NAME=P", "The same, times alpha.", _number_by_part, True),
+    "body_force": Given(_LOAD, "fx,fy[,fz]", "Force per volume, such as the weight.", _numbers),
+}
+
+
+def _with_mesh_options(command: Callable[..., None]) -> Callable[..., None]:
+    """The command, whose ``**texts`` are options of their own in its signature, which typer reads."""
+    own = signature(command, eval_str=True)
+    mesh, *others, _ = own.parameters.values()
+    options = [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=_annotation(name, given))
+        for name, given in MESH_OPTIONS.items()
+    ]
+    command.__signature__ = own.replace(parameters=[mesh, *options, *others])  # type: ignore[attr-defined]
+    command.__annotations__ |= {option.name: option.annotation for option in options}
+    return command
+
+
+def _annotation(name: str, given: Given) -> Any:
+    flag = "--" + name.replace("_", "-")
+    how = typer.Option(flag, metavar=given.metavar, help=given.help, rich_help_panel=given.panel, show_default=False)
+    return Annotated[list[str] | None, how] if given.repeated else Annotated[str | None, how]
+
+
 AtAlpha = Annotated[
     str | None,
     typer.Option(
         "--alpha",
-        "NUMBER",
-        "Parameter value: a number, or a fraction such as 8/3; required if friction or load depend on it.",
-        LIMITS,
+        metavar="NUMBER",
+        help="Parameter value: a number, or a fraction such as 8/3; required if friction or load depend on it.",
+        rich_help_panel=LIMITS,
+        show_default=False,
     ),
 ]
 Output = Annotated[

@@ -2,31 +2,8 @@
 
 File layout: the line ``enumsol-proof 1``, a zlib stream, and the SHA-256 digest (32 bytes) of everything before it.
 The stream holds one JSON record per line, in ASCII: a header, the tree in preorder, and a footer. (Proofs of branch
-graphs have other records; see ``checker.graph_checker``.)
-
-Header
-    ``{"format": "enumsol-proof", "version": 1, "problem": <fingerprint>, "alpha": "a/b", "p": p,
-    "data": "problem" | "condensed", "force": [...], "length": [...]}``; ``force`` and ``length`` are binary exponents
-    of the units in which the multipliers are written. ``data`` says what is certified: the problem's own matrices, or
-    the condensed S and g as computed.
-Tree
-    ``["b", node, [codes]]``: contact node ``node`` is branched on; the children follow, in this order.
-    ``["x", rows, multipliers]``: no solution; the dual inequality is positive. Base64 of little-endian 32-bit unsigned
-    row numbers and 64-bit floats. ``["X", ...]``: the same, to be checked in rational arithmetic.
-    ``["n"]``: no solution; the selection is regular and its only candidate breaks a condition strictly, or its
-    equations contradict the bound on all solutions.
-    ``["r", [mid], [rad], index]``: exactly one root, regular; 2p balls of lambda in the problem's units.
-    ``["N"]``: no solution, in rational arithmetic.
-    ``["D", [[point], ...], dimension]``: in rational arithmetic, the selection's roots are the hull of these points,
-    each a list of 2p fractions ``"a/b"`` of lambda in the problem's units, in lowest terms and in hexadecimal digits
-    (they may be long).
-    ``["m", selection, free, weights, [mid], [rad], index]``: one root, the only one with the statuses of the nodes that
-    are not free; ``["m", selection, free, weights, [mid]]``: no solution below. ``["M", selection, weights, count]``:
-    the same in rational arithmetic.
-    ``["z"]``: the unloaded body; nothing but lambda = 0 solves.
-    ``["u", reason]``: undecided.
-Footer
-    ``{"roots": ..., "families": ..., "undecided": ..., "leaves": ...}``.
+graphs have other records.) docs/proof_format.md says what the records are; ``proof.records`` has a class for each kind
+of leaf.
 
 What reading costs
     A file is read as a stream, its header first. Whatever its bytes are, they become at most EXPANSION times as many

@@ -79,14 +79,14 @@ def test_starts_in_2d(capsys, tmp_path):
 
 
 def test_ctrl_c_prints_the_last_iterate(capsys, monkeypatch):
-    whole, count = successive.solve, iter(range(100))
+    whole, count = successive.solve_scaled, iter(range(100))
 
     def solve(*arguments):
         if next(count) == 2:
             raise KeyboardInterrupt
         return whole(*arguments)
 
-    monkeypatch.setattr(successive, "solve", solve)
+    monkeypatch.setattr(successive, "solve_scaled", solve)
     status, out, _ = run(capsys, "gallery:one-node-3d", "--alpha", 0)
     assert status == 130
     assert "interrupted after 2 iterations" in out

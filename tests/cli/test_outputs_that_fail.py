@@ -281,5 +281,5 @@ def test_a_proof_that_has_no_room_leaves_the_roots():
 def test_statuses_are_documented(capsys):
     for verb in ("roots", "table", "graph", "follow", "audit", "verify"):
         text = " ".join(run(capsys, verb, "--help")[1].split())
-        assert "74 when" in text, verb
-        assert "141 when nobody read it any more" in text, verb
+        assert "74 if" in text, verb
+        assert "141 if the program that read it has ended" in text, verb

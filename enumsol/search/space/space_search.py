@@ -124,7 +124,7 @@ def _towards(code: int, vector: np.ndarray) -> float:
     return float(middle @ vector / np.linalg.norm(middle))
 
 
-class SpaceCertifier:
+class SpaceCertifier(RecordingCertifier):
     """Proves prunings and leaves with the trusted core, and writes the proof.
 
     Parameters
