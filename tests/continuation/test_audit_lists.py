@@ -145,7 +145,7 @@ def test_the_help_explains_distance_and_tolerance(capsys):
         "energy norm sqrt(d' S d) of the difference d of the contact forces",
         "relative to the load, that is to the largest sqrt(g' S^-1 g) in the interval",
         "a is the difference of alpha in twentieths of the interval",
-        "For points of another code give ten times the relative error of its forces",
+        "For points of another code, give ten times the relative error of its forces",
         "--tolerance",
         "rows are counted from 0",
     ):
