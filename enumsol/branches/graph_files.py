@@ -136,7 +136,8 @@ def _mesh_record(mesh: BodyMesh | None) -> dict[str, Any] | None:
         return None
     offset = None if mesh.offset is None else mesh.offset.tolist()
     points, cells = mesh.points.tolist(), mesh.cells.tolist()
-    return {"points": points, "cells": cells, "motion": _matrix_record(mesh.motion), "offset": offset}
+    record = {"points": points, "cells": cells, "motion": _matrix_record(mesh.motion), "offset": offset}
+    return record if mesh.lame is None else record | {"lame": mesh.lame.tolist()}
 
 
 def _matrix_record(matrix: Any) -> dict[str, Any]:
@@ -163,7 +164,7 @@ def _problem(record: dict[str, Any]) -> ContactProblem:
         coordinates=record["coordinates"],
         mesh=None
         if (mesh := record.get("mesh")) is None
-        else BodyMesh(mesh["points"], mesh["cells"], matrix(mesh["motion"]), mesh["offset"]),
+        else BodyMesh(mesh["points"], mesh["cells"], matrix(mesh["motion"]), mesh["offset"], lame=mesh.get("lame")),
     )
 
 

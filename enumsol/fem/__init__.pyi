@@ -21,3 +21,4 @@ from .solids import (
     solid_body_forces as solid_body_forces,
     solid_stiffness as solid_stiffness,
 )
+from .stresses import cell_stresses as cell_stresses

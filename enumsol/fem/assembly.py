@@ -290,6 +290,6 @@ def contact_problem(
         slip_offset=slip_offset,
         node_ids=[int(node) for node in touching] if node_ids is None else node_ids,
         coordinates=nodes[touching],
-        mesh=lambda left: BodyMesh.of_dofs(nodes, bodies, left),
+        mesh=lambda left: BodyMesh.of_dofs(nodes, bodies, left, lame=lame),
     )
     return cast("ContactProblem", problem)

@@ -170,12 +170,13 @@ def mesh_problem(
     offset = held.supports.values
     springs = part_springs(body, parted, spring)
     check_held(parted, held.supports, springs)
-    A = sp.csc_array(body.stiffness(*lame(young, poisson, plane)) + springs)
+    coefficients = lame(young, poisson, plane)
+    A = sp.csc_array(body.stiffness(*coefficients) + springs)
     axes = _axes(nodes, axis, dimension)
     slopes = slope.ravel() if np.any(slope) else None
     return problem_of(
         *(A, forces.ravel(), slopes, plain_dofs(parted.points.shape), nodes, axes, held.supports),
-        mesh=lambda left: BodyMesh.of_dofs(parted.points, parted.cells, left, offset, surface),
+        mesh=lambda left: BodyMesh.of_dofs(parted.points, parted.cells, left, offset, surface, lame=coefficients),
         **more,
     )
 

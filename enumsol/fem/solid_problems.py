@@ -138,7 +138,7 @@ def solid_contact_problem(
         ContactRows(rows.means, normal, np.zeros_like(mask)),
         (first, second),
         Supports.held(mask),
-        mesh=lambda left: BodyMesh.of_dofs(nodes, bodies, left, None, surface.facets, of_facets),
+        mesh=lambda left: BodyMesh.of_dofs(nodes, bodies, left, None, surface.facets, of_facets, lame),
         gap=gap,
         friction=friction,
         friction_slope=friction_slope,

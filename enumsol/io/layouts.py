@@ -79,9 +79,9 @@ _SYNONYMS = {
 }
 _COMMON = ("gap", "friction", "load_slope", "slip_offset", "node_ids", "coordinates")
 #: Names of the arrays of a BodyMesh: one of "mesh_motion" and "mesh_dofs" is required, and all of MESH.
-MESH, SURFACE = ("mesh_points", "mesh_cells"), ("mesh_offset", "mesh_facets", "mesh_rows")
+MESH, SURFACE = ("mesh_points", "mesh_cells"), ("mesh_offset", "mesh_facets", "mesh_rows", "mesh_lame")
 _MESH = (*MESH, "mesh_motion", "mesh_dofs", *SURFACE)
-_MESH_TABLES = (*MESH, "mesh_offset", "mesh_facets")
+_MESH_TABLES = (*MESH, "mesh_offset", "mesh_facets", "mesh_lame")
 LAYOUT_2D = Layout(
     contact=("A", "Bn", "Bt"),
     matrices=("A", "Bn", "Bt", "mesh_motion"),

@@ -36,5 +36,5 @@ def arrays_of_mesh(mesh: BodyMesh | None) -> dict[str, Any]:
     if mesh is None:
         return {}
     arrays = {"mesh_points": mesh.points, "mesh_cells": mesh.cells, "mesh_motion": mesh.motion}
-    surface = zip(SURFACE, (mesh.offset, mesh.facets, mesh.rows), strict=True)
+    surface = zip(SURFACE, (mesh.offset, mesh.facets, mesh.rows, mesh.lame), strict=True)
     return arrays | {name: part for name, part in surface if part is not None}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Protocol
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from enumsol.support.files import writing
 
 if TYPE_CHECKING:
     import os
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -56,8 +59,13 @@ class State(Protocol):
         """Slips, shape (p, 2) [length]."""
 
 
-def write_vtu(problem: ContactProblem | ContactProblem3D, state: State, path: str | os.PathLike[str]) -> None:
-    """Write displacements and contact forces to a VTU file for ParaView, by meshio.
+def write_vtu(
+    problem: ContactProblem | ContactProblem3D, state: State | Sequence[State], path: str | os.PathLike[str]
+) -> None:
+    """Write displacements, contact forces and stresses to a VTU file for ParaView, by meshio.
+
+    Of several states, such as a RootSet, ``roots.vtu`` is a file for each root (``roots-0.vtu``, ...) and
+    ``roots.pvd``, which shows them one after the other; families are not written.
 
     With ``problem.mesh`` the file holds the body, its points with their ``displacement``, and the facets of the contact
     surface as cells of their own (cell data ``contact_surface``: 0 body, 1 surface). What belongs to contact rows is
@@ -73,20 +81,23 @@ def write_vtu(problem: ContactProblem | ContactProblem3D, state: State, path: st
     ``u_n``, ``u_t`` and ``status`` (0 open, 1 stick, 2 slip+, 3 slip-) stand at the node that a contact row belongs to
     most.
 
+    Where the mesh knows its Lame coefficients the cells have their mean ``stress`` (nine components in 3D; in 2D those
+    in the plane, the others zero), in 3D also ``von_mises``; facets of the contact surface have NaN.
+
     Parameters
     ----------
     problem : ContactProblem or ContactProblem3D
         With ``mesh`` or ``coordinates``.
-    state : FixedPoint, TrescaSolution or other
+    state : Root, RootSet, FixedPoint, TrescaSolution or other, or a sequence of them
         With u (n,), lambda_n (p,), lambda_t (p, 2), u_n (p,) and u_t (p, 2); in 2D lambda_t and u_t are (p,).
     path : str or path-like
-        Ends in .vtu; an existing file is replaced.
+        Ends in .vtu; existing files are replaced.
 
     Raises
     ------
     InvalidArgumentError
-        The problem has neither mesh nor coordinates, or has patches and no facets; the state lacks an array or has one
-        of another shape; there can be no such file.
+        There is no state; the problem has neither mesh nor coordinates, or has patches and no facets; the state lacks
+        an array or has one of another shape; there can be no such file.
     OutputError
         There is no room for it.
     MissingDependencyError
@@ -112,10 +123,45 @@ def write_vtu(problem: ContactProblem | ContactProblem3D, state: State, path: st
     place = file_path(path, "path")
     if place.suffix != ".vtu":
         raise InvalidArgumentError(f"path is {str(place)!r}; expected a name that ends in .vtu")
+    if not isinstance(state, Sequence):
+        states = {place: state}
+    elif not len(state):
+        raise InvalidArgumentError("state is empty; expected at least one")
+    else:
+        states = {place.with_stem(f"{place.stem}-{k}"): one for k, one in enumerate(state)}
     meshio = _meshio()
-    picture = _plane(meshio, problem, state) if isinstance(problem, ContactProblem) else _space(meshio, problem, state)
+    pictures = {file: _picture(meshio, problem, one) for file, one in states.items()}
+    for file, picture in pictures.items():
+        with writing(file, "path"):
+            picture.write(file, file_format="vtu")
+    if isinstance(state, Sequence):
+        _write_collection(place.with_suffix(".pvd"), [file.name for file in pictures])
+
+
+def _picture(meshio: Any, problem: ContactProblem | ContactProblem3D, state: State) -> Any:
+    return _plane(meshio, problem, state) if isinstance(problem, ContactProblem) else _space(meshio, problem, state)
+
+
+def _write_collection(place: Path, names: list[str]) -> None:
+    """The file by which ParaView shows files one after the other."""
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
+    collection = ElementTree.SubElement(root, "Collection")
+    for k, name in enumerate(names):
+        ElementTree.SubElement(collection, "DataSet", timestep=str(k), file=name)
     with writing(place, "path"):
-        picture.write(place, file_format="vtu")
+        ElementTree.ElementTree(root).write(place, encoding="utf-8", xml_declaration=True)
+
+
+def _stresses(problem: ContactProblem | ContactProblem3D, u: Floats) -> dict[str, Floats]:
+    """Cell data of the body: stresses, where the mesh knows its Lame coefficients."""
+    if problem.mesh is None or problem.mesh.lame is None:
+        return {}
+    from enumsol.fem.stresses import cell_stresses, von_mises  # scikit-fem comes with the first stresses
+
+    stress = cell_stresses(problem, u)
+    if stress.shape[1] == 3:
+        return {"stress": stress.reshape(-1, 9), "von_mises": von_mises(stress)}
+    return {"stress": np.pad(stress, ((0, 0), (0, 1), (0, 1))).reshape(-1, 9)}
 
 
 def _space(meshio: Any, problem: ContactProblem3D, state: State) -> Any:
@@ -126,7 +172,7 @@ def _space(meshio: Any, problem: ContactProblem3D, state: State) -> Any:
         vertices = np.arange(problem.p)[:, None]
         return meshio.Mesh(problem.coordinates, [("vertex", vertices)], point_data=data)
     data |= _vectors(problem, problem.mesh, data)
-    u = problem.mesh.displacements(_array(state, "u", (problem.n,)))
+    u = _array(state, "u", (problem.n,))
     return _body(meshio, problem, problem.mesh, u, data)
 
 
@@ -142,12 +188,15 @@ def _plane(meshio: Any, problem: ContactProblem, state: State) -> Any:
         return meshio.Mesh(_in_space(problem.coordinates), [("vertex", np.arange(p)[:, None])], point_data=data)
     shape = body_shape(problem)
     nodes, count = np.asarray(shape.weights.argmax(axis=1)).ravel(), len(shape.points)
-    moves = shape.displacements(_array(state, "u", (problem.n,)))
+    u = _array(state, "u", (problem.n,))
+    moves = shape.displacements(u)
     forces = shape.contact_forces(problem, data["lambda_n"], data["lambda_t"])
     point_data = {"displacement": _in_space(moves), "contact_force": _in_space(forces)}
     point_data |= {name: _spread(values, nodes, count) for name, values in data.items()}
-    cells = [(KINDS[2, part.shape[1]].file_name, part) for _, part in by_kind(2, shape.cells)]
-    return meshio.Mesh(_in_space(shape.points), cells, point_data=point_data)
+    kinds = by_kind(2, shape.cells)
+    cells = [(KINDS[2, part.shape[1]].file_name, part) for _, part in kinds]
+    cell_data = {name: [values[rows] for rows, _ in kinds] for name, values in _stresses(problem, u).items()}
+    return meshio.Mesh(_in_space(shape.points), cells, point_data=point_data, cell_data=cell_data)
 
 
 def _in_space(vectors: Floats) -> Floats:
@@ -210,13 +259,13 @@ def _body(meshio: Any, problem: ContactProblem3D, mesh: BodyMesh, u: Floats, dat
     cells = [(kind.file_name, mesh.cells)]
     if mesh.facets is not None:
         cells.append((kind.file_facets, mesh.facets))
-    point_data, cell_data = (
-        {"displacement": u},
-        {"contact_surface": [np.full(len(c), k) for k, (_, c) in enumerate(cells)]},
-    )
+    point_data: dict[str, Any] = {"displacement": mesh.displacements(u)}
+    cell_data: dict[str, Any] = {"contact_surface": [np.full(len(c), k) for k, (_, c) in enumerate(cells)]}
+    for name, values in _stresses(problem, u).items():
+        cell_data[name] = [values, *(np.full((len(c), *values.shape[1:]), np.nan) for _, c in cells[1:])]
     if mesh.rows is None:
         nodes = _nodes(problem, mesh)
-        point_data |= {name: _spread(values, nodes, len(u)) for name, values in data.items()}
+        point_data |= {name: _spread(values, nodes, len(mesh.points)) for name, values in data.items()}
     else:
         moving = np.flatnonzero(mesh.rows >= 0)
         for name, values in data.items():

@@ -42,6 +42,9 @@ class BodyMesh(Immutable):
         inside.
     rows : (k,) array_like of int or None
         Where contact rows stand for patches, the row of each facet (-1: held); None where they stand for nodes.
+    lame : (2,) or (M, 2) array_like or None
+        Lame coefficients of all cells or of each, from which stresses follow (`fem.cell_stresses`); kept as (M, 2)
+        [force / length^2].
 
     Raises
     ------
@@ -64,6 +67,7 @@ class BodyMesh(Immutable):
         offset: ArrayLike | None = None,
         facets: ArrayLike | None = None,
         rows: ArrayLike | None = None,
+        lame: ArrayLike | None = None,
     ) -> None:
         self.points = sealed(real_array(points, "mesh_points"))
         if self.points.ndim != 2 or self.points.shape[1] not in (2, 3):
@@ -88,6 +92,7 @@ class BodyMesh(Immutable):
             raise InvalidProblemError(
                 f"mesh_rows has shape {self.rows.shape}; expected (k,), one for each of mesh_facets"
             )
+        self.lame = None if lame is None else _lame(lame, len(self.cells))
         self._freeze()
 
     @classmethod
@@ -99,6 +104,7 @@ class BodyMesh(Immutable):
         offset: ArrayLike | None = None,
         facets: ArrayLike | None = None,
         rows: ArrayLike | None = None,
+        lame: ArrayLike | None = None,
     ) -> BodyMesh:
         """The mesh of a problem whose entries of u are the components ``d node + component`` in ``dofs``, (n,).
 
@@ -115,7 +121,7 @@ class BodyMesh(Immutable):
             )
         count = len(columns)
         motion = sp.csr_array((np.ones(count), (columns, np.arange(count))), shape=(size, count))
-        return cls(points, cells, motion, offset, facets, rows)
+        return cls(points, cells, motion, offset, facets, rows, lame)
 
     @property
     def motion(self) -> sp.csr_array:
@@ -174,6 +180,13 @@ def _numbers(value: ArrayLike, name: str, count: int | None, least: int = 0) -> 
         found = f"{least} or more" if count is None else f"{least} .. {count - 1}"
         raise InvalidProblemError(f"{name} holds other numbers than {found}; expected whole ones in that range")
     return array.astype(np.int64)
+
+
+def _lame(value: ArrayLike, count: int) -> Floats:
+    array = real_array(value, "mesh_lame")
+    if array.shape not in ((2,), (count, 2)):
+        raise InvalidProblemError(f"mesh_lame has shape {array.shape}; expected (2,) or (M, 2) = ({count}, 2)")
+    return sealed(np.tile(array, (count, 1)) if array.ndim == 1 else array)
 
 
 def _elements(value: ArrayLike, name: str, sizes: tuple[int, ...], count: int) -> Integers:

@@ -8,6 +8,7 @@ import meshio
 import numpy as np
 import pytest
 
+import enumsol
 from enumsol import (
     BodyMesh,
     ContactProblem3D,
@@ -194,3 +195,72 @@ def test_meshio_is_an_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "meshio", None)
     with pytest.raises(MissingDependencyError, match=r'VTU files need the package meshio, .* "enumsol\[meshes\]"'):
         write_vtu(PATCHES, some_state(PATCHES), tmp_path / "p.vtu")
+
+
+# -- stresses, and several states --------------------------------------------------------------------------------------
+
+
+def strained(dimension, **options):
+    """A body and the displacements of a homogeneous strain, with the stress that it has everywhere."""
+    gradient = np.array([[1e-3, 4e-4, 0.0], [-2e-4, -5e-4, 3e-4], [1e-4, 0.0, 2e-4]])[:dimension, :dimension]
+    mesh = fem.rectangle(3, 2).parted() if dimension == 2 else fem.box(2, 2, 1, **options)
+    where = {"contact": "bottom", "spring": {"top": (1.0, 1.0)}}
+    problem = fem.mesh_problem(mesh, young=2.5, poisson=0.25, friction=0.5, **where)
+    strain = 0.5 * (gradient + gradient.T)
+    lam, mu = fem.lame(2.5, 0.25)
+    stress = lam * np.trace(strain) * np.eye(dimension) + 2 * mu * strain
+    return problem, (mesh.points @ gradient.T).ravel()[problem.mesh.dofs], stress
+
+
+@pytest.mark.parametrize(("dimension", "options"), [(2, {}), (3, {}), (3, {"cells": "tetrahedra"})])
+def test_a_homogeneous_strain_has_one_stress_everywhere(tmp_path, dimension, options):
+    problem, u, stress = strained(dimension, **options)
+    found = fem.cell_stresses(problem, u)
+    np.testing.assert_allclose(found, np.broadcast_to(stress, found.shape), atol=1e-12)
+    p, tangents = problem.p, (problem.p,) if dimension == 2 else (problem.p, 2)
+    state = SimpleNamespace(u=u, lambda_n=np.zeros(p), lambda_t=np.zeros(tangents), u_n=np.zeros(p))
+    state.u_t = np.zeros(tangents)
+    write_vtu(problem, state, tmp_path / "p.vtu")
+    back = meshio.read(tmp_path / "p.vtu")
+    full = np.zeros((3, 3))
+    full[:dimension, :dimension] = stress
+    np.testing.assert_allclose(back.cell_data["stress"][0], np.broadcast_to(full.ravel(), (len(found), 9)), atol=1e-12)
+    if dimension == 3:
+        deviator = stress - np.trace(stress) / 3 * np.eye(3)
+        np.testing.assert_allclose(back.cell_data["von_mises"][0], np.sqrt(1.5) * np.linalg.norm(deviator))
+        assert np.isnan(back.cell_data["stress"][1]).all()
+
+
+def test_files_keep_the_lame_coefficients(tmp_path):
+    for dimension in (2, 3):
+        problem, u, _ = strained(dimension)
+        enumsol.write_problem(problem, tmp_path / "p.npz")
+        again = enumsol.read_problem(tmp_path / "p.npz")
+        np.testing.assert_array_equal(fem.cell_stresses(again, u), fem.cell_stresses(problem, u))
+
+
+def test_without_lame_coefficients_there_are_no_stresses(tmp_path):
+    problem = gallery.two_node_square()
+    with pytest.raises(InvalidArgumentError, match="no mesh with Lame coefficients"):
+        fem.cell_stresses(problem, np.zeros(problem.n))
+    write_vtu(problem, enumsol.enumerate_roots(problem, 3.5)[0], tmp_path / "p.vtu")
+    assert "stress" not in meshio.read(tmp_path / "p.vtu").cell_data
+    with pytest.raises(enumsol.InvalidProblemError, match=r"mesh_lame has shape \(3,\)"):
+        BodyMesh(problem.mesh.points, problem.mesh.cells, problem.mesh.motion, lame=[1, 2, 3])
+
+
+@pytest.mark.parametrize("name", ["wedge-8-5", "wedge3d-4-9"])
+def test_all_roots_in_one_call(tmp_path, name):
+    entry = gallery.get(name)
+    problem = entry.build()
+    roots = enumsol.enumerate_roots(problem, entry.alpha)
+    write_vtu(problem, roots, tmp_path / "roots.vtu")
+    files = [f"roots-{k}.vtu" for k in range(len(roots))]
+    assert sorted(file.name for file in tmp_path.iterdir()) == sorted([*files, "roots.pvd"])
+    shown = ElementTree.parse(tmp_path / "roots.pvd").getroot().iter("DataSet")
+    assert [(part.get("timestep"), part.get("file")) for part in shown] == [(str(k), f) for k, f in enumerate(files)]
+    for root, file in zip(roots, files, strict=True):
+        moved = meshio.read(tmp_path / file).point_data["displacement"][:, : problem.mesh.points.shape[1]]
+        np.testing.assert_allclose(moved, problem.mesh.displacements(root.u))
+    with pytest.raises(InvalidArgumentError, match="state is empty"):
+        write_vtu(problem, [], tmp_path / "none.vtu")
