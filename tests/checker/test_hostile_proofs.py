@@ -14,9 +14,18 @@ import numpy as np
 import pytest
 from oracles import exact_solutions
 from proof_fuzz import mutant, read
-from proof_tools import Judge, copied, leaves_of, multipliers, proof_of, records_of, sealed, with_multipliers
+from proof_tools import Judge, bytes_of, copied, multipliers, proof_of, records_of, sealed, with_multipliers
 
-from enumsol import ContactProblem, EnumsolError, Proof, ProofFormatError, gallery, verify, write_problem
+from enumsol import (
+    ContactProblem,
+    EnumsolError,
+    Proof,
+    ProofFormatError,
+    enumerate_roots,
+    gallery,
+    verify,
+    write_problem,
+)
 from enumsol.cli import main
 from enumsol.condensation.factorization import Factorization
 from enumsol.errors import InvalidArgumentError
@@ -24,7 +33,6 @@ from enumsol.proof import proof_file as proof_module
 from enumsol.proof.compressed_parts import Part
 
 BEFORE = {item["name"]: item for item in json.loads(Path(__file__).with_name("proofs_written_before.json").read_text())}
-POINTS = [name for name in BEFORE if not name.startswith("graph")]
 GRAPHS = [name for name in BEFORE if name.startswith("graph")]
 
 
@@ -359,14 +367,6 @@ def test_a_fraction_at_the_bounds_is_a_number(text):
         assert repr(report)
 
 
-@pytest.mark.parametrize(
-    "interval", [["1"], ["0", "1", "2"], "01", {"0": "1"}, None, ["1", "1"], ["2", "1"], [["0"], "1"]]
-)
-def test_what_is_no_interval(interval):
-    refused(*changed("graph", 0, interval=interval))
-    refused(*changed("graph", 1, piece=interval))
-
-
 @pytest.mark.few(2)
 @pytest.mark.parametrize("value", [1e300, -1e300, 1.7e308, 5e-324, float("inf"), float("-inf"), float("nan")])
 def test_a_huge_multiplier(value):
@@ -449,74 +449,7 @@ def test_units(key, name):
         refused(*changed(name, k, **{key: [exponent] * len(good)}))
 
 
-@pytest.mark.parametrize(
-    "codes", ["", "0", "00000", "777", "0\u0660\u0660", "-11", 0, None, [0, 0, 0], {"0": 0}, "abc", "\ud800" * 3]
-)
-def test_codes_of_a_graph(codes):
-    problem, proof = before("graph in several pieces")
-    records = records_of(proof)
-    for k, record in enumerate(records[2:9], start=2):
-        tampered = copied(records)
-        tampered[k] = [record[0], codes, *record[2:]]
-        refused(problem, proof_of(tampered))
-    for roots in ([codes], codes, [codes, "666"], ["666", "666"], []):
-        refused(*changed("graph in several pieces", 1, roots=roots))
-
-
-@pytest.mark.few(4)
-@pytest.mark.parametrize("name", POINTS)
-def test_every_record_has_its_entries(name):
-    problem, proof = before(name)
-    records = records_of(proof)
-    for k, _ in leaves_of(records)[:10]:
-        for record in ([*records[k], 0], [*records[k], []], records[k][:-1], [[records[k][0]], *records[k][1:]], [{}]):
-            refused(problem, proof_of([*records[:k], record, *records[k + 1 :]]))
-
-
 # -- the file ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["stopped", "graph"])
-def test_what_is_no_text_of_records(name):
-    problem, proof = before(name)
-    text = zlib.decompress(proof._source[16:-32])
-    record = text.splitlines()[1]
-    for other in (
-        text.replace(b'"version"', '"\u00e9":1,"version"'.encode()),
-        text.replace(b'"version":1', b'"version":1,"version":1'),
-        text.replace(b'"version":1', b'"version":01'),
-        text.replace(record, record.decode().encode("utf-16")),
-        text.replace(record, record + b" " + record),
-        text.replace(record, b"[" * 100_000),
-        text.replace(record, b"[" * 900 + b"]" * 900 + b"0"),
-        b"\xef\xbb\xbf" + text,
-        text[:-1],
-        text.replace(b"\n", b"\r"),
-        text + b"\n",
-        b"",
-        b"\n",
-    ):
-        assert other != text
-        try:
-            refused(problem, sealed(zlib.compress(other, 1)))
-        except ProofFormatError:
-            continue
-        assert other == b""
-
-
-@pytest.mark.parametrize("name", ["stopped", "graph"])
-def test_nothing_follows_the_content(name):
-    problem, proof = before(name)
-    body = proof._source[16:-32]
-    for more in (b"\0", b"more", body, bytes(200_000)):
-        with pytest.raises(ProofFormatError, match="ends in the middle of its file"):
-            verify(problem, sealed(body + more))
-    records = records_of(proof)
-    for tail in ([records[-1]], [[]], ["null"], ['""']):
-        try:
-            refused(problem, proof_of([*records, *tail]))
-        except ProofFormatError as error:
-            assert "cannot be decoded" in str(error)  # noqa: PT017
 
 
 def test_what_is_no_file(tmp_path):
@@ -572,6 +505,18 @@ def test_the_command_line_answers_in_words(tmp_path, capsys):
 
 # -- fuzzing -----------------------------------------------------------------------------------------------------------
 
+#: Proofs of today beside those of the version before: more kinds of records, and roots on the border of conditions.
+TODAY = ("one-node-6.1", "one-node-6.3", "two-node-5", "two-node-6.4")
+
+
+@functools.cache
+def original(name):
+    """Problem and proof."""
+    if name in BEFORE:
+        return before(name)
+    problem, alpha = gallery.get(name).build(), gallery.get(name).alpha
+    return problem, sealed(bytes_of(enumerate_roots(problem, alpha).proof)[16:-32])
+
 
 @functools.cache
 def holding(name, alpha):
@@ -583,26 +528,28 @@ def holding(name, alpha):
 
 def is_true(name, report, records):
     """Whether what a report on changed records claims is true, by rational arithmetic."""
-    problem, proof = before(name)
+    problem, proof = original(name)
     if records == records_of(proof):
         return True
-    if name in POINTS:
+    if name not in GRAPHS:
+        # certified may be S and g as computed, which the exact judge does not know; nothing else may have changed
         return Judge(problem).valid([{**records[0], "data": "problem"}, *records[1:]])
     a, b = report.interval
     return all(holding(name, a + (b - a) * Fraction(k, 4)) <= report.selections for k in range(5))
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(2)
 @pytest.mark.usefixtures("enclosed_once")
-@pytest.mark.parametrize("name", BEFORE)
+@pytest.mark.parametrize("name", [*BEFORE, *TODAY])
 def test_mutants(name, monkeypatch):
     """Every mutant is refused, is named malformed, or claims what is true; nothing else is raised or warned of."""
-    problem, proof = before(name)
-    records, rng = records_of(proof), np.random.default_rng([7, list(BEFORE).index(name)])
+    problem, proof = original(name)
+    records, rng = records_of(proof), np.random.default_rng([7, [*BEFORE, *TODAY].index(name)])
     effort = Effort(monkeypatch)
     outcomes = {"malformed": 0, "refused": 0, "true": 0}
-    for _ in range(250):
-        candidate, how = mutant(rng, records, proof._source)
+    for k in range(250):
+        # in the first hundred the numbers of the records alone
+        candidate, how = mutant(rng, records, proof._source, ("nudge", "numbers") if k < 100 else None)
         effort.characters = 0
         try:
             report = verify(problem, candidate)
@@ -615,4 +562,45 @@ def test_mutants(name, monkeypatch):
             outcomes["true" if report.ok else "refused"] += 1
         # twice: the tree alone, then its leaves
         assert effort.characters <= 2 * (proof_module.EXPANSION * candidate.size + proof_module.SMALL) + 2**17
-    assert min(outcomes["malformed"], outcomes["refused"]) > 50
+    assert min(outcomes["malformed"], outcomes["refused"]) > 25
+    assert outcomes["true"]
+
+
+@pytest.mark.parametrize("name", TODAY)
+def test_some_changes_are_accepted(name):
+    """Or else the test above would say nothing: multipliers in another order, and wider balls."""
+    problem, proof = original(name)
+    records = records_of(proof)
+    for k, record in enumerate(records[1:-1], start=1):
+        changed = copied(records)
+        if record[0] == "r" and any(record[2]):
+            changed[k][2] = [2 * r for r in record[2]]
+        elif record[0] == "x":
+            rows, values = multipliers(record)
+            changed[k] = with_multipliers(record, rows[::-1], values[::-1])
+        else:
+            continue
+        assert verify(problem, proof_of(changed)).complete
+        assert Judge(problem).valid(changed)
+
+
+@pytest.mark.parametrize("name", ["one-node-6.1", "two-node-5"])
+def test_any_flipped_bit_is_refused(name):
+    problem, proof = original(name)
+    data = proof._source
+    bits = np.arange(8 * len(data)) if len(data) < 500 else np.random.default_rng(1).choice(8 * len(data), size=1500)
+    for bit in bits.tolist():
+        flipped = bytearray(data)
+        flipped[bit // 8] ^= 1 << bit % 8
+        with pytest.raises(ProofFormatError):
+            verify(problem, Proof(bytes(flipped)))
+
+
+@pytest.mark.parametrize("exponent", [-901, -900, -600, -540, 0, 540, 600, 900, 901])
+@pytest.mark.parametrize("other", [-900, 0, 900])
+def test_extreme_units(exponent, other):
+    for name in ("one-node-6.1", "one-node-6.3"):
+        problem, proof = original(name)
+        changed = records_of(proof)
+        changed[0]["force"], changed[0]["length"] = [exponent] * 2, [other] * 2
+        assert not verify(problem, proof_of(changed)).ok or Judge(problem).valid(changed)

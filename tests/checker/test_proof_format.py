@@ -1,6 +1,7 @@
 """docs/proof_format.md suffices: a checker written from it alone accepts proofs of small problems, and no forgery."""
 
 import ast
+import dataclasses
 import functools
 import json
 from fractions import Fraction
@@ -28,7 +29,18 @@ from graph_proofs import (
     triangle,
     without_arcs,
 )
-from proof_tools import MAGIC, bytes_of, copied, leaves_of, multipliers, proof_of, records_of, sealed, with_multipliers
+from proof_tools import (
+    MAGIC,
+    Judge,
+    bytes_of,
+    copied,
+    leaves_of,
+    multipliers,
+    proof_of,
+    records_of,
+    sealed,
+    with_multipliers,
+)
 from rational_checker import Refused, check, check_records, fingerprint
 from touching import beside_a_loaded_node
 
@@ -210,10 +222,13 @@ def test_forged_roots(name):
     problem, records, _ = point(name)
     for k in of_kind(records, "r"):
         _, mid, rad, index = records[k]
+        moved = [m + 3 * r * (r == max(rad)) for m, r in zip(mid, rad, strict=True)]
         for other in (
             ["r", [m + 1.0 for m in mid], rad, index],
             ["r", mid, rad, -index],
             ["r", mid, [-1.0, *rad[1:]], index],
+            # where all nodes are open the root is the point zero, to the last bit
+            *([["r", moved, rad, index]] if any(rad) else []),
             ["r", mid[1:], rad[1:], index],
             ["n"],
             ["N"],
@@ -254,13 +269,59 @@ def test_forged_trees_and_counts(name):
         assert refused(problem, changed[:k] + changed[k + 1 :])
     for k in of_kind(records, "b")[:6]:
         _, node, children = records[k]
-        for other in (children[:-1], [*children[:-1], children[0]], [0, 5, 4], [1, 2], []):
+        for other in (
+            children[:-1],
+            [*children[:-1], children[0]],
+            [0, 5, 4],
+            [1, 2],
+            [6],
+            [c + 1 for c in children],
+            [],
+        ):
             assert refused(problem, replaced(records, k, ["b", node, other]))
+        assert refused(problem, replaced(records, k, ["b", -1, children]))
         assert refused(problem, replaced(records, k, ["b", node + problem.p, children]))
-    for key in records[-1]:
-        assert refused(problem, replaced(records, -1, {**records[-1], key: records[-1][key] + 1}))
+    for key, change in product(records[-1], (1, -1)):
+        assert refused(problem, replaced(records, -1, {**records[-1], key: records[-1][key] + change}))
     assert refused(problem, [*records, records[-1]])
-    assert refused(problem, records[:-1])
+    for count in (0, 1, len(records) // 2, len(records) - 1):
+        assert refused(problem, records[:count])
+
+
+def test_every_multiplier_counts_by_exact_judgement():
+    """Halved, doubled, turned, and those of another leaf: accepted only where they still prove the leaf."""
+    for name in ("one-node-6.1", "five roots"):
+        problem, records, _ = point(name)
+        judge, held = Judge(problem), []
+        excluded = of_kind(records, "x")
+        for k in excluded:
+            rows, values = multipliers(records[k])
+            forged = [with_multipliers(records[k], rows[::-1], values[::-1]), *(records[other] for other in excluded)]
+            for j, factor in product(range(len(rows)), (0.5, 2.0, -1.0)):
+                altered = [v * factor if i == j else v for i, v in enumerate(values)]
+                forged.append(with_multipliers(records[k], rows, altered))
+            for record in forged:
+                changed = replaced(records, k, record)
+                held.append(verify(problem, proof_of(changed)).ok)
+                assert held[-1] == judge.valid(changed) or not held[-1]
+        assert {True, False} == set(held)
+
+
+def test_swapped_children_prove_nothing():
+    """The order of the children says which subtree is which."""
+    for name in ("one-node-6.1", "five roots", "all statuses"):
+        problem, records, _ = point(name)
+        for k in of_kind(records, "b"):
+            changed = replaced(records, k, [*records[k][:2], records[k][2][::-1]])
+            assert not verify(problem, proof_of(changed)).ok or Judge(problem).valid(changed)
+
+
+def test_the_proof_of_a_neighbour():
+    """The same problem but for one bit of its load."""
+    problem, _, roots = point("one-node-6.1")
+    near = dataclasses.replace(problem, f=np.nextafter(problem.f, np.inf))
+    for other in (near, point("five roots")[0]):
+        assert "another problem" in verify(other, roots.proof).failures[0]
 
 
 def test_a_loaded_body_is_not_unloaded():

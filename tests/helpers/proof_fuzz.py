@@ -76,9 +76,9 @@ FLOATS = (1e300, -1e300, 1.7e308, float("inf"), float("-inf"), float("nan"), 0.0
 _HOLE = "\u0001hole"
 
 
-def mutant(rng, records, data):
-    """One mutant of a proof, given by its records and its bytes, and the name of the mutation."""
-    how = str(rng.choice(list(_MUTATIONS)))
+def mutant(rng, records, data, ways=None):
+    """One mutant of a proof, given by its records and its bytes, and the name of the mutation, one of all or these."""
+    how = str(rng.choice(list(ways or _MUTATIONS)))
     return _MUTATIONS[how](rng, records, data), how
 
 
@@ -227,6 +227,15 @@ def _field(rng, records, _):
     return _sealed_lines(_lines(changed))
 
 
+def _nudge(rng, records, _):
+    """One number, text or list slightly otherwise."""
+    changed = copied(records)
+    at = int(rng.integers(len(changed)))
+    path = _pick(rng, list(_places(changed[at])))
+    changed[at] = _put(changed[at], path, _nudged(rng, _get(changed[at], path)))
+    return _sealed_lines(_lines(changed))
+
+
 def _nudged(rng, old):
     if isinstance(old, bool) or old is None:
         return not old
@@ -314,6 +323,7 @@ _MUTATIONS = {
     "order": _order,
     "field": _field,
     "field again": _field,
+    "nudge": _nudge,
     "numbers": _numbers,
     "bomb": _bomb,
 }
