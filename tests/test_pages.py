@@ -91,6 +91,8 @@ def test_three_dimensions(three_dimensions):
     assert [str(root.statuses[0]) for root in three_dimensions["roots"]] == ["stick", "slip", "open"]
     assert three_dimensions["roots"].complete
     assert (three_dimensions["folder"] / "block.vtu").stat().st_size > 1000
+    pictures = {path.name for path in three_dimensions["folder"].glob("wedge*")}
+    assert pictures == {"wedge.pvd", *(f"wedge-{k}.vtu" for k in range(9))}
 
 
 def test_results(results):

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, so_far
-from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, Quiet, count, csv, file, number
-from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure
+from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, Quiet, VtuFile, count, csv, file, number
+from enumsol.cli.output import as_json, check_outputs, check_places, check_plot, check_vtu, deliver, write_figure
 from enumsol.cli.progress import Display
-from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import pandas as pd
 
     from enumsol.fixed_points import FixedPoint, FixedPointProgress
@@ -43,7 +40,7 @@ def fixed_point(
     json_file: JsonFile = None,
     csv_file: Annotated[str | None, csv("contact node, or with --starts per start")] = None,
     npz_file: Annotated[str | None, file("--npz", "Write all arrays, for FixedPoint.load.")] = None,
-    vtu_file: Annotated[str | None, file("--vtu", "Write the deformed body for ParaView (3D).")] = None,
+    vtu_file: VtuFile = None,
     plot_file: PlotFile = None,
     quiet: Quiet = False,
 ) -> None:
@@ -56,7 +53,8 @@ def fixed_point(
     Ctrl-C, after printing the last iterate; 74 if a result could not be written; 141 if the program that read it has
     ended.
     """
-    check_outputs(json=json_file, csv=csv_file, npz=npz_file, vtu=vtu_file)
+    check_outputs(json=json_file, csv=csv_file, npz=npz_file)
+    check_vtu(vtu_file)
     check_plot(plot_file)
     _check_combination(starts, npz_file, vtu_file, plot_file)
     body = load_any_problem(problem)
@@ -64,11 +62,17 @@ def fixed_point(
     options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations, "anderson": anderson}
     if starts is not None:
         _basins(_in_2d(body, problem), problem, value, starts, options, json_file, csv_file, plot_file)
-    write_vtu = None if vtu_file is None else _vtu_writer(body, problem, vtu_file)
+    check_places(vtu_file, body, problem)
     found, ended = so_far(lambda: _approximate(body, value, start, options))
+
+    def show(path: str) -> None:
+        from enumsol.io.vtu import write_vtu  # numpy: not for --help
+
+        write_vtu(body, found, path)
+
     deliver(
         (npz_file, found.save),
-        (vtu_file, lambda path: write_vtu and write_vtu(found, path)),
+        (vtu_file, show),
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: repr(found),
@@ -118,22 +122,6 @@ def _approximate(
             display.show(min(1.0, 1.0 / max(state.increment, 1e-300)), f"iteration {state.iteration}")
 
         return successive_approximations(body, alpha, start, progress=show, **options)
-
-
-def _vtu_writer(body: ContactProblem | ContactProblem3D, name: str, file: str) -> Callable[[FixedPoint, str], None]:
-    """What writes a result, if there can be such a file at all."""
-    from enumsol.io.vtu import write_vtu  # as above
-    from enumsol.model.problem3d import ContactProblem3D
-
-    if not isinstance(body, ContactProblem3D):
-        raise InvalidArgumentError(f"--vtu is given, but {name} is a problem in 2D; expected one in 3D")
-    if not file.endswith(".vtu"):
-        raise InvalidArgumentError(f"--vtu is {file!r}; expected a name that ends in .vtu")
-    if find_spec("meshio") is None:
-        raise MissingDependencyError(
-            '--vtu needs meshio, which is not installed; install it with: pip install "enumsol[meshes]"'
-        )
-    return lambda found, path: write_vtu(body, found, path)
 
 
 def _content(found: FixedPoint, name: str) -> dict[str, Any]:

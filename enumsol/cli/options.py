@@ -88,6 +88,10 @@ Quiet = Annotated[
     ),
 ]
 JsonFile = Annotated[str | None, file("--json", "Write the result as JSON; - is stdout.")]
+VtuFile = Annotated[
+    str | None,
+    file("--vtu", "Write deformed bodies with forces and stresses for ParaView; of several roots FILE-0.vtu, ..."),
+]
 PlotFile = Annotated[str | None, file("--plot", "Draw a figure: .png, .pdf, .svg.", PLOT)]
 Overview = Literal["norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"]
 DrawnQuantity = Annotated[Quantity, typer.Option(help="What is drawn against alpha.", rich_help_panel=PLOT)]

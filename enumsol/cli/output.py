@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
+
     #: Where a result goes, None where it is not asked for, and what writes it there.
     Output = tuple[str | None, Callable[[str], object]]
 
@@ -121,6 +124,41 @@ def check_outputs(**paths: str | None) -> None:
         raise InvalidArgumentError(f"{' and '.join(on_stdout)} are both -; expected one of them to be a file")
     for name, path in paths.items():
         check_writable(path, f"--{name}")
+
+
+def check_vtu(path: str | None) -> None:
+    """Refuse files for ParaView that cannot be written before the search rather than after it.
+
+    Raises
+    ------
+    MissingDependencyError
+        meshio is not installed.
+    InvalidArgumentError
+        The file cannot be written, or its name does not end in .vtu.
+    """
+    if path is None:
+        return
+    if path == "-":
+        raise InvalidArgumentError("--vtu is -, but it is a binary file; expected the name of a file")
+    if not path.endswith(".vtu"):
+        raise InvalidArgumentError(f"--vtu is {path!r}; expected a name that ends in .vtu")
+    check_writable(path, "--vtu")
+    if find_spec("meshio") is None:
+        raise MissingDependencyError(
+            '--vtu needs meshio, which is not installed; install it with: pip install "enumsol[meshes]"'
+        )
+
+
+def check_places(path: str | None, problem: ContactProblem | ContactProblem3D, name: str) -> None:
+    """Refuse files for ParaView of a problem that has no places, before the search.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The problem, which is called ``name``, has neither mesh nor coordinates.
+    """
+    if path is not None and problem.mesh is None and problem.coordinates is None:
+        raise InvalidArgumentError(f"--vtu is given, but {name} has neither mesh nor coordinates; expected one of them")
 
 
 def check_plot(path: str | None) -> None:

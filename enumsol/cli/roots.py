@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, NoReturn
 
 import typer
 
@@ -15,13 +15,14 @@ from enumsol.cli.options import (
     MaxNodes,
     ProblemArgument,
     Quiet,
+    VtuFile,
     count,
     csv,
     file,
     number,
     seconds,
 )
-from enumsol.cli.output import check_outputs, check_writable, deliver
+from enumsol.cli.output import check_outputs, check_places, check_vtu, check_writable, deliver
 from enumsol.cli.progress import SearchDisplay
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
@@ -77,6 +78,7 @@ def roots(
     resume: Resume = False,
     json_file: JsonFile = None,
     csv_file: CsvFile = None,
+    vtu_file: VtuFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
@@ -91,7 +93,8 @@ def roots(
     """
     if jobs > 1 and method != "tree":
         raise InvalidArgumentError(f"--jobs is {jobs} with the exhaustive method; expected 1 job, or the method tree")
-    check_files(proof_file, json_file, csv_file, resume=resume)
+    files = Files(proof_file, json_file, csv_file, vtu_file)
+    files.check(resume=resume)
     if unique and stop_after is not None:
         raise InvalidArgumentError(f"--stop-after is {stop_after} with --unique, which stops at the second root")
     limits: dict[str, Any] = {
@@ -101,23 +104,34 @@ def roots(
     }
     options = {"arithmetic": arithmetic, "method": method, "proof_path": proof_file, "resume": resume, **limits}
     value = parse_alpha(alpha)
-    answer(problem, load_any_problem(problem), value, jobs, options, json_file, csv_file, unique=unique)
+    answer(problem, load_any_problem(problem), value, jobs, options, files, unique=unique)
 
 
-def check_files(proof_file: str | None, json_file: str | None, csv_file: str | None, *, resume: bool) -> None:
-    """Refuse results that cannot be written.
+class Files(NamedTuple):
+    """The files that the results of a search go to; None where there is none."""
 
-    Raises
-    ------
-    InvalidArgumentError
-        As `check_outputs`, the proof is to go to stdout, or there is none to resume.
-    """
-    check_outputs(json=json_file, csv=csv_file)
-    if proof_file == "-":
-        raise InvalidArgumentError("--proof is -, but a proof is a binary file; expected the name of a file")
-    check_writable(proof_file, "--proof")
-    if resume and proof_file is None:
-        raise InvalidArgumentError("--resume is given without --proof; expected the file of the proof to resume from")
+    proof: str | None
+    json: str | None
+    csv: str | None
+    vtu: str | None
+
+    def check(self, *, resume: bool) -> None:
+        """Refuse results that cannot be written.
+
+        Raises
+        ------
+        InvalidArgumentError, MissingDependencyError
+            As `check_outputs` and `check_vtu`, the proof is to go to stdout, or there is none to resume.
+        """
+        check_outputs(json=self.json, csv=self.csv)
+        if self.proof == "-":
+            raise InvalidArgumentError("--proof is -, but a proof is a binary file; expected the name of a file")
+        check_writable(self.proof, "--proof")
+        check_vtu(self.vtu)
+        if resume and self.proof is None:
+            raise InvalidArgumentError(
+                "--resume is given without --proof; expected the file of the proof to resume from"
+            )
 
 
 def answer(
@@ -126,8 +140,7 @@ def answer(
     alpha: Alpha,
     jobs: int,
     options: dict[str, Any],
-    json_file: str | None,
-    csv_file: str | None,
+    files: Files,
     *,
     unique: bool = False,
 ) -> NoReturn:
@@ -135,18 +148,31 @@ def answer(
 
     With ``unique`` the question is only whether there is one solution.
     """
+    check_places(files.vtu, problem, name)
     found, ended = so_far(lambda: _search(problem, alpha, jobs, **options))
     deliver(
-        json_file=json_file,
-        csv_file=csv_file,
+        (files.vtu, lambda path: _write_vtu(problem, found, path)),
+        json_file=files.json,
+        csv_file=files.csv,
         text=lambda: root_report.uniqueness(found) if unique else root_report.roots_as_text(found),
         content=lambda: root_report.roots_as_json(found, name),
         frame=found.to_frame,
     )
-    if csv_file is not None and found.families:
+    partly = [name for name, path in (("the CSV", files.csv), ("--vtu", files.vtu)) if path is not None]
+    if partly and found.families:
         families = counted(len(found.families), "family", "families")
-        note(f"the CSV holds the isolated roots only, --json the {families} too")
+        holds = "hold" if len(partly) > 1 else "holds"
+        note(f"{' and '.join(partly)} {holds} the isolated roots only, --json the {families} too")
     finish(ended, ExitStatus.DONE if unique and found.unique is not None else _status(found))
+
+
+def _write_vtu(problem: ContactProblem | ContactProblem3D, found: RootSet, path: str) -> None:
+    if not len(found):
+        note("--vtu: no isolated root was found, so that no file is written for ParaView")
+        return
+    from enumsol.io.vtu import write_vtu  # numpy: not for --help
+
+    write_vtu(problem, found, path)
 
 
 def _search(problem: ContactProblem | ContactProblem3D, alpha: Alpha, jobs: int, **options: Any) -> RootSet:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from enumsol.cli.common import GALLERY, TOML, load_any_problem, note, parse_alpha, refuse_misspelt
-from enumsol.cli.options import LIMITS, OUTPUT, JsonFile, MaxNodes, Quiet
+from enumsol.cli.options import LIMITS, OUTPUT, JsonFile, MaxNodes, Quiet, VtuFile
 from enumsol.cli.roots import (
     CsvFile,
+    Files,
     HowExact,
     Jobs,
     ProofFile,
@@ -18,7 +19,6 @@ from enumsol.cli.roots import (
     StopAfter,
     TimeLimit,
     answer,
-    check_files,
 )
 from enumsol.errors import InvalidArgumentError
 
@@ -206,6 +206,7 @@ def solve(
     resume: Resume = False,
     json_file: JsonFile = None,
     csv_file: CsvFile = None,
+    vtu_file: VtuFile = None,
     output: Output = None,
     quiet: Quiet = False,
     **texts: Any,
@@ -223,7 +224,8 @@ def solve(
         for name, text in texts.items()
         if text is not None
     }
-    check_files(proof_file, json_file, csv_file, resume=resume)
+    files = Files(proof_file, json_file, csv_file, vtu_file)
+    files.check(resume=resume)
     value = None if alpha is None else parse_alpha(alpha)
     problem = _problem(mesh, given)
     if _at_rest(problem):
@@ -236,7 +238,7 @@ def solve(
         raise InvalidArgumentError("--alpha is missing, on which friction or load depend; expected it, or --output")
     limits: dict[str, Any] = {"stop_after": stop_after, "max_nodes": max_nodes, "time_limit": time_limit}
     options = {"arithmetic": arithmetic, "proof_path": proof_file, "resume": resume, **limits}
-    answer(mesh, problem, value or 0.0, jobs, options, json_file, csv_file)
+    answer(mesh, problem, value or 0.0, jobs, options, files)
 
 
 def _problem(mesh: str, options: dict[str, Any]) -> ContactProblem | ContactProblem3D:

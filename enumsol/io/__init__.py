@@ -41,7 +41,7 @@ In 3D both take ``Bt1`` and ``Bt2`` instead of ``Bt``, which tell a problem in 3
     The format of the Frictional Contact Library (`enumsol.io.fclib`); needs h5py.
 
 ``.vtu``
-    Displacements and contact forces of a state of a problem in 3D, for ParaView: `enumsol.write_vtu`, by meshio.
+    Displacements, contact forces and stresses of solutions in 2D and 3D, for ParaView: `enumsol.write_vtu`, by meshio.
 
 NumPy archives and MatrixMarket directories give every number back bit by bit. Pickled objects are never loaded.
 """

@@ -17,6 +17,7 @@ from enumsol.model.statuses import STATUSES
 from enumsol.support.arguments import file_path
 from enumsol.support.array_arguments import real_array
 from enumsol.support.files import writing
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     import os
@@ -64,8 +65,10 @@ def write_vtu(
 ) -> None:
     """Write displacements, contact forces and stresses to a VTU file for ParaView, by meshio.
 
-    Of several states, such as a RootSet, ``roots.vtu`` is a file for each root (``roots-0.vtu``, ...) and
-    ``roots.pvd``, which shows them one after the other; families are not written.
+    Of one state the file at ``path`` is written. Of several, such as a RootSet, one file each is written beside it
+    (for ``roots.vtu``: ``roots-0.vtu``, ``roots-1.vtu``, ...), and ``roots.pvd``, which ParaView opens to show them one
+    after the other; there is no ``roots.vtu`` then, even of one root in a RootSet. The continua in ``roots.families``
+    are not written.
 
     With ``problem.mesh`` the file holds the body, its points with their ``displacement``, and the facets of the contact
     surface as cells of their own (cell data ``contact_surface``: 0 body, 1 surface). What belongs to contact rows is
@@ -96,8 +99,9 @@ def write_vtu(
     Raises
     ------
     InvalidArgumentError
-        There is no state; the problem has neither mesh nor coordinates, or has patches and no facets; the state lacks
-        an array or has one of another shape; there can be no such file.
+        There is no state, for example because all solutions of a RootSet are continua; the problem has neither mesh
+        nor coordinates, or has patches and no facets; a state lacks an array or has one of another shape; there can be
+        no such file.
     OutputError
         There is no room for it.
     MissingDependencyError
@@ -126,7 +130,7 @@ def write_vtu(
     if not isinstance(state, Sequence):
         states = {place: state}
     elif not len(state):
-        raise InvalidArgumentError("state is empty; expected at least one")
+        raise InvalidArgumentError(f"state is {_empty(state)}; expected at least one")
     else:
         states = {place.with_stem(f"{place.stem}-{k}"): one for k, one in enumerate(state)}
     meshio = _meshio()
@@ -136,6 +140,13 @@ def write_vtu(
             picture.write(file, file_format="vtu")
     if isinstance(state, Sequence):
         _write_collection(place.with_suffix(".pvd"), [file.name for file in pictures])
+
+
+def _empty(states: Sequence[State]) -> str:
+    families = getattr(states, "families", ())
+    if not families:
+        return "empty"
+    return f"a RootSet without isolated roots, whose {counted(len(families), 'family', 'families')} no file shows"
 
 
 def _picture(meshio: Any, problem: ContactProblem | ContactProblem3D, state: State) -> Any:

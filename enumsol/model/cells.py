@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
 
+#: Cosine of the angle up to which the boundary of a solid counts as smooth across an edge.
+_SMOOTH = float(np.cos(np.radians(20.0)))
+
 
 @dataclass(frozen=True, eq=False)
 class CellKind:
@@ -184,6 +187,21 @@ def facet_outlines(facets: Integers) -> Integers:
     """Nodes (k, m) along the edges of facets of solids, from corner to corner by what lies between them."""
     outline = KINDS[2, facets.shape[1]].outline
     return facets[:, outline]
+
+
+def outline_edges(points: Floats, faces: Integers) -> Integers:
+    """Edges (k, 2) of outlines of boundary facets at which the surface of a solid bends by more than 20 degrees."""
+    after = np.roll(faces, -1, axis=1)
+    edges = np.sort(np.stack([faces, after], axis=2).reshape(-1, 2), axis=1)
+    # twice the area of each face as a vector along its normal
+    normals = np.sum(np.cross(points[faces], points[after]), axis=1)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    of_face = np.repeat(np.arange(len(faces)), faces.shape[1])
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    edges, of_face = edges[order], of_face[order]
+    pair = np.flatnonzero(np.all(edges[1:] == edges[:-1], axis=1))
+    bends = np.sum(normals[of_face[pair]] * normals[of_face[pair + 1]], axis=1) < _SMOOTH
+    return np.asarray(edges[pair[bends]])
 
 
 def contact_nodes(dimension: int, facets: Integers) -> Integers:

@@ -9,14 +9,21 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.model.statuses import ContactStatus
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
 
 #: Displacements are drawn so that the largest takes this part of the body's size, and forces likewise.
 _MOVED, _LONGEST = 0.08, 0.16
+#: Length of an arrow along a slip, whatever the slip, as a part of the body's size.
+SLIP_ARROW = 0.12
+#: Bodies whose largest displacements differ by more than this factor are each drawn with an enlargement of their own.
+_ALIKE = 8.0
 #: Nodal forces below this part of the largest are rounding.
 _LEAST_FORCE = 1e-9
 
@@ -93,6 +100,28 @@ def round_scale(largest: float, size: float, share: float = _MOVED) -> float:
     wanted = share * size / largest
     power = 10.0 ** np.floor(np.log10(wanted))
     return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-12)))
+
+
+def own_scales(largest: Sequence[float], size: float) -> tuple[float, ...]:
+    """Factors of bodies that are compared: the same for all, or of each its own if they move by very different amounts.
+
+    Bodies that do not move at all have the factor of the others.
+    """
+    moved = [value for value in largest if value > 0]
+    common = round_scale(max(largest), size)
+    if not moved or max(moved) <= _ALIKE * min(moved):
+        return (common,) * len(largest)
+    return tuple(round_scale(value, size) if value > 0 else common for value in largest)
+
+
+def slip_directions(problem: Any, root: Any) -> tuple[NDArray[np.int64], Floats]:
+    """Contact rows in 3D that slip, (k,), and the unit vectors in global axes along which they do, (k, 3)."""
+    axes = np.stack([problem.mesh.directions(rows) for rows in (problem.Bt1, problem.Bt2)], axis=1)
+    moves = np.einsum("pk,pkc->pc", root.u_t, axes)
+    size = np.linalg.norm(moves, axis=1)
+    slips = np.array([status is ContactStatus.SLIP for status in root.statuses])
+    slides = np.flatnonzero(slips & (size > 0))
+    return slides, moves[slides] / size[slides, None]
 
 
 def arrow_scale(largest: float, size: float) -> float:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.cells import KINDS, boundary_facets, facet_outlines
-from enumsol.model.shapes import BodyShape, arrow_scale, body_shape, round_scale
+from enumsol.model.cells import KINDS, boundary_facets, facet_outlines, outline_edges
+from enumsol.model.shapes import SLIP_ARROW, BodyShape, arrow_scale, body_shape, own_scales, slip_directions
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.arguments import positive_number
 from enumsol.support.plotting import axes_or_none, figure_of, new_figure
@@ -28,7 +28,8 @@ MARKS = {
     ContactStatus.SLIP_MINUS: ("v", "#2a8a4a"),
     ContactStatus.SLIP: ("D", "#c23b4b"),
 }
-_FORCE, _BODY, _EDGE = "#b3202c", "#dfe6ee", "#8796a8"
+_FORCE, _SLIP, _BODY, _EDGE, _BEFORE = "#b3202c", "#6a3d9a", "#dfe6ee", "#8796a8", "#dcdcdc"
+_BEFORE_IN_SPACE, _BEFORE_LINE = "#5b6672", {"linewidths": 0.8, "linestyles": "dashed"}
 #: Bodies side by side, and how many are drawn at most.
 _ACROSS, MOST_BODIES = 3, 12
 
@@ -37,35 +38,40 @@ def draw_body(root: Any, problem: Any, ax: Any = None, scale: float | None = Non
     """A figure of one deformed body; see Root.plot_body."""
     axes_or_none(ax)
     shape = body_shape(problem)
-    factors = _factors([root], problem, shape, scale)
+    (factor,), arrows = _factors([root], problem, shape, scale)
     if ax is None:
         figure = new_figure(figsize=(6.4, 5.0))
         ax = _axes(figure, 111, shape)
     elif shape.points.shape[1] == 3 and not hasattr(ax, "set_zlim"):
         raise InvalidArgumentError("ax is plane and the body is not; expected Axes with projection '3d', or None")
-    _draw(ax, root, problem, shape, factors)
-    ax.set_title(f"alpha = {float(root.alpha):g}, {_index(root)}; {_scale_words(factors[0])}", fontsize=9)
+    _draw(ax, root, problem, shape, factor, arrows)
+    ax.set_title(f"alpha = {float(root.alpha):g}, {_index(root)}; {_scale_words(factor)}", fontsize=9)
     _legend(ax, [root])
     return figure_of(ax)
 
 
 def draw_bodies(roots: Sequence[Any], scale: float | None = None) -> Any:
-    """A figure of the deformed bodies of several roots side by side, in one scale; see RootSet.plot_bodies."""
+    """A figure of the deformed bodies of several roots side by side; see RootSet.plot_bodies."""
     if not roots:
         raise InvalidArgumentError("there are no isolated roots to draw; expected at least one")
     problem = roots[0].problem
     shape = body_shape(problem)
     drawn = roots[:MOST_BODIES]
-    factors = _factors(drawn, problem, shape, scale)
+    factors, arrows = _factors(drawn, problem, shape, scale)
     across = min(_ACROSS, len(drawn))
     rows = -(-len(drawn) // across)
     figure = new_figure(figsize=(4.0 * across, 3.6 * rows + 0.8))
-    for k, root in enumerate(drawn):
+    one_scale = len(set(factors)) == 1
+    for k, (root, factor) in enumerate(zip(drawn, factors, strict=True)):
         ax = _axes(figure, (rows, across, k + 1), shape)
-        _draw(ax, root, problem, shape, factors)
-        ax.set_title(f"root {k}: {_index(root)}", fontsize=9)
+        _draw(ax, root, problem, shape, factor, arrows)
+        own = "" if one_scale else f"; {_scale_words(factor)}"
+        ax.set_title(f"root {k}: {_index(root)}{own}", fontsize=9)
+    if shape.points.shape[1] == 3:
+        _same_view(figure.axes)
     shown = f", the first {len(drawn)} of {len(roots)} roots" if len(drawn) < len(roots) else ""
-    figure.suptitle(f"alpha = {float(drawn[0].alpha):g}, {_scale_words(factors[0])}{shown}", fontsize=10)
+    words = _scale_words(factors[0]) if one_scale else "every body with an enlargement of its own"
+    figure.suptitle(f"alpha = {float(drawn[0].alpha):g}, {words}{shown}", fontsize=10)
     _legend(figure, drawn)
     return figure
 
@@ -78,13 +84,16 @@ def _scale_words(scale: float) -> str:
     return f"displacements times {scale:g}"
 
 
-def _factors(roots: Sequence[Any], problem: Any, shape: BodyShape, scale: float | None) -> tuple[float, float]:
-    """By what displacements and forces are multiplied, the same for all roots."""
-    forces = max(_largest(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots)
+def _factors(
+    roots: Sequence[Any], problem: Any, shape: BodyShape, scale: float | None
+) -> tuple[tuple[float, ...], float]:
+    """By what the displacements of each root are multiplied, and the forces of all."""
+    arrows = arrow_scale(
+        max(_largest(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots), shape.size
+    )
     if scale is not None:
-        return positive_number(scale, "scale"), arrow_scale(forces, shape.size)
-    moved = max(_largest(shape.displacements(root.u)) for root in roots)
-    return round_scale(moved, shape.size), arrow_scale(forces, shape.size)
+        return (positive_number(scale, "scale"),) * len(roots), arrows
+    return own_scales([_largest(shape.displacements(root.u)) for root in roots], shape.size), arrows
 
 
 def _largest(vectors: Floats) -> float:
@@ -96,8 +105,7 @@ def _axes(figure: Any, place: Any, shape: BodyShape) -> Any:
     return figure.add_subplot(*place, **options) if isinstance(place, tuple) else figure.add_subplot(place, **options)
 
 
-def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, factors: tuple[float, float]) -> None:
-    scale, arrows = factors
+def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, scale: float, arrows: float) -> None:
     moves = scale * shape.displacements(root.u)
     points = shape.points + moves
     places = shape.at_rows(points)
@@ -115,7 +123,16 @@ def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, factors: tuple[flo
     else:
         _solid(ax, shape, points)
         if len(pressed):
-            ax.quiver(*(points - forces)[pressed].T, *forces[pressed].T, color=_FORCE, arrow_length_ratio=0.25)
+            options = {"arrow_length_ratio": 0.25, "zorder": 4}
+            ax.quiver(*(points - forces)[pressed].T, *forces[pressed].T, color=_FORCE, **options)
+        slides, ways = slip_directions(problem, root)
+        if len(slides):
+            length = SLIP_ARROW * shape.size
+            options = {"linewidth": 1.8, "arrow_length_ratio": 0.4, "zorder": 4}
+            ax.quiver(*places[slides].T, *(length * ways).T, color=_SLIP, **options)
+        ax.auto_scale_xyz(*np.concatenate([shape.points, points, (points - forces)[pressed]]).T)
+        ax.locator_params(nbins=4)
+        ax.tick_params(labelsize=7, pad=0)
         ax.set_aspect("equal")
     for status, (marker, face) in MARKS.items():
         at = places[[found is status for found in root.statuses]]
@@ -123,25 +140,35 @@ def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, factors: tuple[flo
             ax.plot(*at.T, marker, markeredgecolor="black", markerfacecolor=face, markersize=5, zorder=5)
 
 
+def _same_view(axes: Sequence[Any]) -> None:
+    """The same limits for bodies that are compared."""
+    for direction in "xyz":
+        limits = [getattr(ax, f"get_{direction}lim")() for ax in axes]
+        for ax in axes:
+            getattr(ax, f"set_{direction}lim")(min(low for low, _ in limits), max(high for _, high in limits))
+    for ax in axes:
+        ax.set_aspect("equal")
+
+
 def _plane(ax: Any, shape: BodyShape, points: Floats) -> None:
     from matplotlib.collections import PolyCollection
 
     cells = shape.cells[:, KINDS[2, shape.cells.shape[1]].outline]
-    ax.add_collection(
-        PolyCollection(list(shape.points[cells]), facecolors="none", edgecolors="#dcdcdc", linewidths=0.5)
-    )
+    ax.add_collection(PolyCollection(list(shape.points[cells]), facecolors="none", edgecolors=_BEFORE, linewidths=0.5))
     ax.add_collection(PolyCollection(list(points[cells]), facecolors=_BODY, edgecolors=_EDGE, linewidths=0.6))
     for positions in (shape.points, points):
         ax.update_datalim(positions)
 
 
 def _solid(ax: Any, shape: BodyShape, points: Floats) -> None:
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
     faces = facet_outlines(boundary_facets(3, shape.cells))
-    body = Poly3DCollection(list(points[faces]), facecolors=_BODY, edgecolors=_EDGE, linewidths=0.4, alpha=0.35)
-    ax.add_collection3d(body)
-    ax.auto_scale_xyz(*points.T)
+    edges = shape.points[outline_edges(shape.points, faces)]
+    ax.computed_zorder = False  # forces and marks are seen through the body
+    look = {"facecolors": _BODY, "edgecolors": _EDGE, "linewidths": 0.4, "alpha": 0.35}
+    ax.add_collection3d(Poly3DCollection(list(points[faces]), zorder=2, **look))
+    ax.add_collection3d(Line3DCollection(list(edges), colors=_BEFORE_IN_SPACE, **_BEFORE_LINE, zorder=3))
 
 
 def _legend(place: Any, roots: Sequence[Any]) -> None:
@@ -155,5 +182,13 @@ def _legend(place: Any, roots: Sequence[Any]) -> None:
     ]
     if any(np.any(root.lambda_n) for root in roots):
         handles.append(Line2D([], [], color=_FORCE, label="contact force on the body"))
-    where = {"loc": "outside lower center", "ncols": 5} if hasattr(place, "add_subplot") else {"loc": "best"}
+    if ContactStatus.SLIP in found:
+        handles.append(Line2D([], [], color=_SLIP, linewidth=1.8, label="direction of slip"))
+    if roots[0].lambda_t.ndim == 2:
+        handles.append(Line2D([], [], color=_BEFORE_IN_SPACE, linewidth=0.8, linestyle="dashed", label="undeformed"))
+    where: dict[str, Any] = {"loc": "best"}
+    if hasattr(place, "add_subplot"):
+        where = {"loc": "outside lower center", "ncols": 6}
+    elif hasattr(place, "set_zlim"):
+        where = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "ncols": 3}
     place.legend(handles=handles, fontsize=8, frameon=False, **where)

@@ -214,7 +214,7 @@ class Root(ContactState):
         return draw_root(self, self.problem, ax)
 
     def plot_body(self, ax: Any = None, *, scale: float | None = None) -> Any:
-        """The deformed body with contact forces as arrows and contact nodes by status.
+        """The deformed body with contact forces as arrows and contact nodes by status; in 3D also directions of slip.
 
         Parameters
         ----------

@@ -252,12 +252,15 @@ class RootSet(Sequence[Root], Immutable):
         )
 
     def plot_bodies(self, *, scale: float | None = None) -> Any:
-        """A matplotlib figure of the deformed bodies of the isolated roots, up to 12 of them, in one scale.
+        """A matplotlib figure of the deformed bodies of the isolated roots, up to 12 of them, side by side.
+
+        Forces are drawn in one scale, and displacements too unless their sizes differ by more than a factor of 8, as
+        those of a jammed and of a free body do; each body then has an enlargement of its own, which its title tells.
 
         Parameters
         ----------
         scale : float, optional
-            As in `Root.plot_body`.
+            The displacements of all roots are multiplied by it.
 
         Raises
         ------

@@ -103,7 +103,7 @@ def test_ctrl_c_prints_the_last_iterate(capsys, monkeypatch):
         (["gallery:one-node-6.1", "--alpha", "1", "--plot", "p.png"], "--plot is given without --starts"),
         (["gallery:one-node-6.1", "--alpha", "1", "--npz", "-"], "--npz is -, but it is a binary file"),
         (["gallery:one-node-6.1", "--alpha", "1", "--vtu", "x.vtu", "--starts", "5"], "--vtu and --starts are both"),
-        (["gallery:one-node-6.1", "--alpha", "1", "--vtu", "x.vtu"], "--vtu is given, but gallery:one-node-6.1 is a"),
+        (["gallery:one-node-6.1", "--alpha", "1", "--vtu", "-"], "--vtu is -, but it is a binary file"),
         (["gallery:one-node-6.1", "--alpha", "1", "--npz", "/nowhere/x.npz"], "--npz is /nowhere/x.npz"),
     ],
 )

@@ -7,8 +7,8 @@ from parted_solids import solid
 
 import enumsol
 from enumsol import BodyMesh, InvalidArgumentError, fem
-from enumsol.model.cells import boundary_facets, facet_outlines
-from enumsol.model.shapes import body_shape, round_scale
+from enumsol.model.cells import boundary_facets, facet_outlines, outline_edges
+from enumsol.model.shapes import body_shape, own_scales, round_scale, slip_directions
 
 
 @pytest.fixture(scope="module")
@@ -62,10 +62,20 @@ def test_what_is_drawn(wedge):
     assert entries == {*(status.value for status in root.statuses), "contact force on the body"}
 
 
-def test_all_roots_side_by_side_in_one_scale(wedge):
-    _, roots = wedge
-    figure = roots.plot_bodies()
+def test_all_roots_side_by_side(wedge):
+    problem, roots = wedge
+    figure = roots.plot_bodies(scale=3)
     assert [ax.get_title() for ax in figure.axes] == [f"root {k}: index {r.index:+d}" for k, r in enumerate(roots)]
+    assert "displacements times 3" in figure.get_suptitle()
+    # the free wedge moves a hundred times as far as the jammed one: each has a scale of its own, and says so
+    figure = roots.plot_bodies()
+    assert "every body with an enlargement of its own" in figure.get_suptitle()
+    sizes = [np.max(np.linalg.norm(problem.mesh.displacements(root.u), axis=1)) for root in roots]
+    assert max(sizes) > 8 * min(sizes)
+    for k, (ax, root, size) in enumerate(zip(figure.axes, roots, sizes, strict=True)):
+        head, scale = ax.get_title().split("; displacements times ")
+        assert head == f"root {k}: index {root.index:+d}"
+        assert 0.03 * body_shape(problem).size < float(scale) * size < 0.0801 * body_shape(problem).size
     many = enumsol.enumerate_roots(enumsol.gallery.chain(3), 5.0).plot_bodies()
     assert len(many.axes) == 12
     assert "the first 12 of 27 roots" in many.get_suptitle()
@@ -133,7 +143,49 @@ def test_bodies_with_cells_of_two_kinds(kind, tmp_path):
     assert enumsol.read_problem(tmp_path / "p.npz").fingerprint == problem.fingerprint
 
 
+def test_bodies_in_space_are_compared_in_one_view():
+    problem = enumsol.gallery.get("wedge3d-4-9").build()
+    roots = enumsol.enumerate_roots(problem, 3.0)
+    figure = roots.plot_bodies()
+    assert len({(ax.get_xlim(), ax.get_ylim(), ax.get_zlim()) for ax in figure.axes}) == 1
+    low, high = np.array([figure.axes[0].get_xlim(), figure.axes[0].get_ylim(), figure.axes[0].get_zlim()]).T
+    for ax, root in zip(figure.axes, roots, strict=True):
+        scale = float(ax.get_title().rpartition(" ")[2])
+        moved = problem.mesh.points + scale * problem.mesh.displacements(root.u)
+        assert np.all((low <= moved) & (moved <= high))
+    entries = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert entries == {"open", "stick", "slip", "contact force on the body", "direction of slip", "undeformed"}
+
+
+def test_slips_in_global_axes():
+    problem = enumsol.gallery.get("wedge3d-4-9").build()
+    for root in enumsol.enumerate_roots(problem, 3.0):
+        rows, ways = slip_directions(problem, root)
+        assert rows.tolist() == [i for i, status in enumerate(root.statuses) if str(status) == "slip"]
+        # the first axes point out of the notch along its walls, the second ones along y and -y
+        s, c = np.sin(np.radians(20)), np.cos(np.radians(20))
+        for i, way in zip(rows, ways, strict=True):
+            side = -1 if problem.coordinates[i, 0] < 0 else 1
+            expected = root.u_t[i, 0] * np.array([side * s, 0, c]) + root.u_t[i, 1] * np.array([0, -side, 0])
+            np.testing.assert_allclose(way, expected / np.linalg.norm(expected), atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", [4, 8, 10, 27])
+def test_the_outline_of_a_box_is_its_edges(kind):
+    mesh = solid((3, 2, 2), kind)
+    edges = outline_edges(mesh.points, facet_outlines(boundary_facets(3, mesh.cells)))
+    along = mesh.points[edges]
+    # both ends lie in the same two of the six sides, and the lengths add up to those of the twelve edges
+    size = mesh.points.max(axis=0)
+    sides = np.sum(np.all((along == 0) | (along == size), axis=1), axis=1)
+    assert np.all(sides == 2)
+    assert np.sum(np.linalg.norm(along[:, 1] - along[:, 0], axis=1)) == pytest.approx(4 * np.sum(size))
+
+
 def test_scales_are_round():
+    assert own_scales([0.08, 0.02, 0.0], 1.0) == (1.0, 1.0, 1.0)
+    assert own_scales([0.08, 0.002, 0.0], 1.0) == (1.0, 20.0, 1.0)
+    assert own_scales([0.0, 0.0], 1.0) == (1.0, 1.0)
     assert [round_scale(x, 1.0, 0.08) for x in (0.08, 0.081, 0.03, 0.0016, 0.0)] == [1.0, 0.5, 2.0, 50.0, 1.0]
 
 
