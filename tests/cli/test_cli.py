@@ -211,20 +211,6 @@ def test_jobs_in_3d(capsys, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--arithmetic", "exact"), 'arithmetic is "exact", which problems in 3D do not have'),
-        (
-            ("--arithmetic", "fast", "--method", "exhaustive"),
-            'method is "exhaustive", which problems in 3D do not have',
-        ),
-    ],
-)
-def test_what_3d_does_not_have_is_refused(capsys, arguments, message):
-    assert_refused(*run(capsys, "roots", "gallery:one-node-3d", "--alpha", 0, *arguments), message)
-
-
-@pytest.mark.parametrize(
     "arguments",
     [
         ("graph", "gallery:block3d-4", "--from", 0, "--to", 1),
@@ -276,8 +262,12 @@ def test_statuses_of_the_process(tmp_path):
     cut = call("roots", "gallery:chain-2", "--alpha", "5", "--stop-after", "1", "--json", tmp_path / "r.json")
     assert (cut.returncode, cut.stderr) == (3, "")
     assert json.loads((tmp_path / "r.json").read_text())["complete"] is False
-    bad = call("roots", "gallery:nothing", "--alpha", "5")
-    assert_refused(bad.returncode, bad.stdout, bad.stderr, "the gallery has no problem named 'nothing'")
+    for arguments, part in (
+        (("--alpha", "5"), "the gallery has no problem named 'nothing'"),
+        (("--alfa", "5"), "no such"),
+    ):
+        bad = call("roots", "gallery:nothing", *arguments)
+        assert_refused(bad.returncode, bad.stdout, bad.stderr, part)
 
 
 def test_a_reader_that_stops_early_does_no_harm():
@@ -296,40 +286,13 @@ def bar(n):
     return sp.diags_array([-np.ones(n - 1), main_diagonal, -np.ones(n - 1)], offsets=(-1, 0, 1)).toarray()
 
 
-def with_entry(name, index, value):
-    changed = DENSE[name].copy()
-    changed[index] = value
-    return {name: changed}
-
-
+#: One of each kind of mistake: their sentences are tested where they come from.
 BAD_FILES = {
-    "A of wrong shape": (DENSE | {"A": A[:3]}, "A has shape (3, 4); expected a square matrix"),
-    "Bn of wrong shape": (DENSE | {"Bn": np.eye(3)[:2]}, "Bn has shape (2, 3); expected (p, n) = (2, 4)"),
-    "Bt of wrong shape": (DENSE | {"Bt": np.eye(4)[:1]}, "Bt has shape (1, 4); expected (p, n) = (2, 4)"),
-    "f of wrong shape": (DENSE | {"f": np.ones(3)}, "f has shape (3,); expected (4,)"),
-    "gap of wrong shape": (DENSE | {"gap": np.ones(3)}, "gap has shape (3,); expected (2,) or a single number"),
-    "A unsymmetric": (DENSE | with_entry("A", (0, 1), 0.4), "A is not symmetric"),
-    "A indefinite": (DENSE | {"A": A - 1.7 * np.eye(4)}, "A is not positive definite"),
+    "shape": (DENSE | {"A": A[:3]}, "A has shape (3, 4); expected a square matrix"),
     "rigid body": (DENSE | {"A": bar(4)}, "the body is free to move as a rigid body"),
-    "NaN in A": (DENSE | with_entry("A", (2, 2), np.nan), "A has the value nan at index (2, 2)"),
-    "inf in Bn": (DENSE | with_entry("Bn", (0, 1), np.inf), "Bn has the value inf at index (0, 1)"),
-    "NaN in Bt": (DENSE | with_entry("Bt", (1, 1), np.nan), "Bt has the value nan at index (1, 1)"),
-    "inf in f": (DENSE | with_entry("f", 3, -np.inf), "f has the value -inf at index (3,)"),
-    "NaN in gap": (DENSE | {"gap": np.nan}, "gap has the value nan"),
-    "NaN in friction": (DENSE | {"friction0": np.nan}, "friction F0 has the value nan"),
-    "inf in load_slope": (DENSE | {"load_slope": np.full(4, np.inf)}, "load_slope has the value inf"),
-    "NaN in slip_offset": (DENSE | {"slip_offset": np.nan}, "slip_offset has the value nan"),
-    "dependent rows": (DENSE | {"Bt": DENSE["Bn"]}, "[Bn; Bt] has linearly dependent rows (Bn row 0, "),
-    "negative friction": (
-        DENSE | {"friction1": -1.0},
-        "friction at alpha = 5 is -5 at contact node 0; expected F >= 0",
-    ),
-    "negative constant": (DENSE | {"friction": -1.0}, "friction is -1 at contact node 0; expected F >= 0"),
-    "friction list": (DENSE | {"friction": [0.1, 0.2]}, "friction is an array of shape (2,), which is ambiguous"),
-    "p = 0": (DENSE | {"Bn": np.zeros((0, 4)), "Bt": np.zeros((0, 4))}, "p = 0 contact nodes"),
+    "NaN": (DENSE | {"gap": np.nan}, "gap has the value nan"),
+    "at this alpha": (DENSE | {"friction1": -1.0}, "friction at alpha = 5 is -5 at contact node 0; expected F >= 0"),
     "missing array": ({k: v for k, v in DENSE.items() if k != "Bt"}, "Bt is missing (found A, Bn and f)"),
-    "misnamed array": ({**{k: v for k, v in DENSE.items() if k != "f"}, "F": DENSE["f"]}, "is F meant as f?"),
-    "misnamed option": (DENSE | {"Gap": 0.0}, "Gap is not known (is gap meant?)"),
 }
 
 
@@ -381,6 +344,7 @@ def test_bad_problems_get_one_sentence(capsys, tmp_path, case):
         (("roots", "gallery:chain-2", "--alpha", "5", "--stop-after", "two"), "'--stop-after'"),
         (("roots", "gallery:chain-2", "--alpha", "5", "--arithmetic", "sloppy"), "'sloppy' is not one of"),
         (("roots", "gallery:chain-2", "--alpha", "5", "--method", "exhaustive"), "for the oracle"),
+        (("roots", "gallery:one-node-3d", "--alpha", "0", "--arithmetic", "exact"), "which problems in 3D do not have"),
         (("roots", "gallery:chain-2", "--alpha", "5", "--method", "exhaustive", "--jobs", "2"), "expected 1 job"),
         (
             ("roots", "gallery:clamped-block-16", "--alpha", "5", "--method", "exhaustive", "--arithmetic", "fast"),
@@ -408,15 +372,6 @@ def test_a_file_that_is_no_problem_file(capsys, tmp_path):
     assert_refused(
         *run(capsys, "roots", tmp_path, "--alpha", 5), "no MatrixMarket files; expected A.mtx, Bn.mtx, Bt.mtx and f.mtx"
     )
-
-
-def test_every_bad_input_is_status_2_of_the_process_too(tmp_path):
-    file = tmp_path / "p.npz"
-    np.savez(file, **(DENSE | {"A": bar(4)}))
-    done = call("roots", file, "--alpha", 5)
-    assert_refused(done.returncode, done.stdout, done.stderr, "the body is free to move as a rigid body")
-    done = call("roots", file, "--alfa", 5)
-    assert_refused(done.returncode, done.stdout, done.stderr, "no such option")
 
 
 @pytest.mark.filterwarnings("default")
@@ -503,3 +458,65 @@ def test_verify_refuses_a_damaged_proof(capsys, tmp_path):
     proof.write_bytes(content)
     assert_refused(*run(capsys, "verify", "gallery:one-node-6.1", proof), "checksum")
     assert_refused(*run(capsys, "verify", "gallery:one-node-6.1", tmp_path / "missing.proof"), "cannot be read")
+
+
+# -- bare commands -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("group", [(), ("gallery",)])
+def test_it_is_the_help_on_stdout(group):
+    bare, asked = call(*group), call(*group, "--help")
+    assert (bare.returncode, bare.stderr) == (0, "")
+    assert bare.stdout.rstrip() == asked.stdout.rstrip()
+    assert "Usage: enumsol" in bare.stdout
+
+
+# -- names that are misspelt -------------------------------------------------------------------------------------------
+
+
+def refusal(capsys, name, *parts):
+    status, out, err = run(capsys, "roots", name, "--alpha", 1)
+    assert_refused(status, out, err, *parts)
+    return err
+
+
+@pytest.mark.parametrize("name", ["wedge-14-5", "Wedge-14-5", "galery:wedge-14-5", "gallery/:wedge-14-5"])
+def test_a_gallery_name_without_its_prefix(capsys, name):
+    err = refusal(capsys, name, f"{name}: there is no such file or directory; did you mean gallery:wedge-14-5?")
+    assert "wedge-14-3" not in err
+
+
+@pytest.mark.parametrize(("name", "close"), [("wegde-14-5", "wedge-14-5"), ("gallry:two-node-64", "two-node-6.4")])
+def test_a_misspelt_one_without_its_prefix(capsys, name, close):
+    refusal(capsys, name, f"did you mean gallery:{close}")
+
+
+def test_a_misspelt_one_with_its_prefix(capsys):
+    refusal(capsys, "gallery:wedge-14-6", "no problem named 'wedge-14-6'; did you mean wedge-14-5")
+    refusal(capsys, "gallery:WEDGE-14-5", "did you mean wedge-14-5?")
+
+
+def test_a_misspelt_file_name(capsys, tmp_path):
+    write_problem(gallery.one_node_triangle(), tmp_path / "bracket.npz")
+    write_problem(gallery.one_node_triangle(), tmp_path / "bracket")
+    (tmp_path / "brackte.txt").touch()
+    err = refusal(capsys, tmp_path / "brackte.npz", f"did you mean {tmp_path / 'bracket.npz'}")
+    assert "brackte.txt" not in err
+    refusal(capsys, tmp_path / "brakcet", f"did you mean {tmp_path / 'bracket'}")
+
+
+@pytest.mark.parametrize("name", ["nowhere.npz", "no/such/directory.npz", "zzzz"])
+def test_a_name_close_to_nothing_says_what_is_expected(capsys, name):
+    err = refusal(capsys, name, "expected a .npz file, a directory of MatrixMarket files")
+    assert "did you mean" not in err
+
+
+def test_every_verb_that_takes_a_problem(capsys):
+    for arguments in (
+        ("table", "wedge-14-5", "--alphas", "1"),
+        ("graph", "wedge-14-5", "--from", 0, "--to", 1),
+        ("follow", "wedge-14-5", "--from", 0, "--to", 1, "--start", 0),
+        ("verify", "wedge-14-5", "some.proof"),
+    ):
+        assert_refused(*run(capsys, *arguments), "did you mean gallery:wedge-14-5?")

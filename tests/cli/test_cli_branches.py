@@ -2,11 +2,12 @@ import csv
 import importlib.util
 import io
 import json
+import re
 
 import numpy as np
 import pytest
 from branches.test_degenerate import pair
-from command_line import assert_refused, call, on_terminal, run
+from command_line import assert_refused, on_terminal, run
 
 from enumsol import BranchGraph, gallery, write_problem
 
@@ -194,17 +195,6 @@ def test_ctrl_c_stops_a_graph(jobs):
     assert process.returncode == 130
 
 
-def test_help_of_the_commands(capsys):
-    for command, words in (
-        ("table", ("--from", "--alphas", "--samples", "--jobs")),
-        ("graph", ("--plot", "--save", "--graphml", "--time-limit", "--jobs")),
-    ):
-        status, out, _ = run(capsys, command, "--help")
-        assert status == 0
-        for word in words:
-            assert word in out
-
-
 # -- bad input ---------------------------------------------------------------------------------------------------------
 
 TABLE = ("table", "gallery:one-node-6.1")
@@ -250,16 +240,93 @@ def test_without_matplotlib_the_extra_is_named(capsys, monkeypatch, tmp_path):
     assert_refused(*answer, "--plot needs matplotlib", 'pip install "enumsol[plots]"')
 
 
-def test_statuses_of_the_process(tmp_path):
-    done = call("graph", "gallery:one-node-6.1", "--from", 0, "--to", 20)
-    assert (done.returncode, done.stderr) == (0, "")
-    bad = call("graph", "gallery:one-node-6.1", "--from", 2, "--to", 1)
-    assert_refused(bad.returncode, bad.stdout, bad.stderr, "--from is 2 and --to is 1")
-
-
 def test_json_has_no_nan(capsys):
     _, out, _ = run(capsys, "table", "gallery:one-node-6.3", "--alphas", "2", "--json", "-")
     assert "NaN" not in out
     (row,) = json.loads(out)["rows"]
     assert row["families"] == 1
     assert np.isfinite(row["alpha"])
+
+
+# -- plots of graphs that were cut short -------------------------------------------------------------------------------
+
+
+#: Among them graphs without any arc, with arcs that end in the middle, and with a continuum.
+NAMES = ("one-node-6.1", "one-node-6.3", "two-node-6.4", "two-node-6.7-minus", "clamped-block-8")
+
+
+def draw(capsys, tmp_path, name, *options):
+    file = tmp_path / "graph.png"
+    status, out, err = run(capsys, "graph", f"gallery:{name}", "--from", 0, "--to", 10, "--plot", file, *options)
+    assert err == ""
+    assert file.read_bytes().startswith(b"\x89PNG")
+    return status, out
+
+
+@pytest.mark.few(2)
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("nodes", [1, 2, 5, 7])
+def test_after_so_many_nodes(capsys, tmp_path, tree_only, name, nodes):
+    quantity = "lambda_n" if nodes != 2 else "u_t"
+    status, out = draw(capsys, tmp_path, name, "--max-nodes", nodes, "--quantity", quantity)
+    assert status == 3
+    assert out.splitlines()[-1].startswith(f"complete: no (stopped after max_nodes = {nodes} node")
+
+
+def test_after_no_time(capsys, tmp_path):
+    status, out = draw(capsys, tmp_path, "two-node-6.4", "--time-limit", 1e-9)
+    assert status == 3
+    assert out.splitlines()[-1].startswith("complete: no (stopped by the time limit")
+
+
+def test_after_ctrl_c(capsys, tmp_path, monkeypatch):
+    calls = []
+
+    def interrupt(*state):
+        calls.append(state)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+
+    # the first word of progress comes from the search
+    monkeypatch.setattr("enumsol.cli.progress.Display.show", interrupt)
+    status, out = draw(capsys, tmp_path, "wedge-8-5")
+    assert calls
+    assert status == 130
+    assert out.splitlines()[-1].startswith("complete: no (interrupted after ")
+
+
+# -- columns of tables -------------------------------------------------------------------------------------------------
+
+
+SAMPLED = ("table", "gallery:two-node-6.4", "--from", 0, "--to", 10)
+CAPTION = "open, stick, slip+, slip-: how many of the roots have a node in that status"
+
+
+def test_the_columns_are_explained_below_them(capsys):
+    _, out, _ = run(capsys, *SAMPLED, "--samples", 3)
+    lines = out.splitlines()
+    assert re.split(r"\s+", lines[0].strip())[:2] == ["alpha", "roots"]
+    for name in ("open", "stick", "slip+", "slip-"):
+        assert name in lines[0].split()
+    assert lines[4] == CAPTION
+    assert len(lines) == 7  # heading, three rows, caption, blank, closing line
+
+
+def test_rows_of_several_alphas_say_so(capsys):
+    _, out, _ = run(capsys, *SAMPLED, "--samples", 101)
+    lines = out.splitlines()
+    assert lines[0].startswith("first alpha last alpha  roots")
+    assert "to alpha" not in out
+    assert CAPTION in lines
+    assert "each row stands for all alphas tried from the first to the last, which have equal counts" in lines
+    assert max(map(len, lines)) <= 90
+
+
+def test_an_empty_table_explains_nothing(capsys, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("enumsol.branches.table.table_row", interrupt)
+    status, out, _ = run(capsys, *SAMPLED, "--samples", 3)
+    assert status == 130
+    assert out == "\ncomplete: no (interrupted after 0 of 3 alphas)\n"

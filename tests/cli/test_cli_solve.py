@@ -5,10 +5,10 @@ import os
 from inspect import signature
 
 import pytest
+from command_line import assert_refused, run
 from typer.testing import CliRunner
 
 from enumsol import enumerate_roots, fem, read_problem
-from enumsol.cli import main
 from enumsol.cli.app import app
 from enumsol.cli.solve import MESH_OPTIONS
 
@@ -67,11 +67,6 @@ def here(tmp_path, monkeypatch):
     (tmp_path / "body.msh").write_text(BODY)
     (tmp_path / "body.toml").write_text(TOML)
     return tmp_path
-
-
-def run(capsys, *arguments):
-    status = main([str(argument) for argument in arguments])
-    return status, *capsys.readouterr()
 
 
 def test_from_a_mesh_to_the_roots(here, capsys):
@@ -205,17 +200,11 @@ def test_bad_calls_get_one_sentence(here, capsys, arguments, part):
     for name in ("pipe.msh", "pipe.toml", "pipe.npz"):
         os.mkfifo(here / name)
     (here / "dangling.msh").symlink_to(here / "nothing")
-    status, out, err = run(capsys, *arguments)
-    assert (status, out) == (2, "")
-    assert err.startswith("enumsol: error: ")
-    assert err.count("\n") == 1
-    assert part in err
+    assert_refused(*run(capsys, *arguments), part)
 
 
 def test_help_names_every_option_of_mesh_problem():
     said = CliRunner().invoke(app, ["solve", "--help"], env={"COLUMNS": "200"}).stdout
-    from inspect import signature
-
     names = [name for name in signature(fem.mesh_problem).parameters if name != "mesh"]
     assert [name for name in names if f"--{name.replace('_', '-')} " not in said] == []
 
