@@ -27,6 +27,7 @@ from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.products import Products, scaled
 from enumsol.errors import EnumsolError
 from enumsol.support.arguments import alpha_value
+from enumsol.support.deadlines import attended
 from enumsol.support.immutable import Sealed
 
 if TYPE_CHECKING:
@@ -83,7 +84,8 @@ class CondensedEnclosure(Sealed):
             raise NotEnclosedError(_OVERFLOW)
         scale, size = products.scale, len(products.mid)
         A, _ = scaled(sp.csr_array(problem.A), scale, scale)
-        bound = sparse_eigenvalue_bound(sp.csc_array(A), _smallest_eigenvalue(problem, scale))
+        estimate = _smallest_eigenvalue(problem, scale)
+        bound = attended(lambda: sparse_eigenvalue_bound(sp.csc_array(A), estimate), A.nnz)
         if not bound > 0:
             raise NotEnclosedError(
                 "A is positive definite only within rounding: its smallest eigenvalue, after scaling to a unit "

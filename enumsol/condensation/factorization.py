@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from enumsol.errors import InvalidProblemError
+from enumsol.support.deadlines import attended
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
 
 if TYPE_CHECKING:
@@ -42,11 +43,14 @@ class Factorization(Immutable):
         options = {"SymmetricMode": True, "Equil": False}
         try:
             # the scaled copy of A is not kept: the factors are all that solving needs
-            self._lu = splu(
-                sp.csc_array(scaling @ A @ scaling),
-                permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.0,
-                options=options,
+            self._lu = attended(
+                lambda: splu(
+                    sp.csc_array(scaling @ A @ scaling),
+                    permc_spec="MMD_AT_PLUS_A",
+                    diag_pivot_thresh=0.0,
+                    options=options,
+                ),
+                A.nnz,
             )
         except RuntimeError as error:  # SuperLU: "Factor is exactly singular"
             raise InvalidProblemError(_RIGID.format(ratio=0.0)) from error

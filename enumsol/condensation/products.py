@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, residual, upper_norm
 from enumsol.condensation.data import CondensableData
+from enumsol.support.deadlines import look
 from enumsol.support.immutable import Sealed
 
 if TYPE_CHECKING:
@@ -93,6 +94,7 @@ class Products(Sealed):
             mid, rounded = np.empty((rows, K.shape[1])), np.empty((rows, K.shape[1]))
             lengths, left = np.empty(K.shape[1]), np.empty(K.shape[1])
             for start in range(0, K.shape[1], _COLUMNS):
+                look()
                 part = slice(start, min(start + _COLUMNS, K.shape[1]))
                 columns = K[:, part].toarray()
                 X = solve(columns)

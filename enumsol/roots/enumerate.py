@@ -14,7 +14,7 @@ from enumsol.roots.at_rest import AtRest
 from enumsol.roots.builder import RootBuilder, in_order, named, root_family
 from enumsol.roots.closed import apart, closed_component
 from enumsol.roots.components import RootComponent, connected_components
-from enumsol.roots.enumeration import Enumeration
+from enumsol.roots.enumeration import Enumeration, not_begun
 from enumsol.roots.local_degree import local_degree
 from enumsol.roots.root_set import RootSet
 from enumsol.search.certifiers.protocol import UndecidedPart
@@ -33,7 +33,7 @@ from enumsol.support.arguments import (
     optional_seconds,
     share,
 )
-from enumsol.support.deadlines import TimeOverError, within
+from enumsol.support.deadlines import Deadline, TimeOverError, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -95,7 +95,7 @@ def enumerate_roots(
         Stop after this many nodes of the tree (selections, for the exhaustive method).
     time_limit : float, optional
         Stop after this many seconds; the result is then made of what was found, which takes a fifth of them and two
-        seconds at most, but for very large bodies.
+        seconds at most.
     proof_path : path, optional
         Stream the proof to this file (arithmetic "verified"); by default it is kept, compressed, in memory.
     resume : bool
@@ -150,13 +150,20 @@ def enumerate_roots(
         from enumsol.search.space.space_setup import SpaceSolvers
 
         check_supported(arithmetic, method, engine)
-        _check_proof(arithmetic, method, proof_path, resume)
-        in_space = SpaceSolvers(problem, value, arithmetic)
-        search: Enumeration[Any] = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
-        return search.run(executor, *counts, seconds)
     _check_proof(arithmetic, method, proof_path, resume)
-    solvers = Solvers(problem, value, arithmetic, tolerance, engine)
-    search = _Enumeration(solvers, method, progress, proof_path, resumed=resume, started=started)
+    search: Enumeration[Any]
+    try:
+        with within(Deadline.after(started, seconds)):
+            if _is_in_space(problem):
+                in_space = SpaceSolvers(problem, value, arithmetic)
+                _ = in_space.enclosed  # before a file is begun
+                search = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
+            else:
+                solvers = Solvers(problem, value, arithmetic, tolerance, engine)
+                _ = solvers.enclosed  # as above
+                search = _Enumeration(solvers, method, progress, proof_path, resumed=resume, started=started)
+    except TimeOverError:
+        return not_begun(problem, value, arithmetic, method, time.perf_counter() - started)
     return search.run(executor, *counts, seconds)
 
 

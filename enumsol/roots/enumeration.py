@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from enumsol.errors import Interrupted, OutputError
 from enumsol.proof.begun import begun_proof
 from enumsol.proof.writer import ProofWriter
-from enumsol.roots.root_set import SearchStats
+from enumsol.roots.root_set import RootSet, SearchStats, Undecided
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.outcome import SearchLimits, SearchOutcome, Stop, StopReason
 from enumsol.search.parallel import Searchable, Spread
@@ -22,10 +22,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from concurrent.futures import Executor
 
+    from enumsol.model.contact_body import ContactBody
     from enumsol.proof.begun import BegunProof
     from enumsol.proof.proof_file import Proof
-    from enumsol.roots.root_set import RootSet
     from enumsol.search.outcome import SearchProgress
+    from enumsol.support.arguments import Alpha
 
 _Solvers = TypeVar("_Solvers", bound=Searchable)
 
@@ -167,3 +168,20 @@ class Enumeration(ABC, Generic[_Solvers]):
             self.writer.write({**counts, "undecided": len(outcome.undecided), "leaves": leaves})
         proof = self.writer.close()
         return proof if whole and self.writer.failure is None else None
+
+
+def not_begun(problem: ContactBody, alpha: Alpha, arithmetic: str, method: str, seconds: float) -> RootSet:
+    """What is known of a body that is so large that the time was over before it was condensed: nothing."""
+    reason = "the time was over before the body was condensed to its contact nodes"
+    return RootSet(
+        alpha=alpha,
+        roots=[],
+        families=[],
+        undecided=[Undecided((None,) * problem.p, reason, "raise the limit")],
+        arithmetic=arithmetic,
+        method=method,
+        stopped=str(Stop(StopReason.TIME_LIMIT)),
+        stats=SearchStats(seconds=seconds),
+        node_ids=problem.node_ids,
+        at_least=0,
+    )

@@ -291,7 +291,8 @@ class RootSet(Sequence[Root], Immutable):
         if self.families:
             heading += f", {counted(len(self.families), 'family', 'families')}"
         if not self.whole:
-            heading += f" found, at least {self.at_least} in all"
+            # of nothing, zero is no bound
+            heading += f" found, at least {self.at_least} in all" if self.at_least else " found"
         return f"{heading} ({self.arithmetic}, {self.method})"
 
     def _rows(self) -> list[tuple[str, str, str, str, str, str]]:

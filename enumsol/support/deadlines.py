@@ -6,18 +6,26 @@ the call and the loop, and code that is called without a limit never stops.
 
 from __future__ import annotations
 
+import threading
 import time
+from concurrent.futures import Future, wait
 from contextlib import contextmanager
-from contextvars import ContextVar
+from contextvars import ContextVar, copy_context
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
+
+_Result = TypeVar("_Result")
 
 #: Of the time limit, and seconds besides: what may be used after it to put together what was found. A fifth and two
 #: seconds are promised; what does not look at the clock needs the rest.
 _SHARE, _SECONDS = 0.15, 1.2
+#: How often a call in a thread of its own is asked for, in seconds.
+_POLL = 0.05
+#: Sparse matrices with fewer entries are factorized in some hundredths of a second.
+_SHORT = 50_000
 
 
 class TimeOverError(Exception):
@@ -87,3 +95,36 @@ def look() -> None:
     """Raise TimeOverError if the time is over."""
     if over():
         raise TimeOverError
+
+
+def attended(work: Callable[[], _Result], size: int) -> _Result:
+    """What one long call into compiled code returns; Ctrl-C and the end of the time end the wait for it at once.
+
+    Nothing can interrupt such a call, so it runs in a thread of its own (it must release the interpreter's lock, as
+    factorizations do). Once nobody waits any longer, it runs to its end, and what it returns is dropped.
+
+    Parameters
+    ----------
+    work : callable
+    size : number of entries that it works on; a short call needs no thread
+
+    Raises
+    ------
+    TimeOverError
+        The deadline that holds here has passed.
+    """
+    if size < _SHORT:
+        return work()
+    done: Future[_Result] = Future()
+    context = copy_context()
+
+    def run() -> None:
+        try:
+            done.set_result(context.run(work))
+        except Exception as error:  # noqa: BLE001 (raised again where it is waited for)
+            done.set_exception(error)
+
+    threading.Thread(target=run, daemon=True).start()
+    while not wait([done], _POLL).done:
+        look()
+    return done.result()

@@ -1,6 +1,7 @@
 """Time limits are kept in every phase, by a clock that counts pieces of work instead of seconds."""
 
 import inspect
+import signal
 import threading
 from itertools import count
 
@@ -13,12 +14,14 @@ from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, veri
 from enumsol.branches.enclosed.tracing import _Tracing
 from enumsol.branches.exact import gluing
 from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.condensation import products
+from enumsol.condensation.factorization import Factorization
 from enumsol.relaxation.convex_forms import FormAscent
 from enumsol.search import form_policy as forms
 from enumsol.search.interval.subintervals import IntervalSearch
 from enumsol.search.solvers import Solvers
 from enumsol.selections.rational_selections import ExactSelections
-from enumsol.support.deadlines import Deadline, TimeOverError, current, look, over, within
+from enumsol.support.deadlines import Deadline, TimeOverError, attended, current, look, over, within
 
 
 @pytest.fixture
@@ -96,6 +99,58 @@ def test_what_is_added_to_a_limit_is_less_than_what_is_promised(clock, limit):
     assert 3.0 + limit < last.deadline < 3.0 + kept(limit)
     clock[0] = 3.0
     assert last.part(0.5).deadline == pytest.approx((3.0 + last.deadline) / 2)
+
+
+# -- one long call -----------------------------------------------------------------------------------------------------
+
+LONG = 10**6
+
+
+@pytest.fixture
+def endless():
+    """A call that ends when the test does."""
+    ended = threading.Event()
+    yield ended.wait
+    ended.set()
+
+
+def test_what_a_long_call_returns_or_raises():
+    assert attended(current, LONG) is None
+    with within(Deadline(5.0)):
+        assert attended(current, LONG) == 5.0
+    with pytest.raises(ZeroDivisionError):
+        attended(lambda: 1 // 0, LONG)
+
+
+def test_a_long_call_is_not_waited_for_beyond_the_limit(clock, endless):
+    def work():
+        clock[0] = 6.0
+        endless()
+
+    with within(Deadline(5.0)), pytest.raises(TimeOverError):
+        attended(work, LONG)
+
+
+def test_a_long_call_ends_at_once_on_ctrl_c(endless):
+    def work():
+        signal.raise_signal(signal.SIGINT)
+        endless()
+
+    with pytest.raises(KeyboardInterrupt):
+        attended(work, LONG)
+
+
+@pytest.mark.parametrize("build", [lambda: gallery.clamped_block(8, 4), lambda: gallery.block3d(2, 2, 2)])
+def test_a_body_that_is_not_condensed_in_time(clock, takes, monkeypatch, tmp_path, build):
+    monkeypatch.setattr(products, "_COLUMNS", 1)
+    takes(Factorization, "solve")
+    problem = build()
+    roots = enumerate_roots(problem, 0, time_limit=4.0, proof_path=tmp_path / "p")
+    assert clock[0] <= kept(4.0)
+    assert (len(roots), roots.complete, roots.unique, roots.proof) == (0, False, None, None)
+    assert "0 roots found (verified, tree)\nundecided, 1 times: the time was over before the body was" in str(roots)
+    assert not any(tmp_path.iterdir())
+    assert enumerate_roots(problem, 0, time_limit=1000.0).complete
 
 
 # -- roots -------------------------------------------------------------------------------------------------------------
