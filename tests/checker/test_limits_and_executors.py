@@ -10,7 +10,7 @@ from generators import integer_problem
 from proof_tools import bytes_of, records_of
 
 import enumsol
-from enumsol import ContactProblem, Interrupted, Proof, ProofFormatError, enumerate_roots, gallery, verify
+from enumsol import ContactProblem, Interrupted, Proof, enumerate_roots, gallery, verify
 from enumsol.condensation.exact import ExactSystem
 from enumsol.proof.proof_file import fraction_text
 
@@ -51,13 +51,6 @@ def test_executors_give_the_same_roots_and_a_proof(executor, wedge, tmp_path):
             report = verify(problem, proof)
             assert report.complete
             assert (report.roots, report.families) == (len(alone), len(alone.families))
-
-
-def test_enough_in_parallel_leaves_a_proof_that_says_so(executor, wedge):
-    problem, alpha = wedge
-    roots = enumerate_roots(problem, alpha, executor=executor, stop_after=2)
-    assert len(roots) >= 2
-    check_cut_short(problem, roots)
 
 
 def check_cut_short(problem, roots):
@@ -143,18 +136,6 @@ def test_progress_of_the_checker():
     assert seen == sorted(seen)
     assert seen[-1] <= report.leaves
     assert len(seen) == report.leaves // 256
-
-
-def test_a_file_that_is_not_there(tmp_path, wedge):
-    with pytest.raises(ProofFormatError, match="cannot be read"):
-        Proof.load(tmp_path / "nothing.proof")
-    with pytest.raises(ProofFormatError, match="cannot be read"):
-        Proof.load(tmp_path)
-    path = tmp_path / "gone.proof"
-    roots = enumerate_roots(*wedge, proof_path=path)
-    path.unlink()
-    with pytest.raises(ProofFormatError, match="cannot be read"):
-        verify(wedge[0], roots.proof)
 
 
 def test_a_proof_that_cannot_be_written(tmp_path, wedge):

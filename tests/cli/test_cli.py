@@ -344,7 +344,8 @@ def test_bad_problems_get_one_sentence(capsys, tmp_path, case):
         (("roots", "gallery:chain-2", "--alpha", "5", "--stop-after", "two"), "'--stop-after'"),
         (("roots", "gallery:chain-2", "--alpha", "5", "--arithmetic", "sloppy"), "'sloppy' is not one of"),
         (("roots", "gallery:chain-2", "--alpha", "5", "--method", "exhaustive"), "for the oracle"),
-        (("roots", "gallery:one-node-3d", "--alpha", "0", "--arithmetic", "exact"), "which problems in 3D do not have"),
+        (("roots", "gallery:one-node-3d", "--alpha", "0", "--arithmetic", "exact"), 'is "exact", which problems in 3D'),
+        (("roots", "gallery:one-node-3d", "--alpha", "0", "--method", "exhaustive"), "method is"),
         (("roots", "gallery:chain-2", "--alpha", "5", "--method", "exhaustive", "--jobs", "2"), "expected 1 job"),
         (
             ("roots", "gallery:clamped-block-16", "--alpha", "5", "--method", "exhaustive", "--arithmetic", "fast"),

@@ -1,4 +1,3 @@
-import pickle
 import re
 from collections import Counter
 from fractions import Fraction
@@ -35,12 +34,8 @@ def bar(n):
 
 BAD = {
     "A not square": ({"A": A[:3]}, r"A has shape \(3, 4\); expected a square matrix"),
-    "A of one dimension": ({"A": A[0]}, r"A has 1 dimension\(s\), shape \(4,\); expected a matrix"),
     "A empty": ({"A": np.zeros((0, 0))}, r"A has shape \(0, 0\)"),
-    "A of text": ({"A": [["a", "b"], ["c", "d"]]}, "A is not an array of real numbers"),
-    "A ragged": ({"A": [[1.0, 2.0], [3.0]]}, "A is not an array of real numbers"),
     "A complex": ({"A": A + 0j}, "A is not an array of real numbers"),
-    "A complex sparse": ({"A": sp.csr_array(A + 0j)}, "A has complex entries; expected real numbers"),
     "A unsymmetric": ({"A": with_entry(A, (0, 1), -0.4)}, r"A is not symmetric: max\|A - A'\| = 0.1 .*; expected"),
     "A negative diagonal": (
         {"A": with_entry(A, (3, 3), -2.0)},
@@ -68,17 +63,10 @@ BAD = {
     "load slope": ({"load_slope": [1.0]}, r"load_slope has shape \(1,\); expected \(4,\)"),
     "load slope NaN": ({"load_slope": with_entry(F, 0, np.nan)}, "load_slope has the value nan"),
     "friction list": ({"friction": [0.1, 0.2]}, r"friction is a bare list, which is ambiguous; expected a number, or"),
-    "friction array": ({"friction": np.array([0.1, 0.2])}, "friction is a bare ndarray, which is ambiguous"),
-    "friction triple": ({"friction": (0.1, 0.2, 0.3)}, "friction is a tuple of 3 entries; expected a number"),
     "friction None": ({"friction": None}, "friction is a bare NoneType"),
     "friction shape": ({"friction": ([0.1, 0.2, 0.3], 0.0)}, r"friction F0 has shape \(3,\); expected \(2,\)"),
     "friction NaN": ({"friction": (0.0, np.nan)}, "friction F1 has the value nan"),
     "friction negative": ({"friction": -0.3}, "friction is -0.3 at contact node 0; expected F >= 0"),
-    "node ids few": ({"node_ids": [7]}, "node_ids has 1 entries, 1 distinct; expected 2 distinct labels"),
-    "node ids equal": ({"node_ids": ["a", "a"]}, "node_ids has 2 entries, 1 distinct"),
-    "node ids number": ({"node_ids": 7}, "node_ids is 7; expected a sequence of 2 distinct labels"),
-    "node ids lists": ({"node_ids": [[1], [2]]}, "node_ids .* expected a sequence of 2 distinct labels"),
-    "coordinates": ({"coordinates": [0.0, 1.0]}, r"coordinates has shape \(2,\); expected \(p, 2\) = \(2, 2\)"),
     "coordinates NaN": (
         {"coordinates": [[0.0, np.nan], [1.0, 0.0]]},
         r"coordinates has the value nan at index \(0, 1\)",
@@ -126,12 +114,6 @@ def test_a_singular_matrix_is_not_called_indefinite():
         Factorization(fem.solid_stiffness(box.points, box.cells, (1, 1))).check_positive_definite()
 
 
-@pytest.mark.parametrize("alpha", [np.nan, np.inf, -np.inf, "five", None, 10**400, 1j])
-def test_alpha_must_be_finite(alpha):
-    with pytest.raises(InvalidArgumentError, match=r"alpha is .*; expected a finite real number"):
-        enumerate_roots(problem(), alpha)
-
-
 def test_negative_friction_at_alpha_names_the_node():
     p = problem(friction=([1.0, 2.0], [0.5, -1.0]), node_ids=["left", "right"])
     assert np.array_equal(p.friction_at(2.0), [2.0, 0.0])
@@ -167,33 +149,6 @@ def test_fields_and_defaults():
     assert problem(gap=-0.0).fingerprint == problem(gap=0.0).fingerprint
 
 
-def test_sparse_and_dense_data_make_the_same_problem():
-    rng = np.random.default_rng(1)
-    duplicates = sp.coo_array(([1.5, 0.5, 2.0, 2.0, 2.0], ([0, 0, 1, 2, 3], [0, 0, 1, 2, 3])), shape=(4, 4))
-    assert np.array_equal(problem(A=duplicates).A.toarray(), 2 * np.eye(4))
-    X = rng.normal(size=(4, 4))
-    S = X @ X.T + np.eye(4)
-    for kind in (sp.csr_array, sp.csc_array, sp.coo_array, sp.csr_matrix, sp.lil_array):
-        assert np.array_equal(problem(A=kind(S)).A.toarray(), problem(A=S).A.toarray())
-
-
-def test_the_problem_is_immutable_and_independent_of_its_sources():
-    f, gap, stiffness = F.copy(), np.zeros(2), sp.csc_array(A)
-    p = problem(A=stiffness, f=f, gap=gap)
-    f[0], gap[0] = 99.0, 99.0
-    stiffness.data[:] = 99.0
-    assert p.f[0] == 1.0
-    assert p.gap[0] == 0.0
-    assert p.A[0, 0] == 2.0
-    with pytest.raises(AttributeError, match="ContactProblem is immutable: f cannot be set; build a new problem"):
-        p.f = F
-    arrays = (p.f, p.gap, p.slip_offset, *p.friction)
-    sparse = (p.A.data, p.A.indices, p.A.indptr, p.Bn.data, p.Bn.indices, p.Bn.indptr, p.Bt.data)
-    for array in (*arrays, *sparse, p.condensed.S, p.condensed.g0):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 1
-
-
 @pytest.mark.parametrize("scale", [1e-200, 1e-9, 1.0, 1e9, 1e200])
 def test_a_small_asymmetry_is_averaged_away(scale):
     skewed = scale * with_entry(A, (0, 1), -0.5 * (1 + 1e-12))
@@ -207,21 +162,3 @@ def test_a_small_asymmetry_is_averaged_away(scale):
 def test_rows_that_are_nearly_dependent_but_independent_are_accepted():
     rows = np.eye(4)[:2] + 1e-9 * np.eye(4)[2:]
     assert ContactProblem(A, np.eye(4)[:2], rows, F).p == 2
-
-
-def test_pickling_keeps_the_problem():
-    p = problem(gap=0.1, friction=(0.2, [1.0, 2.0]), load_slope=F, node_ids=["a", "b"], coordinates=[[0, 0], [1, 0]])
-    before = enumerate_roots(p, 1.5)
-    copy = pickle.loads(pickle.dumps(p))
-    assert copy.node_ids == p.node_ids
-    for name in ("f", "gap", "load_slope", "slip_offset", "coordinates"):
-        assert np.array_equal(getattr(copy, name), getattr(p, name))
-    assert np.array_equal(copy.friction, p.friction)
-    assert np.array_equal(copy.A.toarray(), p.A.toarray())
-    after = enumerate_roots(copy, 1.5)
-    assert [root.statuses for root in after] == [root.statuses for root in before]
-    assert np.array_equal([root.u for root in after], [root.u for root in before])
-    with pytest.raises(AttributeError, match="immutable"):
-        copy.f = F
-    with pytest.raises(ValueError, match="read-only"):
-        copy.f[0] = 1.0

@@ -8,7 +8,7 @@ import networkx as nx
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from read_only import assert_locked
+from read_only import assert_locked, reachable
 
 import enumsol
 from enumsol import ContactProblem, gallery
@@ -112,23 +112,6 @@ def test_matrices_are_made_without_copying_and_work_as_any(problem):
 
 
 # -- everything else that a problem holds ----------------------------------------------------------------------------
-
-
-def reachable(value, path, seen=None):
-    """Arrays that can be reached by attributes and items, with the way to each."""
-    seen = set() if seen is None else seen
-    if id(value) in seen:
-        return
-    seen.add(id(value))
-    if isinstance(value, np.ndarray):
-        yield path, value
-    elif isinstance(value, (tuple, list, frozenset)):
-        for k, item in enumerate(value):
-            yield from reachable(item, f"{path}[{k}]", seen)
-    elif type(value).__module__.startswith("enumsol."):
-        for name, item in getattr(value, "__dict__", {}).items():
-            if name != "_tangent":  # how to compute the derivative, in floats: its solver is working memory
-                yield from reachable(item, f"{path}.{name}", seen)
 
 
 def test_no_array_of_a_problem_can_be_written(problem):

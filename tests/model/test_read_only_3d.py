@@ -2,33 +2,13 @@
 
 import copy
 import pickle
-from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from read_only import assert_locked
+from read_only import assert_locked, reachable
 
 import enumsol
 from enumsol import gallery
-
-
-def reachable(value, path, seen=None):
-    """Arrays that can be reached by attributes and items, with the way to each."""
-    seen = set() if seen is None else seen
-    if id(value) in seen:
-        return
-    seen.add(id(value))
-    if isinstance(value, np.ndarray):
-        yield path, value
-    elif isinstance(value, (tuple, list, frozenset)):
-        for k, item in enumerate(value):
-            yield from reachable(item, f"{path}[{k}]", seen)
-    elif isinstance(value, Mapping):
-        for key, item in value.items():
-            yield from reachable(item, f"{path}[{key}]", seen)
-    elif type(value).__module__.startswith("enumsol."):
-        for name, item in getattr(value, "__dict__", {}).items():
-            yield from reachable(item, f"{path}.{name}", seen)
 
 
 @pytest.fixture

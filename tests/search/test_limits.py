@@ -89,17 +89,6 @@ def test_options_out_of_range(option):
         enumsol.enumerate_roots(gallery.one_node_triangle(), 1.0, **option)
 
 
-@pytest.mark.parametrize("alpha", [float("nan"), float("inf"), "much", None, 1j])
-def test_alpha_out_of_range(alpha):
-    with pytest.raises(enumsol.InvalidArgumentError, match="alpha is"):
-        enumsol.enumerate_roots(gallery.one_node_triangle(), alpha, "fast")
-
-
-def test_negative_friction_is_refused_at_its_alpha():
-    with pytest.raises(enumsol.InvalidArgumentError, match="friction at alpha = -1 is -1 at contact node 0"):
-        enumsol.enumerate_roots(gallery.one_node_triangle(), -1.0, "fast")
-
-
 @pytest.mark.parametrize("method", ["tree", "exhaustive"])
 def test_progress(method):
     seen = []
@@ -138,27 +127,6 @@ def test_interruption_keeps_what_was_found(method):
     assert isinstance(caught.value, KeyboardInterrupt)
 
 
-def test_interruption_of_a_parallel_search_keeps_what_was_found(monkeypatch):
-    monkeypatch.setattr("enumsol.search.parallel.NODES", 16)
-    problem = gallery.chain(5, 0.0)
-    with ThreadPoolExecutor(2) as executor, pytest.raises(enumsol.Interrupted) as caught:
-        enumsol.enumerate_roots(problem, 5.0, "fast", executor=executor, progress=Stop(0.5))
-    assert 0 < len(caught.value.partial) < 243
-
-
-@pytest.mark.parametrize("name", ["wedge-14-5", "two-node-5", "one-node-6.3", "chain-4-coupled"])
-def test_threads(name):
-    entry = gallery.get(name)
-    problem = entry.build()
-    serial = enumsol.enumerate_roots(problem, entry.alpha, "fast")
-    with ThreadPoolExecutor(2) as executor:
-        parallel = enumsol.enumerate_roots(problem, entry.alpha, "fast", executor=executor)
-    assert not differences(parallel, serial, rtol=1e-12)
-    # a subtree starts cold, and ties at its minimiser may break another way
-    assert parallel.stats.nodes == pytest.approx(serial.stats.nodes, rel=0.1)
-    assert parallel.stopped is None
-
-
 def test_processes():
     # spawn: nothing is inherited, everything travels by pickle
     context = multiprocessing.get_context("spawn")
@@ -176,16 +144,6 @@ def test_parallel_search_of_an_unloaded_body():
     with ThreadPoolExecutor(2) as executor:
         roots = enumsol.enumerate_roots(gallery.chain(8, 0.1, f=(0.0, 0.0)), 1.0, "fast", executor=executor)
     assert (len(roots), roots.index_sum) == (1, 1)
-
-
-def test_parallel_search_with_limits(wedge):
-    with ThreadPoolExecutor(2) as executor:
-        two = enumsol.enumerate_roots(*wedge, "fast", executor=executor, stop_after=2)
-        assert len(two) >= 2
-        assert two.stopped is not None or len(two) == 5
-        late = enumsol.enumerate_roots(*wedge, "fast", executor=executor, time_limit=1e-9)
-    assert not late.complete
-    assert late.stopped is not None
 
 
 def test_the_exhaustive_method_stops_at_max_nodes_without_a_root():
