@@ -64,6 +64,7 @@ from .io import read_problem as read_problem, write_problem as write_problem
 from .io.vtu import write_vtu as write_vtu
 from .model.friction import FrictionTable as FrictionTable
 from .model.mesh import BodyMesh as BodyMesh
+from .model.mirrors import Mirror as Mirror
 from .model.problem import ContactProblem as ContactProblem
 from .model.problem3d import ContactProblem3D as ContactProblem3D
 from .model.slip_mean import SlipMean as SlipMean

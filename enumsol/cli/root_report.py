@@ -77,7 +77,8 @@ def roots_as_json(found: RootSet, problem: str) -> str:
         "stopped": found.stopped,
         "index_sum": found.index_sum,
         "node_ids": list(found.node_ids),
-        "roots": [_root(root) for root in found],
+        **_mirror(found),
+        "roots": [_root(root) | _image(found, k) for k, root in enumerate(found)],
         "families": [_family(family) for family in found.families],
         "undecided": [_undecided(item) for item in found.undecided],
         "stats": {name: getattr(stats, name) for name in _STATS},
@@ -103,6 +104,20 @@ def _root(root: Root) -> dict[str, Any]:
         "margin": _finite(root.margin),
         **(_in_space(root) if root.lambda_t.ndim == 2 else _in_plane(root)),
     }
+
+
+def _mirror(found: RootSet) -> dict[str, Any]:
+    """What is known of the symmetry of the problem, after --mirror."""
+    images = found.mirror_images
+    if images is None:
+        return {}
+    asymmetry = images.asymmetry
+    content = {"asymmetry": asymmetry.bound, "proven": asymmetry.proven, "differs": asymmetry.differs}
+    return {"mirror": content | {"missing": list(images.missing), "ambiguous": list(images.ambiguous)}}
+
+
+def _image(found: RootSet, k: int) -> dict[str, Any]:
+    return {} if found.mirror_images is None else {"mirror_image": found.mirror_images.images[k]}
 
 
 def _in_plane(root: Root) -> dict[str, Any]:

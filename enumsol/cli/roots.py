@@ -54,6 +54,15 @@ StopAfter = Annotated[int | None, count("Stop at N roots; 2 decides whether the 
 Unique = Annotated[
     bool, typer.Option("--unique", help="Only report whether there is one solution; stop at a second one.")
 ]
+MirrorAxis = Annotated[
+    Literal["x", "y", "z"] | None,
+    typer.Option(
+        "--mirror",
+        help="Direction across which body, supports and load are symmetric: report which roots are mirror images.",
+        rich_help_panel=OUTPUT,
+        show_default=False,
+    ),
+]
 TimeLimit = Annotated[float | None, seconds("Stop after this time.")]
 Jobs = Annotated[int, count("Number of processes that search (tree).")]
 ProofFile = Annotated[str | None, file("--proof", "Write the proof (verified).")]
@@ -74,6 +83,7 @@ def roots(
     max_nodes: MaxNodes = None,
     time_limit: TimeLimit = None,
     jobs: Jobs = 1,
+    mirror: MirrorAxis = None,
     proof_file: ProofFile = None,
     resume: Resume = False,
     json_file: JsonFile = None,
@@ -104,7 +114,7 @@ def roots(
     }
     options = {"arithmetic": arithmetic, "method": method, "proof_path": proof_file, "resume": resume, **limits}
     value = parse_alpha(alpha)
-    answer(problem, load_any_problem(problem), value, jobs, options, files, unique=unique)
+    answer(problem, load_any_problem(problem), value, jobs, options, files, mirror, unique=unique)
 
 
 class Files(NamedTuple):
@@ -141,15 +151,19 @@ def answer(
     jobs: int,
     options: dict[str, Any],
     files: Files,
+    mirror: str | None = None,
     *,
     unique: bool = False,
 ) -> NoReturn:
     """Search with the options of `enumerate_roots`, write what was found, and end the command.
 
-    With ``unique`` the question is only whether there is one solution.
+    With ``unique`` the question is only whether there is one solution; across ``mirror`` roots are paired.
     """
     check_places(files.vtu, problem, name)
+    check_mirror(problem, alpha, mirror)
     found, ended = so_far(lambda: _search(problem, alpha, jobs, **options))
+    if mirror is not None and len(found):
+        found = found.mirrored(mirror)
     deliver(
         (files.vtu, lambda path: _write_vtu(problem, found, path)),
         json_file=files.json,
@@ -164,6 +178,22 @@ def answer(
         holds = "hold" if len(partly) > 1 else "holds"
         note(f"{' and '.join(partly)} {holds} the isolated roots only, --json the {families} too")
     finish(ended, ExitStatus.DONE if unique and found.unique is not None else _status(found))
+
+
+def check_mirror(problem: ContactProblem | ContactProblem3D, alpha: Alpha, mirror: str | None) -> None:
+    """Refuse a mirror under which the problem changes, before the search.
+
+    Raises
+    ------
+    InvalidArgumentError
+        Contact nodes or data have no mirror images.
+    """
+    if mirror is None:
+        return
+    from enumsol.model.mirrors import Mirror  # numpy: not for --help
+    from enumsol.roots.mirrored import SYMMETRIC, problem_asymmetry
+
+    problem_asymmetry(problem, alpha, Mirror.across(problem, mirror), SYMMETRIC)
 
 
 def _write_vtu(problem: ContactProblem | ContactProblem3D, found: RootSet, path: str) -> None:

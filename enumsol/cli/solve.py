@@ -14,6 +14,7 @@ from enumsol.cli.roots import (
     Files,
     HowExact,
     Jobs,
+    MirrorAxis,
     ProofFile,
     Resume,
     StopAfter,
@@ -202,6 +203,7 @@ def solve(
     max_nodes: MaxNodes = None,
     time_limit: TimeLimit = None,
     jobs: Jobs = 1,
+    mirror: MirrorAxis = None,
     proof_file: ProofFile = None,
     resume: Resume = False,
     json_file: JsonFile = None,
@@ -238,7 +240,7 @@ def solve(
         raise InvalidArgumentError("--alpha is missing, on which friction or load depend; expected it, or --output")
     limits: dict[str, Any] = {"stop_after": stop_after, "max_nodes": max_nodes, "time_limit": time_limit}
     options = {"arithmetic": arithmetic, "proof_path": proof_file, "resume": resume, **limits}
-    answer(mesh, problem, value or 0.0, jobs, options, files)
+    answer(mesh, problem, value or 0.0, jobs, options, files, mirror)
 
 
 def _problem(mesh: str, options: dict[str, Any]) -> ContactProblem | ContactProblem3D:

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from enumsol.errors import InvalidArgumentError
 from enumsol.roots.root import Root, summary
+from enumsol.support.arguments import positive_number
 from enumsol.support.immutable import Immutable, Sealed
 from enumsol.support.messages import counted, html_lines, html_table
 
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 
     from enumsol.model.statuses import ContactStatus
     from enumsol.proof.proof_file import Proof
+    from enumsol.roots.mirrored import MirrorImages
     from enumsol.roots.root import Enclosure, RootFamily
     from enumsol.search.certifiers.protocol import Escalations
     from enumsol.support.arguments import Alpha
@@ -145,6 +148,8 @@ class RootSet(Sequence[Root], Immutable):
         What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed).
     proof : Proof or None
         In verified arithmetic: the proof that ``enumsol.verify`` checks; None when the search was interrupted.
+    mirror_images : MirrorImages or None
+        Which roots are mirror images of one another; None unless `mirrored` made it.
 
     Examples
     --------
@@ -169,6 +174,7 @@ class RootSet(Sequence[Root], Immutable):
         at_least: int | None = None,
         certified_data: str = "problem",
         proof: Proof | None = None,
+        mirror_images: MirrorImages | None = None,
     ) -> None:
         self.alpha = alpha
         self._roots = tuple(roots)
@@ -182,6 +188,7 @@ class RootSet(Sequence[Root], Immutable):
         self.node_ids = node_ids
         self.certified_data = certified_data
         self.proof = proof
+        self.mirror_images = mirror_images
         self._freeze()
 
     @property
@@ -230,8 +237,68 @@ class RootSet(Sequence[Root], Immutable):
     def __getitem__(self, item: int | slice) -> Root | tuple[Root, ...]:
         return self._roots[item]
 
+    def mirrored(self, mirror: Any, *, tolerance: float = 1e-9) -> RootSet:
+        """The same roots with ``mirror_images``, which tells which are mirror images of one another.
+
+        Nothing is taken from the symmetry: the search has found all roots without it, and a root without a mirror image
+        is reported as such (theory, section 6.14). Families are not compared.
+
+        Parameters
+        ----------
+        mirror : Mirror, or "x", "y", "z" or a (d,) vector
+            A direction stands for the mirror of `Mirror.across` through the middle of the contact nodes.
+        tolerance : float
+            By how much S, g and F may change at most under the mirror, relative to their size. Meshes and stiffness
+            matrices are symmetric within rounding; a root and the image of its partner may differ by a thousand times
+            as much, as roots of soft bodies do.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The problem is not symmetric up to the tolerance, or there is no isolated root.
+
+        Examples
+        --------
+        A wedge that can come out of its notch at either end:
+
+        >>> import enumsol
+        >>> problem = enumsol.gallery.wedge3d(2, 2, 2)
+        >>> roots = enumsol.enumerate_roots(problem, alpha=1).mirrored("y")
+        >>> roots.mirror_images.missing
+        ()
+        """
+        from enumsol.model.mirrors import Mirror  # meshes and shapes: for symmetric problems only
+        from enumsol.roots.mirrored import paired_roots, problem_asymmetry
+
+        if not self._roots:
+            raise InvalidArgumentError("there are no isolated roots to compare; expected at least one")
+        problem, limit = self._roots[0].problem, positive_number(tolerance, "tolerance")
+        plane = mirror if isinstance(mirror, Mirror) else Mirror.across(problem, mirror)
+        asymmetry = problem_asymmetry(problem, self.alpha, plane, limit)
+        return self._with(paired_roots(self._roots, plane, asymmetry, limit))
+
+    def _with(self, images: MirrorImages) -> RootSet:
+        return RootSet(
+            alpha=self.alpha,
+            roots=self._roots,
+            families=self.families,
+            undecided=self.undecided,
+            arithmetic=self.arithmetic,
+            method=self.method,
+            stopped=self.stopped,
+            stats=self.stats,
+            node_ids=self.node_ids,
+            at_least=self.at_least,
+            certified_data=self.certified_data,
+            proof=self.proof,
+            mirror_images=images,
+        )
+
     def to_frame(self) -> pd.DataFrame:
-        """One row per root and node: alpha, root, node, status, lambda_n, lambda_t, u_n, u_t, index, regular."""
+        """One row per root and node: alpha, root, node, status, lambda_n, lambda_t, u_n, u_t, index, regular.
+
+        After `mirrored` also mirror_image, the number of the root that is the mirror image, None where there is none.
+        """
         import pandas as pd  # slow to import, used here only
 
         count, p = len(self), len(self.node_ids)
@@ -248,8 +315,14 @@ class RootSet(Sequence[Root], Immutable):
                 },
                 "index": np.repeat(np.array([root.index for root in self], dtype=object), p),
                 "regular": np.repeat(np.array([root.regular for root in self], dtype=bool), p),
+                **self._mirror_column(p),
             }
         )
+
+    def _mirror_column(self, p: int) -> dict[str, Any]:
+        if self.mirror_images is None:
+            return {}
+        return {"mirror_image": np.repeat(np.array(self.mirror_images.images, dtype=object), p)}
 
     def plot_bodies(self, *, scale: float | None = None) -> Any:
         """A matplotlib figure of the deformed bodies of the isolated roots, up to 12 of them, side by side.
@@ -304,10 +377,13 @@ class RootSet(Sequence[Root], Immutable):
                 "yes" if root.regular else "no",
                 f"{root.margin:.2e}",
                 f"{np.max(root.lambda_n):.5g}",
-                summary(root.statuses),
+                summary(root.statuses) + self._mirror_words(k),
             )
             for k, root in enumerate(self._roots[:_PRINTED_ROOTS])
         ]
+
+    def _mirror_words(self, k: int) -> str:
+        return "" if self.mirror_images is None else f"; {self.mirror_images.words(k)}"
 
     def _notes(self) -> list[str]:
         """The lines below the table of roots."""
@@ -333,6 +409,8 @@ class RootSet(Sequence[Root], Immutable):
         if self.stats.fallback_qps:
             of = counted(self.stats.qps, "relaxation")
             lines.append(f"stalled: {self.stats.fallback_qps} of {of}, solved by a slower solver or not at all")
+        if self.mirror_images is not None:
+            lines += self.mirror_images.notes(complete=self.complete)
         total = self.index_sum
         # a sum other than +1 proves that something is missing or wrong
         note = "unknown" if total is None else f"{total:+d}" if total == 1 else f"{total:+d} (not +1!)"
