@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError
 from enumsol.roots.root import ContactState
 from enumsol.support.arguments import alpha_value
+from enumsol.support.messages import TextEnum
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from enumsol.support.arguments import AlphaLike
 
 
-class VertexKind(enum.StrEnum):
+class VertexKind(TextEnum):
     """What a vertex is; members compare with their texts: ``vertex.kind == "fold"``."""
 
     #: One arc from the left goes on as another to the right.
@@ -50,9 +50,6 @@ class VertexKind(enum.StrEnum):
     BROKEN = "broken"
     #: On the interval's border.
     END = "end"
-
-    def __repr__(self) -> str:
-        return repr(self.value)
 
 
 #: Kinds of vertices at which branches are cut.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.continuation.follower import Follower
 from enumsol.continuation.not_converged import AmbiguousStart
-from enumsol.continuation.path import Path, finished
+from enumsol.continuation.path import Path
 from enumsol.continuation.start import Start
 from enumsol.continuation.tangents import Tangent, admissible_tangents
 from enumsol.continuation.transitions import ACTIVE_TOLERANCE, CurvePoint
@@ -15,9 +15,7 @@ from enumsol.support.arguments import direction_value, row_number, shown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-from enumsol.model.problem import ContactProblem
 
-if TYPE_CHECKING:
     from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.model.problem import ContactProblem
@@ -92,7 +90,7 @@ def follow(
     chosen = _choose(first, direction, tangent)
     point = CurvePoint(first.x, chosen.codes, chosen.vector)
     sign = chosen.orientation or direction
-    return finished(Follower(first.equation, point, sign, first.interval, first.options, smooth_path, visited))
+    return Follower(Path, first, point, sign, visited).run()
 
 
 def start_tangents(

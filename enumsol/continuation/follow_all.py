@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,10 @@ from enumsol.support.arguments import alpha_interval, instance_of, optional_call
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from enumsol.continuation.audit.graph_map import GraphLike
+    from numpy.typing import NDArray
+
+    from enumsol.branches.elements import Arc
+    from enumsol.branches.graph import BranchGraph
     from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.support.arguments import AlphaLike
 
@@ -78,7 +81,7 @@ def follow_all(
     interval: tuple[AlphaLike, AlphaLike],
     options: ContinuationOptions | None = None,
     *,
-    graph: GraphLike | None = None,
+    graph: BranchGraph | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> FollowAllResult:
     """Every branch in the interval followed in both directions, and the audit of all paths.
@@ -181,20 +184,21 @@ class _Coverage:
                 yield _seed(arc, arc.lo + share * (arc.hi - arc.lo))
 
 
-@dataclass(frozen=True)
-class _Seed:
+class _Seed(NamedTuple):
+    """A root on an arc, to start from."""
+
     alpha: float
-    lambda_n: Any
-    lambda_t: Any
+    lambda_n: NDArray[np.float64]
+    lambda_t: NDArray[np.float64]
 
 
-def _seed(arc: Any, alpha: float) -> _Seed:
+def _seed(arc: Arc, alpha: float) -> _Seed:
     return _Seed(alpha, *arc.values(alpha))
 
 
 def follow_arc(
     problem: ContactProblem,
-    graph: GraphLike,
+    graph: BranchGraph,
     vertex: int,
     arc: int,
     interval: tuple[AlphaLike, AlphaLike] | None = None,

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
 from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
-from enumsol.continuation.path_data import PathStatus, PointKind
+from enumsol.continuation.path_data import PathData, PathStatus, PointKind
 from enumsol.continuation.recorder import PathRecorder
 from enumsol.continuation.tangents import curve_tangent, orientation
 from enumsol.continuation.transitions import (
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
-    from enumsol.continuation.continuation_options import ContinuationOptions
-    from enumsol.continuation.parameter_path import SmoothPath
-    from enumsol.continuation.path_data import PathData
+    from enumsol.continuation.start import Start
     from enumsol.continuation.tangents import Tangent
+
+_Path = TypeVar("_Path", bound=PathData)
 
 #: Conditions may be negative by this much at a point that is converged to rounding.
 ROUNDING = 1e-12
@@ -61,49 +61,38 @@ class _Stop:
     message: str
 
 
-class Follower:
+class Follower(Generic[_Path]):
     """One continuation.
 
     Parameters
     ----------
-    equation : CondensedEquation
+    kind : subclass of PathData
+        What is made of the points.
+    start : Start
     first : CurvePoint
         The start and the direction in which to leave it.
     sign : {+1, -1}
         Orientation kept along the path.
-    interval : (float, float)
-        Range of unscaled alpha.
-    options : ContinuationOptions
-    smooth_path : SmoothPath or None
-        Carried into the Path.
     visited : sequence of PathData
     """
 
     def __init__(
-        self,
-        equation: CondensedEquation,
-        first: CurvePoint,
-        sign: int,
-        interval: tuple[float, float],
-        options: ContinuationOptions,
-        smooth_path: SmoothPath | None,
-        visited: Sequence[PathData],
+        self, kind: type[_Path], start: Start, first: CurvePoint, sign: int, visited: Sequence[PathData] = ()
     ) -> None:
-        self.equation, self.options, self.interval = equation, options, interval
+        self._kind, self._smooth_path = kind, start.smooth_path
+        self.equation, self.options, self.interval = start.equation, start.options, start.interval
         self.current, self.sign = first, sign
-        self.h = options.h_init
-        self._smooth_path = smooth_path
+        self.h = self.options.h_init
         self._origin = first
         self._in_place = 0
         self._friction_ends = False
-        low, high = interval
-        margin = options.overshoot
-        self._low, self._high = (low - margin) / equation.alpha_scale, (high + margin) / equation.alpha_scale
-        self._landmarks = list(_landmarks(equation, visited))
-        self.record = PathRecorder(equation)
+        (low, high), margin, scale = self.interval, self.options.overshoot, self.equation.alpha_scale
+        self._low, self._high = (low - margin) / scale, (high + margin) / scale
+        self._landmarks = list(_landmarks(self.equation, visited))
+        self.record = PathRecorder(self.equation)
         self.record.add(first, PointKind.START)
 
-    def run(self) -> PathData:
+    def run(self) -> _Path:
         """Follow until a stop condition is met."""
         try:
             stop = None
@@ -115,15 +104,16 @@ class Follower:
             raise Interrupted(f"follow was {message}", partial) from interruption
         return self._path(stop)
 
-    def _path(self, stop: _Stop) -> PathData:
-        return self.record.path(
-            stop.status,
-            stop.message,
+    def _path(self, stop: _Stop) -> _Path:
+        return self._kind(
+            **self.record.found(),
+            status=stop.status,
+            message=stop.message,
             orientation=self.sign,
             interval=self.interval,
-            options=self.options,
+            options=replace(self.options, alpha_scale=self.equation.alpha_scale),
             next_step=self.h,
-            smooth_path=self._smooth_path,
+            _smooth_path=self._smooth_path,
         )
 
     def _alpha(self) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from enumsol.continuation.follower import Follower
@@ -11,7 +10,7 @@ from enumsol.continuation.path_files import load_path, save_path
 from enumsol.continuation.start import Start
 from enumsol.continuation.tangents import curve_tangent
 from enumsol.continuation.transitions import CurvePoint
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     import os
@@ -64,11 +63,6 @@ class Path(PathData):
     ('interval left', 1.0, 10.0)
     """
 
-    @classmethod
-    def of(cls, data: PathData) -> Path:
-        """The path of these data."""
-        return cls(**{item.name: getattr(data, item.name) for item in fields(data)})
-
     def plot(
         self, graph: Any = None, *, node: int = 0, quantity: str = "lambda_n", ax: Any = None, **graph_options: Any
     ) -> Any:
@@ -115,7 +109,7 @@ class Path(PathData):
         InvalidArgumentError
             The file does not hold a path.
         """
-        return cls.of(load_path(path))
+        return load_path(cls, path)
 
     def resume(
         self,
@@ -142,42 +136,19 @@ class Path(PathData):
             The problem is missing, or the path ended in a way from which it cannot go on.
         """
         body = self._problem if problem is None else problem
-        return _resumed(self, body, interval, options, self._smooth_path if smooth_path is None else smooth_path)
-
-
-def finished(follower: Follower) -> Path:
-    """The path that a follower makes; of an interrupted one the part so far goes with the error.
-
-    Raises
-    ------
-    Interrupted
-        On Ctrl-C.
-    """
-    try:
-        return Path.of(follower.run())
-    except Interrupted as interruption:
-        raise Interrupted(str(interruption), Path.of(interruption.partial)) from interruption.__cause__
-
-
-def _resumed(
-    path: Path,
-    problem: ContactProblem | None,
-    interval: tuple[AlphaLike, AlphaLike] | None,
-    options: ContinuationOptions | None,
-    smooth_path: SmoothPath | None,
-) -> Path:
-    """The path and what follows from its end."""
-    if problem is None:
-        raise InvalidArgumentError("problem is missing; a path loaded from a file needs it: path.resume(problem)")
-    if path.status in (PathStatus.CLOSED, PathStatus.DEAD_END):
-        raise InvalidArgumentError(f"the path cannot go on: {path.message}")
-    span = path.interval if interval is None else interval
-    start = Start(problem, path[-1], span, path.options if options is None else options, smooth_path)
-    codes = tuple(int(code) for code in path.codes[-1])
-    vector = curve_tangent(start.equation, codes, start.x, path.orientation)
-    if vector is None:
-        raise InvalidArgumentError("the path ends where its tangent is not unique; start anew with follow(tangent=...)")
-    first = CurvePoint(start.x, codes, vector)
-    follower = Follower(start.equation, first, path.orientation, start.interval, start.options, smooth_path, ())
-    follower.h = min(max(path.next_step, start.options.h_min), start.options.h_max)
-    return Path.of(path.joined(finished(follower)))
+        if body is None:
+            raise InvalidArgumentError("problem is missing; a path loaded from a file needs it: path.resume(problem)")
+        if self.status in (PathStatus.CLOSED, PathStatus.DEAD_END):
+            raise InvalidArgumentError(f"the path cannot go on: {self.message}")
+        span = self.interval if interval is None else interval
+        smooth = self._smooth_path if smooth_path is None else smooth_path
+        start = Start(body, self[-1], span, self.options if options is None else options, smooth)
+        codes = tuple(int(code) for code in self.codes[-1])
+        vector = curve_tangent(start.equation, codes, start.x, self.orientation)
+        if vector is None:
+            raise InvalidArgumentError(
+                "the path ends where its tangent is not unique; start anew with follow(tangent=...)"
+            )
+        follower = Follower(Path, start, CurvePoint(start.x, codes, vector), self.orientation)
+        follower.h = min(max(self.next_step, start.options.h_min), start.options.h_max)
+        return self.joined(follower.run())

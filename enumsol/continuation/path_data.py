@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from operator import add
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from enumsol.roots.root import summary
 from enumsol.support.immutable import Sealed
-from enumsol.support.messages import counted
+from enumsol.support.messages import TextEnum, counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +32,7 @@ _PRINTED_TRANSITIONS = 12
 ARRAYS = ("alpha", "lambda_n", "lambda_t", "u_n", "u_t", "codes", "steps", "corrections", "arclength")
 
 
-class PointKind(enum.StrEnum):
+class PointKind(TextEnum):
     """How a path came to a point; members compare with their texts."""
 
     START = "start"
@@ -41,11 +41,8 @@ class PointKind(enum.StrEnum):
     TRANSITION = "transition"
     END = "end"
 
-    def __repr__(self) -> str:
-        return repr(self.value)
 
-
-class PathStatus(enum.StrEnum):
+class PathStatus(TextEnum):
     """Why a path ended; members compare with their texts."""
 
     INTERVAL_LEFT = "interval left"
@@ -60,9 +57,6 @@ class PathStatus(enum.StrEnum):
     #: No step was accepted, however short.
     STALLED = "stalled"
     INTERRUPTED = "interrupted"
-
-    def __repr__(self) -> str:
-        return repr(self.value)
 
 
 @dataclass(frozen=True)
@@ -152,11 +146,7 @@ class PathStats:
         return self.not_converged + self.refused
 
     def __add__(self, other: PathStats) -> PathStats:
-        return PathStats(*(a + b for a, b in zip(_values(self), _values(other), strict=True)))
-
-
-def _values(stats: PathStats) -> tuple[Any, ...]:
-    return tuple(stats.__dict__.values())
+        return PathStats(*map(add, astuple(self), astuple(other)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -259,7 +249,7 @@ class PathData(Sequence[PathPoint], Sealed):
         columns |= {f"status_{node}": [names[i].value for names in self._names] for i, node in enumerate(nodes)}
         return pd.DataFrame(columns)
 
-    def joined(self, more: PathData) -> PathData:
+    def joined(self, more: Self) -> Self:
         """The path followed by one that starts at its end."""
         shift = len(self) - 1
         arrays: dict[str, Any] = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from enumsol.continuation.continuation_options import ContinuationOptions
 from enumsol.continuation.path_data import ARRAYS, PathData, PathStats, PathStatus, PointKind, Transition
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import os
 
 _FORMAT = 1
+_Path = TypeVar("_Path", bound=PathData)
 
 
 def save_path(path: PathData, file: str | os.PathLike[str]) -> None:
@@ -35,16 +36,16 @@ def save_path(path: PathData, file: str | os.PathLike[str]) -> None:
     write_arrays(file_path(file, "path"), _FORMAT, report, {name: getattr(path, name) for name in ARRAYS})
 
 
-def load_path(file: str | os.PathLike[str]) -> PathData:
-    """Read a path; see Path.load."""
+def load_path(kind: type[_Path], file: str | os.PathLike[str]) -> _Path:
+    """Read a path as an object of that class; see Path.load."""
     place = file_path(file, "path")
     with reading(place, "a path", "Path.save"):
-        return _unpacked(*read_arrays(place, _FORMAT, ARRAYS))
+        return _unpacked(kind, *read_arrays(place, _FORMAT, ARRAYS))
 
 
-def _unpacked(report: dict[str, Any], arrays: dict[str, Any]) -> PathData:
+def _unpacked(kind: type[_Path], report: dict[str, Any], arrays: dict[str, Any]) -> _Path:
     low, high = report["interval"]
-    return PathData(
+    return kind(
         **arrays,
         kinds=tuple(PointKind(kind) for kind in report["kinds"]),
         transitions=tuple(_unpack(item) for item in report["transitions"]),

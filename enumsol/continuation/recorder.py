@@ -1,21 +1,20 @@
-"""Collects the points of a continuation and makes a Path of them."""
+"""Collects the points of a continuation, with the transitions between them and the counts of its steps."""
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.continuation.path_data import PathData, PathStats, PathStatus, PointKind, Transition
+from enumsol.continuation.path_data import PathStats, PointKind, Transition
 from enumsol.errors import TooLargeError
 from enumsol.roots.local_branch import coherent_orientation
 
 if TYPE_CHECKING:
     from enumsol.continuation.condensed_equation import CondensedEquation, Vector
-    from enumsol.continuation.continuation_options import ContinuationOptions
-    from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.continuation.transitions import CurvePoint, Kink
     from enumsol.roots.local_branch import LocalBranchTest
 
@@ -32,15 +31,12 @@ class PathRecorder:
     kinds: list[PointKind] = field(default_factory=list)
     steps: list[float] = field(default_factory=list)
     corrections: list[int] = field(default_factory=list)
-    arclength: list[float] = field(default_factory=list)
     transitions: list[Transition] = field(default_factory=list)
     stats: PathStats = field(default_factory=PathStats)
     started: float = field(default_factory=time.perf_counter)
 
     def add(self, point: CurvePoint, kind: PointKind, step: float = 0.0, corrections: int = 0) -> None:
-        """Append a point; a point equal to the last one replaces it (the end of a path at a step or a transition)."""
-        length = self.equation.norm(point.x - self.points[-1].x) if self.points else 0.0
-        self.arclength.append(length + (self.arclength[-1] if self.arclength else 0.0))
+        """Append a point."""
         self.points.append(point)
         self.kinds.append(kind)
         self.steps.append(step)
@@ -69,47 +65,29 @@ class PathRecorder:
         """Add to the counts of the statistics."""
         self.stats = replace(self.stats, **{name: getattr(self.stats, name) + n for name, n in changes.items()})
 
-    def path(
-        self,
-        status: PathStatus,
-        message: str,
-        *,
-        orientation: int,
-        interval: tuple[float, float],
-        options: ContinuationOptions,
-        next_step: float,
-        smooth_path: SmoothPath | None,
-    ) -> PathData:
-        """The path so far."""
+    def found(self) -> dict[str, Any]:
+        """What a PathData keeps of the points so far, by the names of its attributes."""
         equation, p = self.equation, self.equation.p
         forces = np.array([equation.forces(point.x) for point in self.points])
         w = np.array([equation.displacements(point.x) for point in self.points])
-        return PathData(
-            alpha=np.array([equation.alpha(point.x) for point in self.points]),
-            lambda_n=forces[:, :p],
-            lambda_t=forces[:, p:],
-            u_n=w[:, :p],
-            u_t=w[:, p:],
-            codes=np.array([point.codes for point in self.points], dtype=np.int8),
-            kinds=tuple(self.kinds),
-            steps=np.array(self.steps),
-            corrections=np.array(self.corrections, dtype=np.int64),
-            arclength=np.array(self.arclength),
-            transitions=tuple(self.transitions),
-            status=status,
-            message=message,
-            orientation=orientation,
-            interval=interval,
-            options=replace(options, alpha_scale=equation.alpha_scale),
-            next_step=next_step,
-            stats=replace(self.stats, seconds=time.perf_counter() - self.started),
-            node_ids=equation.problem.node_ids,
-            _names=tuple(
-                equation.statuses(point.codes, slip) for point, slip in zip(self.points, w[:, p:], strict=True)
-            ),
-            _problem=equation.problem,
-            _smooth_path=smooth_path,
-        )
+        lengths = [equation.norm(after.x - before.x) for before, after in pairwise(self.points)]
+        return {
+            "alpha": np.array([equation.alpha(point.x) for point in self.points]),
+            "lambda_n": forces[:, :p],
+            "lambda_t": forces[:, p:],
+            "u_n": w[:, :p],
+            "u_t": w[:, p:],
+            "codes": np.array([point.codes for point in self.points], dtype=np.int8),
+            "kinds": tuple(self.kinds),
+            "steps": np.array(self.steps),
+            "corrections": np.array(self.corrections, dtype=np.int64),
+            "arclength": np.cumsum([0.0, *lengths]),
+            "transitions": tuple(self.transitions),
+            "stats": replace(self.stats, seconds=time.perf_counter() - self.started),
+            "node_ids": equation.problem.node_ids,
+            "_names": tuple(equation.statuses(one.codes, w[k, p:]) for k, one in enumerate(self.points)),
+            "_problem": equation.problem,
+        }
 
     def _slip(self, point: CurvePoint, step: float) -> Vector:
         return self.equation.w(point.x + step * point.tangent)[self.equation.p :]

@@ -31,7 +31,7 @@ START_TOLERANCE = 1e-6
 
 
 class Start:
-    """Validated arguments: the equation, the start as a point of it, interval and options."""
+    """Validated arguments: the equation, the start as a point of it, interval, options and smooth path."""
 
     def __init__(
         self,
@@ -46,6 +46,7 @@ class Start:
             instance_of(smooth_path, SmoothPath, "smooth_path")
         chosen = ContinuationOptions() if options is None else options
         self.options = instance_of(chosen, ContinuationOptions, "options")
+        self.smooth_path = smooth_path
         alpha, forces = _start_values(start, problem.p)
         self.interval = _interval(problem, interval, alpha, smooth_path)
         low, high = self.interval

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import enum
 from html import escape
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+
+class TextEnum(enum.StrEnum):
+    """Base of enumerations whose members compare with their texts, and are printed as these: ``kind == "fold"``."""
+
+    def __repr__(self) -> str:
+        return repr(self.value)
 
 
 def counted(number: int, singular: str, plural: str | None = None) -> str:

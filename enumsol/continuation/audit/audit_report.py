@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ import numpy as np
 
 from enumsol.continuation.audit.graph_map import GraphPlaceKind
 from enumsol.roots.root import summary
-from enumsol.support.messages import counted
+from enumsol.support.messages import TextEnum, counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -27,7 +26,7 @@ ROWS = "rows are counted from 0: in a file from the first row below the names of
 _PRINTED = 8
 
 
-class Verdict(enum.StrEnum):
+class Verdict(TextEnum):
     """Where a point is; members compare with their texts: ``point.verdict == "on"``."""
 
     #: Within the tolerance of its place.
@@ -36,9 +35,6 @@ class Verdict(enum.StrEnum):
     OFF = "off"
     #: Whether it is on the graph is not known, for the reason given.
     NOT_COMPARED = "not compared"
-
-    def __repr__(self) -> str:
-        return repr(self.value)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from enumsol.continuation.audit.audit_report import AuditedPoint, AuditReport, Jump, MissedArc, Verdict
-from enumsol.continuation.audit.graph_map import GraphLike, GraphMap, GraphPlace, GraphPlaceKind
+from enumsol.continuation.audit.graph_map import GraphMap, GraphPlace, GraphPlaceKind
 from enumsol.continuation.audit.points import Columns, PointRun, read_points
 from enumsol.continuation.path import Path
 from enumsol.errors import InvalidArgumentError
@@ -17,6 +17,7 @@ from enumsol.support.arguments import real_or_nan, shown
 if TYPE_CHECKING:
     import pandas as pd
 
+    from enumsol.branches.graph import BranchGraph
     from enumsol.continuation.condensed_equation import Vector
 
 #: A point further than this from every arc and vertex lies off the graph: ten times the tolerance of the corrections.
@@ -29,7 +30,7 @@ _UNPLACED = "on no arc that the graph holds, and the graph is not complete"
 
 def audit(
     path: Path | Sequence[Path] | pd.DataFrame | str | os.PathLike[str] | Sequence[PointRun],
-    graph: GraphLike,
+    graph: BranchGraph,
     *,
     tolerance: float = POINT_TOLERANCE,
     detour: float = DETOUR,
@@ -186,7 +187,7 @@ def _between(chart: GraphMap, points: tuple[Vector, Vector], places: tuple[Graph
     return {joining[0].number} if joining else set()
 
 
-def _missed(graph: GraphLike, visited: set[int]) -> tuple[MissedArc, ...]:
+def _missed(graph: BranchGraph, visited: set[int]) -> tuple[MissedArc, ...]:
     return tuple(
         MissedArc(arc.number, branch.number, arc.statuses, (arc.lo, arc.hi), bool(arc.dimension))
         for branch in graph.branches

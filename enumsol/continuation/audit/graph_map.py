@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import enum
 import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,14 +17,14 @@ from enumsol.continuation.transitions import selection_distance
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import real_or_nan, shown
+from enumsol.support.messages import TextEnum
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import NDArray
-
-    from enumsol.continuation.condensed_equation import Codes, Vector
-    from enumsol.model.statuses import ContactStatus
+    from enumsol.branches.elements import Arc, Vertex
+    from enumsol.branches.graph import BranchGraph
+    from enumsol.continuation.condensed_equation import Vector
 
 #: Points at which the length of an arc is measured.
 _SAMPLES = 9
@@ -40,61 +39,7 @@ _NEARER = 1 - 1e-9
 _ASKED = ("problem", "interval", "arcs", "vertices", "branches", "complete", "reasons")
 
 
-class ArcLike(Protocol):
-    """An arc of a branch graph between the vertices ``tail`` and ``head``; a sheet has a positive dimension.
-
-    ``selections`` are the status codes that hold on it; of a sheet, each gives a polytope of solutions at every alpha.
-    """
-
-    number: int
-    statuses: tuple[ContactStatus, ...]
-    lo: float
-    hi: float
-    tail: int
-    head: int
-    dimension: int
-    selections: tuple[Codes, ...]
-
-    def values(self, alpha: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(lambda_n, lambda_t) at an alpha of the arc, which is no sheet."""
-
-
-class VertexLike(Protocol):
-    """A vertex of a branch graph; ``family`` is a RootFamily or None."""
-
-    number: int
-    alpha: float
-    lambda_n: NDArray[np.float64]
-    lambda_t: NDArray[np.float64]
-    family: Any
-
-
-class GraphLike(Protocol):
-    """What an audit asks of a BranchGraph: ``arcs`` are ArcLike and ``vertices`` VertexLike.
-
-    ``reasons`` say why solutions may be missing from the graph; without any, ``complete`` says whether completeness is
-    proven.
-    """
-
-    problem: ContactProblem
-    interval: tuple[float, float]
-    arcs: tuple[Any, ...]
-    vertices: tuple[Any, ...]
-    reasons: tuple[str, ...]
-
-    @property
-    def complete(self) -> bool:
-        """Whether it is proven that no solution in the interval is missing."""
-
-    @property
-    def branches(self) -> Sequence[Any]:
-        """Arcs in a row: ``branch.arcs``, with a ``branch.number``."""
-
-    def starting_points(self) -> Iterable[Any]:
-        """Regular roots, one or more on every branch."""
-
-
-def checked_graph(graph: Any) -> GraphLike:
+def checked_graph(graph: Any) -> BranchGraph:
     """The argument ``graph`` as a branch graph.
 
     Raises
@@ -109,11 +54,11 @@ def checked_graph(graph: Any) -> GraphLike:
             f"graph is a {type(graph).__name__}{why}; expected a BranchGraph, which holds arcs over an interval "
             "(of branch_graph or BranchGraph.load)"
         )
-    found: GraphLike = graph
+    found: BranchGraph = graph
     return found
 
 
-class GraphPlaceKind(enum.StrEnum):
+class GraphPlaceKind(TextEnum):
     """What a point lies on; members compare with their texts."""
 
     #: An arc, or a sheet.
@@ -123,9 +68,6 @@ class GraphPlaceKind(enum.StrEnum):
     OUTSIDE = "outside"
     #: The graph has no arc and no vertex.
     NONE = "none"
-
-    def __repr__(self) -> str:
-        return repr(self.value)
 
 
 @dataclass(frozen=True)
@@ -166,7 +108,7 @@ class GraphMap:
 
     Parameters
     ----------
-    graph : GraphLike
+    graph : BranchGraph
     tolerance : float
         Points within this of an arc or vertex lie on it.
 
@@ -176,13 +118,13 @@ class GraphMap:
         The graph is no branch graph, or the tolerance is not between 0 and 1.
     """
 
-    def __init__(self, graph: GraphLike, tolerance: float) -> None:
+    def __init__(self, graph: BranchGraph, tolerance: float) -> None:
         self.graph, self.tolerance = checked_graph(graph), checked_tolerance(tolerance)
         low, high = (float(end) for end in graph.interval)
         scale = ALPHA_FRACTION * (high - low)
         self.equation = CondensedEquation(AffinePath(graph.problem), (low, high), low, alpha_scale=scale)
-        self.arcs: dict[int, ArcLike] = {arc.number: arc for arc in graph.arcs}
-        self.vertices: dict[int, VertexLike] = {vertex.number: vertex for vertex in graph.vertices}
+        self.arcs: dict[int, Arc] = {arc.number: arc for arc in graph.arcs}
+        self.vertices: dict[int, Vertex] = {vertex.number: vertex for vertex in graph.vertices}
         self.curves = [arc for arc in self.arcs.values() if not arc.dimension]
         self._corners = {number: self._corner_points(vertex) for number, vertex in self.vertices.items()}
 
@@ -223,12 +165,12 @@ class GraphMap:
         distance = min((self.arc_distance(x, arc) for arc in ends), default=math.inf)
         return GraphPlace(GraphPlaceKind.VERTEX, place.number, min(place.distance, distance))
 
-    def _gap(self, x: Vector, arc: ArcLike) -> float:
+    def _gap(self, x: Vector, arc: Arc) -> float:
         """Distance in alpha alone, a lower bound."""
         alpha = self.equation.alpha(x)
         return max(arc.lo - alpha, alpha - arc.hi, 0.0) / self.equation.alpha_scale
 
-    def _in_order(self, near: GraphPlace | None) -> Iterable[ArcLike]:
+    def _in_order(self, near: GraphPlace | None) -> Iterable[Arc]:
         if near is None:
             return self.arcs.values()
         if near.kind is GraphPlaceKind.ARC and near.number in self.arcs:
@@ -238,7 +180,7 @@ class GraphMap:
             ends, first = {near.number}, -1
         return sorted(self.arcs.values(), key=lambda a: (a.number != first, not ends & {a.tail, a.head}, a.number))
 
-    def arc_distance(self, x: Vector, arc: ArcLike) -> float:
+    def arc_distance(self, x: Vector, arc: Arc) -> float:
         """Distance of a point from an arc (from a sheet: at the alpha of the point)."""
         low, high = arc.lo, arc.hi
         alpha = min(max(self.equation.alpha(x), low), high)
@@ -261,12 +203,12 @@ class GraphMap:
             alpha = min(max(alpha + self.equation.dot(x - y, slope) / self.equation.dot(slope, slope), low), high)
         return best
 
-    def _sheet_distance(self, x: Vector, arc: ArcLike, alpha: float) -> float:
+    def _sheet_distance(self, x: Vector, arc: Arc, alpha: float) -> float:
         y = np.append(x[:-1], alpha / self.equation.alpha_scale)
         across = min(selection_distance(self.equation, codes, y) for codes in arc.selections)
         return math.hypot(across, float(x[-1] - y[-1]))
 
-    def on_arc(self, arc: ArcLike, alpha: float) -> Vector:
+    def on_arc(self, arc: Arc, alpha: float) -> Vector:
         """Scaled point of an arc."""
         return self.point(alpha, *arc.values(alpha))
 
@@ -274,7 +216,7 @@ class GraphMap:
         """Distance of a point from a vertex, or from the nearest polytope of a family."""
         return min(self._hull_distance(x, corners) for corners in self._corners[number])
 
-    def _corner_points(self, vertex: VertexLike) -> list[Vector]:
+    def _corner_points(self, vertex: Vertex) -> list[Vector]:
         if vertex.family is None:
             return [self.point(vertex.alpha, vertex.lambda_n, vertex.lambda_t)[None, :]]
         return [
@@ -306,7 +248,7 @@ class GraphMap:
             network.add_edge(arc.tail, arc.head, key=arc.number, weight=self._length(arc))
         return network
 
-    def _length(self, arc: ArcLike) -> float:
+    def _length(self, arc: Arc) -> float:
         """Length of an arc; of a sheet, what every way across it has at least."""
         if arc.dimension:
             return (arc.hi - arc.lo) / self.equation.alpha_scale
