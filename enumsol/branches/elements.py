@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -17,11 +17,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.arithmetic.algebraic import CriticalAlpha
-    from enumsol.branches.enclosed.arc_values import ArcValues
     from enumsol.model.statuses import ContactStatus
     from enumsol.roots.root import RootFamily
     from enumsol.selections.solution import Codes
     from enumsol.support.arguments import AlphaLike
+
+    #: Forces and displacements, arrays of length 2p.
+    Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 class VertexKind(TextEnum):
@@ -101,6 +103,13 @@ class Vertex(ContactState):
         return self.exact.enclosure()
 
 
+class ArcValues(Protocol):
+    """lambda and w of a selection's solutions."""
+
+    def at(self, alpha: Fraction) -> Pair:
+        """At an alpha of the arc; beside its rounded ends, those of a point on it."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Arc:
     """All solutions of one selection between two neighbouring critical alphas, one for every alpha (many on a sheet).
@@ -135,8 +144,8 @@ class Arc:
     tail: int
     head: int
     index: int | None
-    dimension: int
-    grazing: bool
+    dimension: int = 0
+    grazing: bool = False
     selections: tuple[Codes, ...] = field(repr=False)
     begin: CriticalAlpha = field(repr=False)
     end: CriticalAlpha = field(repr=False)
@@ -157,7 +166,7 @@ class Arc:
         """Whether it is known to begin below an alpha and to end above it."""
         return self.begin.compare(alpha) < 0 < self.end.compare(alpha)
 
-    def state(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def state(self, alpha: AlphaLike) -> Pair:
         """Forces and displacements at an alpha of the arc, both (2p,), normal ones first; errors as ``values``."""
         exact = alpha_value(alpha)
         value = float(exact)
@@ -171,7 +180,7 @@ class Arc:
             )
         return self._values.at(Fraction(exact))
 
-    def values(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def values(self, alpha: AlphaLike) -> Pair:
         """(lambda_n, lambda_t) at an alpha of the arc, arrays of shape (p,) [force].
 
         Exact, then rounded, on a graph whose ``arcs_by`` is "exact"; else in double arithmetic.
@@ -184,7 +193,7 @@ class Arc:
         forces = self.state(alpha)[0]
         return forces[: len(self.statuses)], forces[len(self.statuses) :]
 
-    def displacements(self, alpha: AlphaLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def displacements(self, alpha: AlphaLike) -> Pair:
         """(u_n, u_t) at an alpha of the arc, two arrays of shape (p,) [length]; errors as ``values``."""
         moves = self.state(alpha)[1]
         return moves[: len(self.statuses)], moves[len(self.statuses) :]

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
+from enumsol.branches.assembly import make_branches, make_components, multigraph
 from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps, uniqueness_bound
 from enumsol.branches.elements import VertexKind
-from enumsol.branches.exact.make_elements import make_branches, make_components, multigraph
 from enumsol.branches.graph_text import completeness, graph_html, graph_text
 from enumsol.branches.roots_at import roots_of
 from enumsol.errors import IncompleteGraphError, InvalidArgumentError

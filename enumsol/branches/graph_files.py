@@ -16,8 +16,9 @@ from flint import fmpq, fmpz, fmpz_poly
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
 from enumsol.branches.elements import Arc, Vertex, VertexKind
-from enumsol.branches.enclosed.arc_values import ExactArcValues, TracedArcValues
+from enumsol.branches.enclosed.make_traced import TracedArcValues
 from enumsol.branches.enclosed.traced import TracedProblem
+from enumsol.branches.exact.make_elements import ExactArcValues
 from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.condensation.unloaded import vanishing_alpha
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from enumsol.branches.enclosed.arc_values import ArcValues
+    from enumsol.branches.elements import ArcValues
     from enumsol.selections.solution import Codes
 
 FORMAT, VERSION = "enumsol-branch-graph", 3

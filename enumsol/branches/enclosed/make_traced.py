@@ -2,25 +2,55 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.arithmetic.algebraic import EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.elements import Arc, Vertex, VertexKind
-from enumsol.branches.enclosed.arc_values import TracedArcValues
+from enumsol.branches.assembly import make_vertex, sides_of, with_exact_zeros
+from enumsol.branches.elements import Arc
 from enumsol.branches.enclosed.joining import EventPlaceKind
-from enumsol.branches.exact.make_elements import degree_of, named_active, vertex_kind, with_exact_zeros
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK
+from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.roots.slip_signs import shown_status
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Sequence, Set
+    from fractions import Fraction
 
+    from enumsol.branches.assembly import Sides
+    from enumsol.branches.elements import Pair, Vertex
     from enumsol.branches.enclosed.joining import EventPlace, Joined, JoinedArc
     from enumsol.branches.enclosed.traced import TracedProblem
-    from enumsol.selections.solution import ActiveSets
+    from enumsol.selections.solution import ActiveSets, Codes
+
+
+@dataclass(frozen=True)
+class TracedArcValues:
+    """Values in double arithmetic, with the rounding errors of S.
+
+    Attributes
+    ----------
+    traced : TracedProblem
+    codes : status codes
+    sample : Fraction
+        An alpha inside the arc.
+    """
+
+    traced: TracedProblem
+    codes: Codes
+    sample: Fraction
+
+    def at(self, alpha: Fraction) -> Pair:
+        """Forces and displacements at an alpha."""
+        for value in (alpha, self.sample):
+            found = self.traced.values(self.codes, value, precisely=False)
+            if found is None:
+                found = self.traced.values(self.codes, value, precisely=True)
+            if found is not None:
+                return found
+        raise AssertionError("an arc's selection is not regular inside it")
 
 
 def make_traced(traced: TracedProblem, joined: Joined) -> tuple[list[Vertex], list[Arc]]:
@@ -28,13 +58,8 @@ def make_traced(traced: TracedProblem, joined: Joined) -> tuple[list[Vertex], li
     number = {place: k for k, place in enumerate(joined.places)}
     exact = [EnclosedAlpha(rational(place.low), rational(place.high)) for place in joined.places]
     arcs = [_arc(traced, k, arc, (number[arc.tail], number[arc.head]), exact) for k, arc in enumerate(joined.arcs)]
-    left: list[list[Arc]] = [[] for _ in exact]
-    right: list[list[Arc]] = [[] for _ in exact]
-    for arc in arcs:
-        right[arc.tail].append(arc)
-        left[arc.head].append(arc)
-    sides = zip(joined.places, exact, left, right, strict=True)
-    return [_vertex(traced, k, *parts) for k, parts in enumerate(sides)], arcs
+    sides = sides_of(arcs, len(exact))
+    return [_vertex(traced, k, place, exact[k], sides[k]) for k, place in enumerate(joined.places)], arcs
 
 
 def _arc(
@@ -46,18 +71,15 @@ def _arc(
         EnclosedAlpha(rational(known), rational(known)) if place.kind is EventPlaceKind.OPEN else exact[vertex]
         for place, known, vertex in zip((arc.tail, arc.head), (arc.low, arc.high), ends, strict=True)
     )
-    still = [i for i, code in enumerate(arc.codes) if code == FRICTIONLESS]
-    signs = traced.slip_signs(arc.codes, sample, still) if still else {}
+    signs = _slip_signs(traced, [arc.codes], sample, [{code} for code in arc.codes])
     return Arc(
         number=number,
-        statuses=tuple(shown_status(code, signs.get(i, 0)) for i, code in enumerate(arc.codes)),
+        statuses=tuple(map(shown_status, arc.codes, signs)),
         lo=float(begin),
         hi=float(end),
         tail=ends[0],
         head=ends[1],
         index=arc.index or None,
-        dimension=0,
-        grazing=False,
         selections=(arc.codes,),
         begin=begin,
         end=end,
@@ -66,43 +88,33 @@ def _arc(
     )
 
 
-def _vertex(
-    traced: TracedProblem,
-    number: int,
-    place: EventPlace,
-    exact: EnclosedAlpha,
-    left: Sequence[Arc],
-    right: Sequence[Arc],
-) -> Vertex:
-    p, border = traced.problem.p, place.low == place.high and place.low in traced.interval
+def _vertex(traced: TracedProblem, number: int, place: EventPlace, exact: EnclosedAlpha, sides: Sides) -> Vertex:
+    p = traced.problem.p
     settled = place.kind is not EventPlaceKind.OPEN and place.whole
-    degrees = (degree_of(left), degree_of(right)) if settled else (None, None)
     active = _active(traced, place)
     middle = (place.low + place.high) / 2
-    values = traced.values(place.members[0], middle, precisely=True) if place.members else None
-    forces, w = (np.zeros(2 * p), np.zeros(2 * p)) if values is None else values
-    if settled:
-        forces, w = with_exact_zeros(forces, w, active)
-    still = [i for i, codes in enumerate(active) if FRICTIONLESS in codes]
-    signs = traced.slip_signs(place.members[0], middle, still) if still and place.members else {}
-    names = named_active(active, lambda node: signs.get(node, 0))
-    return Vertex(
-        number=number,
-        alpha=float(exact),
-        kind=vertex_kind(left, right, border=border, dimension=0) if settled else VertexKind.UNSETTLED,
-        border=border,
-        statuses=tuple(next(s for s in STATUSES if s in found) for found in names),
-        active=names,
-        lambda_n=forces[:p],
-        lambda_t=forces[p:],
-        u_n=w[:p],
-        u_t=w[p:],
-        family=None,
-        index_left=degrees[0],
-        index_right=degrees[1],
-        selections=tuple(place.members),
-        exact=exact,
+    known = traced.values(place.members[0], middle, precisely=True) if place.members else None
+    state = (np.zeros(2 * p), np.zeros(2 * p)) if known is None else known
+    return make_vertex(
+        number,
+        exact,
+        sides,
+        with_exact_zeros(state, active) if settled else state,
+        active,
+        _slip_signs(traced, place.members, middle, active).__getitem__,
+        place.members,
+        border=place.low == place.high and place.low in traced.interval,
+        settled=settled,
     )
+
+
+def _slip_signs(
+    traced: TracedProblem, members: Sequence[Codes], alpha: Fraction, active: Sequence[Set[int]]
+) -> list[int]:
+    """Signs of u_t at the nodes without friction, by the first selection that holds; 0 elsewhere."""
+    still = [i for i, codes in enumerate(active) if FRICTIONLESS in codes]
+    signs = traced.slip_signs(members[0], alpha, still) if still and members else {}
+    return [signs.get(i, 0) for i in range(len(active))]
 
 
 def _active(traced: TracedProblem, place: EventPlace) -> ActiveSets:
