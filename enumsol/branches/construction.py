@@ -19,7 +19,7 @@ from enumsol.branches.enclosed.traced import TracedProblem
 from enumsol.branches.exact.gluing import glue
 from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.branches.graph import BranchGraph
-from enumsol.branches.graph_data import GraphData, GraphStats
+from enumsol.branches.graph_data import GraphStats
 from enumsol.branches.proof_records import write_graph_proof
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.data import EXACT_DOF_LIMIT
@@ -95,7 +95,7 @@ def branch_graph(
         "verified": every leaf of the search is proven empty over its whole piece of the interval, and every surviving
         selection is followed, by rigorous error bounds for the problem's own matrices (theory, section 7.14). The graph
         is made of these arcs; up to 24 degrees of freedom, and up to 250 if bounds left something open, it is made by
-        exact algebra instead, for the same matrices (``graph.data.arcs_by`` says which). Beyond 250, or where exact
+        exact algebra instead, for the same matrices (``graph.arcs_by`` says which). Beyond 250, or where exact
         algebra would take more than some minutes, what is left open is a vertex of kind "unsettled", and the graph is
         not complete. Only where A is positive definite within rounding are more than 24 degrees of freedom about S and
         g as computed in floats (``graph.certified_data``).
@@ -180,19 +180,18 @@ def branch_graph(
         search_seconds=searched - started,
         seconds=time.perf_counter() - started,
     )
-    data = GraphData(
+    graph = BranchGraph(
         problem=problem,
         exact=made.exact,
-        interval=(a, b),
+        exact_interval=(a, b),
         arithmetic=arithmetic,
         vertices=tuple(made.vertices),
         arcs=tuple(made.arcs),
-        reasons=(*map(str, made.stops), *made.reasons),
+        undecided=(*map(str, made.stops), *made.reasons),
         stats=stats,
         pieces=tuple(search.pieces),
         make_proof=_proof(search, problem, made),
     )
-    graph = BranchGraph(data)
     if any(stop.interrupted for stop in made.stops):
         raise Interrupted("branch_graph was interrupted; the arcs found so far are kept", graph)
     return graph

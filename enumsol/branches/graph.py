@@ -6,35 +6,27 @@ from collections import Counter
 from dataclasses import asdict
 from fractions import Fraction
 from functools import cached_property
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from enumsol.arithmetic.algebraic import CriticalAlpha
-from enumsol.arithmetic.rationals import rational
-from enumsol.branches.assembly import make_branches, make_components, multigraph
-from enumsol.branches.claims import Claims, Multiplicity, MultiplicitySteps, uniqueness_bound
+from enumsol.branches.claims import Multiplicity, MultiplicitySteps, uniqueness_bound
 from enumsol.branches.elements import VertexKind
-from enumsol.branches.graph_text import completeness, graph_html, graph_text
-from enumsol.branches.roots_at import roots_of
+from enumsol.branches.figures.graph_plots import plot_graph
+from enumsol.branches.graph_data import GraphData
+from enumsol.branches.graph_files import load_graph, save_graph, write_graphml
+from enumsol.branches.graph_text import arcs_frame, graph_html, graph_text, vertices_frame
+from enumsol.branches.roots_at import roots_at, roots_of
 from enumsol.errors import IncompleteGraphError, InvalidArgumentError
 from enumsol.support.arguments import alpha_value
-from enumsol.support.immutable import Immutable
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    import pandas as pd
-
-    from enumsol.branches.elements import Arc, Branch, Component, Vertex
-    from enumsol.branches.graph_data import GraphData
-    from enumsol.proof.proof_file import Proof
+    from enumsol.branches.elements import Arc, Branch, Vertex
     from enumsol.roots.root import Root, RootFamily
-    from enumsol.roots.root_set import RootSet
     from enumsol.support.arguments import AlphaLike
 
 
-class BranchGraph(Immutable):
+class BranchGraph(GraphData):
     """All solutions over an interval of alpha: arcs of single selections, glued at vertices (made by ``branch_graph``).
 
     A graph with ``reasons`` is not complete. It shows what was found, and every part of it is true: arcs are solutions,
@@ -42,21 +34,27 @@ class BranchGraph(Immutable):
     the whole graph (``multiplicity_at``, ``steps``, ``uniqueness_limit``) raises IncompleteGraphError then;
     ``at_least`` and ``claims`` give what is known.
 
-    Parameters
-    ----------
-    data : GraphData
-
     Attributes
     ----------
     problem : ContactProblem
-    interval : (float, float)
-    arithmetic : str
+    interval, exact_interval : (float, float), (Fraction, Fraction)
+    arithmetic, arcs_by, certified_data : str
+        How leaves were decided; how arcs were followed, "exact" (functions of alpha in rationals) or "balls"; and what
+        completeness is about, "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed).
+    complete : bool
+        Whether it is proven that no solution is missing.
+    claims : Claims
+        What is known about the number of solutions.
     vertices : tuple of Vertex
         In the order of alpha.
     arcs : tuple of Arc
     graph : networkx.MultiGraph
         Nodes are the numbers of vertices (attributes alpha, kind, statuses, ..., vertex), edges the arcs, keyed by
         their numbers (attributes statuses, alpha, index, values, ..., arc).
+    components, branches : tuples of Component, and of Branch
+        Connected components, and what is left of them cut at bifurcations, families and sheets.
+    branch_of : mapping
+        Number of the branch of every arc, by the arc's number.
     reasons : tuple of str
         Why the graph is not complete: what was left out, stayed undecided or contradicts the balance of degrees.
     stats : GraphStats
@@ -75,62 +73,12 @@ class BranchGraph(Immutable):
     (3.0, 5, 3)
     """
 
-    def __init__(self, data: GraphData) -> None:
-        self.data = data
-        self.problem = data.problem
-        self.exact = data.exact
-        self.exact_interval = data.interval
-        self.interval = (float(data.interval[0]), float(data.interval[1]))
-        self.arithmetic = data.arithmetic
-        self.vertices = data.vertices
-        self.arcs = data.arcs
-        self.stats = data.stats
-        self.pieces = data.pieces
-        self.graph = multigraph(self.vertices, self.arcs)
-        self.reasons = data.all_reasons
-        self._freeze()
-
-    @property
-    def proof(self) -> Proof | None:
-        """The proof for ``enumsol.verify``, made when it is first asked for."""
-        return self.data.proof
-
-    @property
-    def complete(self) -> bool:
-        """Whether it is proven that no solution is missing: proven leaves, nothing undecided, degrees balanced."""
-        return self.data.complete
-
-    @property
-    def claims(self) -> Claims:
-        """What is known about the number of solutions: exact counts, or lower bounds for a graph with gaps."""
-        return self.data.claims
-
     def _whole(self, name: str, instead: str) -> None:
         """Refuse a statement about all solutions unless nothing is known to be missing."""
         if not self.claims.whole:
             raise IncompleteGraphError(f"{name} is not known: the graph is not complete ({self.reasons[0]}); {instead}")
 
-    @property
-    def certified_data(self) -> str:
-        """What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed)."""
-        return self.data.certified_data
-
     # -- parts -----------------------------------------------------------------------------------------------------
-
-    @cached_property
-    def components(self) -> tuple[Component, ...]:
-        """Connected components of what was found, in the order of their smallest alpha."""
-        return make_components(self.graph, self.vertices, self.arcs)
-
-    @cached_property
-    def branches(self) -> tuple[Branch, ...]:
-        """Components cut at bifurcations, families and sheets: paths and closed loops of arcs, and sheets."""
-        return make_branches(self.components, self.vertices)
-
-    @cached_property
-    def branch_of(self) -> Mapping[int, int]:
-        """Number of the branch of every arc, by the arc's number."""
-        return MappingProxyType({arc.number: branch.number for branch in self.branches for arc in branch.arcs})
 
     def _of_kind(self, kind: VertexKind) -> tuple[Vertex, ...]:
         return tuple(v for v in self.vertices if v.kind is kind)
@@ -179,23 +127,6 @@ class BranchGraph(Immutable):
 
     # -- solutions at one alpha ------------------------------------------------------------------------------------
 
-    def _inside(self, alpha: AlphaLike) -> Fraction:
-        """An alpha of the interval."""
-        value, (low, high) = Fraction(alpha_value(alpha)), self.exact_interval
-        if low <= value <= high:
-            return value
-        raise InvalidArgumentError(
-            f"alpha is {float(value):.17g}; expected a value in the graph's interval [{float(low):g}, {float(high):g}]"
-        )
-
-    def _located(self, alpha: AlphaLike) -> tuple[list[Arc], list[Vertex], list[Vertex]]:
-        """Arcs over an alpha, vertices at it, and vertices whose bounds are too wide to tell on which side it lies."""
-        point = CriticalAlpha.rational(rational(self._inside(alpha)))
-        arcs = [arc for arc in self.arcs if arc.passes_over(point)]
-        equal = [v for v in self.vertices if v.exact.compare(point) == 0]
-        known = [v for v in equal if v.exact.is_rational]
-        return arcs, known, [v for v in equal if v not in known]
-
     def arcs_at(self, alpha: AlphaLike) -> tuple[Arc, ...]:
         """Arcs and sheets that pass over an alpha inside the interval (vertices at it do not count).
 
@@ -204,7 +135,7 @@ class BranchGraph(Immutable):
         InvalidArgumentError
             alpha is outside the interval, or cannot be told from a vertex of which only bounds are known.
         """
-        arcs, _, near = self._located(alpha)
+        arcs, _, near = self.located(alpha)
         if not near:
             return tuple(arcs)
         low, high = map(float, near[0].enclosure)
@@ -213,19 +144,7 @@ class BranchGraph(Immutable):
             f"{low!r} and {high!r}; expected another alpha, or roots_at, which solves there"
         )
 
-    def roots_at(self, alpha: AlphaLike) -> RootSet:
-        """All solutions at one alpha, as enumerate_roots returns them; of a graph with gaps, those that were found.
-
-        Raises
-        ------
-        InvalidArgumentError
-            alpha is outside the interval.
-        """
-        arcs, vertices, near = self._located(alpha)
-        beside = {v.number for v in near}
-        arcs += [arc for arc in self.arcs if beside & {arc.tail, arc.head}]
-        codes = {c for arc in arcs for c in arc.selections} | {c for v in (*vertices, *near) for c in v.selections}
-        return roots_of(self.data, alpha_value(alpha), sorted(codes))
+    roots_at = roots_at
 
     def multiplicity_at(self, alpha: AlphaLike) -> int:
         """Number of isolated roots and of families at one alpha, together.
@@ -255,7 +174,7 @@ class BranchGraph(Immutable):
         return self._multiplicity(alpha).count
 
     def _multiplicity(self, alpha: AlphaLike) -> Multiplicity:
-        found = self.claims.multiplicity(self._inside(alpha))
+        found = self.claims.multiplicity(self.inside(alpha))
         if self.claims.whole and not found.exact:
             # only the side on which a vertex lies is not known
             roots = self.roots_at(alpha)
@@ -309,7 +228,7 @@ class BranchGraph(Immutable):
             alpha = 0.5 * (arc.lo + arc.hi)
             if arc.grazing or not arc.lo < alpha < arc.hi:
                 continue
-            roots = roots_of(self.data, alpha, arc.selections)
+            roots = roots_of(self, alpha, arc.selections)
             if len(roots) and roots[0].regular:
                 return roots[0]
         return None
@@ -319,25 +238,15 @@ class BranchGraph(Immutable):
         found = (self.starting_point(branch) for branch in self.branches)
         return tuple(root for root in found if root is not None)
 
-    # -- tables and files ------------------------------------------------------------------------------------------
+    # -- tables, files and figures ---------------------------------------------------------------------------------
 
-    def to_frame(self) -> pd.DataFrame:
-        """One row per arc: its branch, component, ends and their kinds, index, dimension and statuses (by node)."""
-        from enumsol.branches.graph_text import arcs_frame  # pandas, slow to import
-
-        return arcs_frame(self.data, self.components, self.branch_of)
-
-    def vertices_frame(self) -> pd.DataFrame:
-        """One row per vertex and contact node: alpha, kind, statuses that hold, and values."""
-        from enumsol.branches.graph_text import vertices_frame  # as above
-
-        return vertices_frame(self.data)
-
-    def save(self, file: str | Path) -> None:
-        """Write the graph with its problem to a JSON file, all numbers to the last bit; ``load`` reads it."""
-        from enumsol.branches.graph_files import save_graph
-
-        save_graph(self.data, file)
+    to_frame = arcs_frame
+    vertices_frame = vertices_frame
+    save = save_graph
+    write_graphml = write_graphml
+    plot = plot_graph
+    __repr__ = graph_text
+    _repr_html_ = graph_html
 
     @classmethod
     def load(cls, file: str | Path) -> BranchGraph:
@@ -348,31 +257,7 @@ class BranchGraph(Immutable):
         InvalidArgumentError
             The file is not such a graph.
         """
-        from enumsol.branches.graph_files import load_graph
-
-        return cls(load_graph(file))
-
-    def write_graphml(self, file: str | Path) -> None:
-        """Write vertices and arcs as GraphML for other graph programs (values at the vertices, no functions)."""
-        from enumsol.branches.graph_files import write_graphml
-
-        write_graphml(self.data, self.branch_of, file)
-
-    def plot(self, quantity: str | None = None, nodes: Sequence[Any] | None = None, **options: Any) -> Any:
-        """A figure of alpha against an overview, or a quantity of chosen nodes; see branches.figures.graph_plots."""
-        from enumsol.branches.figures.graph_plots import plot_graph  # as above
-
-        return plot_graph(self, quantity, nodes, **options)
-
-    def completeness(self) -> str:
-        """The closing line of the printed summary."""
-        return completeness(self.data)
-
-    def __repr__(self) -> str:
-        return graph_text(self.data, len(self.components), self.branches)
-
-    def _repr_html_(self) -> str:
-        return graph_html(self.data, len(self.components), self.branches)
+        return load_graph(cls, file)
 
     def summary(self) -> dict[str, Any]:
         """Counts and answers as plain values, for JSON; what is not known is None."""

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
+from enumsol.arithmetic.algebraic import CriticalAlpha
+from enumsol.arithmetic.rationals import rational
+from enumsol.branches.assembly import make_branches, make_components, multigraph
 from enumsol.branches.claims import Claims, Standing
 from enumsol.branches.elements import VertexKind
+from enumsol.errors import InvalidArgumentError
+from enumsol.support.arguments import alpha_value
+from enumsol.support.immutable import Immutable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from fractions import Fraction
+    from collections.abc import Callable, Mapping
 
-    from enumsol.branches.elements import Arc, Vertex
+    from enumsol.branches.elements import Arc, Branch, Component, Vertex
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.model.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
     from enumsol.search.interval.subintervals import SearchedPiece
+    from enumsol.support.arguments import AlphaLike
 
 
 @dataclass(frozen=True)
@@ -46,21 +54,21 @@ class GraphStats:
     seconds: float = 0.0
 
 
-@dataclass(frozen=True)
-class GraphData:
-    """Vertices and arcs over an interval, and where they come from.
+@dataclass(eq=False, repr=False)
+class GraphData(Immutable):
+    """Vertices and arcs over an interval, where they come from, and what they are parts of; see BranchGraph.
 
     Attributes
     ----------
     problem : ContactProblem
     exact : ExactCondensed or None
         The condensed problem in rationals, on which the arcs rest; None where they were followed in ball arithmetic.
-    interval : (Fraction, Fraction)
+    exact_interval : (Fraction, Fraction)
     arithmetic : str
     vertices : tuple of Vertex
         In the order of alpha.
     arcs : tuple of Arc
-    reasons : tuple of str
+    undecided : tuple of str
         What search and gluing left out or could not decide.
     stats : GraphStats
     pieces : tuple of SearchedPiece
@@ -71,19 +79,27 @@ class GraphData:
 
     problem: ContactProblem
     exact: ExactCondensed | None
-    interval: tuple[Fraction, Fraction]
+    exact_interval: tuple[Fraction, Fraction]
     arithmetic: str
     vertices: tuple[Vertex, ...]
     arcs: tuple[Arc, ...]
-    reasons: tuple[str, ...]
+    undecided: tuple[str, ...]
     stats: GraphStats
     pieces: tuple[SearchedPiece, ...] = ()
     make_proof: Callable[[], Proof | None] | None = None
+
+    def __post_init__(self) -> None:
+        self._freeze()
 
     @cached_property
     def proof(self) -> Proof | None:
         """The proof, made when it is first asked for; None when there is none."""
         return None if self.make_proof is None else self.make_proof()
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """First and last alpha, rounded."""
+        return float(self.exact_interval[0]), float(self.exact_interval[1])
 
     @property
     def certified_data(self) -> str:
@@ -98,18 +114,67 @@ class GraphData:
     @property
     def complete(self) -> bool:
         """Whether it is proven that no solution is missing: proven leaves, nothing undecided, degrees balanced."""
-        return self.arithmetic != "fast" and not self.all_reasons
+        return self.arithmetic != "fast" and not self.reasons
 
     @cached_property
-    def all_reasons(self) -> tuple[str, ...]:
+    def reasons(self) -> tuple[str, ...]:
         """Why the graph is not complete: what was left out, and what contradicts the balance of degrees."""
-        return (*self.reasons, *self.gaps)
+        return (*self.undecided, *self.gaps)
 
     @cached_property
     def claims(self) -> Claims:
         """What is known about the number of solutions: exact counts, or lower bounds for a graph with gaps."""
         whole = Standing.PROVEN if self.complete else Standing.NOT_PROVEN
-        return Claims(self.vertices, self.arcs, self.interval, Standing.INCOMPLETE if self.all_reasons else whole)
+        return Claims(self.vertices, self.arcs, self.exact_interval, Standing.INCOMPLETE if self.reasons else whole)
+
+    def completeness(self) -> str:
+        """The closing line of the printed summary: whether the graph is complete, and of what, or why not."""
+        if self.reasons:
+            more = f" and {len(self.reasons) - 1} more" if len(self.reasons) > 1 else ""
+            return f"complete: no ({self.reasons[0]}{more})"
+        if not self.complete:
+            return "complete: not proven (degrees balance at every vertex)"
+        about = "" if self.certified_data == "problem" else " for S and g as computed"
+        return f"complete: yes (proven{about})"
+
+    # -- parts -----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def graph(self) -> Any:
+        """The networkx.MultiGraph of vertices and arcs."""
+        return multigraph(self.vertices, self.arcs)
+
+    @cached_property
+    def components(self) -> tuple[Component, ...]:
+        """Connected components of what was found, in the order of their smallest alpha."""
+        return make_components(self.graph, self.vertices, self.arcs)
+
+    @cached_property
+    def branches(self) -> tuple[Branch, ...]:
+        """Components cut at bifurcations, families and sheets: paths and closed loops of arcs, and sheets."""
+        return make_branches(self.components, self.vertices)
+
+    @cached_property
+    def branch_of(self) -> Mapping[int, int]:
+        """Number of the branch of every arc, by the arc's number."""
+        return MappingProxyType({arc.number: branch.number for branch in self.branches for arc in branch.arcs})
+
+    def inside(self, alpha: AlphaLike) -> Fraction:
+        """An alpha of the interval."""
+        value, (low, high) = Fraction(alpha_value(alpha)), self.exact_interval
+        if low <= value <= high:
+            return value
+        raise InvalidArgumentError(
+            f"alpha is {float(value):.17g}; expected a value in the graph's interval [{float(low):g}, {float(high):g}]"
+        )
+
+    def located(self, alpha: AlphaLike) -> tuple[list[Arc], list[Vertex], list[Vertex]]:
+        """Arcs over an alpha, vertices at it, and vertices whose bounds are too wide to tell on which side it lies."""
+        point = CriticalAlpha.rational(rational(self.inside(alpha)))
+        arcs = [arc for arc in self.arcs if arc.passes_over(point)]
+        equal = [v for v in self.vertices if v.exact.compare(point) == 0]
+        known = [v for v in equal if v.exact.is_rational]
+        return arcs, known, [v for v in equal if v not in known]
 
     @cached_property
     def gaps(self) -> tuple[str, ...]:
@@ -117,9 +182,9 @@ class GraphData:
 
         Each of them proves that something is missing.
         """
-        found, first = [], float(self.interval[0])
+        found, first = [], float(self.exact_interval[0])
         unsettled = sum(v.kind is VertexKind.UNSETTLED for v in self.vertices)
-        if unsettled and not self.reasons:
+        if unsettled and not self.undecided:
             found.append(f"selections that were not examined hold at {unsettled} of {len(self.vertices)} vertices")
         for v in self.vertices:
             if v.kind is VertexKind.UNSETTLED:
@@ -133,6 +198,6 @@ class GraphData:
                 )
         start = [v.index_right for v in self.vertices if v.border and v.alpha == first]
         total = sum(k for k in start if k is not None)
-        if not self.reasons and None not in start and total != 1:
+        if not self.undecided and None not in start and total != 1:
             found.append(f"the degrees of all arcs at alpha = {first:g} sum to {total:+d} and not to +1")
         return tuple(found)

@@ -7,7 +7,7 @@ import re
 from dataclasses import asdict
 from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import networkx as nx
 import numpy as np
@@ -31,12 +31,13 @@ from enumsol.support.arguments import file_path
 from enumsol.support.files import writing
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from enumsol.branches.elements import ArcValues
     from enumsol.selections.solution import Codes
 
+_Graph = TypeVar("_Graph", bound=GraphData)
 FORMAT, VERSION = "enumsol-branch-graph", 3
 #: Version 1 gave kinds to the vertices of graphs that were not complete; only its complete graphs are read. Before
 #: version 3 every vertex with a single arc was "broken".
@@ -47,16 +48,16 @@ _FRACTION = re.compile(r"-?\d+(/\d+)?", re.ASCII)
 
 
 def save_graph(data: GraphData, file: str | Path) -> None:
-    """Write a graph and its problem as JSON (see BranchGraph.save)."""
+    """Write the graph with its problem to a JSON file, all numbers to the last bit; ``load`` reads it."""
     record = {
         "format": FORMAT,
         "version": VERSION,
         "problem": _problem_record(data.problem),
         "arcs_by": data.arcs_by,
         "condensed_exactly": data.certified_data == "problem",
-        "interval": [str(end) for end in data.interval],
+        "interval": [str(end) for end in data.exact_interval],
         "arithmetic": data.arithmetic,
-        "reasons": list(data.reasons),
+        "reasons": list(data.undecided),
         "stats": asdict(data.stats),
         "vertices": [_vertex_record(v) for v in data.vertices],
         "arcs": [_arc_record(arc, data.vertices) for arc in data.arcs],
@@ -66,8 +67,8 @@ def save_graph(data: GraphData, file: str | Path) -> None:
         place.write_text(json.dumps(record), encoding="utf-8")
 
 
-def load_graph(file: str | Path) -> GraphData:
-    """Read a graph that save_graph wrote (see BranchGraph.load).
+def load_graph(kind: type[_Graph], file: str | Path) -> _Graph:
+    """Read a graph that save_graph wrote as an object of that class (see BranchGraph.load).
 
     Raises
     ------
@@ -89,12 +90,12 @@ def load_graph(file: str | Path) -> GraphData:
                 f"graph {file} is not complete and was saved by an earlier version, which claimed more about such "
                 "graphs than is known; expected a complete one, or one saved by this version"
             )
-        return _from_record(record)
+        return _from_record(kind, record)
     except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise InvalidArgumentError(f"graph {file} is damaged (at {error}); expected a saved graph") from error
 
 
-def _from_record(record: dict[str, Any]) -> GraphData:
+def _from_record(kind: type[_Graph], record: dict[str, Any]) -> _Graph:
     problem = _problem(record["problem"])
     first, last = (_fraction(end) for end in record["interval"])
     exact, values = _values(problem, record, (first, last))
@@ -102,7 +103,7 @@ def _from_record(record: dict[str, Any]) -> GraphData:
     vertices = tuple(_vertex(k, item, balls=balls) for k, item in enumerate(record["vertices"]))
     arcs = tuple(_arc(k, item, vertices, values) for k, item in enumerate(record["arcs"]))
     reasons, stats = tuple(record["reasons"]), GraphStats(**record["stats"])
-    return GraphData(problem, exact, (first, last), record["arithmetic"], vertices, arcs, reasons, stats)
+    return kind(problem, exact, (first, last), record["arithmetic"], vertices, arcs, reasons, stats)
 
 
 def _values(
@@ -297,8 +298,8 @@ def _arc_end(known: str | None, vertex: Vertex) -> tuple[float, CriticalAlpha]:
 # -- other programs ----------------------------------------------------------------------------------------------------
 
 
-def write_graphml(data: GraphData, branch_of: Mapping[int, int], file: str | Path) -> None:
-    """Write vertices and arcs as GraphML, arrays as text."""
+def write_graphml(data: GraphData, file: str | Path) -> None:
+    """Write vertices and arcs as GraphML for other graph programs (arrays at the vertices as text, no functions)."""
     plain = nx.MultiGraph(complete=data.complete, standing=data.claims.standing.value)
     for v in data.vertices:
         plain.add_node(
@@ -318,7 +319,7 @@ def write_graphml(data: GraphData, branch_of: Mapping[int, int], file: str | Pat
             statuses=" ".join(_names(arc.statuses)),
             index="" if arc.index is None else str(arc.index),
             dimension=arc.dimension,
-            branch=branch_of[arc.number],
+            branch=data.branch_of[arc.number],
         )
     place = file_path(file, "file")
     with writing(place, "file"):

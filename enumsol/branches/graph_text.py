@@ -9,11 +9,9 @@ from enumsol.branches.elements import VertexKind
 from enumsol.support.messages import counted, html_lines, html_table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     import pandas as pd
 
-    from enumsol.branches.elements import Branch, Component
+    from enumsol.branches.elements import Branch
     from enumsol.branches.graph_data import GraphData
 
 
@@ -21,27 +19,15 @@ if TYPE_CHECKING:
 _PRINTED_BRANCHES = 20
 
 
-def completeness(data: GraphData) -> str:
-    """Whether the graph is complete, and of what, or why not."""
-    reasons = data.all_reasons
-    if reasons:
-        more = f" and {len(reasons) - 1} more" if len(reasons) > 1 else ""
-        return f"complete: no ({reasons[0]}{more})"
-    if not data.complete:
-        return "complete: not proven (degrees balance at every vertex)"
-    about = "" if data.certified_data == "problem" else " for S and g as computed"
-    return f"complete: yes (proven{about})"
-
-
-def graph_text(data: GraphData, components: int, branches: Sequence[Branch]) -> str:
+def graph_text(data: GraphData) -> str:
     """Counts, a line a branch, and whether the graph is complete."""
-    lines = [*_heading(data, components, branches), *map(_branch_line, branches[:_PRINTED_BRANCHES])]
-    if len(branches) > _PRINTED_BRANCHES:
-        lines.append(f"  ... {len(branches) - _PRINTED_BRANCHES} more branches")
-    return "\n".join([*lines, completeness(data)])
+    lines = [*_heading(data), *map(_branch_line, data.branches[:_PRINTED_BRANCHES])]
+    if len(data.branches) > _PRINTED_BRANCHES:
+        lines.append(f"  ... {len(data.branches) - _PRINTED_BRANCHES} more branches")
+    return "\n".join([*lines, data.completeness()])
 
 
-def graph_html(data: GraphData, components: int, branches: Sequence[Branch]) -> str:
+def graph_html(data: GraphData) -> str:
     """The same in a notebook."""
     rows = [
         (
@@ -51,22 +37,22 @@ def graph_html(data: GraphData, components: int, branches: Sequence[Branch]) -> 
             *(f"{end:.6g}" for end in branch.interval),
             ", ".join(f"{v.alpha:.6g}" for v in branch.folds),
         )
-        for branch in branches[:_PRINTED_BRANCHES]
+        for branch in data.branches[:_PRINTED_BRANCHES]
     ]
-    more = len(branches) - _PRINTED_BRANCHES
+    more = len(data.branches) - _PRINTED_BRANCHES
     table = html_table(("branch", "shape", "arcs", "alpha from", "to", "folds at"), rows) if rows else ""
-    closing = [*([f"... {more} more branches"] if more > 0 else []), completeness(data)]
-    return html_lines(_heading(data, components, branches)) + table + html_lines(closing)
+    closing = [*([f"... {more} more branches"] if more > 0 else []), data.completeness()]
+    return html_lines(_heading(data)) + table + html_lines(closing)
 
 
-def _heading(data: GraphData, components: int, branches: Sequence[Branch]) -> list[str]:
+def _heading(data: GraphData) -> list[str]:
     kinds = Counter(v.kind for v in data.vertices)
     numbers = ", ".join(f"{kinds[kind]} {kind}" for kind in VertexKind if kinds[kind])
-    a, b = (float(end) for end in data.interval)
+    a, b = data.interval
     found = "" if data.claims.whole else ", not complete; of what was found:"
     return [
         f"BranchGraph for alpha in [{a:g}, {b:g}] ({data.arithmetic}){found}",
-        f"  components {components}, branches {len(branches)}, arcs {len(data.arcs)}",
+        f"  components {len(data.components)}, branches {len(data.branches)}, arcs {len(data.arcs)}",
         f"  vertices {len(data.vertices)}" + (f": {numbers}" if numbers else ""),
     ]
 
@@ -89,15 +75,15 @@ def _shape(branch: Branch) -> str:
     return "unfinished" if any(v.kind is VertexKind.UNSETTLED for v in branch.vertices) else "open"
 
 
-def arcs_frame(data: GraphData, components: Sequence[Component], branch_of: Mapping[int, int]) -> pd.DataFrame:
+def arcs_frame(data: GraphData) -> pd.DataFrame:
     """One row per arc: its branch, component, ends and their kinds, index, dimension and statuses (by node)."""
     import pandas as pd
 
-    place = {arc.number: c.number for c in components for arc in c.arcs}
+    place = {arc.number: c.number for c in data.components for arc in c.arcs}
     rows = [
         {
             "arc": arc.number,
-            "branch": branch_of[arc.number],
+            "branch": data.branch_of[arc.number],
             "component": place[arc.number],
             "alpha_from": arc.lo,
             "alpha_to": arc.hi,

@@ -17,13 +17,29 @@ from enumsol.roots.root_set import RootSet, SearchStats
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.selections.float_selections import FloatSelections
 from enumsol.selections.rational_selections import ExactSelections
+from enumsol.support.arguments import alpha_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.branches.graph_data import GraphData
     from enumsol.selections.solution import Codes, SelectionSolution
-    from enumsol.support.arguments import Alpha
+    from enumsol.support.arguments import Alpha, AlphaLike
+
+
+def roots_at(data: GraphData, alpha: AlphaLike) -> RootSet:
+    """All solutions at one alpha, as enumerate_roots returns them; of a graph with gaps, those that were found.
+
+    Raises
+    ------
+    InvalidArgumentError
+        alpha is outside the interval.
+    """
+    arcs, vertices, near = data.located(alpha)
+    beside = {v.number for v in near}
+    arcs += [arc for arc in data.arcs if beside & {arc.tail, arc.head}]
+    codes = {c for arc in arcs for c in arc.selections} | {c for v in (*vertices, *near) for c in v.selections}
+    return roots_of(data, alpha_value(alpha), sorted(codes))
 
 
 def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> RootSet:
@@ -58,10 +74,10 @@ def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> Root
         undecided=(),
         arithmetic=data.arithmetic,
         method="graph",
-        stopped=str(Stop(StopReason.GRAPH_INCOMPLETE)) if data.all_reasons else None,
+        stopped=str(Stop(StopReason.GRAPH_INCOMPLETE)) if data.reasons else None,
         stats=SearchStats(selections=len(selections)),
         node_ids=problem.node_ids,
-        at_least=whole + int(whole < len(components)) if data.all_reasons else None,
+        at_least=whole + int(whole < len(components)) if data.reasons else None,
     )
 
 
@@ -69,7 +85,7 @@ def _in_balls(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> Roo
     """Roots that the selections are proven to have, for the problem's data as given."""
     positive = [F > 0 for F in exactly_at(Fraction(alpha), *data.problem.friction)]
     codes = _codes_at(selections, tuple(positive))
-    return roots_of_selections(data.problem, alpha, codes, whole=not data.all_reasons)
+    return roots_of_selections(data.problem, alpha, codes, whole=not data.reasons)
 
 
 def _codes_at(selections: Sequence[Codes], F_positive: tuple[bool, ...]) -> list[Codes]:

@@ -257,7 +257,7 @@ def test_continua_and_grazing_arcs(clock, takes, name):
 def test_arcs_in_balls(clock, takes, limit):
     problem = gallery.get("wedge-8-5").build()
     whole = branch_graph(problem, (0, 3))
-    assert whole.data.arcs_by == "balls"
+    assert whole.arcs_by == "balls"
     takes(_Tracing, "_box")
     graph = branch_graph(problem, (0, 3), time_limit=limit)
     assert clock[0] <= kept(limit) < 60

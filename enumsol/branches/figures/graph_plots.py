@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from enumsol.branches.figures.curves import (
 from enumsol.branches.figures.labels import narrow_changes
 from enumsol.branches.figures.marks import GREY, MARKERS, STATUS_STYLES, colour_of, handles, index_style
 from enumsol.branches.figures.panels import draw_numbers, draw_steps, drawn_range, family_range, sheet_range
+from enumsol.branches.roots_at import roots_at
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import alpha_interval, positive_number, shown
 from enumsol.support.messages import counted
@@ -27,37 +29,7 @@ from enumsol.support.plotting import axes_or_none, figure_of, new_figure
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from enumsol.branches.claims import Claims
-    from enumsol.branches.elements import Arc, Branch, Vertex
-    from enumsol.model.problem import ContactProblem
-    from enumsol.roots.root_set import RootSet
-
-
-class DrawnGraph(Protocol):
-    """What a figure shows of a BranchGraph."""
-
-    problem: ContactProblem
-    interval: tuple[float, float]
-    vertices: tuple[Vertex, ...]
-    arcs: tuple[Arc, ...]
-
-    @property
-    def branches(self) -> tuple[Branch, ...]:
-        """Paths and closed loops of arcs, and sheets."""
-
-    @property
-    def branch_of(self) -> Mapping[int, int]:
-        """Number of the branch of every arc."""
-
-    @property
-    def claims(self) -> Claims:
-        """What is known about the number of solutions."""
-
-    def completeness(self) -> str:
-        """One sentence about it."""
-
-    def roots_at(self, alpha: float) -> RootSet:
-        """All solutions at one alpha."""
+    from enumsol.branches.graph_data import GraphData
 
 
 #: Panels drawn when no nodes are named.
@@ -78,7 +50,7 @@ class _Style:
 
 
 def plot_graph(
-    graph: DrawnGraph,
+    graph: GraphData,
     quantity: str | None = None,
     nodes: Sequence[Any] | None = None,
     *,
@@ -98,7 +70,6 @@ def plot_graph(
 
     Parameters
     ----------
-    graph : BranchGraph
     quantity : {"norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"}, optional
         The first three are overviews: norm of all contact forces (the default), sums of normal and of tangential
         forces. The others are of single nodes; default "lambda_n" if nodes are named.
@@ -173,7 +144,7 @@ def checked_units(units: Any) -> tuple[str, str] | None:
     return units[0], units[1]
 
 
-def _rows(graph: DrawnGraph, quantity: Quantity, nodes: Sequence[Any] | None, *, one: bool) -> list[int]:
+def _rows(graph: GraphData, quantity: Quantity, nodes: Sequence[Any] | None, *, one: bool) -> list[int]:
     """Columns of the values, one per panel: contact nodes, or the only column of an overview."""
     ids = list(graph.problem.node_ids)
     if nodes is not None:
@@ -198,7 +169,7 @@ def _rows(graph: DrawnGraph, quantity: Quantity, nodes: Sequence[Any] | None, *,
     return sorted(np.argsort(-spread, kind="stable")[:most].tolist())
 
 
-def _windows(graph: DrawnGraph, zoom: Any) -> list[tuple[float, float]]:
+def _windows(graph: GraphData, zoom: Any) -> list[tuple[float, float]]:
     if isinstance(zoom, (bool, np.bool_)):
         return narrow_changes(graph.claims.steps(), graph.interval) if zoom else []
     low, high = (float(end) for end in alpha_interval(zoom, "zoom"))
@@ -226,7 +197,7 @@ def _grid(rows: int, multiplicity: bool, zooms: int, figsize: Any) -> tuple[Any,
     return figure, axes
 
 
-def _drawn(graph: DrawnGraph, style: _Style, window: tuple[float, float] | None) -> dict[int, Curve]:
+def _drawn(graph: GraphData, style: _Style, window: tuple[float, float] | None) -> dict[int, Curve]:
     lo, hi = window or graph.interval
     arcs = [arc for arc in graph.arcs if not arc.dimension]
     changing = [arc for arc in arcs if window is not None and (lo < arc.lo < hi or lo < arc.hi < hi)]
@@ -241,7 +212,7 @@ def _drawn(graph: DrawnGraph, style: _Style, window: tuple[float, float] | None)
 
 def _panel(
     axis: Any,
-    graph: DrawnGraph,
+    graph: GraphData,
     style: _Style,
     row: int,
     drawn: dict[int, Curve],
@@ -255,7 +226,7 @@ def _panel(
     for arc in graph.arcs:
         if arc.dimension:
             sides = graph.vertices[arc.tail], graph.vertices[arc.head]
-            band = sheet_range(graph.problem, graph.roots_at, arc, sides, quantity, row)
+            band = sheet_range(graph.problem, partial(roots_at, graph), arc, sides, quantity, row)
             if band is not None:
                 axis.fill_between(*band, color=GREY, alpha=0.25, linewidth=0)
         elif arc.number in drawn:
@@ -284,7 +255,7 @@ def _panel(
 
 
 def _ending(
-    graph: DrawnGraph, drawn: dict[int, Curve], row: int, window: tuple[float, float]
+    graph: GraphData, drawn: dict[int, Curve], row: int, window: tuple[float, float]
 ) -> tuple[float, float] | None:
     """The range of the arcs that end inside a window, with room above and below; None where it has no height."""
     lo, hi = window
@@ -297,7 +268,7 @@ def _ending(
     return (low - room, high + room) if room > 1e-12 * max(abs(low), abs(high)) else None
 
 
-def _dress(axis: Any, graph: DrawnGraph, style: _Style, row: int, window: tuple[float, float]) -> None:
+def _dress(axis: Any, graph: GraphData, style: _Style, row: int, window: tuple[float, float]) -> None:
     quantity = style.quantity
     name = f"{quantity.name} of node {graph.problem.node_ids[row]}" if quantity.by_node else quantity.words
     if style.units is not None:
@@ -327,7 +298,7 @@ def _mark_windows(axes: list[list[Any]], windows: list[tuple[float, float]]) -> 
 
 
 def _words(
-    figure: Any, first: Any, graph: DrawnGraph, quantity: Quantity, title: str | None, others: set[str], *, alone: bool
+    figure: Any, first: Any, graph: GraphData, quantity: Quantity, title: str | None, others: set[str], *, alone: bool
 ) -> None:
     """The title and the legend."""
     problem, (a, b) = graph.problem, graph.interval
