@@ -345,16 +345,6 @@ def test_mutants_accepted_as_a_whole_are_true(name):
         assert any(accepted)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("block", range(2))
-@pytest.mark.parametrize("name", ORIGINALS)
-def test_thousands_of_mutants_accepted_as_a_whole_are_true(name, block):
-    rng = random.Random(f"{name} {block}")
-    records = original(name)[1]
-    for _ in range(MUTANTS):
-        judge(name, mutant(rng, records))
-
-
 @pytest.mark.few(3)
 @pytest.mark.parametrize("name", [name for name in ORIGINALS if name != "open"])
 def test_an_arc_removed_with_its_events_is_refused(name):

@@ -1,21 +1,21 @@
 """Mutation testing of graph proofs: a mutant that is accepted names every selection that holds somewhere, exactly."""
 
 import functools
-from contextlib import nullcontext
+import struct
+from contextlib import nullcontext, suppress
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from generators import through_the_unloaded_state
 from graph_proofs import forms_at_once, without_arcs
-from hypothesis import HealthCheck, assume, given, settings, strategies as st
 from oracles import exact_solutions
-from proof_tools import copied, multipliers, proof_of, records_of, with_multipliers
+from proof_fuzz import mutant, read
+from proof_tools import copied, proof_of, records_of
 from rational_checker import check_records
 
-from enumsol import ContactProblem, branch_graph, gallery, verify
+from enumsol import ContactProblem, ProofFormatError, branch_graph, gallery, verify
 
-QUICK = settings(max_examples=120, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 SAMPLES = 25
 
 
@@ -60,87 +60,15 @@ def case(name):
     return problem, without_arcs(records_of(graph.proof)), holding  # arcs are forged in test_rational_arcs
 
 
-def _mutate_codes(draw, record):
-    place, codes = draw(st.integers(0, len(record[1]) - 1)), record[1]
-    record[1] = codes[:place] + str(draw(st.integers(0, 6))) + codes[place + 1 :]
-
-
-def _mutate_values(draw, record):
-    rows, values = multipliers(["x", *record[2:]])
-    assume(rows)
-    j = draw(st.integers(0, len(rows) - 1))
-    how = draw(st.sampled_from(("sign", "scale", "all", "row", "drop")))
-    if how == "sign":
-        values[j] = -values[j]
-    elif how == "scale":
-        values[j] *= draw(st.sampled_from((0.0, 0.5, 2.0, 1e3, 1 + 1e-9)))
-    elif how == "all":
-        values = [v * draw(st.sampled_from((1e-6, 0.5, 2.0, 1e6))) for v in values]
-    elif how == "row":
-        rows[j] = draw(st.integers(0, 20))
-    else:
-        del rows[j], values[j]
-    record[2:] = with_multipliers(["x", "", ""], rows, values)[1:]
-
-
-def _mutate_header(draw, record):
-    if "interval" in record:
-        place = draw(st.integers(0, 1))
-        shift = Fraction(draw(st.sampled_from((-1, 1))), 4)
-        record["interval"][place] = str(Fraction(record["interval"][place]) + shift)
-    elif "piece" in record:
-        key = draw(st.sampled_from(("piece", "force", "length", "roots")))
-        place = draw(st.integers(0, len(record[key]) - 1))
-        if key == "piece":
-            record[key][place] = str(Fraction(record[key][place]) + Fraction(draw(st.integers(-2, 2)), 8))
-        elif key == "roots":
-            record[key][place] = "5" + record[key][place][1:]
-        else:
-            shift = draw(st.integers(-3, 3))
-            record["force"] = [x + shift for x in record["force"]]
-            record["length"] = [x - shift * draw(st.integers(0, 1)) for x in record["length"]]
-    else:
-        key = draw(st.sampled_from(sorted(record)))
-        record[key] += draw(st.integers(-1, 1))
-
-
-def mutate(draw, records):
-    """Change one thing."""
-    k = draw(st.integers(0, len(records) - 1))
-    record = records[k]
-    how = draw(st.sampled_from(("inside", "inside", "inside", "drop", "repeat", "swap", "kind")))
-    if how == "drop":
-        del records[k]
-    elif how == "repeat":
-        records.insert(k, copied(record))
-    elif how == "swap":
-        other = draw(st.integers(0, len(records) - 1))
-        records[k], records[other] = records[other], records[k]
-    elif isinstance(record, dict):
-        _mutate_header(draw, record)
-    elif how == "kind" and record[0] != "q":
-        kind = draw(st.sampled_from("scxf"))
-        records[k] = [kind, *record[1:]] if kind in "xf" else [kind, record[1]]
-    elif record[0] in ("x", "f") and draw(st.booleans()):
-        _mutate_values(draw, record)
-    elif record[0] == "q":
-        values, j = record[draw(st.integers(1, 4))], draw(st.integers(0, len(record[1]) - 1))
-        values[j] = values[j] * draw(st.sampled_from((-1.0, 0.5, 1 + 1e-9, 2.0, 30.0))) + draw(
-            st.sampled_from((0.0, 0.1))
-        )
-    else:
-        _mutate_codes(draw, record)
-
-
 def recount(records):
     """Make the counts at the end fit, as somebody would who wants to be believed."""
-    lists = [record for record in records if isinstance(record, list)]
+    lists = [record for record in records if isinstance(record, list) and len(record) > 1]
     claim = {
         "pieces": sum(isinstance(record, dict) and "piece" in record for record in records),
         "leaves": sum(record[0] in ("x", "f") for record in lists),
-        "selections": len({record[1] for record in lists if record[0] == "s"}),
+        "selections": len({str(record[1]) for record in lists if record[0] == "s"}),
     }
-    if isinstance(records[-1], dict) and "pieces" in records[-1]:
+    if records and isinstance(records[-1], dict) and "pieces" in records[-1]:
         records[-1] = claim
 
 
@@ -148,29 +76,26 @@ def recount(records):
 @pytest.mark.parametrize("name", [*PATHS, *BY_FORMS])
 def test_accepted_mutants_name_every_selection_that_holds(name):
     problem, original, holding = case(name)
-    accepted = []
-
-    @QUICK
-    @given(st.data())
-    def check(data):
+    rng, accepted = np.random.default_rng([3, len(name)]), 0
+    for _ in range(120):
         records = copied(original)
-        for _ in range(data.draw(st.integers(1, 3))):
-            mutate(data.draw, records)
-        if data.draw(st.booleans()):
+        for _ in range(int(rng.integers(1, 4))):
+            with suppress(ValueError, TypeError, struct.error):  # it does not apply to what is left
+                records = read(mutant(rng, records, None, ("nudge", "nudge", "nudge", "order", "numbers"))[0])
+        if rng.random() < 0.5:
             recount(records)
-        report = verify(problem, proof_of(records))
+        try:
+            report = verify(problem, proof_of(records))
+        except ProofFormatError:
+            continue
         if not report.ok:
             assert report.failures
-            return
-        accepted.append(records != original)
+            continue
+        accepted += records != original
         assert check_records(problem, records) == report.selections
         a, b = report.interval
-        for alpha, codes in holding.items():
-            if a <= alpha <= b:
-                assert codes <= report.selections
-
-    check()
-    assert any(accepted)
+        assert all(codes <= report.selections for alpha, codes in holding.items() if a <= alpha <= b)
+    assert accepted
 
 
 def test_the_originals_name_every_selection_that_holds():

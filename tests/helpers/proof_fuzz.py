@@ -262,7 +262,7 @@ def _numbers(rng, records, _):
     # those of 3D are lists of numbers, which the mutations of fields reach
     places = [k for k in lists if changed[k][0] in ("x", "X") and isinstance(changed[k][-1], str)]
     if not places:
-        return _field(rng, records, _)
+        return _nudge(rng, records, _)
     at = _pick(rng, places)
     head = changed[at][:-2]
     rows, values = multipliers(["x", *changed[at][-2:]])
