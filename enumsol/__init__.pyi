@@ -60,6 +60,9 @@ from .fixed_points import (
     solve_tresca as solve_tresca,
     successive_approximations as successive_approximations,
 )
+from .histories.growing import HistoryProgress as HistoryProgress, histories as histories
+from .histories.history import History as History
+from .histories.steps import LoadStep as LoadStep
 from .io import read_problem as read_problem, write_problem as write_problem
 from .io.vtu import write_vtu as write_vtu
 from .model.friction import FrictionTable as FrictionTable

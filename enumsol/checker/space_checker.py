@@ -11,7 +11,6 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.walk import TreeChecker
 from enumsol.condensation.affine import exactly_at
-from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.condensation.space_condensed import EnclosedSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, rational_from, shown_alpha
@@ -61,8 +60,7 @@ class SpaceChecker(TreeChecker):
     @cached_property
     def system(self) -> EnclosedSpace:
         """Balls for S, g and F in the proof's units."""
-        enclosure = CondensedEnclosure.from_problem(self.problem)
-        enclosed = EnclosedSpace.of_problem(enclosure, self.alpha, self.force, self.length)
+        enclosed = EnclosedSpace.of_problem(self.enclosed(), self.alpha, self.force, self.length)
         if not enclosed.smallest_eigenvalue > 0:
             raise RefusedError("S is not proven positive definite")
         return enclosed

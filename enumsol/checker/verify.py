@@ -19,7 +19,7 @@ from enumsol.checker.form_tables import FormLeaves
 from enumsol.checker.graph_checker import GraphChecker
 from enumsol.checker.reports import GraphVerificationReport, VerificationReport
 from enumsol.checker.walk import TreeChecker
-from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.model.problem import ContactProblem
 from enumsol.proof import records
 from enumsol.proof.proof_file import Proof, fraction_text
@@ -140,6 +140,8 @@ class Checker(TreeChecker):
     def system(self) -> EnclosedSystem:
         """Balls for S, g and F in the proof's units."""
         if self.data == "condensed":
+            if not self.problem.known_exactly:
+                raise RefusedError("a proof about S and g as computed, of a problem whose slip offset is a ball")
             scaled = self.problem.condensed.at(self.alpha)
             zero = np.zeros_like
             with np.errstate(over="ignore", invalid="ignore"):
@@ -150,7 +152,7 @@ class Checker(TreeChecker):
                 raise RefusedError("S, g or F over- or underflow in the proof's units")
             enclosed = EnclosedSystem(S, zero(S), g, zero(g), scaled.F, 4 * np.spacing(scaled.F))
         else:
-            enclosed = CondensedEnclosure.from_problem(self.problem).at(self.alpha, self.force, self.length)
+            enclosed = self.enclosed().at(self.alpha, self.force, self.length)
         if not enclosed.smallest_eigenvalue > 0:
             raise RefusedError("S is not proven positive definite")
         return enclosed
@@ -160,6 +162,8 @@ class Checker(TreeChecker):
         """The condensed problem in rationals; computed only if a leaf needs it."""
         if self.data == "condensed":
             raise RefusedError("a rational leaf in a proof about S and g as computed")
+        if not self.problem.known_exactly:
+            raise RefusedError("a rational leaf in a proof about a problem whose slip offset is a ball")
         from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
 
         try:

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from enumsol.checker.reports import MAX_FAILURES, VerificationReport
-from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.proof.reading import RefusedError, quoted, same
 from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, UndecidedRecord, Unloaded, kind_of
@@ -44,6 +44,8 @@ class TreeChecker:
     undecided: int = 0
     leaves: int = 0
     data: Data = "problem"
+    #: The problem's balls, where whoever asks for the check has made them already.
+    enclosure: CondensedEnclosure | None = None
 
     #: Kinds of leaves, by their letters.
     kinds: ClassVar[dict[str, type[Record]]]
@@ -87,6 +89,10 @@ class TreeChecker:
     def _doubtful(self) -> int:
         """UndecidedRecord parts besides undecided leaves."""
         return 0
+
+    def enclosed(self) -> CondensedEnclosure:
+        """Balls for S and g of the problem's own data."""
+        return self.enclosure or CondensedEnclosure.from_problem(self.problem)
 
     # -- what a checker adds ---------------------------------------------------------------------------------------
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     import numpy as np
     import scipy.sparse as sp
     from numpy.typing import NDArray
@@ -29,12 +31,18 @@ class CondensableData(Protocol):
     f : (n,) array, load at alpha = 0 [force]
     load_slope : (n,) array or None
     gap : (p,) array, slip_offset : (p,) or (p, 2) array [length]
+    offset_radius : array of the shape of slip_offset, or None
+        How far the slip offset may be from ``slip_offset``; None: not at all.
+    exact_offset : tuple of Fraction, or None
+        The slip offset where no floats hold it.
     """
 
     f: Vector
     load_slope: Vector | None
     gap: Vector
     slip_offset: Vector
+    offset_radius: Vector | None
+    exact_offset: tuple[Fraction, ...] | None
 
     @property
     def A(self) -> sp.csc_array:  # noqa: N802 (the field's letter)

@@ -48,8 +48,11 @@ class CondensedEnclosure(Sealed):
     ----------
     S, S_rad : (2p, 2p) arrays [length / force]
     g0, g0_rad, g1, g1_rad : (2p,) arrays [length]
+        With the radius of the slip offset, where the problem has one.
     stiffness_bound : float
         Proven lower bound on the smallest eigenvalue of A after scaling to a diagonal near one.
+    free : pair of (2p,) arrays, or None [length]
+        B A^-1 f and its radii: g0 without gap and slip offset; None where the balls are not those of a whole problem.
     """
 
     S: Array
@@ -60,6 +63,7 @@ class CondensedEnclosure(Sealed):
     g1_rad: Array
     stiffness_bound: float
     problem: Any = field(repr=False)  # in 2D or 3D
+    free: tuple[Array, Array] | None = field(default=None, repr=False)
 
     @classmethod
     def from_problem(cls, problem: CondensableData, products: Products | None = None) -> CondensedEnclosure:
@@ -72,10 +76,40 @@ class CondensedEnclosure(Sealed):
         """
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             enclosed = cls._from_problem(problem, products)
-        balls = (enclosed.S, enclosed.S_rad, enclosed.g0, enclosed.g0_rad, enclosed.g1, enclosed.g1_rad)
+        return enclosed._finite()
+
+    def restarted(self, problem: CondensableData, products: Products) -> CondensedEnclosure:
+        """The enclosure of a problem of the same body with another load or slip offset: S is what it is here.
+
+        Raises
+        ------
+        NotEnclosedError
+            Something over- or underflows.
+        """
+        if not products.bounded:
+            raise NotEnclosedError(_OVERFLOW)
+        bound = self.stiffness_bound
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            g0, g0_rad, g1, g1_rad, *free = _displaced(problem, products, products.radii(bound))
+        S = self.S, self.S_rad
+        return CondensedEnclosure(*S, g0, g0_rad, g1, g1_rad, bound, problem, (free[0], free[1]))._finite()
+
+    def moved_freely(self, alpha: Fraction) -> Ball:
+        """B A^-1 f(alpha), where the contact nodes would be without contact, shape (2p,) [length]."""
+        if self.free is None:
+            raise AssertionError("these balls are not those of a whole problem")
+        value, slack = _float_at(alpha)
+        with np.errstate(over="ignore", invalid="ignore"):
+            moved = Ball(np.array(value), np.array(slack)) * Ball(self.g1, self.g1_rad) + Ball(*self.free)
+        if not np.all(np.isfinite(moved.mid)) or not np.all(np.isfinite(moved.rad)):
+            raise NotEnclosedError(_OVERFLOW)
+        return moved
+
+    def _finite(self) -> CondensedEnclosure:
+        balls = (self.S, self.S_rad, self.g0, self.g0_rad, self.g1, self.g1_rad)
         if not all(np.all(np.isfinite(array)) for array in balls):
             raise NotEnclosedError(_OVERFLOW)
-        return enclosed
+        return self
 
     @classmethod
     def _from_problem(cls, problem: CondensableData, products: Products | None) -> CondensedEnclosure:
@@ -96,13 +130,8 @@ class CondensedEnclosure(Sealed):
         # the exact S is symmetric and lies in both triangles' balls
         sym = 0.5 * (S + S.T)
         S_rad = (np.maximum(S_rad, S_rad.T) + np.abs(S - S.T) + 2 * UNIT * np.abs(sym)) * SAFE
-        offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
-        free, free_rad = mid[:, size:] * products.lift, rad[:, size:] * products.lift + TINY
-        # no load moves nothing, exactly: what covers underflow in a norm would be huge beside a tiny load
-        free[:, products.still] = free_rad[:, products.still] = 0.0
-        g0 = free[:, 0] - offset
-        g0_rad = (free_rad[:, 0] + 2 * UNIT * np.abs(g0)) * SAFE + TINY
-        return cls(sym, S_rad, g0, g0_rad, free[:, 1], free_rad[:, 1], bound, problem)
+        g0, g0_rad, g1, g1_rad, *free = _displaced(problem, products, rad)
+        return cls(sym, S_rad, g0, g0_rad, g1, g1_rad, bound, problem, (free[0], free[1]))
 
     def at(self, alpha: AlphaLike, force: Array, length: Array) -> EnclosedSystem:
         """The enclosed system of a 2D problem at one alpha, in units given by powers of two (see ScaledSystem)."""
@@ -129,11 +158,7 @@ class CondensedEnclosure(Sealed):
         """
         if np.any(np.frexp(np.concatenate([force, length]))[0] != 0.5):
             raise AssertionError("units of force and length must be powers of two")
-        try:
-            value = float(alpha)
-        except OverflowError:
-            raise NotEnclosedError(_OVERFLOW) from None
-        slack = 0.0 if Fraction(value) == alpha else 2 * UNIT * abs(value) + TINY
+        value, slack = _float_at(alpha)
         with np.errstate(over="ignore", invalid="ignore"):
             g = self.g0 + value * self.g1
             size = np.abs(value * self.g1)
@@ -150,6 +175,35 @@ class CondensedEnclosure(Sealed):
 #: Smallest quotient of units, far above underflow.
 _LEAST_PAIR = 2.0**-1000
 _OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"
+
+
+def _float_at(alpha: Fraction) -> tuple[float, float]:
+    """The float next to alpha, and how far it may be away.
+
+    Raises
+    ------
+    NotEnclosedError
+        There is none.
+    """
+    try:
+        value = float(alpha)
+    except OverflowError:
+        raise NotEnclosedError(_OVERFLOW) from None
+    return value, 0.0 if Fraction(value) == alpha else 2 * UNIT * abs(value) + TINY
+
+
+def _displaced(problem: CondensableData, products: Products, rad: Array) -> tuple[Array, ...]:
+    """g0, g1 and B A^-1 f, each with its radius, from products with the radii ``rad``."""
+    size, offset = len(products.mid), np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
+    free, free_rad = products.mid[:, size:] * products.lift, rad[:, size:] * products.lift + TINY
+    # no load moves nothing, exactly: what covers underflow in a norm would be huge beside a tiny load
+    free[:, products.still] = free_rad[:, products.still] = 0.0
+    g0 = free[:, 0] - offset
+    g0_rad = (free_rad[:, 0] + 2 * UNIT * np.abs(g0)) * SAFE + TINY
+    if problem.offset_radius is not None:
+        g0_rad[len(problem.gap) :] += problem.offset_radius.ravel(order="F") * SAFE
+        g0_rad *= SAFE
+    return g0, g0_rad, free[:, 1], free_rad[:, 1], free[:, 0], free_rad[:, 0]
 
 
 def _smallest_eigenvalue(problem: CondensableData, scale: Array) -> float:

@@ -218,7 +218,8 @@ def _condensed(problem: ProblemData) -> _Parts:
     loads = rational_matrix(np.column_stack([problem.f, slope]))
     rhs = [[*row, *load] for row, load in zip(B.transpose().tolist(), loads.tolist(), strict=True)]
     table = (B * rational_matrix(problem.A.toarray()).solve(fmpq_mat(rhs))).tolist()
-    offset = [rational(v) for v in (*problem.gap, *problem.slip_offset)]
+    start = problem.slip_offset if problem.exact_offset is None else problem.exact_offset
+    offset = [rational(v) for v in (*problem.gap, *start)]
     g0 = tuple(row[2 * p] - o for row, o in zip(table, offset, strict=True))
     g1 = tuple(row[2 * p + 1] for row in table)
     F0, F1 = (tuple(rational(v) for v in part) for part in problem.friction)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -70,6 +70,20 @@ class Products(Sealed):
     @classmethod
     def of(cls, problem: CondensableData) -> Products:
         """Those of a problem."""
+        return cls._of(problem, problem.contact_rows.shape[0])
+
+    def with_loads_of(self, problem: CondensableData) -> Products:
+        """Those of a problem with the same matrices and another load: only the columns of the load are solved for."""
+        loads, rows = self._of(problem, 0), len(self.mid)
+        columns = {
+            name: np.concatenate([getattr(self, name)[..., :rows], getattr(loads, name)], axis=-1)
+            for name in ("mid", "rounded", "lengths", "left")
+        }
+        return replace(loads, **columns, bounded=self.bounded and loads.bounded)
+
+    @classmethod
+    def _of(cls, problem: CondensableData, columns: int) -> Products:
+        """Products with the first columns of B' and with the loads."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             # np.ldexp, and not a power function, gives powers of two by definition
             exponent = -np.round(0.5 * np.log2(problem.A.diagonal())).astype(int)
@@ -82,23 +96,23 @@ class Products(Sealed):
             size = np.max(np.where(loads != 0, np.frexp(loads)[1] + exponent[:, None], -1000), axis=0)
             lift = np.clip(size, -1000, 1000)
             power = exponent[:, None] - lift
-            K = sp.hstack([B.T, sp.csc_array(np.ldexp(loads, power))], format="csc")
+            K = sp.hstack([B.T[:, :columns], sp.csc_array(np.ldexp(loads, power))], format="csc")
             exact_loads = np.array_equal(np.ldexp(np.ldexp(loads, power), -power), loads)
 
             def solve(columns: Array) -> Array:
                 # not refined: what is left is bounded
                 return np.asarray(problem.factorization.solve(columns / scale[:, None], refined=False) / scale[:, None])
 
-            rows, k = B.shape[0], gamma(int(np.max(np.diff(B.indptr))) + 1)
+            k = gamma(int(np.max(np.diff(B.indptr))) + 1)
             few, B_size, A_size = gamma(int(np.max(np.diff(A.indptr))) + 3), abs(B), abs(A)
-            mid, rounded = np.empty((rows, K.shape[1])), np.empty((rows, K.shape[1]))
+            mid, rounded = np.empty((B.shape[0], K.shape[1])), np.empty((B.shape[0], K.shape[1]))
             lengths, left = np.empty(K.shape[1]), np.empty(K.shape[1])
             for start in range(0, K.shape[1], _COLUMNS):
                 look()
                 part = slice(start, min(start + _COLUMNS, K.shape[1]))
-                columns = K[:, part].toarray()
-                X = solve(columns)
-                R, R_rad = residual(A, X, columns)
+                given = K[:, part].toarray()
+                X = solve(given)
+                R, R_rad = residual(A, X, given)
                 Y = solve(R)
                 mid[:, part] = B @ X + B @ Y
                 # what Y leaves of R, with the rounding of this

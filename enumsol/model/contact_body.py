@@ -52,6 +52,10 @@ class ContactBody(Immutable):
 
     _instead = "build a new problem, or one with other data by dataclasses.replace"
     slip_offset: NDArray[np.float64]
+    #: How far the slip offset may be from ``slip_offset``, and its value where no floats hold it: a step of a history
+    #: starts where the step before it ended (see enumsol.model.restart).
+    offset_radius: NDArray[np.float64] | None = None
+    exact_offset: tuple[Fraction, ...] | None = None
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     def __init_subclass__(cls) -> None:
@@ -134,11 +138,21 @@ class ContactBody(Immutable):
     def is_unloaded(self, alpha: AlphaLike) -> bool:
         """Whether load, gap and slip offset are exactly zero at alpha: then only lambda = 0, w = 0 solves."""
         a = Fraction(alpha_value(alpha))
-        if np.any(self.gap) or np.any(self.slip_offset):
+        if np.any(self.gap) or np.any(self.slip_offset) or self.offset_radius is not None:
             return False
         if self.load_slope is None:
             return not np.any(self.f)
         return not any(exactly_at(a, self.f, self.load_slope))
+
+    @property
+    def known_exactly(self) -> bool:
+        """Whether rationals hold all data: a slip offset may be known as a ball only."""
+        return self.offset_radius is None or self.exact_offset is not None
+
+    @staticmethod
+    def constant_friction(values: NDArray[np.float64]) -> dict[str, Any]:
+        """The attributes of a problem whose coefficients do not depend on alpha, for ``model.restart``."""
+        raise NotImplementedError
 
     def load_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
         """Load f(alpha) = f + alpha load_slope, shape (n,) [force].
@@ -153,6 +167,8 @@ class ContactBody(Immutable):
 
     def _digest(self, kind: bytes, vectors: Sequence[NDArray[np.float64]]) -> str:
         """SHA-256 of the matrices and of ``vectors``, as 64 hexadecimal digits."""
+        if self.offset_radius is not None:
+            kind, vectors = kind + b", from a ball", [*vectors, self.offset_radius.ravel()]
         digest = hashlib.sha256(kind)
         parts: list[Any] = [np.array([self.n, self.p])]
         rows = (sp.csc_array(matrix.matrix()).sorted_indices() for matrix in self._rows.values())

@@ -13,6 +13,7 @@ from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.model.contact_body import ContactBody, friction_values, span, vector
 from enumsol.model.mesh import BodyMesh
 from enumsol.support.arguments import alpha_value, exact_number, instance_of, shown
+from enumsol.support.immutable import sealed
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -147,6 +148,11 @@ class ContactProblem(ContactBody):
             where = f"at alpha = {float(a):g} is {F[node]:g} at contact node {self.node_ids[node]}"
             raise InvalidArgumentError(f"friction {where}; expected F >= 0")
         return F
+
+    @staticmethod
+    def constant_friction(values: NDArray[np.float64]) -> dict[str, Any]:
+        """The attributes of a problem with coefficients that do not depend on alpha, for ``model.restart``."""
+        return {"friction": (sealed(values), sealed(np.zeros_like(values)))}
 
     @cached_property
     def fingerprint(self) -> str:

@@ -220,6 +220,11 @@ class ContactProblem3D(ContactBody):
             "(successive_approximations takes both)"
         )
 
+    @staticmethod
+    def constant_friction(values: NDArray[np.float64]) -> dict[str, Any]:
+        """The attributes of a problem with coefficients that do not depend on alpha, for ``model.restart``."""
+        return {"law": ConstantFriction(values), "_slope": sealed(np.zeros_like(values))}
+
     @cached_property
     def fingerprint(self) -> str:
         """SHA-256 of all data, as 64 hexadecimal digits; proofs are bound to it.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -53,6 +54,11 @@ class AtRest:
         """Zeros."""
         del point
         return (0,) * self._p
+
+    def exact_slips(self, point: Any) -> tuple[Fraction, ...]:
+        """Zeros."""
+        del point
+        return (Fraction(0),) * self._p
 
     def bounds(self, point: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Zeros where they are proven."""

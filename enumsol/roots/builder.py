@@ -93,6 +93,7 @@ class RootBuilder:
             _condensed=self._problem.condensed,
             _tangent=SelectionTangent(self._floats, self._problem.condensed, canonical, force, w) if regular else None,
             _slips=slips,
+            _exact_slips=self._points.exact_slips(solution.vertices[0]),
         )
 
     def _slip_signs(self, codes: Codes, solution: SelectionSolution) -> SlipSigns:

@@ -16,6 +16,7 @@ from enumsol.support.messages import html_lines, html_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from fractions import Fraction
 
     from numpy.typing import NDArray
 
@@ -134,6 +135,7 @@ class Root(ContactState):
     slip_angle: NDArray[np.float64] | None = field(default=None, compare=False)
     _tangent: SelectionTangent | None = field(repr=False, compare=False, default=None)
     _slips: SlipSigns | None = field(repr=False, compare=False, default=None)
+    _exact_slips: tuple[Fraction, ...] | None = field(repr=False, compare=False, default=None)
 
     @cached_property
     def condition(self) -> float:
@@ -181,6 +183,11 @@ class Root(ContactState):
             The problem is one in 3D.
         """
         return branch_test(self._in_2d("local_branch_test"), self)
+
+    @property
+    def exact_slips(self) -> tuple[Fraction, ...] | None:
+        """In 2D and where arithmetic is exact, u_t without rounding, p rationals; otherwise None."""
+        return self._exact_slips
 
     @property
     def problem(self) -> Any:

@@ -48,7 +48,7 @@ class SlipSigns:
     @cached_property
     def _exact(self) -> tuple[int, ...] | None:
         """All signs in rationals; None when the problem is too large for them."""
-        if self.problem.n > EXACT_DOF_LIMIT:
+        if self.problem.n > EXACT_DOF_LIMIT or not self.problem.known_exactly:
             return None
         from enumsol.condensation.exact import ExactSystem  # python-flint, not for fast arithmetic
         from enumsol.selections.rational_selections import ExactSelections

@@ -70,7 +70,8 @@ class Solvers:
     ) -> None:
         self.problem, self.alpha, self.arithmetic, self.engine = problem, alpha, arithmetic, engine
         system = problem.condensed.at(alpha)
-        exactly = arithmetic != "fast" and problem.n <= EXACT_DOF_LIMIT
+        self._in_rationals = problem.n <= EXACT_DOF_LIMIT and problem.known_exactly
+        exactly = arithmetic != "fast" and self._in_rationals
         self.scaled = system.proposals if exactly else system.scaled
         self.floats = FloatSelections(self.scaled, tolerance)
         if exactly and not problem.condensed.definite:
@@ -96,7 +97,7 @@ class Solvers:
         from enumsol.condensation.exact import ExactSystem, check_definite  # python-flint
         from enumsol.selections.rational_selections import ExactSelections  # python-flint
 
-        if self.arithmetic != "exact" and self.problem.n > EXACT_DOF_LIMIT:
+        if self.arithmetic != "exact" and not self._in_rationals:
             return None
         system = ExactSystem.from_problem(self.problem, self.alpha)
         enclosed, data = self._enclosed
@@ -123,7 +124,7 @@ class Solvers:
                 return enclosed, "problem"
         except NotEnclosedError:
             pass
-        if self.problem.n <= EXACT_DOF_LIMIT:
+        if self._in_rationals or not self.problem.known_exactly:
             return None, "problem"
         enclosed = as_computed_in_floats(system)
         return (enclosed if _positive(enclosed) else None), "condensed"

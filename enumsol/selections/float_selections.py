@@ -196,6 +196,10 @@ class FloatSelections:
         """Floats prove no bounds."""
         del point
 
+    def exact_slips(self, point: NDArray[np.float64]) -> None:
+        """Floats are not exact."""
+        del point
+
     def slip_signs(self, point: NDArray[np.float64]) -> tuple[int, ...]:
         """Signs of w_t; zero within the tolerance."""
         w = (self._w(point) / self._length_scale)[self.p :]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import fmpq, fmpq_mat
 
-from enumsol.arithmetic.rationals import as_objects, rational
+from enumsol.arithmetic.rationals import as_objects, rational, to_fraction
 from enumsol.condensation.exact import ExactSystem
 from enumsol.model.statuses import CONDITIONS, FINAL, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
 from enumsol.selections.polytopes import polytope_vertices, value
@@ -205,6 +205,10 @@ class ExactSelections:
     def slip_signs(self, point: Point) -> tuple[int, ...]:
         """Signs of w_t, exactly."""
         return tuple((v > 0) - (v < 0) for v in self.moved(point)[self.p :])
+
+    def exact_slips(self, point: Point) -> tuple[Fraction, ...]:
+        """w_t, exactly."""
+        return tuple(map(to_fraction, self.moved(point)[self.p :]))
 
     def bounds(self, point: Point) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Floats below and above (lambda, w), two arrays of shape (4p,), equal where a value is a float."""

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from enumsol.errors import TooLargeError
+
+if TYPE_CHECKING:
+    from fractions import Fraction
 
 Codes = tuple[int, ...]
 ActiveSets = tuple[frozenset[int], ...]
@@ -60,6 +63,9 @@ class PointValues(Protocol):
 
     def slip_signs(self, point: Any) -> tuple[int, ...]:
         """Signs of w_t at the point, one per node."""
+
+    def exact_slips(self, point: Any) -> tuple[Fraction, ...] | None:
+        """w_t at the point, p rationals; None in an arithmetic without them."""
 
     def bounds(self, point: Any) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]] | None:
         """Proven bounds of (lambda, w) at the point, two arrays of shape (4p,); None in an arithmetic without any."""

@@ -125,7 +125,11 @@ def exact_condense(problem, alpha):
 
 def exact_solutions(problem, alpha):
     """Connected components of all solutions, by rational arithmetic over all 4^p selections."""
-    S, g, F = exact_condense(problem, alpha)
+    return solutions_of(*exact_condense(problem, alpha))
+
+
+def solutions_of(S, g, F):
+    """The same from S, g and F in Fractions."""
     parts = []
     # a node without friction has one status in contact: its slip is free and its sign no border (code 4)
     for codes in itertools.product(*((0, 1, 2, 3) if c > 0 else (0, 4) for c in F)):

@@ -1,0 +1,7 @@
+"""Where the names are at home."""
+
+from .growing import HistoryProgress as HistoryProgress, histories as histories
+from .history import History as History
+from .history_data import HistoryData as HistoryData, Refinement as Refinement
+from .stages import Stage as Stage
+from .steps import LoadStep as LoadStep

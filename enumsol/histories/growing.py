@@ -1,0 +1,444 @@
+"""histories: every history of solutions that a sequence of loads may leave behind (theory, section 13)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.histories.history import History
+from enumsol.histories.history_data import HistoryData
+from enumsol.histories.refinement import refined
+from enumsol.histories.stages import Rounding, Stage, case_of, contact_displacements, start_after
+from enumsol.histories.steps import LoadStep, steps_of
+from enumsol.model.contact_body import ContactBody
+from enumsol.model.problem import ContactProblem
+from enumsol.model.restart import SlipStart, restarted
+from enumsol.roots.enumerate import enumerate_roots
+from enumsol.roots.root import Root
+from enumsol.support.arguments import (
+    exact_number,
+    instance_of,
+    nonnegative_number,
+    one_of,
+    optional_callable,
+    optional_count,
+    optional_executor,
+    optional_seconds,
+    shown,
+)
+from enumsol.support.messages import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from concurrent.futures import Executor
+
+    from enumsol.histories.history_data import Node
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.roots.root_set import RootSet
+
+    #: Of a parent's root (None in the first step) and the roots of the next step, those that are followed.
+    Choice = Callable[[Root | None, RootSet], Any]
+
+#: Options of enumerate_roots that a history has for the whole of it, or cannot have.
+_OWN = ("stop_after", "proof_path", "resume", "alpha", "method")
+
+
+@dataclass(frozen=True)
+class HistoryProgress:
+    """State of a running history, as handed to the ``progress`` callback.
+
+    Attributes
+    ----------
+    step, steps : int
+        The step that is searched, and how many there are.
+    stages, waiting : int
+        Starts of this step that were searched, and those that are left.
+    roots : int
+        Roots found so far, in all steps.
+    seconds : float
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> seen = []
+    >>> history = enumsol.histories(enumsol.gallery.one_node_triangle(), [1, 5], progress=seen.append)
+    >>> [(state.step, state.roots) for state in seen]
+    [(1, 1), (2, 4)]
+    """
+
+    step: int
+    steps: int
+    stages: int
+    waiting: int
+    roots: int
+    seconds: float
+
+
+def histories(
+    problem: ContactProblem | ContactProblem3D,
+    steps: Any,
+    *,
+    arithmetic: str = "verified",
+    follow: str | Choice = "all",
+    merge: float | None = None,
+    refine: bool = False,
+    max_halvings: int = 4,
+    max_branches: int | None = None,
+    max_nodes: int | None = None,
+    time_limit: float | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[HistoryProgress], object] | None = None,
+    **options: Any,
+) -> History:
+    """All histories of solutions that a sequence of loads may leave behind (theory, section 13).
+
+    Every root of a step starts the next step: its tangential displacements are the next step's slip offset, so that
+    slip is counted from where the nodes are. The first step starts from the problem's own slip offset.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    steps : sequence, array, or pandas.DataFrame
+        The ends of the steps: alphas of the problem's own load path; loads of shape (n,), or all in one array (k, n);
+        `LoadStep` objects; or a table with the columns alpha, friction, or f0 .. f{n-1} (components of the load that
+        replace the problem's).
+    arithmetic : {"verified", "fast", "exact"}
+        Of `enumerate_roots`. "verified": starts are known as balls, and a step is complete only if it is so for every
+        start in its ball. "exact": starts are rationals (2D only). "fast" proves nothing.
+    follow : {"all", "nearest"} or callable
+        Which roots start the next step. "nearest": the one whose contact nodes are nearest to where the step began. A
+        callable gets the root before (None in the first step) and the RootSet, and returns roots or their numbers.
+    merge : float, optional
+        Roots of a step whose contact nodes are nowhere further apart than this [length] start one stage together, from
+        a ball that holds both ends (from the first of both in fast arithmetic). By default, and in exact arithmetic,
+        only equal ends are merged.
+    refine : bool
+        Halve all increments until the statuses along all histories, seen at the given steps, no longer change.
+        ``History.refinement`` says what came of it.
+    max_halvings : int
+        Of ``refine``.
+    max_branches : int, optional
+        Follow at most this many different starts from any step, those of the first roots.
+    max_nodes : int, optional
+        Stop when the searches of all steps together have had this many nodes of their trees.
+    time_limit : float, optional
+        Stop after this many seconds; what was found by then is kept.
+    executor : concurrent.futures.Executor, optional
+        Of `enumerate_roots`.
+    progress : callable, optional
+        Called with a HistoryProgress after every search.
+    **options
+        Further keyword arguments of `enumerate_roots`: ``tolerance``, ``engine``.
+
+    Returns
+    -------
+    History
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument cannot be used; of a step its number is named.
+    Interrupted
+        On Ctrl-C; ``partial`` is the history as far as it was found.
+
+    Examples
+    --------
+    One node is pressed, pulled to one side until it slips, and let go:
+
+    >>> import enumsol
+    >>> import numpy as np
+    >>> problem = enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 0], friction=0.5, load_slope=[0, 1])
+    >>> history = enumsol.histories(problem, [0.25, 1, 0])
+    >>> print(history)
+    History of 3 steps: 1 history (verified)
+    step      alpha  roots  from  histories  dissipated
+       1       0.25      1     1          1           0
+       2          1      1     1          1        0.25
+       3          0      1     1          1        0.25
+    tree
+    1.0 stick
+    2.0 slip+
+    3.0 stick
+    complete: yes (proven), unique until step 3
+    """
+    given: Any = problem
+    if not isinstance(given, ContactBody):
+        instance_of(given, ContactProblem, "problem")
+    one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
+    if not callable(follow):
+        one_of(follow, "follow", ("all", "nearest"))
+    tolerance = None if merge is None else nonnegative_number(merge, "merge")
+    if tolerance is not None and arithmetic == "exact":
+        raise InvalidArgumentError('merge is given with arithmetic "exact", in which only equal ends are merged')
+    for name in _OWN:
+        if name in options:
+            raise InvalidArgumentError(f"{name} is an option of enumerate_roots that histories does not take")
+    instance_of(refine, bool, "refine")
+    optional_executor(executor)
+    optional_callable(progress, "progress")
+    limits = _Limits(
+        optional_count(max_branches, "max_branches"),
+        optional_count(max_nodes, "max_nodes"),
+        optional_seconds(time_limit),
+    )
+    fitted = steps_of(problem, steps)
+    search = {"arithmetic": arithmetic, "executor": executor, **options}
+
+    def grown(several: Sequence[LoadStep]) -> HistoryData:
+        return _Growing(problem, several, follow, tolerance, limits, search, progress).run()
+
+    if not refine:
+        return History(grown(fitted))
+    return History(refined(grown, fitted, optional_count(max_halvings, "max_halvings") or 0))
+
+
+@dataclass
+class _Limits:
+    max_branches: int | None
+    max_nodes: int | None
+    seconds: float | None
+    started: float = field(default_factory=time.perf_counter)
+    nodes: int = 0
+
+    def reached(self) -> str | None:
+        """Why nothing more is searched, or None."""
+        if self.max_nodes is not None and self.nodes >= self.max_nodes:
+            return f"stopped after max_nodes = {counted(self.max_nodes, 'node')}"
+        if self.seconds is not None and time.perf_counter() - self.started >= self.seconds:
+            return "stopped by the time limit"
+        return None
+
+    def left(self) -> dict[str, Any]:
+        """What one search may still take, as options of enumerate_roots."""
+        seconds = None if self.seconds is None else max(self.seconds - (time.perf_counter() - self.started), 1e-3)
+        return {"max_nodes": None if self.max_nodes is None else self.max_nodes - self.nodes, "time_limit": seconds}
+
+
+@dataclass
+class _Waiting:
+    """A start that is to be searched, and the nodes whose ends it is."""
+
+    start: SlipStart
+    parents: list[Node]
+
+
+class _Growing:
+    """One history while it is made."""
+
+    def __init__(
+        self,
+        problem: ContactProblem | ContactProblem3D,
+        steps: Sequence[LoadStep],
+        follow: str | Choice,
+        merge: float | None,
+        limits: _Limits,
+        search: dict[str, Any],
+        progress: Callable[[HistoryProgress], object] | None,
+    ) -> None:
+        self.problem, self.steps, self.follow, self.merge = problem, steps, follow, merge
+        self.limits, self.search, self.progress = limits, search, progress
+        self.stages: list[Stage] = []
+        self.parents: list[tuple[Node, ...]] = []  # of each stage
+        self.followed: set[Node] = set()
+        self.reasons: list[str] = []
+        self.rounding = Rounding()
+        self.node_of: dict[int, list[Node]] = {}  # of each stage, in the order of its roots
+        self.bases: dict[bytes, Any] = {}
+        self.ends: dict[Any, SlipStart] = {}
+        if search["arithmetic"] != "fast":
+            with suppress(NotEnclosedError):
+                _ = problem.enclosure  # made once, for all steps
+
+    def run(self) -> HistoryData:
+        """Step by step, all starts of one before the next."""
+        waiting = [_Waiting(SlipStart.of(self.problem), [])]
+        try:
+            for number, step in enumerate(self.steps, 1):
+                waiting = self._step(number, step, waiting)
+                if not waiting:
+                    break
+        except Interrupted as interruption:
+            raise self._interrupted() from interruption
+        except KeyboardInterrupt as interruption:
+            raise self._interrupted() from interruption
+        return self._history()
+
+    def _interrupted(self) -> Interrupted:
+        self.reasons.append("interrupted")
+        found = counted(sum(len(stage.roots) for stage in self.stages), "root")
+        return Interrupted(
+            f"histories was interrupted in step {self._reached}; {found} so far", History(self._history())
+        )
+
+    @property
+    def _reached(self) -> int:
+        return self.stages[-1].step if self.stages else 1
+
+    def _step(self, number: int, step: LoadStep, waiting: list[_Waiting]) -> list[_Waiting]:
+        """Search a step from all its starts; the starts of the next step."""
+        following: list[_Waiting] = []
+        count = 0
+        for k, item in enumerate(waiting):
+            if (why := self.limits.reached()) is not None:
+                self.reasons.append(f"step {number}: {why}, {counted(len(waiting) - k, 'start')} not searched")
+                break
+            stage = self._stage(number, step, item)
+            nodes = [(number, count + j) for j in range(len(stage.roots))]
+            count += len(nodes)
+            self.stages.append(stage)
+            self.parents.append(tuple(item.parents))
+            self.node_of[stage.number] = nodes
+            self.reasons += [f"step {number}{self._whence(item)}: {reason}" for reason in stage.reasons]
+            if number < len(self.steps):
+                self._ends(stage, item, nodes, following)
+            if self.progress is not None:
+                roots = sum(len(other.roots) for other in self.stages)
+                seconds = time.perf_counter() - self.limits.started
+                left = len(waiting) - k - 1
+                self.progress(HistoryProgress(number, len(self.steps), k + 1, left, roots, seconds))
+        most = self.limits.max_branches
+        if most is not None and len(following) > most:
+            self.reasons.append(f"step {number}: max_branches = {most} of {len(following)} different ends are followed")
+            following = following[:most]
+        self.followed.update(node for item in following for node in item.parents)
+        return following
+
+    @staticmethod
+    def _whence(item: _Waiting) -> str:
+        return "" if not item.parents else " from root " + ", ".join(named(node) for node in item.parents)
+
+    def _stage(self, number: int, step: LoadStep, item: _Waiting) -> Stage:
+        problem = restarted(self._base(step), item.start)
+        alpha = step.exact_alpha if step.alpha is None else step.alpha
+        roots = enumerate_roots(problem, alpha, **self.search, **self.limits.left())
+        self.limits.nodes += roots.stats.nodes + roots.stats.selections
+        return Stage(len(self.stages), number, item.start, roots, problem, self._open(problem, alpha, roots, item))
+
+    def _base(self, step: LoadStep) -> Any:
+        """The problem with the step's load and friction, made once for all steps that have the same."""
+        key = b"|".join(b"" if part is None else part.tobytes() for part in (step.load, step.friction))
+        if key not in self.bases:
+            start = SlipStart.of(self.problem)
+            self.bases[key] = restarted(self.problem, start, step.load, step.friction)
+        return self.bases[key]
+
+    def _open(self, problem: Any, alpha: Any, roots: RootSet, item: _Waiting) -> tuple[str, ...]:
+        """Why a stage is not complete, in words."""
+        reasons = []
+        if roots.families:
+            found = counted(len(roots.families), "family", "families")
+            reasons.append(f"{found} of solutions, which are not followed")
+        if roots.stopped is not None:
+            reasons.append(roots.stopped)
+        elif roots.undecided:
+            reasons.append(self._undecided(problem, alpha, roots, item))
+        return tuple(reasons)
+
+    def _undecided(self, problem: Any, alpha: Any, roots: RootSet, item: _Waiting) -> str:
+        first = roots.undecided[0]
+        text = f"{counted(len(roots.undecided), 'part')} undecided ({first.reason})"
+        if item.start.radius is None or self.search["arithmetic"] != "verified":
+            return text
+        radius = float(np.max(item.start.radius))
+        middle = restarted(problem, SlipStart(item.start.offset))
+        alone = enumerate_roots(middle, alpha, **self.search, **self.limits.left())
+        self.limits.nodes += alone.stats.nodes + alone.stats.selections
+        known = f"its start is known within {radius:.1e} only"
+        if not alone.complete:
+            return f"{text}; {known}, and its midpoint alone leaves something undecided, too"
+        return f'{text}, because {known}: its midpoint alone is decided; arithmetic "exact" may decide it'
+
+    def _ends(self, stage: Stage, item: _Waiting, nodes: list[Node], following: list[_Waiting]) -> None:
+        """Add where the followed roots of a stage leave the contact nodes to the starts of the next step."""
+        chosen = self._chosen(stage, item)
+        for k, (root, node) in enumerate(zip(stage.roots, nodes, strict=True)):
+            if k not in chosen:
+                self.reasons.append(f"step {stage.step}: root {named(node)} is not followed, by the user's choice")
+                continue
+            case = case_of(stage, root)
+            start = self.ends.get(case) if case is not None else None
+            start = start or start_after(stage, root, self.rounding)
+            if start is None:
+                self.reasons.append(f"step {stage.step}: root {named(node)} is known too little to start another step")
+                continue
+            if case is not None:
+                self.ends[case] = start
+            for other in following:
+                joined = self._joined(other.start, start)
+                if joined is not None:
+                    other.start = joined
+                    other.parents.append(node)
+                    break
+            else:
+                following.append(_Waiting(start, [node]))
+
+    def _joined(self, one: SlipStart, other: SlipStart) -> SlipStart | None:
+        """The start of both, if they are equal or within the user's tolerance."""
+        if one.key == other.key:
+            return one
+        if self.merge is None or np.max(np.abs(one.offset - other.offset)) > self.merge:
+            return None
+        return one if self.search["arithmetic"] == "fast" else one.hull(other)
+
+    def _chosen(self, stage: Stage, item: _Waiting) -> set[int]:
+        roots = stage.roots
+        if self.follow == "all" or not len(roots):
+            return set(range(len(roots)))
+        before = self._root(item.parents[0]) if item.parents else None
+        if self.follow == "nearest":
+            start = np.zeros(len(contact_displacements(stage.problem, roots[0])))
+            if before is not None:
+                start = contact_displacements(before.problem, before)
+            far = [float(np.linalg.norm(contact_displacements(stage.problem, root) - start)) for root in roots]
+            return {int(np.argmin(far))}
+        assert callable(self.follow)
+        return _numbers(self.follow(before, roots), roots)
+
+    def _root(self, node: Node) -> Root:
+        stage = next(s for s in self.stages if node in self.node_of[s.number])
+        return stage.roots[self.node_of[stage.number].index(node)]
+
+    def _history(self) -> HistoryData:
+        return HistoryData(
+            self.problem,
+            tuple(self.steps),
+            self.search["arithmetic"],
+            tuple(self.stages),
+            tuple(self.parents),
+            frozenset(self.followed),
+            tuple(self.reasons),
+            time.perf_counter() - self.limits.started,
+        )
+
+
+def named(node: Node) -> str:
+    """A node as it is printed: its step and its number in it."""
+    return f"{node[0]}.{node[1]}"
+
+
+def _numbers(answer: Any, roots: RootSet) -> set[int]:
+    """The numbers of the roots that a callable chose.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It returned something else.
+    """
+    items = [answer] if isinstance(answer, Root) or exact_number(answer) is not None else answer
+    found = set()
+    for item in items if isinstance(items, Iterable) else (items,):
+        own = [k for k, root in enumerate(roots) if root is item]
+        number = exact_number(item) if not own else own[0]
+        if number is None or number != int(number) or not 0 <= number < len(roots):
+            raise InvalidArgumentError(
+                f"follow returned {shown(item)}; expected roots of the RootSet that it was given, or their numbers"
+            )
+        found.add(int(number))
+    return found

@@ -1,0 +1,185 @@
+"""History: what histories found, and the questions it answers (theory, section 13)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.errors import InvalidArgumentError
+from enumsol.histories.history_data import START
+from enumsol.histories.history_text import history_html, history_text
+from enumsol.roots.root import summary
+from enumsol.support.arguments import positive_integer, shown
+from enumsol.support.immutable import Immutable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    import pandas as pd
+
+    from enumsol.histories.history_data import HistoryData, Node
+    from enumsol.histories.stages import Stage
+    from enumsol.roots.root import Root
+
+
+class History(Immutable):
+    """All histories of solutions that a sequence of loads may leave behind (made by ``histories``).
+
+    A node is a pair (step, root): steps are numbered from 1, the roots of one step from 0. (0, 0) is the start.
+
+    Parameters
+    ----------
+    data : HistoryData
+
+    Attributes
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    steps : tuple of LoadStep
+    arithmetic : str
+    graph : networkx.DiGraph
+        Nodes with the attributes root (a `Root`, None at the start), stage, statuses, alpha and dissipated (in the step
+        alone); an edge leads from a root to every root of the next step that may follow it. Where several roots leave
+        the contact nodes at the same place, they have the same successors, and the graph is no tree.
+    reasons : tuple of str
+        Why the history is not complete; each names its step.
+    refinement : Refinement or None
+        What halving the increments changed, if that was asked for.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> history = enumsol.histories(enumsol.gallery.one_node_triangle(), [1, 5, 0.5])
+    >>> history.unique_until, history.branchings, len(history.ends), history.complete
+    (1, ((1, 0),), 3, True)
+    """
+
+    def __init__(self, data: HistoryData) -> None:
+        self.data = data
+        self.problem = data.problem
+        self.steps = data.steps
+        self.arithmetic = data.arithmetic
+        self.reasons = data.reasons
+        self.refinement = data.refinement
+        self.graph = data.graph
+        self._freeze()
+
+    # -- what is proven --------------------------------------------------------------------------------------------
+
+    @property
+    def complete(self) -> bool:
+        """Whether it is proven that these are all histories: every step complete, every root followed to the end."""
+        return self.arithmetic != "fast" and not self.reasons
+
+    @property
+    def unique_until(self) -> int:
+        """The last step up to which it is proven that there is one history only; 0 where there is no such step."""
+        return self.data.unique_until
+
+    # -- the graph -------------------------------------------------------------------------------------------------
+
+    def root(self, node: Node) -> Root:
+        """The root of a node.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There is no such node.
+        """
+        if not isinstance(node, tuple) or node not in self.graph or node == START:
+            raise InvalidArgumentError(f"node is {shown(node)}; expected a pair (step, root) of this history")
+        found: Root = self.graph.nodes[node]["root"]
+        return found
+
+    def roots(self, step: int) -> tuple[Root, ...]:
+        """All roots of one step, from 1, of whatever start.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There is no such step.
+        """
+        number = positive_integer(step, "step", most=len(self.steps))
+        return tuple(self.graph.nodes[node]["root"] for node in self.nodes_of(number))
+
+    @property
+    def branchings(self) -> tuple[Node, ...]:
+        """Nodes that more than one root may follow; (0, 0) if the first step has several."""
+        return tuple(node for node, degree in self.graph.out_degree() if degree > 1)
+
+    @property
+    def ends(self) -> tuple[Node, ...]:
+        """Nodes that nothing follows: those of the last step, and those after which nothing was searched or found."""
+        return tuple(node for node, degree in self.graph.out_degree() if degree == 0 and node != START)
+
+    def stages(self, step: int) -> tuple[Stage, ...]:
+        """The searches of one step, from 1, one for each start."""
+        return self.data.stages_of(step)
+
+    def nodes_of(self, step: int) -> tuple[Node, ...]:
+        """The nodes of one step."""
+        return self.data.nodes_of(step)
+
+    def paths(self) -> Iterator[tuple[Node, ...]]:
+        """The histories one by one: the nodes from the first step to an end."""
+        return self.data.paths()
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """The number of different histories up to every step, from step 1."""
+        return self.data.counts
+
+    @property
+    def dissipated(self) -> Mapping[Node, tuple[float, float]]:
+        """The work of friction from the start to every node, least and most over the histories that lead there."""
+        return self.data.dissipated
+
+    # -- results ---------------------------------------------------------------------------------------------------
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per node: step, alpha, root, parents, stage, statuses, index, regular and sums.
+
+        ``lambda_n`` and ``lambda_t`` (in 3D lambda_t1, lambda_t2) are sums over the contact nodes, ``dissipated`` is
+        the work of friction in the step, ``dissipated_least`` and ``dissipated_most`` that since the start,
+        ``radius`` how far the start of the step may be from its midpoint, and ``followed`` tells whether a next step
+        begins here.
+        """
+        import pandas as pd
+
+        rows = []
+        for node in self.graph:
+            if node == START:
+                continue
+            given, root = self.graph.nodes[node], self.root(node)
+            shear = np.sum(root.lambda_t, axis=0)
+            names = ["lambda_t"] if root.lambda_t.ndim == 1 else ["lambda_t1", "lambda_t2"]
+            rows.append(
+                {
+                    "step": node[0],
+                    "alpha": float(root.alpha),
+                    "root": node[1],
+                    "parents": tuple(self.graph.predecessors(node)),
+                    "stage": given["stage"],
+                    "contact": summary(root.statuses),
+                    "index": root.index,
+                    "regular": root.regular,
+                    "lambda_n": float(np.sum(root.lambda_n)),
+                    **dict(zip(names, np.atleast_1d(shear).tolist(), strict=True)),
+                    "dissipated": given["dissipated"],
+                    "dissipated_least": self.dissipated[node][0],
+                    "dissipated_most": self.dissipated[node][1],
+                    "radius": self.data.stages[given["stage"]].largest_radius,
+                    "followed": node in self.data.followed,
+                }
+            )
+        return pd.DataFrame(rows).astype({"index": "Int64"}) if rows else pd.DataFrame(rows)
+
+    def completeness(self) -> str:
+        """The closing line of the printed history."""
+        return self.data.completeness()
+
+    def __repr__(self) -> str:
+        return history_text(self.data)
+
+    def _repr_html_(self) -> str:
+        return history_html(self.data)

@@ -1,0 +1,259 @@
+"""What a history answers, its limits, and what is proven about starts in balls."""
+
+import dataclasses
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import enumsol
+from enumsol import ContactProblem, Interrupted, InvalidArgumentError, LoadStep, enumerate_roots, histories
+from enumsol.model.restart import SlipStart, restarted
+
+
+def test_the_wedge_ends_jammed_or_free_by_the_branch_alone(out_again):
+    history = out_again
+    assert history.complete
+    assert history.unique_until == 2
+    assert history.counts == (1, 1, 3, 5)
+    assert history.branchings == ((2, 0), (3, 2))
+    last = [{status.value for status in history.root(node).statuses} for node in history.ends]
+    assert last == [{"open"}, {"open"}, {"open"}, {"slip+"}, {"stick"}]
+    assert [node[0] for node in history.ends] == [4] * 5
+    assert len(list(history.paths())) == 5
+    printed = repr(history)
+    assert printed.splitlines()[0] == "History of 4 steps: 5 histories (verified)"
+    assert printed.splitlines()[-1] == "complete: yes (proven), unique until step 2"
+    assert "   └─ 4.4 4 stick" in printed
+    frame = history.to_frame()
+    assert frame["step"].tolist() == [1, 2, 3, 3, 3, 4, 4, 4, 4, 4]
+    assert frame["dissipated_most"].is_monotonic_increasing is False
+    assert (frame["dissipated"] >= 0).all()
+
+
+def test_every_step_is_what_enumerate_roots_finds(out_again, pulled_wedge):
+    """Starts without a radius are ordinary problems: by hand, with problems built anew."""
+    for stage in out_again.data.stages:
+        alpha = float(stage.roots.alpha)
+        by_hand = dataclasses.replace(pulled_wedge, slip_offset=stage.start.offset)
+        roots = enumerate_roots(by_hand, alpha)
+        assert [root.statuses for root in roots] == [root.statuses for root in stage.roots]
+        for one, other in zip(roots, stage.roots, strict=True):
+            assert np.allclose(one.lambda_n, other.lambda_n, rtol=0, atol=1e-12)
+        if stage.start.radius is None:
+            assert by_hand.fingerprint == stage.problem.fingerprint
+        else:
+            assert by_hand.fingerprint != stage.problem.fingerprint
+
+
+def test_steps_in_space_by_hand():
+    given = enumsol.gallery.get("block3d-4").build()
+    block = dataclasses.replace(given, friction=tuple(given.friction_at(0.5).T), friction_slope=0.0)
+    loads = [block.f, block.f * 1.5, -0.5 * block.f]
+    history = histories(block, loads)
+    assert history.counts == (1, 1, 1)
+    problem = dataclasses.replace(block, f=loads[0])
+    for step, load in enumerate(loads, 1):
+        problem = dataclasses.replace(problem, f=load)
+        (root,) = enumerate_roots(problem, 0)
+        assert root.statuses == history.root((step, 0)).statuses
+        assert np.allclose(root.lambda_t, history.root((step, 0)).lambda_t, atol=1e-10)
+        problem = dataclasses.replace(problem, slip_offset=problem.slip_offset + root.u_t)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_complete_step_is_complete_for_every_start_in_its_ball(dimension, pulled_wedge):
+    problem = pulled_wedge if dimension == 2 else enumsol.gallery.get("wedge3d-2-3").build()
+    alpha = 0.5 if dimension == 2 else 1
+    shape, rng = problem.slip_offset.shape, np.random.default_rng(3)
+    radius = np.full(shape, 2e-6 if dimension == 2 else 1e-5)
+    wide = restarted(problem, SlipStart(np.zeros(shape), radius))
+    roots = enumerate_roots(wide, alpha)
+    assert roots.complete
+    assert len(roots) == 3
+    widest = max(float(np.max(np.ptp(root.enclosure.lambda_n, axis=1))) for root in roots)
+    assert widest > 1e-7  # the start's radius, not rounding
+    for _ in range(5):
+        offset = radius * rng.choice([-1.0, 1.0], size=shape)
+        found = enumerate_roots(dataclasses.replace(problem, slip_offset=offset), alpha)
+        assert [root.statuses for root in found] == [root.statuses for root in roots]
+        for one, ball in zip(found, roots, strict=True):
+            for name in ("lambda_n", "lambda_t", "u_n", "u_t"):
+                value, bounds = getattr(one, name), getattr(ball.enclosure, name)
+                assert np.all(bounds[..., 0] <= value + 1e-15), name
+                assert np.all(value - 1e-15 <= bounds[..., 1]), name
+
+
+def test_the_radius_is_named_where_it_is_the_reason(pulled_wedge):
+    history = histories(pulled_wedge, [0, 1, 0, 1])
+    (reason,) = history.reasons
+    assert reason.startswith("step 4 from root 3.1: ")
+    assert "because its start is known within" in reason
+    assert not history.complete
+    assert history.unique_until == 1
+
+
+def test_a_wide_ball_is_not_decided_in_rationals(pulled_wedge):
+    wide = restarted(pulled_wedge, SlipStart(np.zeros(4), np.full(4, 1e-2)))
+    roots = enumerate_roots(wide, 0.5, max_nodes=60)
+    assert any(part.reason != "the search was stopped before it got here" for part in roots.undecided)
+    assert not roots.complete
+
+
+def test_the_slip_offset_moves_no_more_than_it_has_to():
+    """Steps share what depends on the matrices only: the same numbers, and no new factorization."""
+    block = enumsol.gallery.clamped_block(8, 2, 2.0)
+    other = restarted(block, SlipStart(np.linspace(0, 1e-3, 8)), load=2.0 * block.f)
+    again = dataclasses.replace(block, slip_offset=np.linspace(0, 1e-3, 8), f=2.0 * block.f, load_slope=None)
+    assert other.factorization is block.factorization
+    assert other.fingerprint == again.fingerprint
+    assert np.array_equal(other.enclosure.S, again.enclosure.S)
+    assert np.array_equal(other.enclosure.g0, again.enclosure.g0)
+    assert np.array_equal(other.enclosure.g0_rad, again.enclosure.g0_rad)
+    assert np.array_equal(other.condensed.g0, again.condensed.g0)
+
+
+@pytest.mark.parametrize("arithmetic", ["verified", "exact"])
+def test_a_continuum_is_listed_and_not_followed(arithmetic):
+    history = histories(enumsol.gallery.one_node_triangle(f=(1, -2)), [2, 3], arithmetic=arithmetic)
+    assert history.counts == (0, 0)
+    assert history.reasons == ("step 1: 1 family of solutions, which are not followed",)
+    assert not history.complete
+    assert history.unique_until == 0
+    assert "none reaches the last step" in repr(history)
+
+
+# -- choices and limits ------------------------------------------------------------------------------------------------
+
+
+def test_the_nearest_root_is_followed(pulled_wedge):
+    history = histories(pulled_wedge, [-1, 0, 0.5, 1], follow="nearest")
+    assert history.counts == (1, 1, 3, 3)
+    assert {status.value for status in history.root(history.ends[-1]).statuses} == {"stick"}
+    assert not history.complete
+    assert sum("is not followed, by the user's choice" in reason for reason in history.reasons) == 2
+    assert "3.0 4 open (not followed)" in repr(history)
+
+
+def test_a_callable_chooses(pulled_wedge):
+    asked = []
+
+    def loose(before, roots):
+        asked.append((before, len(roots)))
+        return [root for root in roots if not np.any(root.lambda_n)] or 0
+
+    history = histories(pulled_wedge, [-1, 0, 0.5, 1], follow=loose)
+    assert history.counts == (1, 1, 3, 1)
+    assert [count for _, count in asked] == [1, 1, 3]
+    assert asked[0][0] is None
+    assert asked[1][0] is history.root((1, 0))
+    with pytest.raises(InvalidArgumentError, match="follow returned 7; expected roots of the RootSet"):
+        histories(pulled_wedge, [-1, 0], follow=lambda before, roots: 7)
+
+
+def test_limits_keep_what_was_found(pulled_wedge):
+    few = histories(pulled_wedge, [-1, 0, 0.5, 1], max_branches=2)
+    assert few.reasons == ("step 3: max_branches = 2 of 3 different ends are followed",)
+    assert few.counts == (1, 1, 3, 2)
+    short = histories(pulled_wedge, [-1, 0, 0.5, 1], max_nodes=3)
+    assert not short.complete
+    assert short.unique_until < 4
+    assert "stopped after max_nodes = " in short.reasons[-1]
+    none = histories(pulled_wedge, [-1, 0, 0.5, 1], time_limit=1e-9)
+    assert none.counts[-1] == 0
+    assert "time limit" in none.reasons[-1]
+
+
+def test_an_interruption_keeps_the_steps_before(pulled_wedge):
+    def press_ctrl_c(state):
+        if state.step == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match="histories was interrupted in step 3; 5 roots so far") as caught:
+        histories(pulled_wedge, [-1, 0, 0.5, 1], progress=press_ctrl_c)
+    partial = caught.value.partial
+    assert partial.counts == (1, 1, 3, 0)
+    assert partial.unique_until == 2
+    assert not partial.complete
+
+
+def test_equal_ends_start_one_stage():
+    chain = enumsol.gallery.chain(2)
+    history = histories(chain, [5, 5.5])
+    # open, sticking and slipping nodes: those that slip leave the others' ends where they are
+    assert history.complete
+    ends = {stage.start.key for stage in history.stages(2)}
+    assert len(ends) == len(history.stages(2)) < len(history.roots(1)) + 1
+    assert history.counts[0] == 9
+
+
+def test_a_tolerance_joins_ends_in_one_ball(pulled_wedge):
+    apart = histories(pulled_wedge, [1, 0])
+    joined = histories(pulled_wedge, [1, 0], merge=1.0, max_nodes=80)
+    assert len(apart.stages(2)) == 3
+    (stage,) = joined.stages(2)
+    for other in apart.stages(2):
+        assert stage.start.holds(other.start.ball)
+    assert not joined.complete  # so wide a ball is not decided, and that is said
+    with pytest.raises(InvalidArgumentError, match="merge"):
+        histories(pulled_wedge, [1, 0], merge=1.0, arithmetic="exact")
+
+
+def test_increments_are_halved_until_nothing_changes(pulled_wedge):
+    history = histories(pulled_wedge, [-1, 0, 0.5], refine=True)
+    assert history.refinement.settled
+    assert len(history.steps) > 3
+    assert "left the statuses along all histories unchanged" in repr(history)
+    coarse = ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 0], friction=0.5, load_slope=[0, 1])
+    # friction falls as the load reverses: the coarse step slips back, a finer one sees the high load first
+    steps = [LoadStep(0.0, friction=1.0), LoadStep(0.0, friction=1.0)]
+    assert histories(coarse, steps, refine=True).refinement.settled
+
+
+def test_increments_that_matter_are_told():
+    # one step over a turn of the load misses the slip on the way
+    problem = ContactProblem(
+        [[1.0, 0.3], [0.3, 1.0]], [[1, 0]], [[0, 1]], [0.0, 0.0], friction=(0.5, 0.0), load_slope=[1.0, 0.0]
+    )
+    steps = [np.array([1.0, 0.0]), np.array([1.0, 0.4]), np.array([4.0, 3.0]), np.array([0.1, 0.0])]
+    history = histories(problem, steps, refine=True, max_halvings=2)
+    assert history.refinement.halvings >= 1
+    assert str(history.refinement) in repr(history)
+
+
+# -- arguments ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("steps", "message"),
+    [
+        (0.5, r"steps is 0\.5; expected a sequence of alphas"),
+        ([], "steps is empty"),
+        ([1, "x"], "step 2: alpha is 'x'"),
+        ([1, None], "step 2 is None; expected a sequence"),
+        ([np.zeros(3)], r"step 1: load has shape \(3,\); expected \(n,\) = \(2,\)"),
+        ([-1], "step 1: friction at alpha = -1 is -1 at contact node 0"),
+        ([LoadStep(load=[0, 0])], "step 1 has no alpha, on which the problem's friction or load depends"),
+        ([LoadStep(1, friction=-1)], "step 1: friction is -1; expected F >= 0"),
+        ([LoadStep(1, friction=[1, 2])], "step 1: friction has shape"),
+        (pd.DataFrame({"alpha": [1], "frction": [2]}), "steps has the columns alpha, frction; expected"),
+        (pd.DataFrame({"alpha": [1, "one"]}), "step 2: alpha is 'one'"),
+    ],
+)
+def test_steps_that_cannot_be_used(steps, message):
+    with pytest.raises(InvalidArgumentError, match=message):
+        histories(enumsol.gallery.one_node_triangle(), steps)
+
+
+def test_tables_and_arrays_are_steps():
+    problem = ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [2, 0], friction=0.5, load_slope=[0, 1])
+    table = pd.DataFrame({"alpha": ["1/2", "3"], "friction": [0.25, 0.5]})
+    by_table = histories(problem, table)
+    assert [root.lambda_t[0] for root in (by_table.root((1, 0)), by_table.root((2, 0)))] == pytest.approx([0.5, 1.0])
+    loads = np.array([[2.0, 0.5], [2.0, 3.0]])
+    by_array = histories(problem, loads)
+    assert by_array.root((2, 0)).lambda_t[0] == pytest.approx(1.0)
+    named = histories(problem, pd.DataFrame({"f1": [0.5, 3.0]}))
+    assert [named.root((k, 0)).statuses for k in (1, 2)] == [by_array.root((k, 0)).statuses for k in (1, 2)]
+    with pytest.raises(InvalidArgumentError, match="stop_after is an option of enumerate_roots"):
+        histories(problem, loads, stop_after=2)
