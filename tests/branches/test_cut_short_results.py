@@ -64,7 +64,6 @@ def test_gallery_graphs_cut_short_claim_nothing_false(name):
 
 
 @pytest.mark.slow
-@pytest.mark.few(1)
 @pytest.mark.parametrize("calls", [1, 2, 3])
 def test_a_graph_cut_short_by_an_interruption_claims_nothing_false(calls):
     full = complete_graph("wedge-8-3")
@@ -100,6 +99,7 @@ def test_an_interruption_while_arcs_are_worked_out_keeps_those_that_are_done(nam
     assert list(false_claims_of_graph(partial, full)) == []
 
 
+@pytest.mark.slow
 def test_an_interruption_keeps_the_selections_of_a_group_that_are_finished(monkeypatch):
     full = complete_graph("wedge-8-3")
     asked, over_parts = [], tracing.over_parts

@@ -177,6 +177,7 @@ def test_a_pitchfork_and_the_perturbation_that_destroys_it():
     assert not [v for v in moved.vertices if v.kind == "bifurcation"]
 
 
+@pytest.mark.slow
 def test_mirror_symmetric_problems():
     kinds = set()
     for seed in range(80):

@@ -127,6 +127,7 @@ def test_windows_around_narrow_steps(alphas, between, expected):
     np.testing.assert_allclose(np.reshape(found, (-1, 2)), np.reshape(expected, (-1, 2)), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_spike_is_shown_larger(graphs):
     graph = graphs["spike"]
     alphas, _, between = graph.steps

@@ -157,6 +157,7 @@ def test_a_pitchfork_is_left_open(push):
     assert 1.0 + push == 1.0 or all(high - low < 1e-6 for low, high, _ in graphs.open)
 
 
+@pytest.mark.slow
 def test_exact_algebra_that_would_take_too_long_is_not_begun(monkeypatch):
     small = pair(0.0)
     A, rows = np.eye(28), np.zeros((2, 2, 28))  # more degrees of freedom, which nothing touches

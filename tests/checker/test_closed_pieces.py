@@ -465,6 +465,7 @@ def whole(name):
     return body, p, body_records, interval
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("believing", [False, True])
 @pytest.mark.parametrize("name", SEVERAL)
 def test_several_solutions(name, believing, monkeypatch):

@@ -168,6 +168,7 @@ def test_an_accepted_mutant_is_still_a_proof(kind):
     assert MUTANTS / 4 < refused < MUTANTS
 
 
+@pytest.mark.slow
 def test_forged_roots_are_refused():
     for problem, records in cases("m"):
         for k in leaves(records, "m"):
@@ -204,6 +205,7 @@ def test_forged_numbers_are_refused(kind):
                 assert not verify(problem, proof_of([*records[:k], record, *records[k + 1 :]])).ok, (forged, numbers)
 
 
+@pytest.mark.slow
 def test_a_lone_root_is_no_other_and_no_wider():
     for problem, records in cases("a"):
         for k in leaves(records, "a"):

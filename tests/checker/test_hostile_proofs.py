@@ -218,7 +218,7 @@ def test_the_header_comes_first(name, monkeypatch):
     for key, value in (("problem", "0" * 64), ("p", 10**9), ("version", 2), ("data", "both"), ("kind", "sheaf")):
         first = [records[0] | {"problem": other.fingerprint, "p": other.p, key: value}]
         effort = Effort(monkeypatch)
-        outcome = effort.of(other, bomb([*first, records[1]], "[]", 20))
+        outcome = effort.of(other, bomb([*first, records[1]], "[]", 5))
         assert not outcome.ok
         assert effort.characters < 200_000
         # nothing was condensed for it
@@ -487,7 +487,7 @@ def test_the_command_line_answers_in_words(tmp_path, capsys):
         write_problem(problem, tmp_path / f"{name}.npz")
         key = "alpha" if name == "stopped" else "interval"
         hostile[name, "fraction"] = changed(name, 0, **{key: "1e400" if key == "alpha" else ["0", "1e4000000"]})[1]
-        hostile[name, "bomb"] = bomb(records_of(proof)[:2], "[]", 20)
+        hostile[name, "bomb"] = bomb(records_of(proof)[:2], "[]", 5)
         hostile[name, "deep"] = proof_of([records_of(proof)[0], "[" * 100_000])
         hostile[name, "deep enough"] = proof_of([*records_of(proof)[:-1], "[" * 500 + "]" * 500])
         hostile[name, "surrogates"] = proof_of([*records_of(proof)[:-1], ["\ud800", "\x1b[31m"]])

@@ -253,6 +253,7 @@ def test_both_checkers_agree_on_random_graphs(make, p, seed):
         assert refused(problem, with_part(records, k, i, [*part[:2], -part[2], *part[3:]]))
 
 
+@pytest.mark.slow
 def test_boxes_left_open_may_have_fractions_for_ends():
     """As right of an alpha at which g vanishes in a family."""
     problem, interval = random_graph(integer_problem, 3, 2)

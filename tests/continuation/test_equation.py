@@ -43,6 +43,7 @@ def test_sign_arrays_name_the_statuses():
     assert sign_array([]).shape == (0, 3)
 
 
+@pytest.mark.slow
 def test_the_selection_of_h_is_the_one_that_the_sign_array_names():
     rng = np.random.default_rng(0)
     seen = set()

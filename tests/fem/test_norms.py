@@ -31,6 +31,7 @@ def test_norm_of_forces_is_the_supremum():
     assert norms.of_force(mu) ** 2 == pytest.approx(scipy.linalg.eigh(np.outer(b, b), G, eigvals_only=True)[-1])
 
 
+@pytest.mark.slow
 def test_smooth_pressures_have_a_norm_that_hardly_depends_on_the_mesh_and_rough_ones_lose_half_a_power():
     smooth, rough = [], []
     for n in (4, 8, 16):

@@ -27,6 +27,7 @@ def test_it_is_the_bound_of_the_branch_graph_or_better(rng):
     assert enumsol.lipschitz_estimate(problem, 1.0).factor >= bound * (1 - 1e-12)
 
 
+@pytest.mark.slow
 def test_below_the_bound_there_is_one_root(rng):
     for _ in range(100):
         p = int(rng.integers(1, 5))
@@ -38,6 +39,7 @@ def test_below_the_bound_there_is_one_root(rng):
         assert len(enumsol.enumerate_roots(small, 0)) == 1
 
 
+@pytest.mark.slow
 def test_the_constant_bounds_differences_of_psi(rng):
     for _ in range(30):
         p = int(rng.integers(1, 4))
@@ -71,6 +73,7 @@ def test_the_constant_bounds_differences_of_psi(rng):
         assert after <= estimate.constant * before * (1 + 1e-9)
 
 
+@pytest.mark.slow
 def test_iterations_contract_at_least_as_much_as_the_estimate_says(rng):
     for _ in range(20):
         p = int(rng.integers(1, 5))

@@ -11,7 +11,7 @@ from enumsol import ContactProblem3D, FrictionTable, SlipMean
 ROWS = np.eye(4)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::enumsol.FrictionJumpWarning")
 @pytest.mark.parametrize("anderson", [0, 5])
 def test_converged_means_coefficients_at_the_slips(rng, anderson):

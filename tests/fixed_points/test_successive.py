@@ -40,6 +40,7 @@ def test_the_public_one_contact_problem():
     np.testing.assert_allclose(reaction, r_n * np.array([1.0, 0.1 * np.cos(phi), 0.1 * np.sin(phi)]), rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_random_problems_satisfy_the_equations(rng):
     converged = 0
     for _ in range(60):

@@ -53,7 +53,7 @@ def hard(rng, coefficients):
     return problem, size * rng.choice([0, 1e-300, 1e-12, 1e-3, 1, 1, 1e3, 1e12], size=p), F
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["newton", "clarabel"])
 def test_hard_problems_are_solved(rng, solver):
     for _ in range(150):

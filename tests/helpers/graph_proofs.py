@@ -29,8 +29,8 @@ def three_with_everything():
 
 
 GRAPHS = {
-    "friction": lambda: (gallery.get("two-node-6.4").build(), (0.0, 6.0)),
     "load": lambda: (gallery.get("two-node-6.7-minus").build(), (-3.0, 3.0)),
+    "friction": lambda: (gallery.get("two-node-6.4").build(), (0.0, 6.0)),
     "both": lambda: (triangle(f=[1.0, -2.5], load_slope=[0.2, -0.5], friction=(0.5, 0.7)), (0.0, 6.0)),
     "unloaded": through_the_unloaded_state,
     "frictionless": lambda: (triangle(load_slope=[-1.0, 0.5], friction=0.0), (0.0, 4.0)),

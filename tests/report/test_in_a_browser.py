@@ -191,6 +191,7 @@ def test_a_graph_cut_short_never_counts_as_complete(browser, pages):
     assert browser.complaints() == []
 
 
+@pytest.mark.slow
 def test_a_page_that_has_crashed_is_not_waited_for():
     other = Browser(find_browser())
 

@@ -165,6 +165,7 @@ def test_the_slider_reaches_every_narrow_step():
     assert len(slider_alphas([k / 1000 for k in range(1001)], (0.0, 1.0))) < 2100
 
 
+@pytest.mark.slow
 def test_a_graph_of_many_arcs_is_drawn_more_coarsely(wedge, monkeypatch):
     fine = content.report_content(wedge)
     assert fine["tolerance"] == 1e-3

@@ -38,6 +38,7 @@ def _peak(p):
     return peak / len(roots)
 
 
+@pytest.mark.slow
 def test_memory_of_a_coupled_chain_grows_like_its_answer():
     enumsol.enumerate_roots(gallery.chain(2, 0.01), 5.0, "fast")  # imports and caches
     small, large = _peak(4), _peak(6)  # bytes per root; a root of the larger problem holds 6 / 4 as many numbers

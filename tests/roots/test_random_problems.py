@@ -43,6 +43,7 @@ def test_six_nodes():
     assert check(100, 50, (6,)) >= 50 / 3
 
 
+@pytest.mark.slow
 def test_five_nodes_tree_only():
     assert check(200, 50, (5,), methods=("tree",)) >= 50 / 3
 
@@ -59,6 +60,7 @@ def test_exact_arithmetic(method):
         assert roots.index_sum == 1
 
 
+@pytest.mark.slow
 def test_the_generator_covers_the_range_of_friction():
     rng = np.random.default_rng(0)
     F = np.concatenate([random_problem(rng, 2).friction[0] for _ in range(300)])

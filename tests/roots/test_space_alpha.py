@@ -67,7 +67,6 @@ def check(problem, alpha, roots, S, g, F, wanted):
 
 
 @pytest.mark.slow
-@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", [0, 3])
 def test_one_node_against_the_closed_form(seed):
     rng = np.random.default_rng(seed)
@@ -90,6 +89,7 @@ def test_one_node_against_the_closed_form(seed):
     assert kinds == {"open", "stick", "slip"}
 
 
+@pytest.mark.slow
 def test_two_nodes_against_newtons_method():
     rng = np.random.default_rng(8)
     counts = []

@@ -137,6 +137,7 @@ def test_the_same_as_the_tree(part):
     assert not all(did)
 
 
+@pytest.mark.slow
 def test_one_node_against_the_closed_form():
     rng, count, several = np.random.default_rng(31), 0, 0
     for _ in range(150):
@@ -212,6 +213,7 @@ def test_the_sum_over_two_solutions_is_not_negative():
     assert pairs > 100
 
 
+@pytest.mark.slow
 def test_any_theta_that_the_gap_allows_serves():
     """An open node, against all states that a node can have (theory, (12.6))."""
     rng, tight = np.random.default_rng(3), 0

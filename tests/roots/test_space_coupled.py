@@ -33,6 +33,7 @@ def test_newton_from_many_starts_finds_no_other(seed, p):
     assert complete >= 9
 
 
+@pytest.mark.slow
 def test_what_successive_approximations_reach():
     # every limit is a root, and roots of index -1 are limits of none
     rng = np.random.default_rng(5)

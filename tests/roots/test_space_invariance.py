@@ -117,7 +117,7 @@ def check(before, S, g, F, image, nodes=(0, 1)):
         assert [twin.statuses for twin in twins] == [tuple(root.statuses[i] for i in nodes)]
 
 
-@pytest.mark.few(3)
+@pytest.mark.slow
 def test_axes_turned_at_every_node(case):
     S, g, F, _ = case
     isotropic = np.repeat(F[:, :1], 2, axis=1)

@@ -98,6 +98,7 @@ def test_degenerate_data_are_undecided_or_right(name):
     assert len(roots) <= len(wanted)
 
 
+@pytest.mark.slow
 def test_degenerate_integer_data():
     rng = np.random.default_rng(7)
     border = 0

@@ -270,6 +270,7 @@ def test_the_reason_is_what_stands_in_the_way_and_the_hint_helps():
     assert undecided_and_perturbed(integers(8)) == ({(Cause.DIRECTIONS.value, perturb)}, True)
 
 
+@pytest.mark.slow
 def test_a_body_that_is_almost_free_to_move():
     roots = enumerate_roots(body(1e-9, 0.1), 0, max_nodes=600)
     reasons = {(region.reason, region.hint) for region in roots.undecided}

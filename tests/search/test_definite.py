@@ -102,6 +102,7 @@ def serves(numbers, F, x, w):
     return True
 
 
+@pytest.mark.slow
 def test_a_solution_that_theta_serves_is_the_only_one():
     tried = needed = several = 0
     rng = np.random.default_rng(0)
@@ -131,6 +132,7 @@ def test_a_solution_that_theta_serves_is_the_only_one():
     assert several > 3
 
 
+@pytest.mark.slow
 def test_a_form_for_any_theta_has_one_solution_for_every_load():
     tried = 0
     rng = np.random.default_rng(1)

@@ -63,6 +63,7 @@ def test_where_friction_vanishes_the_energy_is_kept():
     assert better_form(system) is None
 
 
+@pytest.mark.slow
 def test_a_piece_with_solutions_is_not_excluded_by_any_form():
     tried = 0
     for seed in range(30):
@@ -149,6 +150,7 @@ def test_the_proof_does_not_depend_on_the_workers():
         assert records_of(parallel.proof) == records_of(alone.proof)
 
 
+@pytest.mark.slow
 def test_trees_that_are_given_up_change_nothing_but_the_pieces(monkeypatch):
     problem = gallery.get("wedge-8-3").build()
     plain = branch_graph(problem, (0.0, 3.0))

@@ -99,6 +99,7 @@ def test_the_tree_without_them_finds_the_same(part):
     assert fewer > 10
 
 
+@pytest.mark.slow
 def test_workers_know_the_root(monkeypatch):
     monkeypatch.setattr(parallel, "FIRST", 8)
     monkeypatch.setattr(parallel, "NODES", 16)

@@ -58,7 +58,8 @@ def problems(seed):
     return from_condensed(S, random_load(rng, p) if g is None else g, F)
 
 
-@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 8))])
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(8))
 def test_all_selections_find_the_same(part, monkeypatch):
     # other numbers are sought at once, and small bodies are not spared them
     monkeypatch.setattr(closing, "_FEW", 0)
@@ -174,7 +175,7 @@ def test_what_descent_finds_is_definite(seed):
     assert found > 5
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_changed_certificates_prove_nothing_false(seed):
     rng = np.random.default_rng(seed)

@@ -91,6 +91,7 @@ def test_the_same_roots_and_one_proof_whatever_the_number_of_workers(name, execu
     assert report.roots == len(alone)
 
 
+@pytest.mark.slow
 def test_fast_arithmetic(executors, many):
     problem, _ = many
     assert_equal(enumerate_roots(problem, 0, "fast", executor=executors[0]), enumerate_roots(problem, 0, "fast"))
@@ -160,6 +161,7 @@ def test_a_lost_worker_costs_time_and_nothing_else(healthy, many):
     assert verify(many[0], found.proof).complete
 
 
+@pytest.mark.slow
 def test_tables(executors):
     problem, alphas = gallery.get("block3d-4").build(), [0.0, 0.5, 1.0, 1.5]
     alone = enumsol.multiplicity_table(problem, alphas)

@@ -208,6 +208,7 @@ def moved_to_the_border(seeds, bisections):
     return counts
 
 
+@pytest.mark.slow
 def test_theta_follows_the_solution():
     yes, bordered, judged = moved_to_the_border(range(12), 50)
     assert yes > 2

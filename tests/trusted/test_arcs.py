@@ -144,6 +144,7 @@ def test_a_stack_says_of_each_what_it_says_alone():
         assert all(np.array_equal(*ends) for ends in zip(known.ends, other.ends, strict=True))
 
 
+@pytest.mark.slow
 def test_series_and_their_slopes_lie_within_their_errors():
     assert check_errors(300) > 400
 
@@ -177,6 +178,7 @@ def test_signs_from_bernstein_polynomials_are_right_to_the_last_bit():
     assert proven < 250
 
 
+@pytest.mark.slow
 def test_single_alphas():
     regular = 0
     for rng, selection, truth in selections(300):

@@ -171,6 +171,7 @@ def test_sign_of_the_margin_where_the_bound_is_next_to_zero():
     assert min(signs.count(1), signs.count(-1)) >= 100
 
 
+@pytest.mark.slow
 def test_bounds_never_exceed_the_energy_of_a_solution():
     # the sharpest test there is: a leaf that holds a root can have no positive bound, whatever the multipliers
     rng = np.random.default_rng(2)
@@ -266,6 +267,7 @@ def test_nearly_singular_selections():
     assert proven >= 20
 
 
+@pytest.mark.slow
 def test_singular_integer_selections_are_never_called_regular():
     rng = np.random.default_rng(10)
     singular = 0
@@ -288,6 +290,7 @@ def test_scaled_units_change_nothing():
     assert bench.enclosed.smallest_eigenvalue <= np.linalg.eigvalsh(bench.scaled.S)[0]
 
 
+@pytest.mark.slow
 def test_displacements_of_ill_conditioned_selections(monkeypatch):
     """On weak springs forces are known far worse than displacements; radii in which that cancels are true, too."""
     radii = []

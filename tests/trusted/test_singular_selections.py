@@ -93,7 +93,7 @@ def test_exact_count_by_an_oracle_in_fractions(seed, load):
     assert len(roots.families) == sum(c.dimension > 0 for c in components)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_selection_that_holds_a_root_is_never_contradicted(seed):
     rng = np.random.default_rng([seed, 88])

@@ -61,7 +61,7 @@ def a_member(enclosed, rng):
     return S, enclosed.g + rng.choice([-1.0, 1.0, 0.3], len(enclosed.g)) * enclosed.g_rad
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("degenerate", [False, True])
 def test_solutions_for_all_data_lie_in_the_balls(degenerate):
     rng, concluded, nearest = np.random.default_rng(4), {SpaceRoot: 0, OnlySolution: 0}, 0.0
