@@ -2,6 +2,7 @@
 
 import random
 import resource
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,40 +13,8 @@ from enumsol import EnumsolError, fem, gallery, read_problem, write_problem
 CASES = 60
 #: By how much the peak of memory may grow with one file of some kilobytes [kilobytes].
 MEMORY = 100_000
-SQUARE = """$MeshFormat
-2.2 0 8
-$EndMeshFormat
-$PhysicalNames
-2
-1 7 "floor"
-1 9 "lid"
-$EndPhysicalNames
-$Nodes
-4
-1 0 0 0
-2 1 0 0
-3 1 1 0
-4 0 1 0
-$EndNodes
-$Elements
-3
-1 1 2 7 3 1 2
-2 1 2 9 4 3 4
-3 3 2 1 1 1 2 3 4
-$EndElements
-"""
-ABAQUS = """*NODE
-1, 0., 0.
-2, 1., 0.
-3, 1., 1.
-4, 0., 1.
-*ELEMENT, TYPE=CPS4, ELSET=BODY
-1, 1, 2, 3, 4
-*NSET, NSET=floor
-1, 2
-*NSET, NSET=lid
-3, 4
-"""
+SQUARE = (Path(__file__).parent / "fem" / "meshes" / "square.22.msh").read_text()
+ABAQUS = (Path(__file__).parent / "fem" / "meshes" / "square.inp").read_text()
 OPTIONS = {"young": 2.5, "poisson": 0.25, "contact": "floor", "clamp": "lid"}
 TOML = """mesh = "square.msh"
 young = 2.5

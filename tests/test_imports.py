@@ -77,17 +77,21 @@ def test_a_search_does_not_load_the_checker():
     assert not modules & {"enumsol.checker.verify", "enumsol.io", "enumsol.branches", "enumsol.continuation"}
 
 
-def test_a_problem_in_2d_loads_nothing_of_3d():
-    code = "from concurrent.futures import ThreadPoolExecutor\nimport enumsol\n"
+def test_a_problem_in_2d_loads_nothing_of_3d(tmp_path):
+    code = "from concurrent.futures import ThreadPoolExecutor\nimport enumsol\nfrom enumsol import fem\n"
     code += "problem = enumsol.gallery.two_node_square()\nwith ThreadPoolExecutor(2) as executor:\n"
     code += "    roots = enumsol.enumerate_roots(problem, 3.5, executor=executor)\n"
-    code += "assert enumsol.verify(problem, roots.proof).complete and len(enumsol.multiplicity_table(problem, [1]))\n0"
-    modules = {name.removeprefix("enumsol.") for name in modules_after(code) if name.startswith("enumsol.")}
+    code += "assert enumsol.verify(problem, roots.proof).complete and len(enumsol.multiplicity_table(problem, [1]))\n"
+    code += f"file = {str(tmp_path / 'p.npz')!r}\nenumsol.write_problem(problem, file)\nenumsol.read_problem(file)\n"
+    code += "enumsol.gallery.get('wedge-8-5').build()\n0"
+    loaded = modules_after(code)
+    assert "meshio" not in loaded
+    modules = {name.removeprefix("enumsol.") for name in loaded if name.startswith("enumsol.")}
     assert {"search.parallel", "search.solvers", "roots.enumeration"} <= modules
     of_space = {"model.sectors", "model.friction", "model.slip_mean", "model.problem3d"}
     assert all((Path(enumsol.__file__).parent / f"{name.replace(chr(46), chr(47))}.py").exists() for name in of_space)
     assert not modules & of_space
-    assert not [name for name in modules if "space" in name]
+    assert not [name for name in modules if "space" in name or "3d" in name or name.startswith(("fem.so", "fem.su"))]
 
 
 def test_a_branch_graph_loads_algebra_and_graphs_only():

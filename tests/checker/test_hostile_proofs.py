@@ -367,88 +367,6 @@ def test_a_fraction_at_the_bounds_is_a_number(text):
         assert repr(report)
 
 
-@pytest.mark.few(2)
-@pytest.mark.parametrize("value", [1e300, -1e300, 1.7e308, 5e-324, float("inf"), float("-inf"), float("nan")])
-def test_a_huge_multiplier(value):
-    # warnings are errors here
-    for name in BEFORE:
-        problem, proof = before(name)
-        records = records_of(proof)
-        places = [k for k, record in enumerate(records) if isinstance(record, list) and record[0] in ("x", "X")]
-        for k in places[:4]:
-            rows, values = multipliers(["x", *records[k][-2:]])
-            for altered in ([value] * len(values), [value, *values[1:]]):
-                tampered = copied(records)
-                tampered[k][-2:] = with_multipliers(["x", "", ""], rows, altered)[1:]
-                report = verify(problem, proof_of(tampered))
-                # a small one in place of another may still do
-                assert not report.ok or abs(value) < 1
-
-
-@pytest.mark.parametrize("literal", ["1e999", "-1e999", "Infinity", "-Infinity", "NaN", "1" + "0" * 400, "1E400"])
-def test_every_number_is_finite(literal):
-    for name in ("stopped", "candidates that fail", "graph in several pieces"):
-        problem, proof = before(name)
-        lines = [json.dumps(record) for record in records_of(proof)]
-        for k, line in enumerate(lines):
-            if line.startswith('["r"') or k in (0, len(lines) - 1):
-                record = json.loads(line)
-                if isinstance(record, list):
-                    record[2][0] = "HOLE"
-                else:
-                    record[next(key for key in record if isinstance(record[key], int))] = "HOLE"
-                tampered = [*lines[:k], json.dumps(record).replace('"HOLE"', literal), *lines[k + 1 :]]
-                with pytest.raises(ProofFormatError, match="cannot be decoded"):
-                    verify(problem, proof_of(tampered))
-
-
-def test_the_box_of_a_root():
-    problem, proof = before("stopped")
-    records = records_of(proof)
-    k = next(k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "r")
-    _, mid, rad, index = records[k]
-    size = len(mid)
-    wrong = [
-        ["r", mid[1:], rad[1:], index],
-        ["r", mid, rad[1:], index],
-        ["r", [*mid, 0.0], [*rad, 0.0], index],
-        ["r", mid, [str(r) for r in rad], index],
-        ["r", mid, [None] * size, index],
-        ["r", mid, [True] * size, index],
-        ["r", mid, {"0": 1}, index],
-        ["r", mid, rad, float(index)],
-        ["r", mid, rad, index == 1],
-        ["r", mid, rad],
-        ["r", mid, rad, index, index],
-        ["r", [mid], [rad], index],
-        ["r", mid, [-1e308] * size, index],
-        ["r", [1e308] * size, rad, index],
-    ]
-    for record in wrong:
-        refused(problem, proof_of([*records[:k], record, *records[k + 1 :]]))
-    # a large one holds the root, and says little
-    assert verify(problem, proof_of([*records[:k], ["r", mid, [1e308] * size, index], *records[k + 1 :]])).ok
-
-
-@pytest.mark.parametrize("key", ["force", "length"])
-@pytest.mark.parametrize("name", ["stopped", "graph"])
-def test_units(key, name):
-    k = 0 if name == "stopped" else 1
-    good = records_of(before(name)[1])[k][key]
-    wrong = [
-        good[1:],
-        [*good, 0],
-        [float(x) for x in good],
-        [str(x) for x in good],
-        [x + 0.5 for x in good],
-        [True] * len(good),
-    ]
-    for value in [*wrong, [10**17] * len(good), [901] * len(good), {}, None, 5, "0" * len(good), [[0]] * len(good)]:
-        refused(*changed(name, k, **{key: value}))
-    for exponent in (-900, 900):
-        refused(*changed(name, k, **{key: [exponent] * len(good)}))
-
-
 # -- the file ----------------------------------------------------------------------------------------------------------
 
 
@@ -540,11 +458,11 @@ def is_true(name, report, records):
 
 @pytest.mark.few(2)
 @pytest.mark.usefixtures("enclosed_once")
-@pytest.mark.parametrize("name", [*BEFORE, *TODAY])
+@pytest.mark.parametrize("name", [*TODAY, *BEFORE])
 def test_mutants(name, monkeypatch):
     """Every mutant is refused, is named malformed, or claims what is true; nothing else is raised or warned of."""
     problem, proof = original(name)
-    records, rng = records_of(proof), np.random.default_rng([7, [*BEFORE, *TODAY].index(name)])
+    records, rng = records_of(proof), np.random.default_rng([7, [*TODAY, *BEFORE].index(name)])
     effort = Effort(monkeypatch)
     outcomes = {"malformed": 0, "refused": 0, "true": 0}
     for k in range(250):

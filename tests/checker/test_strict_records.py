@@ -43,7 +43,7 @@ GRAPHS = {
     "halves": lambda: (triangle(), (0.0, 5.0)),
     "forms beside the unloaded state": through_the_unloaded_state,
 }
-SPACE = {"sectors": (1, 22), "one tangent": "one tangent"}
+SPACE = {"sectors": (1, 22), "one tangent": "one tangent", "one leaf in space": None}
 CASES = [*POINTS, *GRAPHS, *SPACE]
 #: Kinds of records that others have as well.
 LONG = ("family", "touching", "no root", "halves", "forms beside the unloaded state", "sectors")
@@ -59,6 +59,9 @@ def slipping():
 @functools.cache
 def case(name):
     """Problem and records."""
+    if name == "one leaf in space":
+        problem = gallery.block3d(2, 2, 1, friction=(0.4, 0.25))
+        return problem, records_of(enumerate_roots(problem, 0, max_nodes=1).proof)
     if name in SPACE:
         problem, _, records, _ = space_proofs.case(SPACE[name])
         return problem, records

@@ -197,35 +197,6 @@ def test_audit_names_a_missed_branch(capsys, points, tmp_path):
     assert "arc 0 of branch 0, alpha from 0 to 20: open" in out
 
 
-def test_audit_finds_a_planted_jump(capsys, points, tmp_path, graph):
-    frame = pd.read_csv(points)
-    late = frame["status_0"].eq("slip-") & frame["alpha"].gt(10)
-    assert late.any()
-    frame.loc[late, ["lambda_n_0", "lambda_t_0"]] = 0.0
-    file, result = tmp_path / "jump.csv", tmp_path / "audit.csv"
-    frame.to_csv(file, index=False)
-    arguments = ("audit", "gallery:one-node-6.1", file, "--graph", graph)
-    status, out, _ = run(capsys, *arguments, "--json", "-", "--csv", result)
-    assert status == 3
-    content = json.loads(out)
-    assert content["ok"] is False
-    assert len(content["jumps"]) == 1
-    assert content["jumps"][0]["way"] is None
-    assert sorted(content["jumps"][0]["branches"]) == [0, 1]
-    assert pd.read_csv(result)["jump"].sum() == 1
-
-
-def test_audit_names_points_off_the_graph(capsys, points, tmp_path):
-    frame = pd.read_csv(points)
-    frame.loc[3, "lambda_n_0"] += 1e-3
-    file = tmp_path / "off.csv"
-    frame.to_csv(file, index=False)
-    status, out, _ = run(capsys, "audit", "gallery:one-node-6.1", file)
-    assert status == 3
-    assert "1 point off" in out
-    assert run(capsys, "audit", "gallery:one-node-6.1", file, "--tolerance", 0.1)[0] == 0
-
-
 def test_audit_reads_stdin(capsys, points, monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO(points.read_text()))
     status, out, err = run(capsys, "audit", "gallery:one-node-6.1", "-")

@@ -3,6 +3,7 @@
 import json
 import os
 from inspect import signature
+from pathlib import Path
 
 import pytest
 from command_line import assert_refused, run
@@ -12,34 +13,7 @@ from enumsol import enumerate_roots, fem, read_problem
 from enumsol.cli.app import app
 from enumsol.cli.solve import MESH_OPTIONS
 
-BODY = """$MeshFormat
-2.2 0 8
-$EndMeshFormat
-$PhysicalNames
-3
-1 7 "floor"
-1 9 "lid"
-2 1 "body"
-$EndPhysicalNames
-$Nodes
-6
-1 0 0 0
-2 1 0 0
-3 2 0 0
-4 0 1 0
-5 1 1 0
-6 2 1 0
-$EndNodes
-$Elements
-6
-1 1 2 7 3 1 2
-2 1 2 7 3 2 3
-3 1 2 9 4 4 5
-4 1 2 9 4 5 6
-5 3 2 1 1 1 2 5 4
-6 3 2 1 1 2 3 6 5
-$EndElements
-"""
+BODY = (Path(__file__).parents[1] / "fem" / "meshes" / "block.22.msh").read_text()
 OPTIONS = (
     "--contact",
     "floor",

@@ -1,5 +1,7 @@
 """Plane meshes from files: gmsh by hand in two versions, node sets, groups of points, files that are no plane body."""
 
+from pathlib import Path
+
 import meshio
 import numpy as np
 import pytest
@@ -7,88 +9,13 @@ from parted_meshes import grid
 
 from enumsol import InvalidArgumentError, enumerate_roots, fem
 
-GMSH_2 = """$MeshFormat
-2.2 0 8
-$EndMeshFormat
-$PhysicalNames
-4
-0 4 "corner"
-1 7 "floor"
-1 9 "lid"
-2 1 "body"
-$EndPhysicalNames
-$Nodes
-5
-10 0 0 0
-20 1 0 0
-30 1 1 0
-40 0 1 0
-50 9 9 0
-$EndNodes
-$Elements
-6
-1 15 2 0 1 50
-2 15 2 4 2 20
-3 1 2 7 3 10 20
-4 1 2 9 4 30 40
-5 2 2 1 1 10 20 30
-6 2 2 1 1 10 30 40
-$EndElements
-"""
+MESHES = Path(__file__).parent / "meshes"
+GMSH_2 = (MESHES / "plane.22.msh").read_text()
 
 #: Edges of second order, in the order of the file: ends, then the node between.
-GMSH_4 = """$MeshFormat
-4.1 0 8
-$EndMeshFormat
-$PhysicalNames
-2
-1 7 "floor"
-2 1 "body"
-$EndPhysicalNames
-$Entities
-0 1 1 0
-3 0 0 0 1 0 0 1 7 0
-1 0 0 0 1 1 0 1 1 1 3
-$EndEntities
-$Nodes
-1 6 1 6
-2 1 0 6
-1
-2
-3
-4
-5
-6
-0 0 0
-1 0 0
-0 1 0
-0.5 -0.1 0
-0.5 0.5 0
-0 0.5 0
-$EndNodes
-$Elements
-2 2 1 2
-1 3 8 1
-1 1 2 4
-2 1 9 1
-2 1 2 3 4 5 6
-$EndElements
-"""
+GMSH_4 = (MESHES / "curved.41.msh").read_text()
 
-ABAQUS = """*HEADING
-made by hand
-*NODE
-1, 0., 0.
-2, 1., 0.
-3, 1., 1.
-4, 0., 1.
-*ELEMENT, TYPE=CPS4, ELSET=BODY
-1, 1, 2, 3, 4
-*NSET, NSET=FLOOR
-1, 2
-*NSET, NSET=POINT
-3
-"""
+ABAQUS = (MESHES / "plane.inp").read_text()
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
 QUAD, LINE = ("quad", [[0, 1, 2, 3]]), ("line", [[0, 1]])

@@ -1,6 +1,7 @@
 """Meshes from files: gmsh by hand and by meshio, VTU, groups with and without names, files that are no body."""
 
 import sys
+from pathlib import Path
 
 import meshio
 import numpy as np
@@ -8,77 +9,11 @@ import pytest
 
 from enumsol import InvalidArgumentError, MissingDependencyError, fem
 
-GMSH_2 = """$MeshFormat
-2.2 0 8
-$EndMeshFormat
-$PhysicalNames
-3
-2 7 "floor"
-2 9 "lid"
-3 1 "body"
-$EndPhysicalNames
-$Nodes
-6
-10 0 0 0
-20 1 0 0
-30 0 1 0
-40 0 0 1
-50 1 1 1
-60 9 9 9
-$EndNodes
-$Elements
-7
-1 15 2 0 1 60
-2 1 2 0 1 10 20
-3 2 2 7 3 10 20 30
-4 2 2 9 4 20 30 50
-5 2 2 9 4 20 40 50
-6 4 2 1 1 10 20 30 40
-7 4 2 1 1 20 30 40 50
-$EndElements
-"""
+MESHES = Path(__file__).parent / "meshes"
+GMSH_2 = (MESHES / "tetrahedra.22.msh").read_text()
 
 
-GMSH_4 = """$MeshFormat
-4.1 0 8
-$EndMeshFormat
-$PhysicalNames
-3
-2 7 "floor"
-2 9 "lid"
-3 1 "body"
-$EndPhysicalNames
-$Entities
-0 0 2 1
-3 0 0 0 1 1 0 1 7 0
-4 0 0 0 1 1 1 1 9 0
-1 0 0 0 1 1 1 1 1 2 3 4
-$EndEntities
-$Nodes
-1 5 1 5
-3 1 0 5
-1
-2
-3
-4
-5
-0 0 0
-1 0 0
-0 1 0
-0 0 1
-1 1 1
-$EndNodes
-$Elements
-3 4 1 4
-2 3 2 1
-1 1 2 3
-2 4 2 1
-2 2 3 5
-3 1 4 2
-3 1 2 3 4
-4 2 3 4 5
-$EndElements
-"""
+GMSH_4 = (MESHES / "tetrahedra.41.msh").read_text()
 
 
 def described(kind, **options):

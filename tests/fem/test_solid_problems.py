@@ -155,48 +155,6 @@ def test_a_press_fit_without_lateral_contraction_has_a_uniform_pressure(kind, op
     assert problem.areas.sum() == pytest.approx(3.0)
 
 
-def test_one_layer_of_hexahedra_that_cannot_move_across_is_plane_strain():
-    """Equal displacements in front and at the back: bilinear quadrilaterals of that thickness, by tensor products."""
-    (nx, nz), (a, b, c), (lam, mu) = (3, 2), (1.5, 0.4, 1.0), (1.3, 0.7)
-    mesh = fem.box(nx, 1, nz, (a, b, c))
-    A = fem.solid_stiffness(mesh.points, mesh.cells, (lam, mu))
-    both = np.zeros((A.shape[0], 2 * (nx + 1) * (nz + 1)))
-    for k in range(nz + 1):
-        for i in range(nx + 1):
-            for j in range(2):
-                node, plane = (k * 2 + j) * (nx + 1) + i, k * (nx + 1) + i
-                both[3 * node, 2 * plane] = both[3 * node + 2, 2 * plane + 1] = 1.0
-    plane = both.T @ A @ both
-
-    def interval(count, length, local):
-        matrix = np.zeros((count + 1, count + 1))
-        for i in range(count):
-            matrix[i : i + 2, i : i + 2] += local(length / count)
-        return matrix
-
-    (Mx, Kx, Cx), (Mz, Kz, Cz) = (
-        (
-            interval(n, length, lambda h: h * np.array([[2, 1], [1, 2]]) / 6),
-            interval(n, length, lambda h: np.array([[1, -1], [-1, 1]]) / h),
-            interval(n, length, lambda _: np.array([[-0.5, -0.5], [0.5, 0.5]])),
-        )
-        for n, length in ((nx, a), (nz, c))
-    )
-    xx, zz, xz = np.kron(Mz, Kx), np.kron(Kz, Mx), np.kron(Cz.T, Cx)
-    expected = np.zeros_like(plane)
-    expected[0::2, 0::2] = (lam + 2 * mu) * xx + mu * zz
-    expected[1::2, 1::2] = (lam + 2 * mu) * zz + mu * xx
-    expected[0::2, 1::2] = lam * xz + mu * xz.T
-    expected[1::2, 0::2] = expected[0::2, 1::2].T
-    assert np.allclose(plane, b * expected, rtol=0, atol=1e-13)
-    # and it does not move across by itself
-    assert np.allclose(A.toarray()[1::3] @ both, -(A.toarray()[1::3] @ both)[_other_side(nx, nz)], rtol=0, atol=1e-13)
-
-
-def _other_side(nx, nz):
-    return np.arange((nx + 1) * 2 * (nz + 1)).reshape(nz + 1, 2, nx + 1)[:, ::-1].ravel()
-
-
 def test_patches_by_labels_and_without_held_ones():
     mesh = fem.box(4, 2, 1)
     facets = mesh.facets["bottom"]
@@ -295,18 +253,6 @@ def test_a_contact_node_held_in_part_is_refused_unless_a_patch_holds_it():
     with pytest.raises(InvalidArgumentError, match="contact node 1 is held in some components only"):
         on_bottom(mesh, held=held)
     assert on_bottom(mesh, held=held, multipliers="elements", ratio=1).p == 4
-
-
-def test_nothing_of_this_is_loaded_for_a_problem_in_2d():
-    import subprocess
-    import sys
-
-    code = (
-        "import sys, enumsol; from enumsol import fem; enumsol.gallery.get('wedge-8-5').build(); "
-        "sys.exit(any(name.startswith(('enumsol.model.problem3d', 'enumsol.model.friction', 'enumsol.fem.so', "
-        "'enumsol.fem.su', 'meshio')) for name in sys.modules))"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 BOX = fem.box(2, 2, 1)

@@ -165,20 +165,6 @@ def test_dense_arrays_and_numbers_for_all_nodes(tmp_path):
     assert_same(read_problem(tmp_path / "p.npz"), ContactProblem3D(**DENSE, friction=0.3))
 
 
-def test_a_problem_in_2d_loads_nothing_of_3d(tmp_path):
-    import subprocess
-    import sys
-
-    write_problem(gallery.one_node_triangle(), tmp_path / "p.npz")
-    code = (
-        f"import sys, enumsol; enumsol.write_problem(enumsol.read_problem({str(tmp_path / 'p.npz')!r}), "
-        f"{str(tmp_path / 'q.npz')!r}); "
-        "names = ('enumsol.model.problem3d', 'enumsol.model.friction', 'enumsol.io.arrays3d'); "
-        "sys.exit(any(name in sys.modules for name in names))"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
 MESH = {"mesh_points": np.zeros((2, 3)), "mesh_cells": np.array([[0, 1, 0, 1]]), "mesh_dofs": np.arange(6)}
 MEAN = {"slip_mean_T1": np.eye(6), "slip_mean_T2": np.eye(6), "slip_mean_offset": np.zeros((6, 2))}
 MEAN |= {"slip_mean_weights": np.full((2, 6), 1 / 6)}
