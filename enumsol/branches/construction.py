@@ -147,22 +147,24 @@ def branch_graph(
     max_nodes, time_limit = optional_count(max_nodes, "max_nodes"), optional_seconds(time_limit)
     _check_friction(problem, a, b)
     started = time.perf_counter()
-    large = arithmetic == "verified" and problem.n > FAST_EXACT_DOF
-    at_rest = large and never_loaded(problem)
-    traced = _traced(problem, (a, b)) if large and not at_rest else None
-    exact = _condensed(problem, arithmetic, at_rest=at_rest) if traced is None else None
-    zero = traced.origin if exact is None and traced is not None else None if exact is None else exact.zero
-    certifier = _certifier(problem, exact, arithmetic, zero)
     limits = Deadline.after(started, time_limit)
-    search = IntervalSearch(
-        problem.condensed,
-        (a, b),
-        zero,
-        certifier,
-        max_nodes=max_nodes,
-        deadline=limits.deadline,
-        progress=_stage(progress, "search"),
-    )
+    try:
+        with within(limits):
+            traced, exact, search = _prepared(problem, (a, b), arithmetic, max_nodes, limits, progress)
+    except TimeOverError:
+        late = f"{Stop(StopReason.TIME_LIMIT)} before the body was condensed to its contact nodes"
+        return BranchGraph(
+            problem=problem,
+            exact=None,
+            exact_interval=(a, b),
+            arithmetic=arithmetic,
+            vertices=(),
+            arcs=(),
+            undecided=(late,),
+            stats=GraphStats(seconds=time.perf_counter() - started),
+            pieces=(),
+            make_proof=None,
+        )
     closed = ClosedPieces()
     search.closed = closed.pieces
     candidates = _candidates(search, exact, executor, traced, closed)
@@ -195,6 +197,38 @@ def branch_graph(
     if any(stop.interrupted for stop in made.stops):
         raise Interrupted("branch_graph was interrupted; the arcs found so far are kept", graph)
     return graph
+
+
+def _prepared(
+    problem: ContactProblem,
+    interval: tuple[Fraction, Fraction],
+    arithmetic: Arithmetic,
+    max_nodes: int | None,
+    limits: Deadline,
+    progress: Callable[[str, float], object] | None,
+) -> tuple[TracedProblem | None, ExactCondensed | None, IntervalSearch]:
+    """The problem in balls or without rounding, whichever its arcs are followed in, and the search over the interval.
+
+    Raises
+    ------
+    TimeOverError
+        The body is so large that the time was over before it was condensed.
+    """
+    large = arithmetic == "verified" and problem.n > FAST_EXACT_DOF
+    at_rest = large and never_loaded(problem)
+    traced = _traced(problem, interval) if large and not at_rest else None
+    exact = _condensed(problem, arithmetic, at_rest=at_rest) if traced is None else None
+    zero = traced.origin if exact is None and traced is not None else None if exact is None else exact.zero
+    search = IntervalSearch(
+        problem.condensed,
+        interval,
+        zero,
+        _certifier(problem, exact, arithmetic, zero),
+        max_nodes=max_nodes,
+        deadline=limits.deadline,
+        progress=_stage(progress, "search"),
+    )
+    return traced, exact, search
 
 
 @dataclass

@@ -153,6 +153,18 @@ def test_a_body_that_is_not_condensed_in_time(clock, takes, monkeypatch, tmp_pat
     assert enumerate_roots(problem, 0, time_limit=1000.0).complete
 
 
+@pytest.mark.parametrize("arithmetic", ["verified", "fast"])
+def test_a_body_that_is_not_condensed_in_time_has_a_graph_of_nothing(clock, takes, monkeypatch, arithmetic):
+    monkeypatch.setattr(products, "_COLUMNS", 1)
+    takes(Factorization, "solve")
+    problem = gallery.clamped_block(8, 4)
+    graph = branch_graph(problem, (0, 1), arithmetic, time_limit=4.0)
+    assert clock[0] <= kept(4.0)
+    assert (len(graph.arcs), len(graph.vertices), graph.complete, graph.proof) == (0, 0, False, None)
+    assert "complete: no (stopped by the time limit before the body was condensed" in str(graph)
+    assert list(false_claims_of_graph(graph, branch_graph(problem, (0, 1), arithmetic))) == []
+
+
 # -- roots -------------------------------------------------------------------------------------------------------------
 
 
