@@ -53,7 +53,8 @@ What checker and search share
       and ``proof.compressed_parts`` have it. What a record makes of a leaf is not in these classes: a checker tests it;
     - ``model.problem``, ``model.mesh``, ``model.cells``, ``model.contact_body``, ``condensation.data``,
       ``condensation.condensed``, ``condensation.factorization``, ``support.immutable``, ``support.arguments``,
-      ``support.array_arguments``, ``support.files``, ``support.messages`` and ``errors``: the data, their checks and
+      ``support.array_arguments``, ``support.deadlines``, ``support.files``, ``support.messages`` and ``errors``: the
+      data, their checks and
       their fingerprint, the factorization of A (no bound assumes that it is accurate), S and g as computed;
     - numpy, scipy and python-flint.
 
