@@ -40,8 +40,8 @@ CASES = {group.__name__: (group, judge) for group in GROUPS} | {
 }
 #: The bodies, which are judged in processes of their own.
 LARGE = "bodies"
-#: First and last of the cases that a smoke run tries, where the first two of a group would take seconds.
-SMOKE_CASES = {"many_roots": (0, 1), "parameters": (8, 10)}
+#: First and last of the cases that a smoke run tries, where the first of a group would take seconds.
+SMOKE_CASES = {"parameters": (8, 9)}
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +57,7 @@ def table(wanted: list[str], *, smoke: bool) -> list[dict[str, Any]]:
             rows += bodies(SMOKE_BODIES if smoke else BODIES)
         else:
             group, judged = CASES[name]
-            chosen = SMOKE_CASES.get(name, (0, 2)) if smoke else (0, None)
+            chosen = SMOKE_CASES.get(name, (0, 1)) if smoke else (0, None)
             rows += [judged(case) for case in islice(group(), *chosen)]
     return rows
 

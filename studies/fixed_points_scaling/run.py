@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from shared.results import Run
 
 #: Contact nodes along one side.
-SIDES, SMOKE_SIDES = (4, 8, 12, 16, 24, 32), (4, 8)
+SIDES, SMOKE_SIDES = (4, 8, 12, 16, 24, 32), (4, 6)
 ALPHA = 0.5
 FRICTION, SMOKE_FRICTION = (0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0), (0.5, 4.0)
 FRICTION_SIDE, SMOKE_FRICTION_SIDE = 12, 4

@@ -8,7 +8,7 @@ from enumsol import branch_graph, enumerate_roots, gallery
 from shared.random_paths import random_path
 from shared.results import yes
 
-COUNT, SMOKE_COUNT = 200, 10
+COUNT, SMOKE_COUNT = 200, 5
 PROBLEMS, SMOKE_PROBLEMS = 30, 4
 WEDGES = ("wedge-14-5", "wedge-14-3")
 
