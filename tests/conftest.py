@@ -9,7 +9,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
-from trees import by_the_tree
+from trees import by_the_tree, without_boxes
 
 from enumsol.condensation.enclosure import CondensedEnclosure
 
@@ -26,6 +26,13 @@ def rng():
 def tree_only():
     """Searches go through their tree, also where one certificate would do."""
     with by_the_tree():
+        yield
+
+
+@pytest.fixture
+def no_boxes():
+    """In 3D, leaves near degenerate roots stay open."""
+    with without_boxes():
         yield
 
 

@@ -1,23 +1,20 @@
 """The checkers of proofs, which import nothing of the search.
 
 What a verified proof says
-    For the problem's own A, Bn, Bt, f, gap, slip offset and friction, read as exact numbers (or, where the report
-    says "S and g as computed", for the condensed data), and for alpha as an exact fraction: the listed roots and
-    families solve the problem, and nothing else does. The proof of a branch graph says that every solution for
-    every alpha of an interval lies in the surviving selections and, if it holds arcs, what each of them does along
-    the interval, except for short intervals that it leaves undecided. The proof of a history says it of every step
-    from every start in its ball, and that the ends of all roots are such starts. All this rests on the energy bound
-    (theory, (5.2)), on branchings that cover (``trusted.status_rows.children_of``), on the a-priori error bounds of
-    IEEE double arithmetic with rounding to nearest in ``arithmetic.balls``, ``condensation.enclosure`` and
-    ``trusted``, and on rational arithmetic in ``checker.rational`` and ``checker.hull``. Linear algebra kernels may
-    sum in any order and fuse multiplications and additions; fast matrix multiplication of Strassen's kind and
-    changed rounding modes are excluded.
+    For the problem's own A, Bn, Bt, f, gap, slip offset and friction, read as exact numbers (or, where the report says
+    "S and g as computed", for the condensed data), and for alpha as an exact fraction: the listed roots and families
+    solve the problem, and nothing else does. The proof of a branch graph says that every solution for every alpha of an
+    interval lies in the surviving selections and, if it holds arcs, what each of them does along the interval, except
+    for short intervals that it leaves undecided. All this rests on the energy bound (theory, (5.2)), on branchings that
+    cover (``trusted.status_rows.children_of``), on the a-priori error bounds of IEEE double arithmetic with rounding to
+    nearest in ``arithmetic.balls``, ``condensation.enclosure`` and ``trusted``, and on rational arithmetic in
+    ``checker.rational`` and ``checker.hull``. Linear algebra kernels may sum in any order and fuse multiplications and
+    additions; fast matrix multiplication of Strassen's kind and changed rounding modes are excluded.
 
 What checker and search share
-    ``checker.verify``, ``checker.graph_checker``, ``checker.history_checker`` and ``checker.space_checker`` import
-    nothing of the search, neither its trees and relaxations nor its arcs and results, and a test guards that. They
-    are not independent of all that it uses. These serve both, and an error in one of them may write a false proof
-    and accept it:
+    ``checker.verify``, ``checker.graph_checker`` and ``checker.space_checker`` import nothing of the search, neither
+    its trees and relaxations nor its arcs and results, and a test guards that. They are not independent of all that it
+    uses. These serve both, and an error in one of them may write a false proof and accept it:
 
     - ``trusted.status_rows``: the codes, the rows and the branchings that cover, on which writer and reader have to
       agree;
@@ -38,11 +35,10 @@ What checker and search share
     - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings and
       the exclusion inequality; ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds
       and which leaves share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution
-      only; ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the variables
-      in which friction is isotropic; ``model.problem3d``, ``model.slip_mean`` and ``model.friction``, the data and
-      their checks;
-    - for histories: ``trusted.positions``, where a root leaves the contact nodes; ``model.restart``, the problem of a
-      step;
+      only; ``trusted.space.boxed_solution``, the test that a box of forces holds exactly one, and which of these are
+      the same; ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
+      variables in which friction is isotropic; ``model.problem3d``, ``model.slip_mean`` and ``model.friction``, the
+      data and their checks;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
       search whether it does at all (then there is no proof); ``condensation.affine``: F(alpha) and f(alpha) without
       rounding; of ``arithmetic.rationals`` the pivots of a definite matrix, and floats as rationals;
@@ -52,10 +48,10 @@ What checker and search share
       resumes from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer``
       and ``proof.compressed_parts`` have it. What a record makes of a leaf is not in these classes: a checker tests it;
     - ``model.problem``, ``model.mesh``, ``model.cells``, ``model.contact_body``, ``condensation.data``,
-      ``condensation.condensed``, ``condensation.factorization``, ``support.immutable``, ``support.arguments``,
-      ``support.array_arguments``, ``support.deadlines``, ``support.files``, ``support.messages`` and ``errors``: the
-      data, their checks and
-      their fingerprint, the factorization of A (no bound assumes that it is accurate), S and g as computed;
+      ``condensation.condensed``, ``condensation.factorization``, ``support.deadlines``, ``support.immutable``,
+      ``support.arguments``, ``support.array_arguments``, ``support.files``, ``support.messages`` and ``errors``: the
+      data, their checks and their fingerprint, the factorization of A (no bound assumes that it is accurate), S and g
+      as computed;
     - numpy, scipy and python-flint.
 
     They are shared because the two must agree. A leaf is written when its inequality is proven positive, and a second
@@ -78,8 +74,9 @@ What counts as one root
 
     In 3D a root that slips along the common end of two sectors is found in both. Roots of leaves with the same statuses
     are one if the directions of one lie in the box of angles in which the other is proven to be the only one, and two
-    if their forces differ for certain. Where neither is proven, one more part counts as undecided. A root that closes
-    the whole tree is the only solution, whatever statuses hold there.
+    if their forces differ for certain. Where neither is proven, one more part counts as undecided. Roots that are the
+    only ones in boxes of forces are one if the box of one surely holds the other; so with roots of leaves. A root that
+    closes the whole tree is the only solution, whatever statuses hold there.
 
 Cross-checks
     They use nothing of the proof and are printed with the result. The indices of all roots and families add up to +1,

@@ -9,24 +9,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY
+from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.walk import TreeChecker
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.space_condensed import EnclosedSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, rational_from, shown_alpha
 from enumsol.proof.records import Limits, NoRoot, RegularRoot
-from enumsol.proof.space_records import LEAVES, ExcludedInSpace, OnlyRoot
+from enumsol.proof.space_records import LEAVES, BoxedRoot, ExcludedInSpace, OnlyRoot
+from enumsol.trusted.space.boxed_solution import apart_in_boxes, is_inside, solution_in_box
 from enumsol.trusted.space.leaves import Open, distinct_roots, settle
-from enumsol.trusted.space.sector_rows import STICK, UNDECIDED, sector_children, sector_margin
-from enumsol.trusted.space.space_uniqueness import OnlySolution, only_root, only_solution_in_space
+from enumsol.trusted.space.sector_rows import UNDECIDED, sector_children, sector_margin
+from enumsol.trusted.space.space_uniqueness import only_root, only_solution_in_space
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.checker.walk import Codes, Test
     from enumsol.proof.records import EnclosureRecord, Record
+    from enumsol.trusted.space.boxed_solution import BoxedSolution
     from enumsol.trusted.space.leaves import SpaceRoot
+    from enumsol.trusted.space.space_uniqueness import LooseSolution
 
 _OPEN = "what it holds is not proven"
 
@@ -38,6 +41,9 @@ class SpaceChecker(TreeChecker):
     kinds = LEAVES
 
     roots: list[tuple[tuple[int, ...], SpaceRoot]] = field(default_factory=list)
+    boxed: list[tuple[tuple[int, ...], BoxedSolution]] = field(default_factory=list)
+    #: What boxes hold that were tested.
+    known: dict[bytes, BoxedSolution | None] = field(default_factory=dict)
     doubtful: int = 0
 
     # -- header and tree -------------------------------------------------------------------------------------------
@@ -82,12 +88,12 @@ class SpaceChecker(TreeChecker):
             ExcludedInSpace: self._excluded,
             NoRoot: self._no_root,
             RegularRoot: self._regular_root,
+            BoxedRoot: self._in_box,
             OnlyRoot: self._only,
         }
 
     def _at_rest(self) -> None:
         self.regular += 1
-        self.locate(Ball.exact(np.zeros(3 * self.problem.p)), np.ones(2 * self.problem.p, dtype=bool))
 
     def _excluded(self, codes: Codes, said: ExcludedInSpace) -> str | None:
         positive = sector_margin(self.system, codes, said.rows, said.values) > 0
@@ -107,13 +113,28 @@ class SpaceChecker(TreeChecker):
         if found is None:
             return "it holds no root"
         self.roots.append((codes, found))
-        self._locate(found.y, np.array(codes) == STICK)
+        return self._placed(found, said.enclosure)
+
+    def _in_box(self, codes: Codes, said: BoxedRoot) -> str | None:
+        """The only solution of a box, in which all roots of the leaf lie."""
+        mid, rad = said.box(len(self.system.g))
+        box = Ball(mid / self.system.unit, rad / self.system.unit)
+        key = box.mid.tobytes() + box.rad.tobytes()
+        if key not in self.known:
+            self.known[key] = solution_in_box(self.system, box)
+        found = self.known[key]
+        if found is None:
+            return "its box is not proven to hold one solution"
+        leaf = settle(self.system, codes)
+        if leaf is not None and (leaf.y is None or not is_inside(leaf.y, box)):
+            return "its roots are not proven to lie in its box"
+        self.boxed.append((codes, found))
         return self._placed(found, said.enclosure)
 
     def _only(self, codes: Codes, said: OnlyRoot) -> str | None:
         """The only solution of all."""
         del codes
-        found: OnlySolution | SpaceRoot | None
+        found: LooseSolution | SpaceRoot | None
         if said.leaf:
             found = only_root(self.system, said.numbers, said.leaf)
         else:
@@ -121,11 +142,9 @@ class SpaceChecker(TreeChecker):
         if found is None:
             return "its solution is not proven to be the only one"
         self.regular += 1
-        statuses = np.array(said.leaf)
-        self._locate(found.y, ~(found.slip | found.open) if isinstance(found, OnlySolution) else statuses == STICK)
         return self._placed(found, said.enclosure)
 
-    def _placed(self, found: SpaceRoot | OnlySolution, said: EnclosureRecord) -> str | None:
+    def _placed(self, found: SpaceRoot | LooseSolution, said: EnclosureRecord) -> str | None:
         """Why the ball and the index that are said to be those of a root are not, or None."""
         centre, radius = said.numbers(len(found.y.mid))
         with np.errstate(over="ignore", invalid="ignore"):
@@ -142,25 +161,9 @@ class SpaceChecker(TreeChecker):
     def _count(self) -> tuple[int, int]:
         """Roots that two leaves share count once; what cannot be told apart leaves the count open."""
         distinct, doubtful = distinct_roots(self.roots)
-        self.doubtful = len(doubtful)
-        return len(distinct), 0
-
-    def locate_rational_roots(self) -> None:
-        """Nothing: in 3D there are none."""
-
-    def _locate(self, y: Ball, still: NDArray[np.bool_]) -> None:
-        """Take note of a root's forces in the problem's units; ``still`` tells nodes that stick for certain."""
-        if self.located is None:
-            return
-        p, system = self.problem.p, self.system
-        forces = Ball(np.zeros(3 * p), np.zeros(3 * p))
-        forces[:p] = Ball(y.mid[:p] * self.force, y.rad[:p] * self.force + TINY)
-        for k in (0, 1):
-            nodes = np.flatnonzero(system.tau[:, k] >= 0)
-            part = y[system.tau[nodes, k]] * Ball(system.F[nodes, k], system.F_rad[nodes, k])
-            forces[(1 + k) * p + nodes] = Ball(part.mid * self.force[nodes], part.rad * self.force[nodes] + TINY)
-        # where a coefficient is 0 a sticking node may move all the same
-        self.locate(forces, np.concatenate([still & (system.tau[:, k] >= 0) for k in (0, 1)]))
+        boxed, uncertain = apart_in_boxes([root for _, root in distinct], self.boxed)
+        self.doubtful = len(doubtful) + len(uncertain)
+        return len(distinct) + len(boxed), 0
 
     def _claim(self, isolated: int, families: int) -> dict[str, int]:
         return {"roots": self.regular + isolated, "undecided": self.undecided, "leaves": self.leaves}

@@ -12,13 +12,14 @@ import numpy as np
 from enumsol.model.sectors import DEEPEST
 from enumsol.proof.reading import bytes_from, numbers_from, quoted
 from enumsol.proof.records import (
+    ClosingRecord,
     EnclosureRecord,
     Exclusion,
     Limits,
     NoRoot,
-    Record,
     RecordError,
     RegularRoot,
+    Solved,
     UndecidedRecord,
     Unloaded,
     table_of,
@@ -62,7 +63,7 @@ class ExcludedInSpace(Exclusion):
 
 
 @dataclass(frozen=True, eq=False)
-class OnlyRoot(Record):
+class OnlyRoot(ClosingRecord):
     """The whole tree: the problem has this solution only.
 
     Attributes
@@ -96,8 +97,39 @@ class OnlyRoot(Record):
         return self.numbers, self.leaf, *self.enclosure
 
 
+@dataclass(frozen=True, eq=False)
+class BoxedRoot(Solved):
+    """All roots of a leaf lie in a box of forces that holds one solution.
+
+    Attributes
+    ----------
+    mid, rad : midpoint and radius of the box, read where they are needed
+    enclosure : EnclosureRecord
+    """
+
+    kind, sizes = "l", (6,)
+
+    mid: Any
+    rad: Any
+    enclosure: EnclosureRecord
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> BoxedRoot:
+        """The box and the enclosure."""
+        del limits
+        return cls(entries[0], entries[1], EnclosureRecord(*entries[2:]))
+
+    def box(self, size: int) -> tuple[Array, Array]:
+        """Midpoint and radius of the box; ValueError where they are no ``size`` numbers each."""
+        return numbers_from(self.mid, size), numbers_from(self.rad, size)
+
+    def entries(self) -> Iterable[Any]:
+        """Those of the enclosure after the box."""
+        return self.mid, self.rad, *self.enclosure
+
+
 #: All kinds of leaves in 3D.
-LEAVES = table_of(ExcludedInSpace, NoRoot, RegularRoot, OnlyRoot, Unloaded, UndecidedRecord)
+LEAVES = table_of(ExcludedInSpace, NoRoot, RegularRoot, BoxedRoot, OnlyRoot, Unloaded, UndecidedRecord)
 
 
 def _row(row: Any, p: int) -> Row:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.selections.solution import Codes
     from enumsol.trusted.space.leaves import Open, SpaceRoot
-    from enumsol.trusted.space.space_uniqueness import OnlySolution
+    from enumsol.trusted.space.space_uniqueness import LooseSolution
 
     Array = NDArray[np.float64]
 
@@ -118,7 +118,7 @@ def slip_angles(system: EnclosedSpace, codes: Codes, leaf: SpaceRoot | Open | No
     return angle, radius
 
 
-def loose_angles(system: EnclosedSpace, found: OnlySolution) -> tuple[Array, Array]:
+def loose_angles(system: EnclosedSpace, found: LooseSolution) -> tuple[Array, Array]:
     """Directions of v as angles and radii, (p,) each; nan where a node does not slip against friction for certain."""
     angle, radius = np.full((2, len(found.slip)), np.nan)
     for i in np.flatnonzero(found.slip):

@@ -19,8 +19,9 @@ from enumsol.roots.root_set import RootSet, Undecided
 from enumsol.roots.space_regions import loose_angles, regions_of, slip_angles, with_zeros
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.immutable import sealed
+from enumsol.trusted.space.boxed_solution import BoxedSolution, apart_in_boxes
 from enumsol.trusted.space.leaves import Cause, distinct_roots
-from enumsol.trusted.space.space_uniqueness import OnlySolution
+from enumsol.trusted.space.space_uniqueness import LooseSolution, OnlySolution
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -55,7 +56,12 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
     def _distinct(self) -> tuple[list[tuple[Codes, Any]], list[Codes]]:
         verified = self.certifier.certified.verified
         only = [(codes, root) for codes, root in verified.items() if isinstance(root, OnlySolution)]
-        return (only, []) if only else distinct_roots(verified.items())
+        if only:
+            return only, []
+        boxed = [(codes, root) for codes, root in verified.items() if isinstance(root, BoxedSolution)]
+        regular, doubtful = distinct_roots(leaf for leaf in verified.items() if not isinstance(leaf[1], BoxedSolution))
+        kept, uncertain = apart_in_boxes([root for _, root in regular], boxed)
+        return [*regular, *kept], [*doubtful, *uncertain]
 
     def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
         return lambda solutions: len(solutions) >= stop_after and len(self._distinct()[0]) >= stop_after
@@ -64,7 +70,8 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         outcome = self.outcome
         distinct, doubtful = self._distinct()
         roots = [
-            self._only(root) if isinstance(root, OnlySolution) else self._root(codes, root) for codes, root in distinct
+            self._loose(root) if isinstance(root, LooseSolution) else self._root(codes, root)
+            for codes, root in distinct
         ]
         if self.unloaded:
             roots = [self._rest()]
@@ -112,10 +119,10 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             _condensed=self.problem.condensed,
         )
 
-    def _only(self, found: OnlySolution) -> Root:
-        """The only solution, whose statuses need not be known."""
+    def _loose(self, found: LooseSolution) -> Root:
+        """A solution whose statuses need not be known."""
         system, p = self.system, self.system.p
-        bounds = self._enclosure(found.y, Ball(found.w.mid, np.where(found.w.rad > 0, np.inf, 0.0)))
+        bounds = self._loose_bounds(found)
         lambda_n = found.y.mid[:p] * system.force
         lambda_t = system.tangential(found.y.mid) * system.F * system.force[:, None]
         u_n, u_t = self._displacements(lambda_n, lambda_t)
@@ -130,13 +137,19 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             lambda_t=lambda_t,
             u_n=u_n,
             u_t=u_t,
-            slip_angle=np.array([_around(*pair) for pair in zip(*loose_angles(self.enclosed, found), strict=True)]),
+            slip_angle=self._loose_angles(found),
             index=found.index,
             regular=False,
             margin=0.0,
-            enclosure=bounds,
+            enclosure=bounds if self.arithmetic == "verified" else None,
             _condensed=self.problem.condensed,
         )
+
+    def _loose_bounds(self, found: LooseSolution) -> Enclosure:
+        return self._enclosure(found.y, Ball(found.w.mid, np.where(found.w.rad > 0, np.inf, 0.0)))
+
+    def _loose_angles(self, found: LooseSolution) -> Array:
+        return np.array([_around(*pair) for pair in zip(*loose_angles(self.enclosed, found), strict=True)])
 
     @cached_property
     def _in_balls(self) -> tuple[Ball, Ball]:
@@ -237,7 +250,11 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
     def _doubtful(self, codes: Codes) -> Undecided:
         root = self.certifier.certified.verified[codes]
-        angles, bounds = self._angles(codes, root), self._root_enclosure(codes, root)
+        if isinstance(root, LooseSolution):
+            angles = self._loose_angles(root)
+            bounds = self._loose_bounds(root) if self.arithmetic == "verified" else None
+        else:
+            angles, bounds = self._angles(codes, root), self._root_enclosure(codes, root)
         return Undecided(_names(codes), _DOUBTFUL, "perturb the load", slip_angle=angles, bounds=bounds)
 
 
@@ -264,7 +281,7 @@ def _status(code: int, u_t: Array) -> ContactStatus:
     return ContactStatus.SLIP
 
 
-def _possible(found: OnlySolution, i: int, u_t: Array, *, rubs: bool) -> list[ContactStatus]:
+def _possible(found: LooseSolution, i: int, u_t: Array, *, rubs: bool) -> list[ContactStatus]:
     """The statuses that a node may have."""
     touching = [_status(FRICTIONLESS, u_t)] if found.stick[i] else []
     if rubs:

@@ -48,7 +48,15 @@ class RecordedBound:
 
 
 class Reader(Protocol):
-    """Understands the records of one proof."""
+    """Understands the records of one proof.
+
+    Attributes
+    ----------
+    kinds : dict
+        Its kinds of leaves, by their letters.
+    """
+
+    kinds: dict[str, type[Any]]
 
     def declare(self, record: list[Any]) -> None:
         """Take note of a form; ValueError where the record makes no sense."""
@@ -72,6 +80,8 @@ class PlaneReader:
     enclosed : EnclosedSystem or None
         Balls for the system, by which forms are proven.
     """
+
+    kinds = records.LEAVES
 
     def __init__(self, friction: Sequence[bool], enclosed: EnclosedSystem | None) -> None:
         self._friction, self._enclosed = friction, enclosed
@@ -194,7 +204,7 @@ class Replay:
 
     def _proven(self, item: TreeNode, record: list[Any]) -> bool:
         """Whether a leaf is proven again, and written."""
-        kind, search = records.kind_of(record, records.LEAVES) or records.Record, self._search
+        kind, search = records.kind_of(record, self._reader.kinds) or records.Record, self._search
         if issubclass(kind, records.Exclusion):
             try:
                 bound = self._reader.bound(item.codes, record)

@@ -14,11 +14,12 @@ import enumsol
 from enumsol import branch_graph, checker, enumerate_roots, write_problem
 
 ROOT = Path(enumsol.__file__).parent
-CHECKERS = ("enumsol.checker.verify", "enumsol.checker.graph_checker", "enumsol.checker.history_checker")
+CHECKERS = ("enumsol.checker.verify", "enumsol.checker.graph_checker")
 IN_SPACE = {
     "enumsol.checker.space_checker",
     "enumsol.trusted.space.sector_rows",
     "enumsol.trusted.space.leaves",
+    "enumsol.trusted.space.boxed_solution",
     "enumsol.trusted.space.space_uniqueness",
     "enumsol.trusted.space.turning",
     "enumsol.condensation.space_condensed",
@@ -31,7 +32,6 @@ SEARCH = (
     "enumsol.branches",
     "enumsol.condensation.exact",
     "enumsol.continuation",
-    "enumsol.histories",
     "enumsol.support.workers",
     "enumsol.relaxation",
     "enumsol.roots",
@@ -54,7 +54,6 @@ SHARED = {
         *("EnclosedPiece", "as_computed", "interval_exclusion_margin", "interval_form_margins", "piece_forms"),
     },
     "trusted.arcs.precise": None,
-    "trusted.positions": {"tangential_positions"},
     "trusted.selection": None,
     "trusted.uniqueness_in_contact": {"lone_root", "numbers_of"},
     "trusted.uniqueness": {"ClosedSolution", "closed_solution", "only_solution", "same_solution"},
@@ -63,7 +62,12 @@ SHARED = {
     "trusted.status_rows": None,
     "trusted.space.sector_rows": None,
     "trusted.space.leaves": None,
-    "trusted.space.space_uniqueness": {"LARGEST_UNIT", "OnlySolution", "only_root", "only_solution_in_space"},
+    "trusted.space.boxed_solution": {
+        *("BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "solution_in_box"),
+    },
+    "trusted.space.space_uniqueness": {
+        *("LARGEST_UNIT", "LooseSolution", "OnlySolution", "only_root", "only_solution_in_space"),
+    },
     "arithmetic.ball_arrays": None,
     "proof.begun": None,
     "proof.compressed_parts": None,
@@ -183,7 +187,7 @@ def test_no_module_of_the_search_is_loaded_by_a_verification(tmp_path):
     moving, interval = through_the_unloaded_state()
     plain = enumsol.gallery.one_node_triangle()
     proofs = [(degenerate, enumerate_roots(degenerate, 0.0)), (plain, enumerate_roots(plain, 5.0))]
-    proofs += [(moving, branch_graph(moving, interval)), (plain, enumsol.histories(plain, [5, 4]))]
+    proofs.append((moving, branch_graph(moving, interval)))
     for k, (problem, found) in enumerate(proofs):
         write_problem(problem, tmp_path / f"{k}.npz")
         found.proof.save(tmp_path / f"{k}.proof")

@@ -22,6 +22,50 @@ def exactly(lam, w, friction=1.0):
     return ContactProblem3D(A, rows[:p], rows[p : 2 * p], rows[2 * p :], load, friction=friction)
 
 
+#: Integer legs and hypotenuses of triangles with a right angle.
+_TRIANGLES = ((3, 4, 5), (4, 3, 5), (5, 12, 13), (1, 0, 1), (0, 1, 1))
+
+
+def degenerate_integers(seed, kinds=("graze", "limit")):
+    """A problem of small integers and a solution of it, without rounding, whose first node is degenerate.
+
+    Returns the problem, lambda and w (p, 3), F (p, 2), and what the nodes do: "graze" touches without load and slides,
+    "rest" without load at rest, "limit" just sticks, "open", "stick" and "slip" are strict. ``kinds`` are those that
+    the first node may have, and others with them.
+    """
+    rng = np.random.default_rng([seed, 77])
+    p = int(rng.integers(1, 5))
+    X = rng.integers(-2, 3, (3 * p, 3 * p))
+    A = X @ X.T / float(rng.choice([1, 4])) + np.eye(3 * p) * float(rng.choice([0.125, 0.5, 1, 2]))
+    F = np.repeat(rng.integers(1, 4, (p, 1)), 2, axis=1).astype(float)
+    if rng.random() < 0.25:
+        F[rng.integers(p), rng.integers(2)] = 0
+    lam, w, named = np.zeros((p, 3)), np.zeros((p, 3)), []
+    for i in range(p):
+        a, b, c = _TRIANGLES[rng.integers(len(_TRIANGLES))]
+        sign, f = rng.choice([-1, 1], 2), F[i]
+        kind = str(rng.choice([*kinds, "open", "stick", "slip"][: len(kinds) if i == 0 else None]))
+        named.append(kind)
+        if kind == "open":
+            w[i] = [-rng.integers(1, 4), *rng.integers(-3, 4, 2)]
+        elif kind == "graze":
+            w[i, 1:] = a * sign[0], b * sign[1]
+        elif kind == "stick":
+            lam[i] = [4, *(f * rng.integers(-2, 3, 2))]
+        elif kind != "rest":
+            # unit vector times c, of one component if there is one
+            along = np.array([a * sign[0], b * sign[1]]) if np.all(f > 0) else np.where(f > 0, c * sign[0], 0)
+            lam[i] = [c, *(f * along)]
+            if kind == "slip":
+                w[i, 1:] = np.where(
+                    f > 0, along * rng.integers(1, 4) / np.where(f > 0, 4 * f, 1), rng.integers(-2, 3, 2)
+                )
+    rows = np.eye(3 * p)
+    f = A @ np.ravel(w, order="F") + np.ravel(lam, order="F")
+    problem = ContactProblem3D(A, rows[:p], rows[p : 2 * p], rows[2 * p :], f, friction=(F[:, 0], F[:, 1]))
+    return problem, lam, w, F, named
+
+
 def random_compliance(rng, p):
     X = rng.normal(size=(3 * p, 3 * p))
     return X @ X.T + 0.5 * np.eye(3 * p)

@@ -8,6 +8,7 @@ from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.search import fathoming as closing
 from enumsol.search.fathoming import Closer
 from enumsol.search.numbers import WeightSource
+from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.search.space.space_fathoming import SpaceCloser
 
 
@@ -18,6 +19,14 @@ def by_the_tree():
         patch.setattr(Closer, "_due", lambda self, nodes: False)
         patch.setattr(SpaceCloser, "whole", lambda self: None)
         patch.setattr(ClosedPieces, "find", lambda self, traced: None)
+        yield
+
+
+@contextmanager
+def without_boxes():
+    """In this context no leaf in 3D is settled by a box of forces that holds one solution."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(KnownBoxes, "holding", lambda self, leaf: None)
         yield
 
 

@@ -130,7 +130,7 @@ def compared(seed):
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("part", range(5))
+@pytest.mark.parametrize("part", range(8))
 def test_the_same_as_the_tree(part):
     did = [compared(seed) for seed in range(40 * part, 40 * part + 40)]
     assert sum(did) > 15

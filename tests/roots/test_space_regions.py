@@ -1,4 +1,4 @@
-"""Degenerate roots and continua in 3D: one undecided region each, which holds what is known by construction."""
+"""Degenerate roots and continua in 3D that no box settles: undecided regions, which hold what is known to be there."""
 
 import dataclasses
 import json
@@ -19,7 +19,7 @@ from enumsol.roots.space_regions import _hull, regions_of
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import Cause
 
-pytestmark = pytest.mark.usefixtures("tree_only")
+pytestmark = pytest.mark.usefixtures("tree_only", "no_boxes")
 LOADED = (np.eye(3), [1, 3, 2])
 STUCK_AT_ITS_LIMIT = (np.eye(3), [5, 4, 3])
 #: It slides with any lambda_n from 0, where it grazes, to 1, where it would stick.

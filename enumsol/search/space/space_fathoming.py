@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 #: A condition of a scaled problem within this of zero may hold as an equation; only what is tried rests on it.
-_NEAR = 1e-9
+NEAR = 1e-9
 #: Level of the sectors in which a regular solution is sought.
 _LEVEL = 20
 #: Smallest eigenvalue of Q relative to S below which it counts as not definite, at which numbers are good enough, and
@@ -108,10 +108,12 @@ class SpaceCloser:
         y = problem.solution()
         if y is None:
             return None
-        point = _Point.of(system, problem, y)
+        point = Point.of(system, problem, y)
         if self._regular and point.slack < _CLEAR:
             return None
-        numbers = point.numbers(_CLEAR if self._regular else _DEFINITE, better=not self._regular and system.p >= _MANY)
+        # a tree would not end at a degenerate solution: numbers are sought there whatever they cost
+        better = not self._regular and (system.p >= _MANY or point.slack <= NEAR)
+        numbers = point.numbers(_CLEAR if self._regular else _DEFINITE, better=better)
         if numbers is None:
             return None
         found = self._certifier.close(numbers, point.codes, point.n) if point.slack > 0 else None
@@ -121,7 +123,7 @@ class SpaceCloser:
 
 
 @dataclass(frozen=True)
-class _Point:
+class Point:
     """A solution in floats.
 
     Attributes
@@ -149,20 +151,21 @@ class _Point:
     slack: float
 
     @classmethod
-    def of(cls, system: SpaceSystem, problem: Isotropic, y: Array) -> _Point:
+    def of(cls, system: SpaceSystem, problem: Isotropic, y: Array) -> Point:
+        """Of forces y, (p, 3), which solve the problem up to rounding."""
         w = problem.displacements(y)
         n, gap, tau, v = np.maximum(y[:, 0], 0.0), np.maximum(-w[:, 0], 0.0), y[:, 1:], w[:, 1:]
         rubs, size, length = np.any(system.tau >= 0, axis=1), np.linalg.norm(v, axis=1), np.linalg.norm(tau, axis=1)
-        loaded, slip, room = n > _NEAR, size * system.slip_scale, (n - length) * system.disc_scale
-        slides = rubs & (slip > _NEAR)
+        loaded, slip, room = n > NEAR, size * system.slip_scale, (n - length) * system.disc_scale
+        slides = rubs & (slip > NEAR)
         # exactly on the border of the disc, or clearly inside
-        border = loaded & rubs & (slides | (length > (1.0 - _NEAR) * n))
+        border = loaded & rubs & (slides | (length > (1.0 - NEAR) * n))
         divisor = np.where(loaded, np.where(border, length, n), np.where(slides, size, np.inf))
         theta = np.where(loaded[:, None], tau, v) / divisor[:, None]
         held = rubs & (slip <= room)
         slack = np.where(n < gap, gap, np.where(rubs, np.minimum(n, np.where(held, room, slip)), n))
         codes = tuple(cls._code(system, i, tau[i], bool(n[i] >= gap[i]), bool(held[i])) for i in range(len(n)))
-        apart = ~loaded & (gap > _NEAR)
+        apart = ~loaded & (gap > NEAR)
         wide = rubs & ~loaded & ~apart & ~slides
         open_gap = np.where(apart, gap, 0.0)
         return cls(system, np.where(loaded, n, 0.0), open_gap, v, theta, wide, codes, float(np.min(slack)))
@@ -188,7 +191,7 @@ class _Point:
         form = _Definite(self)
         logs, shares = form.plain
         least = form.least(logs, shares)
-        if least <= enough and better and least > _HOPELESS:
+        if least <= enough and better and (least > _HOPELESS or self.slack <= NEAR):
             logs, shares, least = form.improved(logs, shares, least)
         return form.values(logs, shares) if least > enough else None
 
@@ -211,7 +214,7 @@ class _Definite:
     (1 + |z|^2)^(1/2) for a z in the plane.
     """
 
-    def __init__(self, point: _Point) -> None:
+    def __init__(self, point: Point) -> None:
         system = point.system
         self._system, self._S, self._point = system, system.S, point
         tau, p = system.tau, system.p
@@ -232,7 +235,7 @@ class _Definite:
         """The numbers as a proof has them."""
         mu, kappa, nu = self._numbers(logs, shares)
         places = self._system.tau >= 0
-        wide = np.where(self._point.wide, kappa * np.maximum(self._reach, _NEAR), 0.0)
+        wide = np.where(self._point.wide, kappa * np.maximum(self._reach, NEAR), 0.0)
         return np.concatenate([mu, kappa, wide, nu[places], self._theta[places]])
 
     def least(self, logs: Array, shares: Array) -> float:
@@ -268,7 +271,7 @@ class _Definite:
     def _numbers(self, logs: Array, shares: Array) -> tuple[Array, Array, Array]:
         logs = np.where(self._open, np.mean(logs, axis=0), logs)
         mu, kappa = np.exp(logs - np.mean(logs))
-        return mu, kappa, np.where(self._pushes, mu[:, None] * self._disc(shares)[0] * (1.0 - _NEAR), 0.0)
+        return mu, kappa, np.where(self._pushes, mu[:, None] * self._disc(shares)[0] * (1.0 - NEAR), 0.0)
 
     @staticmethod
     def _disc(shares: Array) -> tuple[Array, Array]:
@@ -285,7 +288,7 @@ class _Definite:
             form[:p][has] -= (kappa[has] * self._turn[has, k])[:, None] * S[t]
             form[t] = kappa[has, None] * S[t] + (nu[has, k] * self._unit[has, k])[:, None] * S[:p][has]
         wide = np.flatnonzero(self._point.wide)
-        reach = np.maximum(self._reach[wide], _NEAR)
+        reach = np.maximum(self._reach[wide], NEAR)
         for k in range(2):
             rows = self._rows[wide, k] * np.sqrt(kappa[wide] / reach)[:, None]
             form -= 0.5 * rows.T @ rows
@@ -312,12 +315,12 @@ class _Definite:
             by_kappa[has] += SP[t, t] - self._turn[has, k] * SP[t, node[has]]
             by_nu[has, k] = SP[node[has], t] * self._unit[has, k]
         for i in np.flatnonzero(self._point.wide):
-            reach, rows = max(self._reach[i], _NEAR), self._rows[i]
+            reach, rows = max(self._reach[i], NEAR), self._rows[i]
             by_kappa[i] -= 0.5 * (reach * P[i, i] + float(np.sum((rows @ P) * rows)) / reach)
         by_nu = np.where(self._pushes, by_nu, 0.0)
         logs = np.stack([by_mu * mu + np.sum(by_nu * nu, axis=1), by_kappa * kappa])
         logs = np.where(self._open, np.mean(logs, axis=0), logs)
         z, root = self._disc(shares)
-        pulled = by_nu * mu[:, None] * (1.0 - _NEAR)
+        pulled = by_nu * mu[:, None] * (1.0 - NEAR)
         pulled = (pulled - z * np.sum(z * pulled, axis=1, keepdims=True)) / root
         return -np.concatenate([(logs - np.mean(logs)).ravel(), pulled.ravel()])

@@ -69,6 +69,23 @@ class Isotropic:
             found = self._grown()
         return None if found is None else found.reshape(-1, 3)
 
+    def near(self, y: Array, system: SpaceSystem) -> Array | None:
+        """A solution like y near one, both as ``system`` has them, (m,); None if Newton's method finds none."""
+        found = self._newton(self.by_node(y, system).ravel(), 1.0)
+        if found is None:
+            return None
+        near, found = np.empty_like(y), found.reshape(-1, 3)
+        near[: system.p] = found[:, 0]
+        occurs = system.tau >= 0
+        near[system.tau[occurs]] = (found[:, 1:] / np.where(occurs, system.unit[system.tau], 1.0))[occurs]
+        return near
+
+    @staticmethod
+    def by_node(y: Array, system: SpaceSystem) -> Array:
+        """Forces as ``system`` has them, (m,), as they are here, (p, 3)."""
+        units = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
+        return np.column_stack([y[: system.p], system.tangential(y) * units])
+
     def _grown(self) -> Array | None:
         y = self._newton(np.zeros_like(self.g), 0.0)
         radius, step = 0.0, _FIRST

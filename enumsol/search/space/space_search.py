@@ -10,12 +10,13 @@ from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.sectors import DEEPEST, SECTORS, direction, end_number, level_of
 from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, RegularRoot, UndecidedRecord
-from enumsol.proof.space_records import ExcludedInSpace, OnlyRoot
+from enumsol.proof.space_records import LEAVES, BoxedRoot, ExcludedInSpace, OnlyRoot
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart
 from enumsol.search.certifiers.recording import WIDEN, RecordingCertifier
 from enumsol.search.resume import RecordedBound
+from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.trusted.space.leaves import Cause, Open, SpaceRoot, settle
 from enumsol.trusted.space.sector_rows import sector_margin, sector_row_terms
 from enumsol.trusted.space.space_uniqueness import OnlySolution, only_root, only_solution_in_space
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from enumsol.search.certifiers.protocol import Bound
     from enumsol.search.fathoming_in_contact import LoneProposal
     from enumsol.selections.solution import Codes
+    from enumsol.trusted.space.boxed_solution import BoxedSolution
+    from enumsol.trusted.space.space_uniqueness import LooseSolution
 
     Array = NDArray[np.float64]
 
@@ -38,6 +41,8 @@ if TYPE_CHECKING:
 _PLACED = 1e-3
 #: Where all are smaller than this (scaled), relative to this.
 _SMALL_FORCE = 1e-6
+#: Enclosures of solutions in boxes are made in steps of four.
+_WIDER = 4.0 * WIDEN
 _PERTURB, _HOLD = "perturb the load, by 1e-4 of its largest entry, say", "hold the body by stiffer springs"
 
 
@@ -86,6 +91,8 @@ class SpaceReader:
     ----------
     engine : SpaceEngine
     """
+
+    kinds = LEAVES
 
     def __init__(self, engine: SpaceEngine) -> None:
         self._engine = engine
@@ -138,6 +145,7 @@ class SpaceCertifier(RecordingCertifier):
     def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, recorder: Recorder) -> None:
         super().__init__(recorder)
         self._engine, self.enclosed = engine, enclosed
+        self._boxes = KnownBoxes(engine.system, enclosed)
 
     @property
     def certified(self) -> Certified:
@@ -155,12 +163,17 @@ class SpaceCertifier(RecordingCertifier):
         self._leaf(ExcludedInSpace(rows, values))
         return True
 
-    def selection(self, codes: Codes) -> SpaceRoot | UndecidedPart | Refine | None:
+    def selection(self, codes: Codes) -> SpaceRoot | BoxedSolution | UndecidedPart | Refine | None:
         """The root of a leaf, a sector to halve, or why the leaf stays open."""
         answer = settle(self.enclosed, codes)
         if answer is None:
             self._leaf(NoRoot())
         elif isinstance(answer, Open):
+            if (boxed := self._boxes.holding(answer)) is not None:
+                self._verified[codes], unit = boxed, self.enclosed.unit
+                box = boxed.box.mid * unit, boxed.box.rad * unit
+                self._leaf(BoxedRoot(*box, self._ball(boxed, wider=_WIDER)))
+                return boxed
             if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
                 return Refine(answer.node)
             self._leaf(UndecidedRecord(answer.cause.value))
@@ -195,7 +208,7 @@ class SpaceCertifier(RecordingCertifier):
         self._leaf(OnlyRoot(numbers, codes or (), ball.mid, ball))
         return [found]
 
-    def _ball(self, found: SpaceRoot | OnlySolution) -> EnclosureRecord:
+    def _ball(self, found: SpaceRoot | LooseSolution, wider: float = WIDEN) -> EnclosureRecord:
         """Where a root is, in the problem's units."""
         unit = self.enclosed.unit
-        return EnclosureRecord(found.y.mid * unit, WIDEN * found.y.rad * unit, found.index)
+        return EnclosureRecord(found.y.mid * unit, wider * found.y.rad * unit, found.index)

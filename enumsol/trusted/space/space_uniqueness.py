@@ -19,6 +19,7 @@ from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SL
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import Self
 
     from numpy.typing import NDArray
 
@@ -34,8 +35,8 @@ LARGEST_UNIT = 2.0**128
 
 
 @dataclass(frozen=True)
-class OnlySolution:
-    """The one solution of a problem as balls; its statuses need not be known.
+class LooseSolution:
+    """One solution of a problem as balls; its statuses need not be known.
 
     Attributes
     ----------
@@ -43,6 +44,8 @@ class OnlySolution:
         Forces (lambda_n, tau) and displacements, scaled; without radius where they are 0 for certain.
     open, stick, slip : (p,) bool arrays
         Statuses that may hold; of nodes without friction that may touch both of the last two.
+    index : int
+        Its degree.
     """
 
     y: Ball
@@ -50,8 +53,31 @@ class OnlySolution:
     open: Flags
     stick: Flags
     slip: Flags
+    index: int
 
-    index = 1
+    @classmethod
+    def of(cls, system: EnclosedSpace, y: Ball, w: Ball, index: int, **more: Ball) -> Self:
+        """By the statuses that may hold within balls; what vanishes by those that hold for certain is put to 0."""
+        p = len(system.tau)
+        touch = w.mid[:p] + w.rad[:p] >= 0
+        loose = y.mid[:p] - y.rad[:p] <= 0
+        w.mid[:p], w.rad[:p] = np.where(loose, w.mid[:p], 0.0), np.where(loose, w.rad[:p], 0.0)
+        stick, slip = touch.copy(), touch.copy()
+        for i, places in enumerate(system.tau):
+            t = places[places >= 0]
+            if not len(t):
+                continue
+            scale = system.unit[t] * system.disc_scale[i]
+            tau = upper_norm((np.abs(y.mid[t]) + y.rad[t]) * scale * SAFE + TINY)
+            if tau < (y.mid[i] - y.rad[i]) * system.disc_scale[i] / SAFE:
+                slip[i] = False
+                w.mid[t], w.rad[t] = 0.0, 0.0
+            stick[i] &= bool(np.all(np.abs(w.mid[t]) <= w.rad[t]))
+        return cls(y, w, loose, stick, slip, index, **more)
+
+
+class OnlySolution(LooseSolution):
+    """The one solution of a problem."""
 
 
 def only_solution_in_space(
@@ -211,7 +237,7 @@ class _Form:
         for i in np.flatnonzero((n == 0) & (w.mid[:p] + w.rad[:p] < 0)):
             y.rad[[i, *tau[i][tau[i] >= 0]]] = 0.0
         w = self._displacements(y)
-        return self._described(y, w) if self.serves(y, w, errors) else None
+        return OnlySolution.of(self.system, y, w, 1) if self.serves(y, w, errors) else None
 
     def _displacements(self, y: Ball) -> Ball:
         S, g = Ball(self.system.S, self.system.S_rad), Ball(self.system.g, self.system.g_rad)
@@ -299,27 +325,6 @@ class _Form:
             apart = upper_norm((tau - Ball.exact(theta) * n).size + TINY) / (low * most) * SAFE
             off = min(off, float(apart))
         return off
-
-    # -- what is known ---------------------------------------------------------------------------------------------
-
-    def _described(self, y: Ball, w: Ball) -> OnlySolution:
-        """The statuses that may hold within balls, and what vanishes by those that hold for certain."""
-        system, p = self.system, len(self.system.tau)
-        touch = w.mid[:p] + w.rad[:p] >= 0
-        loose = y.mid[:p] - y.rad[:p] <= 0
-        w.mid[:p], w.rad[:p] = np.where(loose, w.mid[:p], 0.0), np.where(loose, w.rad[:p], 0.0)
-        stick, slip = touch.copy(), touch.copy()
-        for i, places in enumerate(system.tau):
-            t = places[places >= 0]
-            if not len(t):
-                continue
-            scale = system.unit[t] * system.disc_scale[i]
-            tau = upper_norm((np.abs(y.mid[t]) + y.rad[t]) * scale * SAFE + TINY)
-            if tau < (y.mid[i] - y.rad[i]) * system.disc_scale[i] / SAFE:
-                slip[i] = False
-                w.mid[t], w.rad[t] = 0.0, 0.0
-            stick[i] &= bool(np.all(np.abs(w.mid[t]) <= w.rad[t]))
-        return OnlySolution(y, w, loose, stick, slip)
 
 
 def _least(system: EnclosedSpace, numbers: SpaceWeights, turn: Ball, push: Array, unit: Array) -> float:

@@ -1,0 +1,87 @@
+"""In 3D: boxes of forces that hold one solution, for leaves that stay open near a degenerate one (theory, 12.7)."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.search.space.space_fathoming import NEAR, Point
+from enumsol.search.space.space_newton import Isotropic
+from enumsol.trusted.space.boxed_solution import BoxedSolution, box_around, is_inside, solution_in_box
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+    from enumsol.trusted.space.leaves import Open
+
+    Array = NDArray[np.float64]
+
+#: What a writer of proofs asks for (see ``solution_in_box``).
+_ERRORS = 2.0
+#: Forces known no better than this, relative to the largest, tell no solution near which to look.
+_ROUGH = 0.1
+#: Solutions that are as near to each other, relative to the largest force, are the same.
+_SAME = 1e-6
+
+
+class KnownBoxes:
+    """Looks for the solution near a leaf that is left open, and for a box in which it is the only one.
+
+    A leaf that would be halved otherwise is worth a look now and then: less and less often where that is in vain.
+
+    Parameters
+    ----------
+    system : SpaceSystem
+    enclosed : EnclosedSpace
+    """
+
+    def __init__(self, system: SpaceSystem, enclosed: EnclosedSpace) -> None:
+        self._system, self._enclosed = system, enclosed
+        self._found: list[BoxedSolution] = []
+        self._passed: list[Array] = []
+        self._wait = self._pause = 0
+
+    @cached_property
+    def _problem(self) -> Isotropic:
+        return Isotropic.of(self._system)
+
+    def holding(self, leaf: Open) -> BoxedSolution | None:
+        """The one solution that an open leaf can have, if that is proven."""
+        if leaf.y is None:
+            return None
+        y = leaf.y
+        for known in self._found:
+            if is_inside(y, known.box, _ERRORS):
+                return known
+        if leaf.node is not None:
+            if not np.max(y.rad) <= _ROUGH * np.max(np.abs(y.mid) + y.rad):
+                return None
+            if self._wait > 0:
+                self._wait -= 1
+                return None
+        found = self._sought(y.mid, halved=leaf.node is not None)
+        self._pause = 2 * self._pause + 1 if found is None else 0
+        self._wait = self._pause
+        return found if found is not None and is_inside(y, found.box, _ERRORS) else None
+
+    def _sought(self, y: Array, *, halved: bool) -> BoxedSolution | None:
+        """A solution near a point in a box of its own, that was not known; of leaves to be halved a degenerate one."""
+        with np.errstate(all="ignore"):
+            near = self._problem.near(y, self._system)
+            if near is None:
+                return None
+            size = _SAME * float(np.max(np.abs(near)))
+            if any(np.max(np.abs(near - other)) <= size for other in self._passed):
+                return None
+            point = Point.of(self._system, self._problem, self._problem.by_node(near, self._system))
+            if halved and point.slack > NEAR:
+                return None
+            self._passed.append(near)
+            box = box_around(self._enclosed, near)
+        found = None if box is None else solution_in_box(self._enclosed, box, _ERRORS)
+        if found is not None:
+            self._found.append(found)
+        return found

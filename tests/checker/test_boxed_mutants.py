@@ -1,0 +1,149 @@
+"""Forged leaves "l" of proofs in 3D: refused, or what they say of the root is true."""
+
+import functools
+
+import numpy as np
+import pytest
+from problems3d import degenerate_integers
+from proof_tools import copied, proof_of, records_of
+from trees import by_the_tree
+
+from enumsol import ProofFormatError, enumerate_roots, verify
+
+_BOX, _BOX_RAD, _MID, _RAD, _INDEX = range(1, 6)
+SEEDS = (2, 7, 47, 26)
+
+
+@functools.cache
+def proven(seed):
+    """Problem, the forces of its degenerate solution as records have them, and records of a proof with such leaves."""
+    problem, _, _, _, _ = degenerate_integers(seed)
+    with by_the_tree():
+        roots = enumerate_roots(problem, 0)
+    assert roots.complete
+    records = records_of(roots.proof)
+    return problem, records, [k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "l"]
+
+
+def report_of(seed, change):
+    """What the checker says of changed records; None where they cannot be read."""
+    problem, records, places = proven(seed)
+    records = copied(records)
+    change(records, places)
+    try:
+        return verify(problem, proof_of(records))
+    except ProofFormatError:
+        return None
+
+
+def refused(seed, change):
+    report = report_of(seed, change)
+    return report is None or not report.ok
+
+
+def each(entry, function):
+    def change(records, places):
+        for k in places:
+            records[k][entry] = function(records[k][entry])
+
+    return change
+
+
+def times(factor):
+    return lambda values: [factor * value for value in values]
+
+
+def shifted(step):
+    return lambda values: [value + step for value in values]
+
+
+@pytest.mark.few(2)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_changed_leaves_are_refused(seed):
+    assert proven(seed)[2]
+    assert report_of(seed, lambda records, places: None).complete
+    for number, change in enumerate(
+        (
+            each(_INDEX, lambda index: -index),
+            each(_INDEX, float),
+            each(_INDEX, lambda index: 0),
+            each(_MID, shifted(1e-3)),
+            each(_RAD, times(0.0)),
+            each(_RAD, times(-1.0)),
+            each(_BOX, shifted(1.0)),
+            each(_BOX_RAD, times(0.0)),
+            each(_BOX_RAD, times(-1.0)),
+            each(_BOX_RAD, times(1e6)),
+            each(_BOX_RAD, times(1e-300)),
+            each(_BOX, lambda values: values[:-1]),
+            each(_BOX_RAD, lambda values: [*values, 1.0]),
+            each(_BOX, lambda values: "box"),
+            each(_MID, lambda values: None),
+            each(_BOX_RAD, lambda values: [True] * len(values)),
+        )
+    ):
+        assert refused(seed, change), number
+
+
+@pytest.mark.few(2)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_boxes_at_other_leaves(seed):
+    """Leaves that hold nothing, or a regular root, and parts of the tree that are not decided, said to be in a box."""
+    (problem, records, places), refusals = proven(seed), 0
+    leaves = [k for k, record in enumerate(records) if isinstance(record, list) and record[0] in "rx"]
+    for k in leaves[:: max(1, len(leaves) // 6)]:
+        record = records[k]
+        changed = copied(records)
+        changed[k] = copied(records)[places[0]]
+        report = verify(problem, proof_of(changed))
+        # where a complete leaf holds nothing, all of it lies in the box
+        assert not report.ok or (record[0] == "x" and report.roots == changed[-1]["roots"])
+        refusals += not report.ok
+    assert refusals
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_leaves_that_are_left_out(seed):
+    """A leaf with the root is said to hold nothing, or is not there, and the counts are as before or fit that."""
+    problem, records, places = proven(seed)
+    changed = copied(records)
+    changed[places[0]] = ["n"]
+    assert not verify(problem, proof_of(changed)).ok
+    changed = copied(records)
+    del changed[places[0]]
+    assert not verify(problem, proof_of(changed)).ok
+    changed = copied(records)
+    changed[-1]["roots"] += 1
+    assert not verify(problem, proof_of(changed)).ok
+    changed = copied(records)
+    changed[places[0]] = ["u", "open"]
+    changed[-1]["undecided"] += 1
+    report = verify(problem, proof_of(changed))
+    assert not report.complete
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("part", range(4))
+def test_random_changes(part):
+    """Accepted, at most, where the box is one of the same root."""
+    rng, seed = np.random.default_rng(part), SEEDS[part]
+    problem, records, places = proven(seed)
+    known = records[places[0]]
+    accepted = 0
+    for _ in range(20):
+        changed = copied(records)
+        record = changed[places[int(rng.integers(len(places)))]]
+        entry = int(rng.integers(1, 5))
+        k = int(rng.integers(len(record[entry])))
+        record[entry][k] *= float(rng.choice([-1.0, 0.0, 0.5, 2.0, 100.0, 1 + 1e-9]))
+        record[entry][k] += float(rng.choice([0.0, 1e-12, 1e-6, 1e-3, 1.0]))
+        report = verify(problem, proof_of(changed))
+        if report.ok:
+            accepted += 1
+            assert report.complete
+            assert report.roots == changed[-1]["roots"]
+            mid, rad = np.array(record[_MID]), np.array(record[_RAD])
+            assert np.all(np.abs(mid - known[_MID]) <= rad + np.array(known[_RAD]))
+            box, reach = np.array(record[_BOX]), np.array(record[_BOX_RAD])
+            assert np.all(np.abs(box - known[_MID]) <= reach + np.array(known[_RAD]))
+    assert accepted < 20

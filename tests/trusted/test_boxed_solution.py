@@ -1,0 +1,180 @@
+"""Boxes of forces with exactly one solution: against known solutions, Newton's method and the theorem's own terms."""
+
+import numpy as np
+import oracles3d
+import pytest
+from problems3d import degenerate_integers, exactly, from_compliance, random_coupled
+from space_proofs import RANDOM, random_problem
+
+from enumsol import enumerate_roots
+from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.trusted.space.boxed_solution import (
+    BoxedSolution,
+    _NaturalMap,
+    apart_in_boxes,
+    box_around,
+    is_inside,
+    solution_in_box,
+)
+
+STATUSES = {"open": (1, 0, 0), "stick": (0, 1, 0), "slip": (0, 0, 1), "graze": (1, 0, 1), "limit": (0, 1, 1)}
+
+
+def scaled(system, lam, F):
+    """Forces (p, 3) in the problem's units as a system has them."""
+    y, occurs = np.zeros(len(system.g)), system.tau >= 0
+    y[: system.p] = lam[:, 0] / system.force
+    y[system.tau[occurs]] = (lam[:, 1:] / np.where(occurs, system.F * system.force[:, None], 1.0))[occurs]
+    return y
+
+
+def boxed(seed):
+    """System, known forces and what is proven of a box around them, or None; what the nodes do, and F."""
+    problem, lam, _, F, kinds = degenerate_integers(seed)
+    solvers = SpaceSolvers(problem, 0.0, "verified")
+    y = scaled(solvers.system, lam, F)
+    box = box_around(solvers.enclosed, y)
+    return solvers, y, None if box is None else solution_in_box(solvers.enclosed, box, 2.0), kinds, F
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("part", range(6))
+def test_known_solutions_lie_in_their_boxes(part):
+    found = 0
+    for seed in range(40 * part, 40 * part + 40):
+        solvers, y, one, kinds, F = boxed(seed)
+        if one is None:
+            continue
+        found += 1
+        assert np.all(np.abs(y - one.y.mid) <= one.y.rad + 1e-12)
+        assert np.max(one.y.rad) < 1e-9
+        assert is_inside(one.y, one.box)
+        assert one.index in (1, -1)
+        for i, kind in enumerate(kinds):
+            rubs, held = bool(np.any(F[i] > 0)), (one.open[i], one.stick[i], one.slip[i])
+            if rubs:
+                assert held == tuple(map(bool, STATUSES[kind])), (seed, i)
+            else:
+                assert held[0] == (kind in ("open", "graze"))
+        # a checker asks for less
+        assert solution_in_box(solvers.enclosed, one.box) is not None
+    assert found > 10
+
+
+def natural(problem, y):
+    """N(y), written out."""
+    S, g, rho = problem.S.mid, problem.g.mid, problem.rho
+    z = y + rho * (g - S @ y)
+    out = z.copy()
+    for i, t in enumerate(problem.tau):
+        out[i] = max(z[i], 0.0)
+        length = np.linalg.norm(z[t])
+        if length > out[i]:
+            out[t] *= out[i] / length
+    return y - out
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("part", range(4))
+def test_steps_stay_within_their_bounds(part):
+    """y - Y N(y) - c is what (12.13) says, and contracts, at random points of sets of all sizes."""
+    rng, tried = np.random.default_rng(part), 0
+    for seed in range(30 * part, 30 * part + 30):
+        solvers, y, _, _, _ = boxed(seed)
+        problem = _NaturalMap(solvers.enclosed)
+        centre = y * problem.unit + rng.normal(size=len(y)) * rng.choice([0.0, 1e-3, 0.1])
+        reach = np.full(len(y), 10.0 ** rng.uniform(-4, 0))
+        step = problem._step(centre, reach)
+        if step is None:
+            continue
+        tried += 1
+        for _ in range(40):
+            point = centre + reach * rng.uniform(-1, 1, len(y)) * rng.choice([1.0, 0.3])
+            moved = point - step.Y @ natural(problem, point) - centre - step.move.mid
+            bound = step.E @ np.abs(point - centre) + 0.5 * np.abs(step.G.mid) @ np.abs(step.V.mid @ (point - centre))
+            assert np.all(np.abs(moved) <= bound * (1 + 1e-9) + 1e-10 * (1 + np.abs(step.Y).max()))
+    assert tried > 20
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("part", range(4))
+def test_no_box_holds_two_solutions(part):
+    """Newton's method from many points finds no second solution in a box, and no box with two is accepted."""
+    rng, several, inside = np.random.default_rng([3, part]), 0, 0
+    named = [random_problem(*name) for name, roots in RANDOM.items() if roots > 1][part:]
+    for k in range(20):
+        if k < len(named):
+            S, g, F = named[k].condensed.S, named[k].condensed.free_displacements(0), named[k].friction_at(0)
+        else:
+            S, g, F = random_coupled(rng, int(rng.integers(1, 4)))
+        problem = from_compliance(S, g, tuple(F.T))
+        solvers = SpaceSolvers(problem, 0.0, "verified")
+        all_forces = [lam.reshape(3, len(F)).T for lam in oracles3d.newton_set(S, g, F, 25, rng)]
+        points = [scaled(solvers.system, lam, F) for lam in all_forces]
+        for y in points:
+            box = box_around(solvers.enclosed, y)
+            if box is None:
+                continue
+            inside += 1
+            one = solution_in_box(solvers.enclosed, box)
+            assert one is not None
+            near = [other for other in points if np.all(np.abs(other - box.mid) <= box.rad)]
+            assert len(near) == 1
+            for other in points:
+                size = np.abs(other - box.mid)
+                if other is y or not np.max(size) > 0:
+                    continue
+                several += 1
+                # a box that reaches to the other one
+                reach = np.maximum(size * 1.01, box.rad)
+                assert solution_in_box(solvers.enclosed, Ball(box.mid, reach)) is None
+    assert inside > 15
+    assert several > 5
+
+
+def test_indices_are_those_of_regular_roots():
+    for name in ((1, 22), (2, 0), (2, 20), (3, 4)):
+        problem = random_problem(*name)
+        solvers, F = SpaceSolvers(problem, 0.0, "verified"), problem.friction_at(0)
+        roots, indices = enumerate_roots(problem, 0), []
+        for root in roots:
+            y = scaled(solvers.system, np.column_stack([root.lambda_n, root.lambda_t]), F)
+            one = solution_in_box(solvers.enclosed, box_around(solvers.enclosed, y))
+            assert one.index == root.index
+            indices.append(one.index)
+        assert sum(indices) == 1
+        assert -1 in indices
+
+
+def test_boxes_that_are_none():
+    solvers, _, one, _, _ = boxed(1)
+    system, box = solvers.enclosed, one.box
+    for mid, rad in (
+        (box.mid + 3.0, box.rad),
+        (box.mid, 0.0 * box.rad),
+        (box.mid, -box.rad),
+        (box.mid, np.nan * box.rad),
+        (np.inf * np.ones_like(box.mid), box.rad),
+        (box.mid, 1e300 * box.rad),
+    ):
+        assert solution_in_box(system, Ball(mid, rad)) is None
+    assert box_around(system, np.full(len(box.mid), np.nan)) is None
+
+
+def test_which_solutions_are_the_same():
+    problem = exactly([[0, 0, 0], [2, 1, 0]], [[0, 0.375, -0.5], [0, 0, 0]])
+    solvers = SpaceSolvers(problem, 0.0, "verified")
+    y = scaled(solvers.system, np.array([[0, 0, 0], [2.0, 1, 0]]), np.ones((2, 2)))
+    one = solution_in_box(solvers.enclosed, box_around(solvers.enclosed, y))
+    half = solution_in_box(solvers.enclosed, Ball(one.box.mid, 0.5 * one.box.rad))
+    kept, doubtful = apart_in_boxes([], [((1, 1), one), ((0, 1), half)])
+    assert [codes for codes, _ in kept] == [(0, 1)]
+    assert doubtful == []
+    moved = Ball(one.y.mid + 1.0, one.y.rad)
+    other = BoxedSolution(moved, one.w, one.open, one.stick, one.slip, 1, Ball(one.box.mid + 1.0, one.box.rad * 0.1))
+    assert len(apart_in_boxes([], [((1, 1), one), ((0, 1), other)])[0]) == 2
+    wide = Ball(one.y.mid, np.full_like(one.y.rad, 9.0))
+    unknown = BoxedSolution(wide, one.w, one.open, one.stick, one.slip, 1, Ball(one.box.mid + 1.0, one.box.rad * 0.1))
+    # the one is not known to lie in the box of the other, nor the other in that of the one
+    assert apart_in_boxes([], [((0, 1), one), ((1, 1), unknown)])[1] == [(1, 1)]
