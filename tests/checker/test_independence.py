@@ -51,7 +51,7 @@ SHARED = {
     "trusted.arcs.selection_balls": None,
     "trusted.arcs.over_parts": None,
     "trusted.over_interval": {
-        *("EnclosedPiece", "as_computed", "interval_exclusion_margin", "interval_form_margins", "piece_forms"),
+        *("EnclosedPiece", "as_computed", "interval_exclusion_margin", "interval_form_margins", "piece_forms")
     },
     "trusted.arcs.precise": None,
     "trusted.selection": None,
@@ -63,10 +63,10 @@ SHARED = {
     "trusted.space.sector_rows": None,
     "trusted.space.leaves": None,
     "trusted.space.boxed_solution": {
-        *("BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "solution_in_box"),
+        *("BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "solution_in_box")
     },
     "trusted.space.space_uniqueness": {
-        *("LARGEST_UNIT", "LooseSolution", "OnlySolution", "only_root", "only_solution_in_space"),
+        *("LARGEST_UNIT", "LooseSolution", "OnlySolution", "only_root", "only_solution_in_space")
     },
     "arithmetic.ball_arrays": None,
     "proof.begun": None,

@@ -39,17 +39,11 @@ def test_listed_alphas_may_be_fractions(capsys):
 
 def test_long_tables_are_printed_as_runs(capsys):
     status, out, _ = run(
-        capsys,
-        *("table", "gallery:two-node-6.4", "--from", 0, "--to", 10, "--samples", 101, "--arithmetic", "fast"),
+        capsys, *("table", "gallery:two-node-6.4", "--from", 0, "--to", 10, "--samples", 101, "--arithmetic", "fast")
     )
     assert status == 0
     rows = [line.split() for line in out.splitlines()[1:5]]
-    assert [row[:3] for row in rows] == [
-        ["0", "2.9", "1"],
-        ["3", "3", "3"],
-        ["3.1", "3.8", "5"],
-        ["3.9", "10", "3"],
-    ]
+    assert [row[:3] for row in rows] == [["0", "2.9", "1"], ["3", "3", "3"], ["3.1", "3.8", "5"], ["3.9", "10", "3"]]
     assert out.endswith("complete: not proven (0 undecided)\n")
 
 

@@ -126,10 +126,7 @@ def test_eigenvalue_bounds_are_below_the_eigenvalue():
             A = (Q * 10 ** rng.uniform(-decades, 0, size=n)) @ Q.T
             A = 0.5 * (A + A.T)
             least = float(np.linalg.eigvalsh(A)[0])
-            for bound in (
-                balls.dense_eigenvalue_bound(A),
-                balls.sparse_eigenvalue_bound(sp.csc_array(A), least),
-            ):
+            for bound in (balls.dense_eigenvalue_bound(A), balls.sparse_eigenvalue_bound(sp.csc_array(A), least)):
                 # eigvalsh itself is off by a few ulps of the largest
                 assert bound <= least + 1e-13
                 assert bound > 0.2 * least or least < 1e-11

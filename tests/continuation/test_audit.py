@@ -151,8 +151,7 @@ def test_follow_all_with_the_closed_form(graph):
 
 
 @pytest.mark.parametrize(
-    ("source", "message"),
-    [(3, "path is a int"), ("missing.csv", "CSV"), ("frame", "no column 'lambda_t_0'")],
+    ("source", "message"), [(3, "path is a int"), ("missing.csv", "CSV"), ("frame", "no column 'lambda_t_0'")]
 )
 def test_bad_arguments(graph, path, source, message):
     given = path.to_frame().drop(columns="lambda_t_0") if source == "frame" else source

@@ -106,13 +106,7 @@ def test_points_not_compared_have_an_exit_status_of_their_own(capsys, tmp_path, 
 
 def test_the_help_names_every_exit_status(capsys):
     out = " ".join(run(capsys, "audit", "--help")[1].split())
-    for text in (
-        "Exit status: 0 if",
-        "; 3 if not",
-        "; 4 if points were not compared",
-        "; 2 on bad input",
-        "; 130 on",
-    ):
+    for text in ("Exit status: 0 if", "; 3 if not", "; 4 if points were not compared", "; 2 on bad input", "; 130 on"):
         assert text in out
 
 

@@ -125,10 +125,7 @@ TRIANGLE = ([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]], (1.0, 1.0))
         (lambda: fem.stiffness([[0, 0, 0]], [[0, 0, 0]], (1, 1)), r"points has shape \(1, 3\); expected \(N, 2\)"),
         (lambda: fem.stiffness([[0, "a"]], [[0, 1, 2]], (1, 1)), "points is not an array of real numbers"),
         (lambda: fem.stiffness(TRIANGLE[0], [[0, 1]], (1, 1)), r"cells has shape \(1, 2\); expected \(k, 3\) or"),
-        (
-            lambda: fem.stiffness(TRIANGLE[0], [[0, 1, 3]], (1, 1)),
-            r"cells has node numbers from 0 to 3; .* 0 \.\. 2",
-        ),
+        (lambda: fem.stiffness(TRIANGLE[0], [[0, 1, 3]], (1, 1)), r"cells has node numbers from 0 to 3; .* 0 \.\. 2"),
         (lambda: fem.stiffness([[0, 0], [1, 0], [2, 0]], [[0, 1, 2]], (1, 1)), "cells row 0 is flat"),
         (lambda: fem.stiffness([*TRIANGLE[0], [1, 1]], [[0, 1, 2]], (1, 1)), "cells leave node 3 out"),
         (lambda: fem.stiffness(*TRIANGLE[:2], (1, -1)), r"lame is \(1, -1\)"),

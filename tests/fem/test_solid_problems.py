@@ -142,13 +142,7 @@ def test_a_press_fit_without_lateral_contraction_has_a_uniform_pressure(kind, op
     """Pressed by delta over the height c, with l = 0: the stress is 2 m delta / c everywhere."""
     mesh = fem.box(4, 3, 2, (2.0, 1.5, 0.8), kind)
     problem = fem.solid_contact_problem(
-        mesh.points,
-        mesh.cells,
-        (0.0, 0.7),
-        contact=mesh.facets["bottom"],
-        held=mesh.nodes("top"),
-        gap=-0.01,
-        **options,
+        mesh.points, mesh.cells, (0.0, 0.7), contact=mesh.facets["bottom"], held=mesh.nodes("top"), gap=-0.01, **options
     )
     forces = np.linalg.solve(problem.condensed.S[: problem.p, : problem.p], problem.condensed.g0[: problem.p])
     assert np.allclose(forces / problem.areas, 2 * 0.7 * 0.01 / 0.8, rtol=1e-10)

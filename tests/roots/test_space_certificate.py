@@ -5,15 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import oracles3d
 import pytest
-from problems3d import (
-    bounds,
-    exactly,
-    forces,
-    from_compliance,
-    random_compliance,
-    random_coupled,
-    random_one_node,
-)
+from problems3d import bounds, exactly, forces, from_compliance, random_compliance, random_coupled, random_one_node
 from space_proofs import RANDOM, random_problem
 from trees import by_the_tree
 

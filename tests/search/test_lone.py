@@ -24,10 +24,7 @@ def kinds(proof):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "traction", "alpha"),
-    [
-        ((128, 16, 2), (1.0, -0.3), 2.0),
-        pytest.param((256, 16, 4), (0.3, -1.0), 5.0, marks=pytest.mark.slow),
-    ],
+    [((128, 16, 2), (1.0, -0.3), 2.0), pytest.param((256, 16, 4), (0.3, -1.0), 5.0, marks=pytest.mark.slow)],
 )
 def test_blocks_that_are_not_definite_take_one_node(size, traction, alpha, monkeypatch):
     monkeypatch.setattr(closing.Reduction, "weights", lambda *_, **__: None)

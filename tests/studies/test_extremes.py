@@ -11,15 +11,7 @@ import pandas as pd
 import pytest
 
 import enumsol
-from enumsol import (
-    ContactProblem,
-    audit,
-    branch_graph,
-    enumerate_roots,
-    follow,
-    gallery,
-    verify,
-)
+from enumsol import ContactProblem, audit, branch_graph, enumerate_roots, follow, gallery, verify
 from enumsol.arithmetic import balls
 from enumsol.condensation import enclosure
 from enumsol.continuation import start_tangents

@@ -59,10 +59,7 @@ def rounded(values, digits=2):
 #: A sentence, with a place for each of its numbers, and what they are.
 CLAIMS = {
     "blocks in 2D": (r"p = (\d+) in 2D and F from ([\d.]+) to ([\d.]+)", lambda: certified("256x")),
-    "blocks in 3D": (
-        r"p = (\d+) in 3D and F from ([\d.]+) to ([\d.]+)",
-        lambda: certified("3D block"),
-    ),
+    "blocks in 3D": (r"p = (\d+) in 3D and F from ([\d.]+) to ([\d.]+)", lambda: certified("3D block")),
     "pressed": (r"up to F = (\d+), the largest value tried", lambda: rounded(largest_of("block pressed"))[:1]),
     "dragged": (
         r"up to F = ([\d.]+) to ([\d.]+) for blocks that are dragged",

@@ -112,11 +112,7 @@ CALLS = [
     (GRAPH.save, {}, "file"),
     (enumsol.BranchGraph.load, {}, "file"),
     (GRAPH.write_graphml, {}, "file"),
-    (
-        enumsol.newton,
-        {"problem": PROBLEM, "alpha": 5.0},
-        "problem alpha start r smooth_path max_iterations",
-    ),
+    (enumsol.newton, {"problem": PROBLEM, "alpha": 5.0}, "problem alpha start r smooth_path max_iterations"),
     (
         enumsol.follow,
         {"problem": PROBLEM, "start": ROOTS[0], "interval": (0, 10), "options": SHORT},
@@ -125,11 +121,7 @@ CALLS = [
     (follow_from, {}, "alpha lambda_n lambda_t"),
     (smooth_friction, {}, "value"),
     (smooth_load, {}, "value"),
-    (
-        start_tangents,
-        {"problem": PROBLEM, "start": ROOTS[0]},
-        "problem start interval options smooth_path",
-    ),
+    (start_tangents, {"problem": PROBLEM, "start": ROOTS[0]}, "problem start interval options smooth_path"),
     (PATH.resume, {}, "problem interval options smooth_path"),
     (PATH.save, {}, "path"),
     (enumsol.Path.load, {}, "path"),
@@ -167,11 +159,7 @@ CALLS = [
     (gallery.one_node_triangle, {}, "f lame"),
     (gallery.two_node_square, {}, "f1 f2 lame friction load_slope"),
     (gallery.clamped_block, {"nx": 1, "ny": 1}, "nx ny length height lame traction friction gap contact"),
-    (
-        gallery.wedge,
-        {"nx": 1, "ny": 1},
-        "nx ny pull press springs width height half_angle lame friction",
-    ),
+    (gallery.wedge, {"nx": 1, "ny": 1}, "nx ny pull press springs width height half_angle lame friction"),
     (gallery.chain, {"p": 1}, "p coupling f lame"),
     (fem.lame, {"young": 2.5, "poisson": 0.25}, "young poisson plane"),
     (
@@ -199,14 +187,7 @@ CALLS = [
     (fem.body_forces, {"points": POINTS, "cells": TRIANGLES, "density": (1, 1)}, "points cells density"),
     (
         fem.contact_problem,
-        {
-            "points": POINTS,
-            "cells": TRIANGLES,
-            "lame": (1, 1),
-            "contact": [0],
-            "normals": (0, -1),
-            "held": [1, 2],
-        },
+        {"points": POINTS, "cells": TRIANGLES, "lame": (1, 1), "contact": [0], "normals": (0, -1), "held": [1, 2]},
         "points cells lame contact normals tangents held springs forces forces_slope gap friction slip_offset node_ids",
     ),
     (fem.rectangle, {"nx": 1, "ny": 1}, "nx ny length height"),
@@ -273,11 +254,7 @@ CALLS = [
     (fem.read_mesh, {"source": "a.vtu"}, "source groups"),
     (fem.read_solid, {"source": "a.vtu"}, "source groups"),
     (fem.solid_stiffness, {"points": BOX.points, "cells": BOX.cells, "lame": (1, 1)}, "points cells lame"),
-    (
-        fem.solid_body_forces,
-        {"points": BOX.points, "cells": BOX.cells, "density": (0, 0, 1)},
-        "points cells density",
-    ),
+    (fem.solid_body_forces, {"points": BOX.points, "cells": BOX.cells, "density": (0, 0, 1)}, "points cells density"),
     (
         fem.facet_forces,
         {"points": BOX.points, "facets": BOX.facets["top"], "traction": (0, 0, 1)},
@@ -298,11 +275,7 @@ CALLS = [
         "points cells lame contact normals axes held springs forces forces_slope gap friction friction_slope "
         "slip_offset node_ids multipliers ratio patches",
     ),
-    (
-        gallery.block3d,
-        {"nx": 1, "ny": 1, "nz": 1},
-        "nx ny nz pull friction lame size cells gap multipliers ratio",
-    ),
+    (gallery.block3d, {"nx": 1, "ny": 1, "nz": 1}, "nx ny nz pull friction lame size cells gap multipliers ratio"),
     (gallery.one_node_3d, {}, "W q friction"),
 ]
 CASES = [(function, good, name) for function, good, names in CALLS for name in names.split()]

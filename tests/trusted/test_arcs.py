@@ -93,11 +93,6 @@ def test_claims_over_parts_are_true():
     assert min(made.values()) > 20, made
 
 
-@pytest.mark.slow
-def test_many_claims():
-    check_claims(400, 1000)
-
-
 def check_errors(count, start=0):
     """Number of series whose errors lie within their bounds."""
     compared = 0

@@ -58,12 +58,7 @@ def sectors():
 
 def exact_terms(kind, number):
     (x, y), (p, q) = start_of(number), start_of(end_number(number))
-    return {
-        TANGENT: [1, -x, -y],
-        CHORD: [x + p, y + q, -(1 + x * p + y * q)],
-        LEFT: [-y, x],
-        RIGHT: [q, -p],
-    }[kind]
+    return {TANGENT: [1, -x, -y], CHORD: [x + p, y + q, -(1 + x * p + y * q)], LEFT: [-y, x], RIGHT: [q, -p]}[kind]
 
 
 @pytest.mark.parametrize("kind", [TANGENT, CHORD, LEFT, RIGHT])
