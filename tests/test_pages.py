@@ -93,7 +93,7 @@ def test_three_dimensions(three_dimensions):
     assert (three_dimensions["folder"] / "block.vtu").stat().st_size > 1000
     assert three_dimensions["pairs"].mirror_images.images == (0, 2, 1, 3, 4)
     pictures = {path.name for path in three_dimensions["folder"].glob("wedge*")}
-    assert pictures == {"wedge.pvd", *(f"wedge-{k}.vtu" for k in range(9))}
+    assert pictures == {"wedge.html", "wedge.pvd", *(f"wedge-{k}.vtu" for k in range(9))}
 
 
 def test_results(results):
@@ -103,4 +103,9 @@ def test_results(results):
 
 
 def test_reports(command_line):
-    assert {path.name for path in command_line["folder"].iterdir()} == {"FILE", "wedge.html", "wedge.proof"}
+    assert {path.name for path in command_line["folder"].iterdir()} == {
+        "FILE",
+        "roots.html",
+        "wedge.html",
+        "wedge.proof",
+    }

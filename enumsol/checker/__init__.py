@@ -1,20 +1,23 @@
 """The checkers of proofs, which import nothing of the search.
 
 What a verified proof says
-    For the problem's own A, Bn, Bt, f, gap, slip offset and friction, read as exact numbers (or, where the report says
-    "S and g as computed", for the condensed data), and for alpha as an exact fraction: the listed roots and families
-    solve the problem, and nothing else does. The proof of a branch graph says that every solution for every alpha of an
-    interval lies in the surviving selections and, if it holds arcs, what each of them does along the interval, except
-    for short intervals that it leaves undecided. All this rests on the energy bound (theory, (5.2)), on branchings that
-    cover (``trusted.status_rows.children_of``), on the a-priori error bounds of IEEE double arithmetic with rounding to
-    nearest in ``arithmetic.balls``, ``condensation.enclosure`` and ``trusted``, and on rational arithmetic in
-    ``checker.rational`` and ``checker.hull``. Linear algebra kernels may sum in any order and fuse multiplications and
-    additions; fast matrix multiplication of Strassen's kind and changed rounding modes are excluded.
+    For the problem's own A, Bn, Bt, f, gap, slip offset and friction, read as exact numbers (or, where the report
+    says "S and g as computed", for the condensed data), and for alpha as an exact fraction: the listed roots and
+    families solve the problem, and nothing else does. The proof of a branch graph says that every solution for
+    every alpha of an interval lies in the surviving selections and, if it holds arcs, what each of them does along
+    the interval, except for short intervals that it leaves undecided. The proof of a history says it of every step
+    from every start in its ball, and that the ends of all roots are such starts. All this rests on the energy bound
+    (theory, (5.2)), on branchings that cover (``trusted.status_rows.children_of``), on the a-priori error bounds of
+    IEEE double arithmetic with rounding to nearest in ``arithmetic.balls``, ``condensation.enclosure`` and
+    ``trusted``, and on rational arithmetic in ``checker.rational`` and ``checker.hull``. Linear algebra kernels may
+    sum in any order and fuse multiplications and additions; fast matrix multiplication of Strassen's kind and
+    changed rounding modes are excluded.
 
 What checker and search share
-    ``checker.verify``, ``checker.graph_checker`` and ``checker.space_checker`` import nothing of the search, neither
-    its trees and relaxations nor its arcs and results, and a test guards that. They are not independent of all that it
-    uses. These serve both, and an error in one of them may write a false proof and accept it:
+    ``checker.verify``, ``checker.graph_checker``, ``checker.history_checker`` and ``checker.space_checker`` import
+    nothing of the search, neither its trees and relaxations nor its arcs and results, and a test guards that. They
+    are not independent of all that it uses. These serve both, and an error in one of them may write a false proof
+    and accept it:
 
     - ``trusted.status_rows``: the codes, the rows and the branchings that cover, on which writer and reader have to
       agree;
@@ -39,6 +42,8 @@ What checker and search share
       the same; ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
       variables in which friction is isotropic; ``model.problem3d``, ``model.slip_mean`` and ``model.friction``, the
       data and their checks;
+    - for histories: ``trusted.positions``, where a root leaves the contact nodes; ``model.restart``, the problem of a
+      step;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
       search whether it does at all (then there is no proof); ``condensation.affine``: F(alpha) and f(alpha) without
       rounding; of ``arithmetic.rationals`` the pivots of a definite matrix, and floats as rationals;

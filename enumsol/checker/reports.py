@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 #: Failures after which a checker reads no further.
 MAX_FAILURES = 20
+#: Steps of a history that are printed.
+_MOST_STEPS = 30
 
 
 @dataclass(frozen=True)
@@ -143,6 +145,65 @@ class GraphVerificationReport:
         if self.complete:
             return [f"  every solution for every alpha in [{ends[0]:g}, {ends[1]:g}] lies on these arcs: {arcs}"]
         return [f"  {arcs}; left open in {counted(self.open, 'short interval')} of alpha"]
+
+
+@dataclass(frozen=True)
+class HistoryVerificationReport:
+    """What the checker found about a history.
+
+    Attributes
+    ----------
+    ok : bool
+        Every search was checked, and so was every start that it names.
+    failures : tuple of str
+        Why the proof was refused.
+    steps : int
+    stages, roots : tuples of int
+        For every step the number of searches, one for each start, and the number of roots that they found.
+    complete : bool
+        Every step is complete from every start, and every root is followed to the last step.
+    unique_until : int
+        The last step up to which it is proven that there is one history only.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> proof = enumsol.histories(problem, [1, 5]).proof
+    >>> enumsol.verify(problem, proof)
+    proof: verified for a history of 2 steps
+      step 1: 1 root from 1 start
+      step 2: 1 root from 1 start
+      complete: yes, unique until step 2
+    """
+
+    ok: bool
+    failures: tuple[str, ...]
+    steps: int
+    stages: tuple[int, ...]
+    roots: tuple[int, ...]
+    complete: bool
+    unique_until: int
+
+    def _repr_html_(self) -> str:
+        return html_lines(repr(self).splitlines())
+
+    def __repr__(self) -> str:
+        if not self.ok:
+            return _refusal(" for a history", self.failures, counted(sum(self.stages), "search", "searches"))
+        rows = [
+            f"  step {k}: {counted(roots, 'root')} from {counted(starts, 'start')}"
+            for k, (roots, starts) in enumerate(zip(self.roots, self.stages, strict=True), 1)
+        ]
+        shown = rows if len(rows) <= _MOST_STEPS else [*rows[:_MOST_STEPS], f"  ... {len(rows) - _MOST_STEPS} more"]
+        unique = f"unique until step {self.unique_until}" if self.unique_until else "no step is proven to be unique"
+        return "\n".join(
+            (
+                f"proof: verified for a history of {counted(self.steps, 'step')}",
+                *shown,
+                f"  complete: {'yes' if self.complete else 'no'}, {unique}",
+            )
+        )
 
 
 _DATA = {"problem": "A, Bn, Bt, f as given", "condensed": "S and g as computed"}

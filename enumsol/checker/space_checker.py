@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE
+from enumsol.arithmetic.balls import SAFE, TINY
 from enumsol.checker.walk import TreeChecker
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.space_condensed import EnclosedSpace
@@ -19,8 +19,8 @@ from enumsol.proof.records import Limits, NoRoot, RegularRoot
 from enumsol.proof.space_records import LEAVES, BoxedRoot, ExcludedInSpace, OnlyRoot
 from enumsol.trusted.space.boxed_solution import apart_in_boxes, is_inside, solution_in_box
 from enumsol.trusted.space.leaves import Open, distinct_roots, settle
-from enumsol.trusted.space.sector_rows import UNDECIDED, sector_children, sector_margin
-from enumsol.trusted.space.space_uniqueness import only_root, only_solution_in_space
+from enumsol.trusted.space.sector_rows import STICK, UNDECIDED, sector_children, sector_margin
+from enumsol.trusted.space.space_uniqueness import OnlySolution, only_root, only_solution_in_space
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -94,6 +94,7 @@ class SpaceChecker(TreeChecker):
 
     def _at_rest(self) -> None:
         self.regular += 1
+        self.locate(Ball.exact(np.zeros(3 * self.problem.p)), np.ones(2 * self.problem.p, dtype=bool))
 
     def _excluded(self, codes: Codes, said: ExcludedInSpace) -> str | None:
         positive = sector_margin(self.system, codes, said.rows, said.values) > 0
@@ -113,6 +114,7 @@ class SpaceChecker(TreeChecker):
         if found is None:
             return "it holds no root"
         self.roots.append((codes, found))
+        self._locate(found.y, np.array(codes) == STICK)
         return self._placed(found, said.enclosure)
 
     def _in_box(self, codes: Codes, said: BoxedRoot) -> str | None:
@@ -129,6 +131,7 @@ class SpaceChecker(TreeChecker):
         if leaf is not None and (leaf.y is None or not is_inside(leaf.y, box)):
             return "its roots are not proven to lie in its box"
         self.boxed.append((codes, found))
+        self._locate(found.y, ~(found.slip | found.open))
         return self._placed(found, said.enclosure)
 
     def _only(self, codes: Codes, said: OnlyRoot) -> str | None:
@@ -142,6 +145,8 @@ class SpaceChecker(TreeChecker):
         if found is None:
             return "its solution is not proven to be the only one"
         self.regular += 1
+        statuses = np.array(said.leaf)
+        self._locate(found.y, ~(found.slip | found.open) if isinstance(found, OnlySolution) else statuses == STICK)
         return self._placed(found, said.enclosure)
 
     def _placed(self, found: SpaceRoot | LooseSolution, said: EnclosureRecord) -> str | None:
@@ -164,6 +169,23 @@ class SpaceChecker(TreeChecker):
         boxed, uncertain = apart_in_boxes([root for _, root in distinct], self.boxed)
         self.doubtful = len(doubtful) + len(uncertain)
         return len(distinct) + len(boxed), 0
+
+    def locate_rational_roots(self) -> None:
+        """Nothing: in 3D there are none."""
+
+    def _locate(self, y: Ball, still: NDArray[np.bool_]) -> None:
+        """Take note of a root's forces in the problem's units; ``still`` tells nodes that stick for certain."""
+        if self.located is None:
+            return
+        p, system = self.problem.p, self.system
+        forces = Ball(np.zeros(3 * p), np.zeros(3 * p))
+        forces[:p] = Ball(y.mid[:p] * self.force, y.rad[:p] * self.force + TINY)
+        for k in (0, 1):
+            nodes = np.flatnonzero(system.tau[:, k] >= 0)
+            part = y[system.tau[nodes, k]] * Ball(system.F[nodes, k], system.F_rad[nodes, k])
+            forces[(1 + k) * p + nodes] = Ball(part.mid * self.force[nodes], part.rad * self.force[nodes] + TINY)
+        # where a coefficient is 0 a sticking node may move all the same
+        self.locate(forces, np.concatenate([still & (system.tau[:, k] >= 0) for k in (0, 1)]))
 
     def _claim(self, isolated: int, families: int) -> dict[str, int]:
         return {"roots": self.regular + isolated, "undecided": self.undecided, "leaves": self.leaves}

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE
+from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT
 from enumsol.checker.form_tables import FormLeaves
 from enumsol.checker.graph_checker import GraphChecker
-from enumsol.checker.reports import GraphVerificationReport, VerificationReport
+from enumsol.checker.reports import GraphVerificationReport, HistoryVerificationReport, VerificationReport
 from enumsol.checker.walk import TreeChecker
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.model.problem import ContactProblem
@@ -52,8 +53,8 @@ _SUBNORMAL = 2.0**-1070
 
 def verify(
     problem: ContactProblem | ContactProblem3D, proof: Proof, progress: Callable[[int], object] | None = None
-) -> VerificationReport | GraphVerificationReport:
-    """Check a proof, of a root set or of a branch graph's search, against a problem.
+) -> VerificationReport | GraphVerificationReport | HistoryVerificationReport:
+    """Check a proof, of a root set, of a branch graph or of a history, against a problem.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def verify(
 
     Returns
     -------
-    VerificationReport or GraphVerificationReport
+    VerificationReport, GraphVerificationReport or HistoryVerificationReport
 
     Raises
     ------
@@ -92,15 +93,20 @@ def verify(
     instance_of(proof, Proof, "proof")
     optional_callable(progress, "progress")
     proof.check_integrity()
+    checker: type[TreeChecker] = Checker
     if in_space:
         from enumsol.checker.space_checker import SpaceChecker  # with its trusted core, for problems in 3D only
 
-        return SpaceChecker(problem, progress).run(proof)
+        checker = SpaceChecker
     lines = proof.records()
     header = next(lines, None)
-    if isinstance(header, dict) and header.get("kind") == "graph":
+    if isinstance(header, dict) and header.get("kind") == "history":
+        from enumsol.checker.history_checker import HistoryChecker  # not for other proofs
+
+        return HistoryChecker(problem, header, checker, progress).run(lines)
+    if isinstance(header, dict) and header.get("kind") == "graph" and not in_space:
         return GraphChecker(cast("ContactProblem", problem), header, progress).run(lines)
-    return Checker(problem, progress).run(proof)
+    return checker(problem, progress).run(proof)
 
 
 def _is_in_space(problem: object) -> bool:
@@ -263,6 +269,7 @@ class Checker(TreeChecker):
         """Count a regular root, and look at what is said of it."""
         self.regular += 1
         self.strict.append(codes)
+        self._locate(ball)
         centre, radius = said.numbers(len(ball.force))
         with np.errstate(over="ignore", invalid="ignore"):
             reach = np.abs(centre - ball.force * self.force) + ball.force_rad * self.force
@@ -274,8 +281,37 @@ class Checker(TreeChecker):
 
         reason, ball = closed_by_balls(self.system, said, self.force)
         if ball is not None:
+            self._locate(ball)
             self.closed[ball.core] = ball
         return reason
+
+    def _locate(self, ball: VerifiedSelection | ClosedSolution) -> None:
+        if self.located is not None:
+            p = self.problem.p
+            forces = Ball(ball.force * self.force, ball.force_rad * self.force + TINY)
+            self.locate(forces, (ball.w[p:] == 0) & (ball.w_rad[p:] == 0))
+
+    def locate_rational_roots(self) -> None:
+        """Add the isolated roots that rationals have found to ``located``."""
+        p = self.problem.p
+        for _, points, dimension in self.polytopes:
+            if dimension:
+                continue
+            exact = [Fraction(x) for x in points[0]]
+            forces = np.array([float(x) for x in exact])
+            w = [Fraction(0)] * p if not any(exact) and self.problem.is_unloaded(self.alpha) else self._slips(exact)
+            self.locate(Ball(forces, np.abs(forces) * 2 * UNIT + TINY), np.array([x == 0 for x in w]))
+
+    def _slips(self, point: list[Fraction]) -> list[Any]:
+        """w_t at a point, exactly."""
+        from enumsol.arithmetic.rationals import rational  # python-flint, as above
+
+        column = [rational(x) for x in point]
+        rows = self.rational.S.tolist()
+        pairs = zip(rows, self.rational.g, strict=True)
+        return [g - sum((a * x for a, x in zip(row, column, strict=True)), g * 0) for row, g in pairs][
+            len(point) // 2 :
+        ]
 
     def _alone(self, codes: Codes, said: records.Alone) -> str | None:
         root = lone_root(self.system, codes, *said.arguments)

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from fractions import Fraction
 
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from enumsol.arithmetic.ball_arrays import Ball
     from enumsol.condensation.data import Data
     from enumsol.proof.proof_file import Proof
     from enumsol.proof.records import Record
@@ -44,6 +48,9 @@ class TreeChecker:
     undecided: int = 0
     leaves: int = 0
     data: Data = "problem"
+    #: What was found of the roots, if someone wants to know where they leave the contact nodes: forces in the
+    #: problem's units, and tangential components with u_t = 0 for certain.
+    located: list[tuple[Ball, NDArray[np.bool_]]] | None = None
     #: The problem's balls, where whoever asks for the check has made them already.
     enclosure: CondensedEnclosure | None = None
 
@@ -212,6 +219,11 @@ class TreeChecker:
         # g = 0: by the energy bound nothing but lambda = 0 solves
         self._at_rest()
         return None if unloaded else "the problem is not unloaded"
+
+    def locate(self, forces: Ball, still: NDArray[np.bool_]) -> None:
+        """Take note of where a root is, if anybody wants to know."""
+        if self.located is not None:
+            self.located.append((forces, still))
 
     def fail(self, message: str) -> None:
         """Take note of a failure.

@@ -161,6 +161,18 @@ def check_places(path: str | None, problem: ContactProblem | ContactProblem3D, n
         raise InvalidArgumentError(f"--vtu is given, but {name} has neither mesh nor coordinates; expected one of them")
 
 
+def check_scripts(path: str | None, problem: ContactProblem | ContactProblem3D) -> None:
+    """Refuse a page that plotly's script draws, before the search.
+
+    Raises
+    ------
+    MissingDependencyError
+        plotly is not installed, and the problem is one in 3D.
+    """
+    if path is not None and not hasattr(problem, "Bt") and find_spec("plotly") is None:
+        raise MissingDependencyError.of("reports", "plotly", "report")
+
+
 def check_plot(path: str | None) -> None:
     """Refuse a figure that cannot be drawn before the search rather than after it.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, NoReturn
 
 import typer
@@ -15,6 +16,7 @@ from enumsol.cli.options import (
     MaxNodes,
     ProblemArgument,
     Quiet,
+    ReportFile,
     VtuFile,
     count,
     csv,
@@ -22,7 +24,7 @@ from enumsol.cli.options import (
     number,
     seconds,
 )
-from enumsol.cli.output import check_outputs, check_places, check_vtu, check_writable, deliver
+from enumsol.cli.output import check_outputs, check_places, check_scripts, check_vtu, check_writable, deliver
 from enumsol.cli.progress import SearchDisplay
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
@@ -89,6 +91,7 @@ def roots(
     json_file: JsonFile = None,
     csv_file: CsvFile = None,
     vtu_file: VtuFile = None,
+    report_file: ReportFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
@@ -103,7 +106,7 @@ def roots(
     """
     if jobs > 1 and method != "tree":
         raise InvalidArgumentError(f"--jobs is {jobs} with the exhaustive method; expected 1 job, or the method tree")
-    files = Files(proof_file, json_file, csv_file, vtu_file)
+    files = Files(proof_file, json_file, csv_file, vtu_file, report_file, source=problem)
     files.check(resume=resume)
     if unique and stop_after is not None:
         raise InvalidArgumentError(f"--stop-after is {stop_after} with --unique, which stops at the second root")
@@ -118,12 +121,17 @@ def roots(
 
 
 class Files(NamedTuple):
-    """The files that the results of a search go to; None where there is none."""
+    """The files that the results of a search go to; None where there is none.
+
+    ``source`` is what other commands take for the problem, None where there is no such file.
+    """
 
     proof: str | None
     json: str | None
     csv: str | None
     vtu: str | None
+    report: str | None
+    source: str | None
 
     def check(self, *, resume: bool) -> None:
         """Refuse results that cannot be written.
@@ -138,6 +146,9 @@ class Files(NamedTuple):
             raise InvalidArgumentError("--proof is -, but a proof is a binary file; expected the name of a file")
         check_writable(self.proof, "--proof")
         check_vtu(self.vtu)
+        if self.report == "-":
+            raise InvalidArgumentError("--report is -; expected the name of a file")
+        check_writable(self.report, "--report")
         if resume and self.proof is None:
             raise InvalidArgumentError(
                 "--resume is given without --proof; expected the file of the proof to resume from"
@@ -160,12 +171,14 @@ def answer(
     With ``unique`` the question is only whether there is one solution; across ``mirror`` roots are paired.
     """
     check_places(files.vtu, problem, name)
+    check_scripts(files.report, problem)
     check_mirror(problem, alpha, mirror)
     found, ended = so_far(lambda: _search(problem, alpha, jobs, **options))
     if mirror is not None and len(found):
         found = found.mirrored(mirror)
     deliver(
         (files.vtu, lambda path: _write_vtu(problem, found, path)),
+        (files.report, lambda path: _write_page(found, path, name, files)),
         json_file=files.json,
         csv_file=files.csv,
         text=lambda: root_report.uniqueness(found) if unique else root_report.roots_as_text(found),
@@ -203,6 +216,24 @@ def _write_vtu(problem: ContactProblem | ContactProblem3D, found: RootSet, path:
     from enumsol.io.vtu import write_vtu  # numpy: not for --help
 
     write_vtu(problem, found, path)
+
+
+def _write_page(found: RootSet, path: str, name: str, files: Files) -> None:
+    from enumsol.report import write_report  # numpy: not for --help
+
+    write_report(found, path, title=name, commands=_commands(found, files))
+
+
+def _commands(found: RootSet, files: Files) -> list[str]:
+    """How a reader checks the proof; none where there is none, or no file of the problem."""
+    if found.proof is None or files.source is None:
+        return []
+    problem = shlex.quote(files.source)
+    if files.proof is not None:
+        return [f"enumsol verify {problem} {shlex.quote(files.proof)}"]
+    # -1 would be read as an option
+    again = f"enumsol roots {problem} --alpha={shlex.quote(str(found.alpha))} --proof roots.proof"
+    return [again, f"enumsol verify {problem} roots.proof"]
 
 
 def _search(problem: ContactProblem | ContactProblem3D, alpha: Alpha, jobs: int, **options: Any) -> RootSet:

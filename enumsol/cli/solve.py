@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from enumsol.cli.common import GALLERY, TOML, load_any_problem, note, parse_alpha, refuse_misspelt
-from enumsol.cli.options import LIMITS, OUTPUT, JsonFile, MaxNodes, Quiet, VtuFile
+from enumsol.cli.options import LIMITS, OUTPUT, JsonFile, MaxNodes, Quiet, ReportFile, VtuFile
 from enumsol.cli.roots import (
     CsvFile,
     Files,
@@ -209,6 +209,7 @@ def solve(
     json_file: JsonFile = None,
     csv_file: CsvFile = None,
     vtu_file: VtuFile = None,
+    report_file: ReportFile = None,
     output: Output = None,
     quiet: Quiet = False,
     **texts: Any,
@@ -226,7 +227,8 @@ def solve(
         for name, text in texts.items()
         if text is not None
     }
-    files = Files(proof_file, json_file, csv_file, vtu_file)
+    source = output if output is not None else mesh if mesh.endswith(TOML) else None
+    files = Files(proof_file, json_file, csv_file, vtu_file, report_file, source)
     files.check(resume=resume)
     value = None if alpha is None else parse_alpha(alpha)
     problem = _problem(mesh, given)

@@ -14,7 +14,7 @@ from enumsol.cli.output import as_json, check_outputs, deliver
 from enumsol.cli.quiet import is_quiet
 
 if TYPE_CHECKING:
-    from enumsol.checker.reports import GraphVerificationReport, VerificationReport
+    from enumsol.checker.reports import GraphVerificationReport, HistoryVerificationReport, VerificationReport
 
 
 def verify(
@@ -22,13 +22,13 @@ def verify(
     proof: Annotated[
         str,
         typer.Argument(
-            metavar="PROOF", help="A file written by --proof of enumsol roots or graph.", show_default=False
+            metavar="PROOF", help="A file written by --proof of enumsol roots, graph or history.", show_default=False
         ),
     ],
     json_file: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Check that PROOF shows its list of roots of PROBLEM, or its arcs of a graph, to be complete.
+    """Check that PROOF shows its list of roots of PROBLEM, its arcs of a graph, or its history, to be complete.
 
     The checker imports nothing from the search: it computes the condensed problem anew and checks every leaf of the
     search tree. It uses the same rigorous bounds; python -m pydoc enumsol.checker lists what the two share.
@@ -59,7 +59,7 @@ def verify(
     raise typer.Exit(ExitStatus.DONE if report.complete else ExitStatus.INCOMPLETE)
 
 
-def _content(report: VerificationReport | GraphVerificationReport) -> dict[str, Any]:
+def _content(report: VerificationReport | GraphVerificationReport | HistoryVerificationReport) -> dict[str, Any]:
     """The report, for JSON; of a graph the number of its selections."""
     content = asdict(report) | {"complete": report.complete}
     if "selections" in content and not isinstance(content["selections"], int):

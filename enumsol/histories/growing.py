@@ -70,7 +70,7 @@ class HistoryProgress:
     >>> seen = []
     >>> history = enumsol.histories(enumsol.gallery.one_node_triangle(), [1, 5], progress=seen.append)
     >>> [(state.step, state.roots) for state in seen]
-    [(1, 1), (2, 4)]
+    [(1, 1), (2, 2)]
     """
 
     step: int

@@ -8,6 +8,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.histories.history_data import START
+from enumsol.histories.history_proof import history_proof
 from enumsol.histories.history_text import history_html, history_text
 from enumsol.roots.root import summary
 from enumsol.support.arguments import positive_integer, shown
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from enumsol.histories.history_data import HistoryData, Node
     from enumsol.histories.stages import Stage
+    from enumsol.proof.proof_file import Proof
     from enumsol.roots.root import Root
 
 
@@ -49,9 +51,9 @@ class History(Immutable):
     Examples
     --------
     >>> import enumsol
-    >>> history = enumsol.histories(enumsol.gallery.one_node_triangle(), [1, 5, 0.5])
-    >>> history.unique_until, history.branchings, len(history.ends), history.complete
-    (1, ((1, 0),), 3, True)
+    >>> history = enumsol.histories(enumsol.gallery.one_node_triangle(), [5, 4])
+    >>> history.unique_until, history.counts, len(history.ends), history.complete
+    (0, (3, 5), 5, True)
     """
 
     def __init__(self, data: HistoryData) -> None:
@@ -75,6 +77,14 @@ class History(Immutable):
     def unique_until(self) -> int:
         """The last step up to which it is proven that there is one history only; 0 where there is no such step."""
         return self.data.unique_until
+
+    @property
+    def proof(self) -> Proof | None:
+        """One proof of the whole for ``enumsol.verify``: all searches, their starts, and which follows which.
+
+        None in fast and exact arithmetic, after ``load``, and where there was no search at all.
+        """
+        return history_proof(self.data)
 
     # -- the graph -------------------------------------------------------------------------------------------------
 

@@ -89,7 +89,7 @@ class LoadStep(Sealed):
             raise InvalidArgumentError(
                 f"step {number} has no alpha, on which the problem's friction or load depends; expected one"
             )
-        step = LoadStep(0.0 if alpha is None else alpha, friction, load)
+        step = LoadStep(alpha, friction, load)
         if friction is None:
             try:
                 problem.friction_at(step.exact_alpha)
@@ -115,7 +115,8 @@ class LoadStep(Sealed):
                 "refine is True, and of two steps one has a load or a friction and the other has none; expected both "
                 "to have one, or neither"
             )
-        return LoadStep(alpha, mixed(self.friction, other.friction), mixed(self.load, other.load))
+        both = self.alpha is not None and other.alpha is not None
+        return LoadStep(alpha if both else None, mixed(self.friction, other.friction), mixed(self.load, other.load))
 
     def __repr__(self) -> str:
         parts = [] if self.alpha is None else [f"alpha={float(self.alpha):g}"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _Body = TypeVar("_Body", bound=ContactBody)
-#: What a body has computed of its data; of another step of the same body only the matrices' part holds.
-_COMPUTED = ("condensed", "enclosure", "products", "fingerprint")
+#: What a body has computed of its matrices alone; everything else that it has computed is its own.
+_SHARED = {"factorization"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +106,8 @@ def restarted(
     load : (n,) array, which does not depend on alpha, or None
     friction : (p,) array, in 3D (p, 2), which does not depend on alpha, or None
     """
-    other = object.__new__(type(problem))
+    other = afresh(problem)
     given = other.__dict__
-    # not copy.copy, which leaves the factorization behind as pickles have to
-    given.update({name: value for name, value in problem.__dict__.items() if name not in _COMPUTED})
     given["slip_offset"] = sealed(start.offset.reshape(problem.slip_offset.shape) + 0.0)
     given["offset_radius"] = None if start.radius is None else sealed(start.radius.reshape(start.offset.shape))
     given["exact_offset"] = start.exact
@@ -124,3 +123,16 @@ def restarted(
         with suppress(NotEnclosedError):  # whoever asks for it is told so
             given["enclosure"] = known.restarted(other, products)
     return other
+
+
+def afresh(problem: _Body) -> _Body:
+    """The same problem without what it has computed, but for the factors of A, on whose accuracy no bound rests."""
+    other = object.__new__(type(problem))
+    # not copy.copy, which leaves the factorization behind as pickles have to
+    other.__dict__.update({name: value for name, value in problem.__dict__.items() if not _computed(problem, name)})
+    return other
+
+
+def _computed(problem: ContactBody, name: str) -> bool:
+    """Whether an attribute was computed of data that another step may change."""
+    return name not in _SHARED and isinstance(getattr(type(problem), name, None), cached_property)

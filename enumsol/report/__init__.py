@@ -1,4 +1,4 @@
-"""Reports: all solutions over an interval of alpha as one HTML page that needs no network."""
+"""Reports: all solutions, over an interval of alpha or at one, as one HTML page that needs no network."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def body_record(problem: ContactProblem) -> dict[str, Any] | str:
     lines = None
     nodes = np.arange(len(shape.points))
     if shape.points.size * columns > _MOST_NUMBERS:
-        lines = _boundary(cells)
+        lines = boundary_edges(cells)
         nodes = np.unique(lines)
     if 2 * len(nodes) * columns > _MOST_NUMBERS:
         return (
@@ -90,7 +90,7 @@ def _row(matrix: sp.csr_array, i: int) -> tuple[Any, Any]:
     return matrix.indices[part], matrix.data[part]
 
 
-def _boundary(outlines: NDArray[np.int64]) -> NDArray[np.int64]:
+def boundary_edges(outlines: NDArray[np.int64]) -> NDArray[np.int64]:
     """Edges that belong to one cell only, (k, 2)."""
     edges = np.concatenate([outlines[:, [k, (k + 1) % outlines.shape[1]]] for k in range(outlines.shape[1])])
     edges = edges[edges[:, 0] != edges[:, 1]]  # triangles among quadrilaterals name a corner twice

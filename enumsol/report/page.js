@@ -1,10 +1,4 @@
-"use strict";
-// Texts of the problem (names, labels) reach the page by textContent, and Plotly with "<" and "&" escaped.
-const data = JSON.parse(document.getElementById("data").textContent);
-const byId = (id) => document.getElementById(id);
-const p = data.nodes.length;
-const GREY = "#333333", FORCE = "#b3202c";
-const COLOURS = { open: "#ffffff", stick: "#1f5fa8", "slip+": "#d9730d", "slip-": "#2a8a4a" };
+// All solutions over an interval: the diagram.
 const STATUS_DASH = { open: "solid", stick: "dash", "slip+": "dashdot", "slip-": "dot" };
 const SYMBOLS = {
   transition: ["circle-open", "transition"], fold: ["square-open", "fold"], bifurcation: ["diamond-open", "bifurcation"],
@@ -17,21 +11,6 @@ const arcs = new Map(data.arcs.map((arc) => [arc.number, arc]));
 const branches = new Map(data.branches.map((branch) => [branch.number, branch]));
 const state = { quantity: data.quantities[0], node: 0, branch: null, alpha: data.slider[0], page: 0 };
 let plotted = null;
-
-const safe = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
-const short = (x) => (x === null || x === undefined ? "?" : Number(x.toPrecision(6)).toString().replace("-", "\u2212"));
-const signed = (k) => (k === null ? "unknown" : k > 0 ? `+${k}` : String(k).replace("-", "\u2212"));
-const status = (codes, k) => data.statuses[Number(codes[k])];
-
-function element(name, properties = {}, ...children) {
-  const made = document.createElement(name);
-  for (const [key, value] of Object.entries(properties)) {
-    if (key in made) made[key] = value;
-    else made.setAttribute(key, value);
-  }
-  made.append(...children);
-  return made;
-}
 
 // -- quantities ---------------------------------------------------------------------------------------------------
 
@@ -57,16 +36,6 @@ function axisName() {
   const item = state.quantity;
   const unit = data.units ? ` [${data.units[item.dimension === "force" ? 0 : 1]}]` : "";
   return safe((item.by_node ? `${item.words} of node ${data.nodes[state.node]}` : item.words) + unit);
-}
-
-function runs(codes) {
-  const parts = [];
-  for (let k = 0, start = 0; k < p; k += 1) {
-    if (k + 1 < p && codes[k + 1] === codes[k]) continue;
-    parts.push(p > 1 ? `${k + 1 - start} ${status(codes, k)}` : status(codes, k));
-    start = k + 1;
-  }
-  return parts.length > 12 ? `${parts.slice(0, 12).join(", ")}, \u2026` : parts.join(", ");
 }
 
 // -- the diagram --------------------------------------------------------------------------------------------------
@@ -221,12 +190,6 @@ function selectBranch(number) {
   );
 }
 
-function table(heads, rows) {
-  const line = (kind, cells) => element("tr", {}, ...cells.map((cell) => element(kind, {}, String(cell))));
-  return element("div", { className: "scroll" }, element("table", {},
-    element("thead", {}, line("th", heads)), element("tbody", {}, ...rows.map((row) => line("td", row)))));
-}
-
 // -- start --------------------------------------------------------------------------------------------------------
 
 function fill(select, entries) {
@@ -271,15 +234,4 @@ function start() {
   document.body.dataset.ready = "yes";
 }
 
-async function load() {
-  const bytes = Uint8Array.from(atob(byId("plotly").textContent), (c) => c.charCodeAt(0));
-  const text = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
-  document.head.append(element("script", { textContent: text }));
-  start();
-}
-
-load().catch((error) => {
-  byId("failed").hidden = false;
-  byId("failed").textContent = `The diagram cannot be drawn by this browser (${error.message}); the tables below are complete.`;
-  console.error(error);
-});
+load(start).catch(failed);

@@ -2,50 +2,52 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
-import json
 from html import escape
-from importlib.resources import files
-from string import Template
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol._version import find_version
 from enumsol.branches import BranchGraph
 from enumsol.branches.figures.graph_plots import checked_units
-from enumsol.errors import MissingDependencyError
+from enumsol.errors import InvalidArgumentError
 from enumsol.report.content import listed, report_content
+from enumsol.report.parts import fact_list, filled_page, packed_plotly, span_words, table_text, warning_list
+from enumsol.report.roots_page import roots_page
+from enumsol.roots.root_set import RootSet
 from enumsol.support.arguments import file_path, instance_of
 from enumsol.support.files import writing
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from enumsol.branches.elements import Vertex
 
 
 def write_report(
-    graph: BranchGraph,
+    solutions: BranchGraph | RootSet,
     file: str | os.PathLike[str],
     *,
     title: str = "Contact problem with Coulomb friction",
     units: tuple[str, str] | None = None,
     commands: Sequence[str] = (),
 ) -> None:
-    """Write all solutions over an interval of alpha as one HTML page that needs no network.
+    """Write all solutions over an interval of alpha, or at one alpha, as one HTML page that needs no network.
 
-    The page has the branches against alpha (pointing shows values and statuses, a click on a branch its arcs), the
-    number of solutions, a slider over alpha with the deformed bodies of all solutions (without a mesh: forces and
-    displacements of the contact nodes), tables of branches, transitions and folds, and what is certified. It says
-    "complete" only where ``graph.complete`` does; of a graph that was cut short it says what is missing.
+    The page of a graph has the branches against alpha (pointing shows values and statuses, a click on a branch its
+    arcs), the number of solutions, a slider over alpha with the deformed bodies of all solutions (without a mesh:
+    forces and displacements of the contact nodes), tables of branches, transitions and folds, and what is certified. It
+    says "complete" only where ``graph.complete`` does; of a graph that was cut short it says what is missing.
+
+    The page of a RootSet, in 2D or 3D, has a card for each root with the deformed body (in 3D it can be turned),
+    contact forces, statuses, directions of slip and a table over the contact nodes; tables of roots, continua and
+    undecided parts; and what is certified. Without a mesh there are in 3D the contact nodes at their coordinates, in 2D
+    bars of forces and displacements, and otherwise the tables alone.
 
     Parameters
     ----------
-    graph : BranchGraph
+    solutions : BranchGraph or RootSet
     file : str or path-like
         An existing file is replaced.
     title : str
@@ -60,7 +62,7 @@ def write_report(
     InvalidArgumentError
         There can be no such file, or an argument is not of that form.
     MissingDependencyError
-        plotly is not installed, whose script draws the diagram in the page.
+        plotly is not installed, whose script draws diagrams and bodies in 3D in the page.
     OutputError
         There is no room for the file.
 
@@ -73,24 +75,22 @@ def write_report(
     ...     "complete: yes (proven)" in pathlib.Path(folder, "square.html").read_text()
     True
     """
-    instance_of(graph, BranchGraph, "graph")
+    given: object = solutions
+    if not isinstance(given, (BranchGraph, RootSet)):
+        raise InvalidArgumentError(f"solutions is a {type(given).__name__}; expected a BranchGraph or a RootSet")
     place = file_path(file, "file")
-    page = report_page(graph, instance_of(title, str, "title"), checked_units(units), tuple(commands))
+    words = (instance_of(title, str, "title"), checked_units(units), tuple(commands))
+    page = report_page(solutions, *words) if isinstance(solutions, BranchGraph) else roots_page(solutions, *words)
     with writing(place, "file"):
         place.write_text(page, encoding="utf-8")
 
 
 def report_page(graph: BranchGraph, title: str, units: tuple[str, str] | None, commands: Sequence[str]) -> str:
     """The text of the page."""
-    parts = files("enumsol.report")
     content = report_content(graph) | {"units": units}
     words = {
         "title": escape(title),
-        "style": (parts / "page.css").read_text(encoding="utf-8"),
-        "script": "\n".join((parts / name).read_text(encoding="utf-8") for name in ("page.js", "page.solutions.js")),
-        "plotly": _packed_plotly(),
-        # no "<" of a name may end the element
-        "data": json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
+        "plotly": packed_plotly(),
         "badge": "yes" if graph.complete else "no",
         "completeness": escape(graph.completeness()),
         "reasons": _reasons(graph.reasons),
@@ -99,28 +99,17 @@ def report_page(graph: BranchGraph, title: str, units: tuple[str, str] | None, c
         "branches": _branches(graph),
         "vertices": _vertices(graph),
         "certified": _certified(graph, commands),
-        "version": escape(find_version()),
     }
-    return Template((parts / "page.html").read_text(encoding="utf-8")).substitute(words)
-
-
-def _packed_plotly() -> str:
-    """Plotly's script, compressed, in base64."""
-    try:
-        from plotly.offline import get_plotlyjs  # an extra
-    except ImportError as error:
-        raise MissingDependencyError.of("reports", "plotly", "report") from error
-    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
+    return filled_page("page.html", ("page.common.js", "page.js", "page.solutions.js"), content, words)
 
 
 def _reasons(reasons: Sequence[str]) -> str:
     if not reasons:
         return ""
-    items = "".join(f"<li>{escape(reason)}</li>" for reason in reasons[:20])
-    more = f"<li>and {len(reasons) - 20} more</li>" if len(reasons) > 20 else ""
-    return (
-        '<div class="warning" id="incomplete"><p>This graph is not complete. Everything shown is a solution, but '
-        f"solutions may be missing: numbers of solutions are lower bounds. Why:</p><ul>{items}{more}</ul></div>"
+    return warning_list(
+        "This graph is not complete. Everything shown is a solution, but solutions may be missing: numbers of "
+        "solutions are lower bounds. Why:",
+        reasons,
     )
 
 
@@ -132,27 +121,15 @@ def _facts(graph: BranchGraph) -> str:
         ("contact nodes", str(problem.p)),
         ("degrees of freedom", f"{problem.n:,}"),
         ("combinations of statuses", f"4^{problem.p}" + (f" = {4**problem.p:.3g}" if problem.p < 500 else "")),
-        ("friction", f"F0 + alpha F1, F0 {_span(F0)}, F1 {_span(F1)}"),
+        ("friction", f"F0 + alpha F1, F0 {span_words(F0)}, F1 {span_words(F1)}"),
         ("load", f"{load}, max |f| = {np.max(np.abs(problem.f)):.4g}"),
-        ("gap", _span(problem.gap)),
+        ("gap", span_words(problem.gap)),
         ("alpha", f"from {a:.10g} to {b:.10g}"),
         ("arithmetic", graph.arithmetic),
         ("found", f"{counted(len(graph.branches), 'branch', 'branches')}, {counted(len(graph.arcs), 'arc')}, "
                   f"{counted(len(graph.folds), 'fold')}"),
     )  # fmt: skip
-    return "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts)
-
-
-def _span(values: Any) -> str:
-    low, high = float(np.min(values)), float(np.max(values))
-    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
-
-
-def _table(heads: Iterable[str], rows: Iterable[tuple[str, Sequence[str]]]) -> str:
-    """A table; a row is its attributes and its cells, which are escaped here."""
-    head = "".join(f"<th>{escape(name)}</th>" for name in heads)
-    body = "".join(f"<tr{kept}>" + "".join(f"<td>{escape(c)}</td>" for c in cells) + "</tr>" for kept, cells in rows)
-    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    return fact_list(facts)
 
 
 def _branches(graph: BranchGraph) -> str:
@@ -170,7 +147,7 @@ def _branches(graph: BranchGraph) -> str:
         indices = ", ".join(sorted({"?" if arc.index is None else f"{arc.index:+d}" for arc in branch.arcs}))
         cells = (str(branch.number), f"{lo:.8g}", f"{hi:.8g}", shape(branch), str(len(branch.arcs)), indices, folds)
         rows.append((f' data-branch="{branch.number}" tabindex="0"', cells))
-    return _table(("branch", "alpha from", "to", "shape", "arcs", "indices", "folds at"), rows)
+    return table_text(("branch", "alpha from", "to", "shape", "arcs", "indices", "folds at"), rows)
 
 
 def _vertices(graph: BranchGraph) -> str:
@@ -190,7 +167,7 @@ def _vertices(graph: BranchGraph) -> str:
         change = _change(graph, v, meeting[v.number])
         cells = (repr(v.alpha), error, v.kind.value, ", ".join(map(str, branches)), change)
         rows.append((f' data-alpha="{v.alpha!r}" tabindex="0"', cells))
-    return _table(("alpha", "width of its bounds", "kind", "branches", "what happens"), rows)
+    return table_text(("alpha", "width of its bounds", "kind", "branches", "what happens"), rows)
 
 
 def _change(graph: BranchGraph, v: Vertex, arcs: Sequence[Any]) -> str:

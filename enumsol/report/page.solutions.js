@@ -72,23 +72,6 @@ function card(item, scales) {
   return made;
 }
 
-function svg(name, attributes = {}, ...children) {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.append(...children);
-  return made;
-}
-
-const tip = (text) => { const made = svg("title"); made.textContent = text; return made; };
-
-function marker(name, x, y, size, text) {
-  const look = { fill: COLOURS[name], stroke: "#111", "stroke-width": size / 6 };
-  const h = size, corner = (...points) => svg("polygon", { ...look, points: points.map(([a, b]) => `${x + a * h},${y + b * h}`).join(" ") }, tip(text));
-  if (name === "open") return svg("circle", { ...look, cx: x, cy: y, r: 0.85 * h }, tip(text));
-  if (name === "stick") return corner([-0.8, -0.8], [0.8, -0.8], [0.8, 0.8], [-0.8, 0.8]);
-  return name === "slip+" ? corner([0, -1.1], [1, 0.8], [-1, 0.8]) : corner([0, 1.1], [1, -0.8], [-1, -0.8]);
-}
-
 // -- deformed bodies ----------------------------------------------------------------------------------------------
 
 function moves(f) {
@@ -120,37 +103,6 @@ function bodyScales(solutions) {
   return { scale, arrow: force > 0 ? 0.16 * size / force : 0, least: 1e-9 * force, words };
 }
 
-function drawBody(item, { scale, arrow, least }) {
-  const { points, cells, lines, size, rows } = data.body;
-  const at = points.map(([x, y], k) => [x + scale * item.u[2 * k], -(y + scale * item.u[2 * k + 1])]);
-  const bounds = (k, pick) => pick(...points.map((point) => (k ? -point[1] : point[0])));
-  const room = 0.2 * size, x0 = bounds(0, Math.min) - room, y0 = bounds(1, Math.min) - room;
-  const width = bounds(0, Math.max) + room - x0, height = bounds(1, Math.max) + room - y0, stroke = size / 250;
-  const round = (x) => Number(x.toPrecision(6));
-  const path = (groups, close) => groups.map((nodes) => `M${nodes.map((k) => `${round(at[k][0])} ${round(at[k][1])}`).join("L")}${close}`).join("");
-  const picture = svg("svg", { viewBox: `${x0} ${y0} ${width} ${height}`, role: "img", class: "body" });
-  const before = (groups, close) => groups.map((nodes) => `M${nodes.map((k) => `${points[k][0]} ${-points[k][1]}`).join("L")}${close}`).join("");
-  picture.append(svg("path", { d: cells ? before(cells, "Z") : before(lines, ""), stroke: "#dcdcdc", "stroke-width": stroke, fill: "none" }));
-  const look = { stroke: "#8796a8", "stroke-width": stroke, fill: cells ? "#dfe6ee" : "none" };
-  picture.append(svg("path", { ...look, d: cells ? path(cells, "Z") : path(lines, "") }));
-  for (const [node, [fx, fy]] of item.forces) {
-    const length = Math.hypot(fx, fy);
-    if (length <= least) continue;
-    const [x, y] = at[node], dx = arrow * fx, dy = -arrow * fy, head = Math.min(0.03 * size, 0.5 * Math.hypot(dx, dy)), n = Math.hypot(dx, dy);
-    const ux = dx / n, uy = dy / n, tipped = [[0, 0], [-ux - 0.4 * uy, -uy + 0.4 * ux], [-ux + 0.4 * uy, -uy - 0.4 * ux]];
-    picture.append(
-      svg("line", { x1: x - dx, y1: y - dy, x2: x - 0.8 * head * ux, y2: y - 0.8 * head * uy, stroke: FORCE, "stroke-width": 2.2 * stroke }),
-      svg("polygon", { fill: FORCE, class: "arrow", points: tipped.map(([a, b]) => `${x + head * a},${y + head * b}`).join(" ") }, tip(`force ${short(length)}`)),
-    );
-  }
-  rows.forEach((row, k) => {
-    const [x, y] = row.reduce(([a, b], [node, weight]) => [a + weight * at[node][0], b + weight * at[node][1]], [0, 0]);
-    const name = status(item.statuses, k);
-    picture.append(marker(name, x, y, 0.016 * size, `node ${data.nodes[k]}: ${name}, lambda_n ${short(item.f[k])}, lambda_t ${short(item.f[p + k])}`));
-  });
-  return picture;
-}
-
 // -- where the body cannot be drawn: forces and displacements of the nodes -------------------------------------------
 
 function barScales(solutions) {
@@ -160,25 +112,4 @@ function barScales(solutions) {
     f: largest("f"), w: largest("w"),
     words: `${data.no_body}. Upper bars are forces (largest ${short(largest("f"))}${unit(0)}), lower bars displacements (largest ${short(largest("w"))}${unit(1)}); left of a node normal, right tangential`,
   };
-}
-
-function drawBars(item, scales) {
-  const step = Math.max(8, 280 / p), width = step * p, half = 55, height = 4 * half + 34;
-  const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", class: "bars" });
-  [["f", half + 4], ["w", 3 * half + 26]].forEach(([key, zero]) => {
-    picture.append(svg("line", { x1: 0, x2: width, y1: zero, y2: zero, stroke: "#8796a8", "stroke-width": 0.7 }));
-    for (let k = 0; k < 2 * p; k += 1) {
-      const tangential = k >= p, node = k % p, value = item[key][k], size = (half - 3) * Math.abs(value) / scales[key];
-      const name = `${key === "f" ? "lambda" : "u"}_${tangential ? "t" : "n"}`;
-      picture.append(svg("rect", {
-        x: step * (node + (tangential ? 0.52 : 0.14)), width: 0.34 * step, y: value > 0 ? zero - size : zero, height: size,
-        fill: tangential ? "#d9730d" : "#1f5fa8",
-      }, tip(`node ${data.nodes[node]}: ${name} ${short(value)}`)));
-    }
-  });
-  for (let k = 0; k < p; k += 1) {
-    const name = status(item.statuses, k);
-    picture.append(marker(name, step * (k + 0.5), 2 * half + 15, Math.min(5, 0.4 * step), `node ${data.nodes[k]}: ${name}`));
-  }
-  return picture;
 }

@@ -143,7 +143,7 @@ def test_both_checkers_agree_on_random_graphs():
 
 @pytest.mark.slow
 def test_both_checkers_agree_on_many_random_graphs():
-    assert agree(range(600, 630)) > 11
+    assert agree(range(600, 615)) > 5
 
 
 # -- forgeries: the record ---------------------------------------------------------------------------------------------
@@ -390,13 +390,13 @@ def widened(records):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("wide", [False, True])
-def test_the_form_is_asked_of_every_arc(wide):
+def test_the_form_is_asked_of_every_arc():
     """Numbers that serve one of two arcs over a piece, and not the other."""
     body, records = proven("everything")
-    records = widened(records) if wide else records
-    assert verify(body, proof_of(records)).ok
-    assert accepted(body, records)
+    wide = widened(records)
+    for either in (records, wide):
+        assert verify(body, proof_of(either)).ok
+        assert accepted(body, either)
     data, rng, k = Data(body), np.random.default_rng(4), of_kind(records, "m")[0]
     held = sorted((middle_of(records, records[j][1]), tuple(map(int, records[j][1]))) for j in of_kind(records, "s"))
     where, codes = zip(*held, strict=True)
@@ -409,7 +409,8 @@ def test_the_form_is_asked_of_every_arc(wide):
         serves = [piece._alone(_Along(piece, each), at, at, 0) for each, at in zip(selections, where, strict=True)]
         found = {"first": serves[-1] and not serves[0], "last": serves[0] and not serves[-1]}
         for which in [which for which, seen in wrong.items() if found[which] and not seen]:
-            assert refused(body, replaced(records, k, ["m", *numbers])), serves
+            for either in (records, wide):
+                assert refused(body, replaced(either, of_kind(either, "m")[0], ["m", *numbers])), serves
             wrong[which] = True
         if all(wrong.values()):
             return

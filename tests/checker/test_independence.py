@@ -14,7 +14,7 @@ import enumsol
 from enumsol import branch_graph, checker, enumerate_roots, write_problem
 
 ROOT = Path(enumsol.__file__).parent
-CHECKERS = ("enumsol.checker.verify", "enumsol.checker.graph_checker")
+CHECKERS = ("enumsol.checker.verify", "enumsol.checker.graph_checker", "enumsol.checker.history_checker")
 IN_SPACE = {
     "enumsol.checker.space_checker",
     "enumsol.trusted.space.sector_rows",
@@ -32,6 +32,7 @@ SEARCH = (
     "enumsol.branches",
     "enumsol.condensation.exact",
     "enumsol.continuation",
+    "enumsol.histories",
     "enumsol.support.workers",
     "enumsol.relaxation",
     "enumsol.roots",
@@ -54,6 +55,7 @@ SHARED = {
         *("EnclosedPiece", "as_computed", "interval_exclusion_margin", "interval_form_margins", "piece_forms")
     },
     "trusted.arcs.precise": None,
+    "trusted.positions": {"tangential_positions"},
     "trusted.selection": None,
     "trusted.uniqueness_in_contact": {"lone_root", "numbers_of"},
     "trusted.uniqueness": {"ClosedSolution", "closed_solution", "only_solution", "same_solution"},
@@ -187,7 +189,7 @@ def test_no_module_of_the_search_is_loaded_by_a_verification(tmp_path):
     moving, interval = through_the_unloaded_state()
     plain = enumsol.gallery.one_node_triangle()
     proofs = [(degenerate, enumerate_roots(degenerate, 0.0)), (plain, enumerate_roots(plain, 5.0))]
-    proofs.append((moving, branch_graph(moving, interval)))
+    proofs += [(moving, branch_graph(moving, interval)), (plain, enumsol.histories(plain, [5, 4]))]
     for k, (problem, found) in enumerate(proofs):
         write_problem(problem, tmp_path / f"{k}.npz")
         found.proof.save(tmp_path / f"{k}.proof")

@@ -10,6 +10,8 @@ import shutil
 import signal
 import tempfile
 
+#: What a browser without a graphics card, or Plotly's way to read colours, is warned of.
+HARMLESS = ("GL Driver Message", "software WebGL", "willReadFrequently")
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
@@ -126,7 +128,7 @@ class Browser:
                 url = parameters["request"]["url"]
                 if not url.startswith(("file:", "data:", "blob:", "about:")):
                     found.append(f"a request to {url}")
-        return found
+        return [text for text in found if not any(part in str(text) for part in HARMLESS)]
 
     def screenshot(self, path, *, whole=True):
         """Write a picture of the page."""

@@ -1,12 +1,11 @@
 """The page of a report against the graph it was made of: numbers, words, tables; what is escaped; what is refused."""
 
 import json
-import re
 import sys
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from pages import Reader, data_of
 
 import enumsol
 from enumsol import InvalidArgumentError, MissingDependencyError, branch_graph, enumerate_roots, gallery, write_report
@@ -22,31 +21,6 @@ HOSTILE = '</script><script>alert("2")</script>'
 def page_of(graph, folder, **options):
     write_report(graph, folder / "page.html", **options)
     return (folder / "page.html").read_text(encoding="utf-8")
-
-
-def data_of(page):
-    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)[1])
-
-
-class Reader(HTMLParser):
-    """Counts elements and keeps the text outside of scripts and styles."""
-
-    def __init__(self, page):
-        super().__init__()
-        self.tags, self.words, self._silent = [], [], False
-        self.feed(page)
-        self.text = " ".join(" ".join(self.words).split())
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-        self._silent = tag in ("script", "style")
-
-    def handle_endtag(self, tag):
-        self._silent = False
-
-    def handle_data(self, data):
-        if not self._silent:
-            self.words.append(data)
 
 
 @pytest.fixture(scope="module")
@@ -256,7 +230,7 @@ def test_continua_and_sheets(tmp_path):
 
 def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
     graph = branch_graph(gallery.one_node_triangle(), (0, 5))
-    with pytest.raises(InvalidArgumentError, match="graph is a int"):
+    with pytest.raises(InvalidArgumentError, match="solutions is a int"):
         write_report(3, tmp_path / "page.html")
     with pytest.raises(InvalidArgumentError, match="title is a int"):
         write_report(graph, tmp_path / "page.html", title=3)

@@ -123,7 +123,7 @@ def test_bodies_with_cells_of_two_kinds(kind, tmp_path):
     """Pictures and files; the page draws a large body by the edges of its boundary."""
     import meshio
 
-    from enumsol.report.body import _boundary, body_record
+    from enumsol.report.body import body_record, boundary_edges
 
     mesh = grid(3, 2, kind)
     problem = fem.mesh_problem(
@@ -136,7 +136,7 @@ def test_bodies_with_cells_of_two_kinds(kind, tmp_path):
     assert (len(triangles), len(others)) == (6, 3)
     assert (triangles.type, others.type) == ("triangle6" if kind[0] == 6 else "triangle", f"quad{kind[1]}".rstrip("4"))
     record = body_record(problem)
-    edges = _boundary(np.array(record["cells"]))
+    edges = boundary_edges(np.array(record["cells"]))
     assert len(edges) == 10 * (1 if kind == (3, 4) else 2)
     assert np.all(np.isin(edges, np.unique(np.concatenate([part.ravel() for part in mesh.facets.values()]))))
     enumsol.write_problem(problem, tmp_path / "p.npz")

@@ -59,7 +59,7 @@ def problems(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(8))
+@pytest.mark.parametrize("part", range(5))
 def test_all_selections_find_the_same(part, monkeypatch):
     # other numbers are sought at once, and small bodies are not spared them
     monkeypatch.setattr(closing, "_FEW", 0)

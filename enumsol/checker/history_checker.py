@@ -1,0 +1,237 @@
+"""The checker of histories: every search of one step from one start, and that every root's end is a start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.checker.reports import MAX_FAILURES, HistoryVerificationReport
+from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.model.restart import SlipStart, afresh, restarted
+from enumsol.proof.reading import RefusedError, numbers_from, quoted, rational_from, same
+from enumsol.trusted.positions import tangential_positions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from fractions import Fraction
+
+    from numpy.typing import NDArray
+
+    from enumsol.arithmetic.ball_arrays import Ball
+
+_HEADER = {"format", "version", "kind", "problem", "p", "steps", "stages"}
+_END = object()
+
+
+@dataclass(frozen=True)
+class _Step:
+    """What a header says of a step."""
+
+    alpha: Fraction
+    load: NDArray[np.float64] | None
+    friction: NDArray[np.float64] | None
+
+
+@dataclass
+class _Stage:
+    """A search of one step from one start, as its record says and as it was checked."""
+
+    step: int
+    start: SlipStart
+    following: list[int]
+    roots: int = 0
+    complete: bool = False
+    ends: list[Ball] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The records of one search, as a checker of root sets reads them."""
+
+    lines: list[Any]
+
+    def records(self) -> Iterator[Any]:
+        """One by one."""
+        return iter(self.lines)
+
+
+class HistoryChecker:
+    """Checks the proof of a history.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    header : the first record
+    checker : type
+        Of the checker of root sets that fits the problem.
+    progress : callable or None
+        Called with the number of leaves checked in a search.
+    """
+
+    def __init__(self, problem: Any, header: Any, checker: Any, progress: Callable[[int], object] | None) -> None:
+        self.problem, self.header, self.checker, self.progress = afresh(problem), header, checker, progress
+        self.failures: list[str] = []
+        self.steps: list[_Step] = []
+        self.stages: list[_Stage] = []
+        self.bases: dict[int, Any] = {}
+
+    def run(self, records: Iterator[Any]) -> HistoryVerificationReport:
+        """Check all records after the header.
+
+        Raises
+        ------
+        ProofFormatError
+            The content is not a sequence of records.
+        """
+        complete, unique = False, 0
+        try:
+            count = self._read_header()
+            self.enclosure = CondensedEnclosure.from_problem(self.problem)
+            for number in range(count):
+                self._stage(number, count, records)
+            self._end(count, records)
+            complete, unique = self._conclusions()
+        except RefusedError as refusal:
+            self.failures.append(str(refusal))
+        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
+            self.failures.append(f"the problem's data cannot be enclosed: {error}")
+        ok = not self.failures
+        numbers = range(1, len(self.steps) + 1)
+        stages = tuple(sum(stage.step == k for stage in self.stages) for k in numbers)
+        roots = tuple(sum(stage.roots for stage in self.stages if stage.step == k) for k in numbers)
+        failures = tuple(self.failures)
+        return HistoryVerificationReport(
+            ok, failures, len(self.steps), stages, roots, ok and complete, unique if ok else 0
+        )
+
+    # -- records ---------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def _end(count: int, records: Iterator[Any]) -> None:
+        """Refuse another end than the footer."""
+        if not same(next(records, _END), {"stages": count}) or next(records, _END) is not _END:
+            raise RefusedError("the end of the proof is missing, or something follows it")
+
+    def _read_header(self) -> int:
+        """Read the steps; the number of searches."""
+        header, problem = self.header, self.problem
+        if set(header) != _HEADER or header["format"] != "enumsol-proof" or not same(header["version"], 1):
+            raise RefusedError("the first record is no header of the history of an enumsol-proof of version 1")
+        if header["problem"] != problem.fingerprint or not same(header["p"], problem.p):
+            raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
+        if not isinstance(header["steps"], list) or not header["steps"] or type(header["stages"]) is not int:
+            raise RefusedError("the header has no steps")
+        try:
+            self.steps = [self._step(said) for said in header["steps"]]
+        except (ValueError, TypeError) as error:
+            raise RefusedError(f"the header cannot be read: {error}") from None
+        return int(header["stages"])
+
+    def _step(self, said: Any) -> _Step:
+        alpha, load, friction = said
+        shape = self.problem.slip_offset.shape
+        size = int(np.prod(shape))
+        given = None if load is None else numbers_from(load, self.problem.n)
+        coefficients = None if friction is None else numbers_from(friction, size).reshape(shape)
+        if coefficients is not None and np.any(coefficients < 0):
+            raise ValueError("a coefficient of friction is negative")
+        return _Step(rational_from(alpha), given, coefficients)
+
+    def _stage(self, number: int, count: int, records: Iterator[Any]) -> None:
+        stage = self._said(number, count, next(records, _END))
+        self.stages.append(stage)
+        step = self.steps[stage.step - 1]
+        problem = restarted(self._base(stage.step), stage.start)
+        enclosure = self.enclosure.restarted(problem, problem.products)
+        checker = self.checker(problem, self.progress)
+        checker.enclosure, checker.located = enclosure, []
+        report = checker.run(_Part(_search(records)))
+        where = f"search {number} (step {stage.step})"
+        self.failures += [f"{where}: {failure}" for failure in report.failures]
+        if len(self.failures) >= MAX_FAILURES:
+            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
+        if report.failures:
+            return
+        if report.alpha != step.alpha:
+            raise RefusedError(f"{where} is about another alpha than its step")
+        if report.data != "problem" and stage.step < len(self.steps):
+            return  # nothing is known of where its roots are
+        checker.locate_rational_roots()
+        stage.roots, stage.complete = report.roots, report.complete and not report.families
+        before = stage.start.ball
+        for forces, still in checker.located:
+            stage.ends.append(tangential_positions(enclosure, step.alpha, forces, still, before))
+
+    def _said(self, number: int, count: int, record: Any) -> _Stage:
+        """What the record of a stage says."""
+        shape = self.problem.slip_offset.shape
+        size = int(np.prod(shape))
+        try:
+            kind, step, mid, rad, following = record
+            offset = numbers_from(mid, size).reshape(shape)
+            radius = None if rad is None else numbers_from(rad, size).reshape(shape)
+        except (ValueError, TypeError) as error:
+            raise RefusedError(f"search {number} cannot be read: {quoted(record)} ({error})") from None
+        later = isinstance(following, list) and all(type(k) is int and number < k < count for k in following)
+        exists = kind == "s" and type(step) is int and 1 <= step <= len(self.steps)
+        if not later or not exists or (radius is not None and not np.all(radius >= 0)):
+            raise RefusedError(f"search {number} has a step, a radius or a list of what follows that cannot be")
+        return _Stage(step, SlipStart(offset, radius), following)
+
+    def _base(self, number: int) -> Any:
+        """The problem with the load and the friction of a step."""
+        if number not in self.bases:
+            step = self.steps[number - 1]
+            start = SlipStart.of(self.problem)
+            self.bases = {number: restarted(self.problem, start, step.load, step.friction)}
+        return self.bases[number]
+
+    # -- what follows ----------------------------------------------------------------------------------------------
+
+    def _conclusions(self) -> tuple[bool, int]:
+        """Whether these are all histories, and up to which step there is one only."""
+        first = [stage for stage in self.stages if stage.step == 1]
+        if len(first) != 1 or first[0].start.key != SlipStart.of(self.problem).key:
+            raise RefusedError("the first step does not start from the problem's own slip offset")
+        for number, stage in enumerate(self.stages):
+            if any(self.stages[k].step != stage.step + 1 for k in stage.following):
+                raise RefusedError(f"search {number} is followed by one of another step than the next")
+        last = len(self.steps)
+        complete = all(
+            stage.complete and (stage.step == last or self._all_followed(stage)) for stage in self._reached(first[0])
+        )
+        unique, stage = 0, first[0]
+        while stage.complete and stage.roots == 1:
+            unique += 1
+            if stage.step == last or len(stage.following) != 1 or not self._all_followed(stage):
+                break
+            stage = self.stages[stage.following[0]]
+        return complete, unique
+
+    def _reached(self, first: _Stage) -> Iterator[_Stage]:
+        """The stages that histories come to."""
+        pending, seen = [self.stages.index(first)], set()
+        while pending:
+            number = pending.pop()
+            if number not in seen:
+                seen.add(number)
+                pending += self.stages[number].following
+                yield self.stages[number]
+
+    def _all_followed(self, stage: _Stage) -> bool:
+        """Whether every root of a stage leaves the nodes in the ball of a start that follows."""
+        starts = [self.stages[k].start for k in stage.following]
+        return bool(stage.ends) and all(any(start.holds(end) for start in starts) for end in stage.ends)
+
+
+def _search(records: Iterator[Any]) -> list[Any]:
+    """The records of the next search: up to the object that ends it."""
+    lines: list[Any] = []
+    for record in records:
+        lines.append(record)
+        if isinstance(record, dict) and len(lines) > 1:
+            return lines
+    raise RefusedError("the proof breaks off within a search")

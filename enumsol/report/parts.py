@@ -1,0 +1,72 @@
+"""What the pages of reports share: filled templates, tables, Plotly's script, short texts of numbers."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from html import escape
+from importlib.resources import files
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol._version import find_version
+from enumsol.errors import MissingDependencyError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+
+def filled_page(template: str, scripts: Sequence[str], content: Mapping[str, Any], words: Mapping[str, str]) -> str:
+    """The text of a page: a template with its words, scripts and the numbers that these draw."""
+    parts = files("enumsol.report")
+    own = {
+        "style": (parts / "page.css").read_text(encoding="utf-8"),
+        "script": "\n".join((parts / name).read_text(encoding="utf-8") for name in scripts),
+        # no "<" of a name may end the element
+        "data": json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
+        "version": escape(find_version()),
+    }
+    return Template((parts / template).read_text(encoding="utf-8")).substitute({**own, **words})
+
+
+def packed_plotly() -> str:
+    """Plotly's script, compressed, in base64.
+
+    Raises
+    ------
+    MissingDependencyError
+        plotly is not installed.
+    """
+    try:
+        from plotly.offline import get_plotlyjs  # an extra
+    except ImportError as error:
+        raise MissingDependencyError.of("reports", "plotly", "report") from error
+    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
+
+
+def span_words(values: Any) -> str:
+    """The range of numbers as text."""
+    low, high = float(np.min(values)), float(np.max(values))
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+
+
+def fact_list(facts: Iterable[tuple[str, str]]) -> str:
+    """Names and values, which are escaped here."""
+    return "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts)
+
+
+def warning_list(sentence: str, items: Sequence[str]) -> str:
+    """A warning with its reasons, of many the first."""
+    lines = "".join(f"<li>{escape(item)}</li>" for item in items[:20])
+    more = f"<li>and {len(items) - 20} more</li>" if len(items) > 20 else ""
+    return f'<div class="warning" id="incomplete"><p>{escape(sentence)}</p><ul>{lines}{more}</ul></div>'
+
+
+def table_text(heads: Iterable[str], rows: Iterable[tuple[str, Sequence[str]]]) -> str:
+    """A table; a row is its attributes and its cells, which are escaped here."""
+    head = "".join(f"<th>{escape(name)}</th>" for name in heads)
+    body = "".join(f"<tr{kept}>" + "".join(f"<td>{escape(c)}</td>" for c in cells) + "</tr>" for kept, cells in rows)
+    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'

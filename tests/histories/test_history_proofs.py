@@ -1,0 +1,195 @@
+"""One proof for a whole history: what the checker accepts, and what it refuses or does not believe."""
+
+import copy
+import dataclasses
+
+import numpy as np
+import pytest
+from proof_tools import proof_of, records_of
+
+import enumsol
+from enumsol import histories, verify
+
+
+def stages_of(records):
+    return [k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "s"]
+
+
+def test_a_branching_history_is_verified(out_again, pulled_wedge):
+    report = verify(pulled_wedge, out_again.proof)
+    assert report.ok, report
+    assert report.complete
+    assert report.unique_until == out_again.unique_until == 2
+    assert report.roots == (1, 1, 3, 5)
+    assert report.stages == (1, 1, 1, 3)
+
+
+def test_a_history_in_space_is_verified():
+    wedge = enumsol.gallery.get("wedge3d-2-3").build()
+    given = {"friction": tuple(wedge.friction_at(1).T), "friction_slope": 0.0, "f": 0 * wedge.f, "load_slope": wedge.f}
+    wedge = dataclasses.replace(wedge, **given)
+    history = histories(wedge, [-1, 0, 0.5, 1])
+    report = verify(wedge, history.proof)
+    assert history.complete
+    assert report.complete
+    assert report.roots == (1, 1, 3, 5)
+
+
+def test_loads_and_friction_of_steps_are_part_of_the_proof():
+    problem = enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [2, 0], friction=0.5)
+    steps = [enumsol.LoadStep(load=[2, 0.5], friction=0.25), enumsol.LoadStep(load=[2, 3]), [1, -3]]
+    history = histories(problem, steps)
+    assert verify(problem, history.proof).complete
+    other = dataclasses.replace(problem, friction=0.25)
+    assert not verify(other, history.proof).ok
+    records = records_of(history.proof)
+    records[0]["steps"][1][1] = [2.0, 3.5]
+    assert not verify(problem, proof_of(records)).ok
+    records = records_of(history.proof)
+    records[0]["steps"][0][2] = [-0.25]
+    assert not verify(problem, proof_of(records)).ok
+
+
+def test_an_incomplete_history_is_verified_and_not_complete(pulled_wedge):
+    history = histories(pulled_wedge, [0, 1, 0, 1])
+    report = verify(pulled_wedge, history.proof)
+    assert report.ok
+    assert not report.complete
+    assert report.unique_until == 1
+    followed = histories(pulled_wedge, [-1, 0, 0.5, 1], follow="nearest")
+    report = verify(pulled_wedge, followed.proof)
+    assert report.ok
+    assert not report.complete
+
+
+def test_only_verified_arithmetic_proves(pulled_wedge):
+    for arithmetic in ("fast", "exact"):
+        assert histories(pulled_wedge, [-1, 0], arithmetic=arithmetic).proof is None
+
+
+def no_follower(records):
+    places = stages_of(records)
+    records[places[2]][4] = records[places[2]][4][:-1]
+
+
+def narrow_start(records):
+    """The start after a root that moved is a thousandth as wide as it has to be."""
+    for k in stages_of(records):
+        if records[k][3] is not None:
+            records[k][3] = [1e-3 * radius for radius in records[k][3]]
+
+
+def other_start(records):
+    places = stages_of(records)
+    records[places[3]][2] = [x + 1e-9 for x in records[places[3]][2]]
+
+
+def exact_start(records):
+    for k in stages_of(records):
+        records[k][3] = None
+
+
+def negative_radius(records):
+    k = next(k for k in stages_of(records) if records[k][3] is not None)
+    records[k][3] = [-radius for radius in records[k][3]]
+
+
+def first_from_elsewhere(records):
+    records[stages_of(records)[0]][2][0] = 1e-12
+
+
+def skips_a_step(records):
+    records[stages_of(records)[1]][1] = 3
+
+
+def follows_itself(records):
+    places = stages_of(records)
+    records[places[1]][4] = [1]
+
+
+def other_alpha(records):
+    records[0]["steps"][1][0] = "1/3"
+
+
+def fewer_steps(records):
+    records[0]["steps"] = records[0]["steps"][:-1]
+
+
+def a_search_left_out(records):
+    places = stages_of(records)
+    del records[places[-1] : -1]
+    records[0]["stages"] -= 1
+    records[-1]["stages"] -= 1
+    for k in stages_of(records):
+        records[k][4] = [n for n in records[k][4] if n < records[0]["stages"]]
+
+
+def breaks_off(records):
+    del records[-4:-1]
+
+
+def more_behind(records):
+    records.append({"stages": 1})
+
+
+def one_more_name(records):
+    records[0]["complete"] = True
+
+
+def leaf_gone(records):
+    k = next(k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "r")
+    records[k] = ["n"]
+
+
+#: These are sound and prove less.
+_LESS = (no_follower, a_search_left_out)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *(no_follower, narrow_start, other_start, exact_start, negative_radius, first_from_elsewhere, skips_a_step),
+        *(
+            follows_itself,
+            other_alpha,
+            fewer_steps,
+            a_search_left_out,
+            breaks_off,
+            more_behind,
+            one_more_name,
+            leaf_gone,
+        ),
+    ],
+)
+def test_a_changed_proof_is_not_complete(change, out_again, pulled_wedge):
+    records = copy.deepcopy(records_of(out_again.proof))
+    change(records)
+    report = verify(pulled_wedge, proof_of(records))
+    assert not report.complete
+    assert report.ok == (change in _LESS), report
+    assert report.unique_until <= 2
+
+
+def test_a_start_that_is_proven_and_too_narrow_is_not_believed(pulled_wedge):
+    """The search of the next step is honest, but it is about other starts than the root's end."""
+    history = histories(pulled_wedge, [0.5, 1])
+    records = records_of(history.proof)
+    places = stages_of(records)
+    alone = dataclasses.replace(pulled_wedge, slip_offset=records[places[1]][2])
+    honest = records_of(enumsol.enumerate_roots(alone, 1.0).proof)
+    assert records[places[1]][3] is not None
+    records[places[1]][3] = None
+    records[places[1] + 1 : places[2]] = honest
+    report = verify(pulled_wedge, proof_of(records))
+    assert report.ok
+    assert not report.complete
+
+
+def test_a_wide_start_may_not_be_decided_in_rationals(pulled_wedge):
+    history = histories(pulled_wedge, [0.5, 1])
+    records = records_of(history.proof)
+    k = next(k for k in stages_of(records) if records[k][3] is not None)
+    records[k + 1]["data"] = "condensed"
+    report = verify(pulled_wedge, proof_of(records))
+    assert not report.ok
+    assert any("slip offset is a ball" in failure for failure in report.failures)

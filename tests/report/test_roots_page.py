@@ -1,0 +1,299 @@
+"""The page of a RootSet, in 2D and 3D: numbers against the roots, words, and how it looks in a headless browser."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+from browser import Browser, find_browser
+from pages import Reader, data_of
+
+import enumsol
+from enumsol import InvalidArgumentError, MissingDependencyError, enumerate_roots, fem, gallery, write_report
+from enumsol.cli import main
+from enumsol.model.shapes import body_shape
+from enumsol.report import roots_content
+
+pytest.importorskip("plotly")
+HOSTILE = '</script><script>document.title = "broken"</script>'
+
+
+@pytest.fixture(scope="module")
+def found():
+    wedge = gallery.get("wedge3d-4-9").build()
+    square = gallery.two_node_square()
+    node = gallery.get("one-node-3d-3").build()
+    rows = (node.A, node.Bn, node.Bt1, node.Bt2, node.f)
+    two = np.kron(np.eye(2), node.A.toarray())
+    places = {"coordinates": [[0, 0, 0], [1, 2, 0]], "node_ids": [HOSTILE, "b"]}
+    scattered = enumsol.ContactProblem3D(
+        two, *(np.kron(np.eye(2), part.toarray()) for part in rows[1:4]), np.tile(node.f, 2), friction=5.0, **places
+    )
+    return {
+        "wedge": enumerate_roots(wedge, 3).mirrored("x"),
+        "turned": enumerate_roots(gallery.get("wedge3d-2-3").build(), 1),
+        "many": enumerate_roots(gallery.chain(2), 5),
+        "plane": enumerate_roots(gallery.get("wedge-8-5").build(), 3),
+        "scattered": enumerate_roots(scattered, 0),
+        "bare": enumerate_roots(enumsol.ContactProblem3D(*rows, friction=5.0), 0),
+        "bars": enumerate_roots(enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f), 3.5),
+        "cut": enumerate_roots(wedge, 3, max_nodes=500),
+    }
+
+
+@pytest.fixture(scope="module")
+def pages(found, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pages")
+    for name, roots in found.items():
+        write_report(roots, folder / f"{name}.html", title=HOSTILE, units=("N", "mm"))
+    return {name: folder / f"{name}.html" for name in found}
+
+
+# -- the text of the page ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["wedge", "plane"])
+def test_bodies_and_forces_are_those_of_the_roots(found, pages, name):
+    data, roots = data_of(pages[name].read_text()), found[name]
+    problem = roots[0].problem
+    shape, d = body_shape(problem), problem.mesh.points.shape[1]
+    points = np.array(data["body"]["points"])
+    # each drawn point is a node of the mesh
+    node = [int(np.argmin(np.linalg.norm(shape.points - point, axis=1))) for point in points]
+    np.testing.assert_allclose(shape.points[node], points, atol=1e-6)
+    assert len(data["roots"]) == len(roots)
+    for record, root in zip(data["roots"], roots, strict=True):
+        assert [data["statuses"][int(code)] for code in record["statuses"]] == [s.value for s in root.statuses]
+        np.testing.assert_allclose(record["f"], np.concatenate([root.lambda_n, root.lambda_t.ravel("F")]), rtol=1e-6)
+        np.testing.assert_allclose(record["w"], np.concatenate([root.u_n, root.u_t.ravel("F")]), rtol=1e-6)
+        moved = problem.mesh.displacements(root.u)
+        np.testing.assert_allclose(np.reshape(record["u"], (-1, d)), moved[node], rtol=1e-5, atol=1e-6 * np.max(moved))
+        forces = np.zeros_like(shape.points)
+        for k, *force in record["forces"]:
+            forces[node[k]] = force
+        expected = shape.contact_forces(problem, root.lambda_n, root.lambda_t)
+        np.testing.assert_allclose(forces, expected, rtol=1e-5, atol=1e-6 * data["largest"])
+        assert 0.03 < record["scale"] * np.max(np.linalg.norm(moved, axis=1)) / shape.size < 0.0801
+        assert len(record["slips"]) == (d - 2) * sum(status.value == "slip" for status in root.statuses)
+        if d == 3:
+            np.testing.assert_allclose([np.linalg.norm(way) for _, *way in record["slips"]], 1, rtol=1e-6)
+    at = [sum(weight * points[k] for k, weight in row) for row in data["body"]["rows"]]
+    np.testing.assert_allclose(at, problem.coordinates, atol=1e-6)
+
+
+def test_the_surface_is_closed(pages):
+    body = data_of(pages["wedge"].read_text())["body"]
+    triangles = np.array(body["triangles"]).T
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    _, count = np.unique(edges, axis=0, return_counts=True)
+    assert set(count) == {2}
+    corners = np.array(body["points"])[triangles]
+    volume = np.sum(np.linalg.det(corners)) / 6
+    # a trapezoid of length 1 along y
+    assert volume == pytest.approx(1 + np.tan(np.radians(20)), rel=1e-5)
+
+
+def test_words_and_tables(found, pages):
+    reader = Reader(pages["wedge"].read_text())
+    assert "The problem has 9 isolated solutions at this alpha, and no other." in reader.text
+    assert reader.text.count("complete: yes (proven)") == 2
+    assert "Sum of the indices: +1." in reader.text
+    assert "0 pairs, 9 symmetric roots" in reader.text
+    assert reader.text.count("its own mirror image") == 9
+    assert found["wedge"][0].problem.fingerprint in reader.text
+    assert sum("data-root" in attributes for tag, attributes in reader.tags if tag == "tr") == 9
+    assert "Undecided" not in reader.text
+    assert HOSTILE in reader.text
+
+
+def test_a_result_that_is_not_complete_says_so(found, pages):
+    text = Reader(pages["cut"].read_text()).text
+    assert not found["cut"].complete
+    assert "complete: yes" not in text
+    assert "It is proven" not in text
+    assert "This result is not complete. Every root shown is a solution, but there may be more." in text
+    assert f"at least {found['cut'].at_least} in all" in text
+    assert "the search was stopped before it got here" in text
+    assert "Nothing is claimed about solutions that are not listed" in text
+
+
+def test_what_is_undecided_has_a_table(tmp_path):
+    """A node in 3D that slides with any lambda_n from 0 to 1."""
+    A = np.array([[2, 1, 0], [1, 1, 0], [0, 0, 1]])
+    region = enumerate_roots(enumsol.ContactProblem3D(A, *np.eye(3)[:, None], [1, 1, 0], friction=1), 0)
+    assert len(region.undecided) == 1
+    write_report(region, tmp_path / "page.html")
+    text = Reader((tmp_path / "page.html").read_text()).text
+    assert region.undecided[0].reason in text
+    assert "0 to 1.2071" in text  # lambda_n of a root in it
+    fast = enumerate_roots(gallery.two_node_square(), 3.5, arithmetic="fast")
+    write_report(fast, tmp_path / "fast.html")
+    assert (
+        "Nothing is proven: floating-point numbers were believed" in Reader((tmp_path / "fast.html").read_text()).text
+    )
+
+
+def test_a_continuum_is_in_a_table(tmp_path):
+    write_report(enumerate_roots(gallery.one_node_triangle(f=(1, -2)), 2), tmp_path / "page.html")
+    text = Reader((tmp_path / "page.html").read_text()).text
+    assert "The problem has 0 isolated solutions and 1 continuum of solutions at this alpha, and no other." in text
+    assert "Connected sets of infinitely many solutions. They are not drawn." in text
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("scattered", "The problem has no mesh: its contact nodes are drawn at their coordinates"),
+        ("bare", "The problem has no mesh and no coordinates, so that no body is drawn"),
+        ("bars", "The problem has no mesh, so that no body is drawn"),
+    ],
+)
+def test_problems_without_a_mesh(pages, name, words):
+    data = data_of(pages[name].read_text())
+    assert data["no_body"].startswith(words)
+    assert (data["body"] is None) == (name != "scattered")
+
+
+def test_pages_are_small_and_ask_the_network_for_nothing(pages, monkeypatch):
+    for name, limit in (("wedge", 3_000_000), ("plane", 60_000), ("bare", 40_000)):
+        text = pages[name].read_text()
+        assert len(text.encode()) < limit
+        for tag, attributes in Reader(text).tags:
+            assert not {"src", "srcset", "data", "action"} & set(attributes), tag
+    roots = enumerate_roots(gallery.chain(2), 5)
+    monkeypatch.setattr(roots_content, "_MOST_VALUES", 40)
+    shortened = roots_content.roots_content(roots)
+    assert (len(shortened["roots"]), shortened["all"]) == (2, 9)
+
+
+def test_large_meshes_are_drawn_in_part_or_not_at_all(found, monkeypatch):
+    count = 3 * len(roots_content.roots_content(found["wedge"])["body"]["points"])
+    monkeypatch.setattr(roots_content, "_MOST_NUMBERS", 4 * count)
+    part = roots_content.roots_content(found["wedge"])
+    assert ["u" in record for record in part["roots"]] == [True] * 3 + [False] * 6
+    assert part["no_body"] == "The bodies of the first 3 roots are drawn: the page holds no more"
+    monkeypatch.setattr(roots_content, "_MOST_NUMBERS", count)
+    assert roots_content.roots_content(found["wedge"])["no_body"].startswith("The mesh is too large to draw: ")
+    plane = found["plane"]
+    nodes = len(plane[0].problem.mesh.points)
+    monkeypatch.setattr(roots_content, "_MOST_NUMBERS", 2 * nodes * (len(plane) + 1) - 1)
+    boundary = roots_content.roots_content(plane)["body"]
+    assert boundary["cells"] is None
+    assert len(boundary["points"]) == len(boundary["lines"]) < nodes
+
+
+def test_second_order_solids_are_drawn_by_their_surface(tmp_path):
+    from parted_solids import solid
+
+    mesh = solid((2, 1, 1), 27)
+    options = {"contact": "bottom", "clamp": "left", "load": {"top": (0.1, 0.0, -0.3)}, "friction": 0.4}
+    problem = fem.mesh_problem(mesh, young=2, poisson=0.3, **options)
+    body = roots_content.roots_content(enumerate_roots(problem, 0))["body"]
+    triangles = np.array(body["triangles"]).T
+    corners = np.array(body["points"])[triangles]
+    assert np.sum(np.linalg.det(corners)) / 6 == pytest.approx(2 if np.ptp(mesh.points[:, 0]) == 2 else 1, rel=0.01)
+
+
+def test_the_command(tmp_path, capsys, monkeypatch):
+    page, proof = tmp_path / "a page.html", tmp_path / "wedge.proof"
+    command = ["roots", "gallery:wedge3d-2-3", "--alpha", "1", "--report", str(page)]
+    assert main([*command, "--proof", str(proof)]) == 0
+    assert capsys.readouterr().out.endswith("complete: yes (proven)\n")
+    text = Reader(page.read_text()).text
+    assert text.startswith("gallery:wedge3d-2-3")
+    assert f"enumsol verify gallery:wedge3d-2-3 {proof}" in text
+    assert main(command) == 0
+    again = Reader(page.read_text()).text
+    assert "enumsol roots gallery:wedge3d-2-3 --alpha=1.0 --proof roots.proof" in again
+    assert main(["roots", "gallery:two-node-5", "--alpha", "5", "--report", "-"]) == 2
+    assert "--report is -; expected the name of a file" in capsys.readouterr().err
+    with pytest.raises(InvalidArgumentError, match="solutions is a int; expected a BranchGraph or a RootSet"):
+        write_report(3, page)
+    monkeypatch.setitem(sys.modules, "plotly.offline", None)
+    with pytest.raises(MissingDependencyError, match=r"enumsol\[report\]"):
+        write_report(enumerate_roots(gallery.get("wedge3d-2-3").build(), 1), page)
+    write_report(enumerate_roots(gallery.two_node_square(), 3.5), page)  # nothing in it needs plotly
+
+
+# -- in a browser -----------------------------------------------------------------------------------------------------
+
+in_a_browser = pytest.mark.skipif(find_browser() is None, reason="no headless browser (Debian's package chromium)")
+
+
+@pytest.fixture(scope="module")
+def browser():
+    browser = Browser(find_browser())
+    yield browser
+    browser.close()
+
+
+def drawn(browser, count):
+    """Wait until so many scenes are drawn."""
+    look = f"document.querySelectorAll('.scene[data-drawn]').length >= {count} ? done(1) : setTimeout(look, 20)"
+    browser.evaluate(f"new Promise((done) => {{ const look = () => {look}; look(); }})")
+
+
+@in_a_browser
+@pytest.mark.parametrize(
+    ("name", "width"),
+    [pytest.param("turned", 1000, marks=pytest.mark.slow), ("plane", 400), ("bare", 400), ("bars", 1280)],
+)
+def test_it_opens_without_complaint_and_fits(browser, pages, found, name, width):
+    """In 3D scenes are drawn by software, which takes its time; one page has all that is asked of them."""
+    browser.size(width, 500)
+    browser.open(pages[name])
+    roots = found[name]
+    if name == "turned":
+        drawn(browser, 3)
+        check_scenes(browser, roots)
+    assert browser.evaluate("document.title") == HOSTILE
+    assert browser.evaluate("document.documentElement.scrollWidth") <= width
+    wide = "[...document.querySelectorAll('h1, h2, p, dd, li, .card')].filter((e) => e.scrollWidth > e.clientWidth + 1)"
+    assert browser.evaluate(f"{wide}.map((e) => e.textContent.slice(0, 40))") == []
+    assert browser.evaluate("document.querySelectorAll('#cards article').length") == len(roots)
+    pictures = {"turned": "#cards .scene canvas", "plane": "#cards svg.body", "bars": "#cards svg.bars"}
+    if name in pictures:
+        assert browser.evaluate(f"document.querySelectorAll('{pictures[name]}').length") >= len(roots)
+    else:
+        assert browser.evaluate("document.querySelectorAll('#cards details[open] table').length") == len(roots)
+    browser.evaluate("document.querySelectorAll('#cards details').forEach((d) => { d.open = true; })")
+    browser.settle()
+    statuses = "[...c.querySelectorAll('tbody tr')].map((r) => r.children[1].textContent)"
+    rows = browser.evaluate(f"[...document.querySelectorAll('.card')].map((c) => {statuses})")
+    assert rows == [[status.value for status in root.statuses] for root in roots]
+    assert browser.complaints() == []
+
+
+def check_scenes(browser, roots):
+    """Arrows and marks are those of the roots, and bodies are turned together."""
+    traces = "scenes.map((s) => s.data.filter((t) => {0}).map((t) => [t.name, t.x.length]))"
+    cones = browser.evaluate(traces.replace("{0}", "t.type === 'cone'"))
+    marks = browser.evaluate(traces.replace("{0}", "t.mode === 'markers'"))
+    shape = body_shape(roots[0].problem)
+    for root, arrows, marked in zip(roots, cones, marks, strict=True):
+        names = [status.value for status in root.statuses]
+        forces = shape.contact_forces(root.problem, root.lambda_n, root.lambda_t)
+        expected = [int(np.sum(np.any(forces != 0, axis=1))), names.count("slip")]
+        assert [count for _, count in arrows] == [count for count in expected if count]
+        assert dict(marked) == {name: names.count(name) for name in set(names)}
+    camera = {"eye": {"x": -1.5, "y": 0.5, "z": 1.0}, "center": {"x": 0, "y": 0, "z": 0}}
+    camera["up"] = {"x": 0, "y": 0, "z": 1}
+    browser.evaluate(f"Plotly.relayout(scenes[1], {{'scene.camera': {json.dumps(camera)}}}).then(() => 1)")
+    browser.settle()
+    assert browser.evaluate("scenes.map((s) => s._fullLayout.scene.camera.eye.x)") == [-1.5] * len(roots)
+
+
+@in_a_browser
+def test_many_roots_are_on_several_pages(browser, pages, found):
+    browser.size(1280, 900)
+    browser.open(pages["many"])
+    shown = "[...document.querySelectorAll('#cards h3')].map((h) => h.textContent)"
+    assert browser.evaluate(shown) == [f"Root {k}" for k in range(6)]
+    browser.evaluate("byId('more').click()")
+    assert browser.evaluate(shown) == ["Root 6", "Root 7", "Root 8"]
+    assert browser.evaluate("byId('range').textContent") == "7 to 9 of 9"
+    assert browser.evaluate("byId('more').disabled")
+    browser.evaluate("document.querySelector('tr[data-root=\"1\"]').click()")
+    assert browser.evaluate(shown)[0] == "Root 0"
+    assert len(found["many"]) == 9
+    assert browser.complaints() == []
