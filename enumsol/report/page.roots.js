@@ -114,6 +114,13 @@ function extent() {
   return low.map((x, c) => [x - room, high[c] + room]);
 }
 
+// true proportions; the longest side has one size, so that flat bodies fit too
+function proportions() {
+  const sides = ranges.map(([low, high]) => high - low), longest = Math.max(...sides);
+  const [x, y, z] = sides.map((side) => (1.3 * side) / longest);
+  return { x, y, z };
+}
+
 function drawScene(scene) {
   const item = scene.item, { points, triangles, edges, outline, rows, size } = data.body, moved = displaced(item);
   const at = rows.map((row) => row.reduce((sum, [node, weight]) => plus(sum, moved[node], weight), [0, 0, 0]));
@@ -142,7 +149,7 @@ function drawScene(scene) {
   const axis = (title, range) => ({ title: { text: title, font: { size: 11 } }, range, tickfont: { size: 9 }, nticks: 4, showspikes: false, backgroundcolor: "#fff", gridcolor: "#e8ebee" });
   const layout = {
     margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false,
-    scene: { aspectmode: "data", camera: state.camera, dragmode: "turntable", xaxis: axis("x", ranges[0]), yaxis: axis("y", ranges[1]), zaxis: axis("z", ranges[2]) },
+    scene: { aspectmode: "manual", aspectratio: proportions(), camera: state.camera, dragmode: "turntable", xaxis: axis("x", ranges[0]), yaxis: axis("y", ranges[1]), zaxis: axis("z", ranges[2]) },
   };
   Plotly.newPlot(scene, traces, layout, { responsive: true, displaylogo: false, displayModeBar: "hover", modeBarButtons: [["toImage", "resetCameraDefault3d"]] }).then(() => {
     scene.dataset.drawn = "yes";

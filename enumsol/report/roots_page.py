@@ -171,7 +171,8 @@ def _what_is_certified(found: RootSet, commands: Sequence[str]) -> str:
     elif found.arithmetic == "fast":
         lines.append("<p>Nothing is proven: floating-point numbers were believed.</p>")
     else:
-        lines.append("<p>The listed roots are proven. Nothing is claimed about solutions that are not listed.</p>")
+        known = "The listed roots are proven. " if len(found) else ""
+        lines.append(f"<p>{known}Nothing is claimed about solutions that are not listed.</p>")
     lines.append("<p>This page is a picture of the result and no proof; numbers are rounded.</p>")
     if len(found):
         print_of = escape(found[0].problem.fingerprint)

@@ -28,11 +28,12 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-#: By how much S, g and F may change under a mirror, relative to their size: meshes and stiffness matrices are symmetric
-#: within rounding, or not at all.
-SYMMETRIC = 1e-9
-#: By how much more than the data a root and the image of its partner may differ.
-_AMPLIFIED = 1e3
+#: By how much S, g and F may change under a mirror, relative to their size. Meshes and stiffness matrices are symmetric
+#: within rounding, which weak springs of a body make larger, or not at all.
+SYMMETRIC = 1e-6
+#: By how much a root and the image of its partner may differ: so many times as much as the data, or by rounding of
+#: fast arithmetic.
+_AMPLIFIED, _ROUNDING = 1e3, 1e-9
 
 
 @dataclass(frozen=True)
@@ -151,8 +152,11 @@ def problem_asymmetry(problem: Any, alpha: Alpha, mirror: Mirror, tolerance: flo
         if not worst <= tolerance:
             where = np.unravel_index(int(np.argmax(most)), most.shape)
             nodes = " and ".join(dict.fromkeys(str(problem.node_ids[int(k) % problem.p]) for k in where))
+            changes_by = (
+                "changes by" if np.abs(middle[where]) > tolerance else "is known too coarsely, and may change by"
+            )
             raise InvalidArgumentError(
-                f"the problem is not its own mirror image: at contact node {nodes} {name} changes by {worst:.2g} "
+                f"the problem is not its own mirror image: at contact node {nodes} {name} {changes_by} {worst:.2g} "
                 f"of its size; expected at most {tolerance:g}"
             )
         bound = max(bound, worst)
@@ -181,17 +185,18 @@ def _relative_friction(problem: Any, alpha: Alpha, mirror: Mirror) -> Floats:
     return np.asarray(changes)
 
 
-def paired_roots(roots: Sequence[Root], mirror: Mirror, asymmetry: Asymmetry, tolerance: float) -> MirrorImages:
+def paired_roots(roots: Sequence[Root], mirror: Mirror, asymmetry: Asymmetry) -> MirrorImages:
     """Which of the roots are mirror images, by their enclosures, statuses and indices."""
     boxes = [_box(root, None) for root in roots]
     low, high = (np.array([box[k] for box in boxes]) for k in range(2))
     scale = _scale(roots, low.shape[1] // 2)
+    slack = max(_AMPLIFIED * asymmetry.bound, _ROUNDING)
     near: list[dict[int, float]] = []
     for root in roots:
         below, above = _box(root, mirror)
         apart = np.max(np.maximum(np.maximum(low - above, below - high), 0.0) / scale, axis=1)
         held = mirror.statuses(root.active)
-        close = np.flatnonzero(apart <= _AMPLIFIED * tolerance).tolist()
+        close = np.flatnonzero(apart <= slack).tolist()
         near.append({j: float(apart[j]) for j in close if _alike(root, held, roots[j])})
     images: list[int | None] = []
     ambiguous = []

@@ -237,7 +237,7 @@ class RootSet(Sequence[Root], Immutable):
     def __getitem__(self, item: int | slice) -> Root | tuple[Root, ...]:
         return self._roots[item]
 
-    def mirrored(self, mirror: Any, *, tolerance: float = 1e-9) -> RootSet:
+    def mirrored(self, mirror: Any, *, tolerance: float = 1e-6) -> RootSet:
         """The same roots with ``mirror_images``, which tells which are mirror images of one another.
 
         Nothing is taken from the symmetry: the search has found all roots without it, and a root without a mirror image
@@ -249,8 +249,7 @@ class RootSet(Sequence[Root], Immutable):
             A direction stands for the mirror of `Mirror.across` through the middle of the contact nodes.
         tolerance : float
             By how much S, g and F may change at most under the mirror, relative to their size. Meshes and stiffness
-            matrices are symmetric within rounding; a root and the image of its partner may differ by a thousand times
-            as much, as roots of soft bodies do.
+            matrices are symmetric within rounding, which weak springs make larger, or not at all.
 
         Raises
         ------
@@ -275,7 +274,7 @@ class RootSet(Sequence[Root], Immutable):
         problem, limit = self._roots[0].problem, positive_number(tolerance, "tolerance")
         plane = mirror if isinstance(mirror, Mirror) else Mirror.across(problem, mirror)
         asymmetry = problem_asymmetry(problem, self.alpha, plane, limit)
-        return self._with(paired_roots(self._roots, plane, asymmetry, limit))
+        return self._with(paired_roots(self._roots, plane, asymmetry))
 
     def _with(self, images: MirrorImages) -> RootSet:
         return RootSet(

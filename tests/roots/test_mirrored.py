@@ -162,17 +162,26 @@ def test_nearly_symmetric_data_are_said_to_be_just_that():
     )
 
 
+def test_weak_springs():
+    """Rounding of the stiffness is large beside the springs: what is said of the data shows it."""
+    problem = gallery.wedge3d(2, 1, 2, springs=(1e-7, 1e-7, 1e-7), pull=(0, 0, 1e-9), friction=0.3)
+    asymmetry = problem_asymmetry(problem, 0, Mirror.across(problem, "x"), 1e-6)
+    assert 1e-12 < asymmetry.bound < 1e-6
+    with pytest.raises(InvalidArgumentError, match=r"at contact node .* (changes|may change) by"):
+        problem_asymmetry(problem, 0, Mirror.across(problem, "x"), 1e-13)
+
+
 def test_a_missing_partner_is_said(wedge):
     problem, roots = wedge
     mirror = Mirror.across(problem, "y")
     asymmetry = problem_asymmetry(problem, 1, mirror, 1e-9)
-    images = paired_roots([roots[k] for k in (0, 1, 3, 4)], mirror, asymmetry, 1e-9)
+    images = paired_roots([roots[k] for k in (0, 1, 3, 4)], mirror, asymmetry)
     assert images.images == (0, None, 2, 3)
     assert images.missing == (1,)
     assert images.words(1) == "no mirror image"
     assert "a complete result of exactly symmetric data cannot have this" in images.notes(complete=True)[1]
     assert "these are still to be found" in images.notes(complete=False)[1]
-    twice = paired_roots([roots[0], roots[0]], mirror, asymmetry, 1e-9)
+    twice = paired_roots([roots[0], roots[0]], mirror, asymmetry)
     assert (twice.images, twice.ambiguous, twice.missing) == ((None, None), (0, 1), ())
     with pytest.raises(InvalidArgumentError, match="no isolated roots to compare"):
         enumsol.enumerate_roots(problem, 1, max_nodes=1).mirrored("y")
