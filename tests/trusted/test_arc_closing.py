@@ -209,14 +209,6 @@ def moved_to_the_border(seeds, bisections):
 
 
 @pytest.mark.slow
-def test_theta_follows_the_solution():
-    yes, bordered, judged = moved_to_the_border(range(12), 50)
-    assert yes > 2
-    assert bordered > 2
-    assert judged > 100
-
-
-@pytest.mark.slow
 def test_theta_follows_many_solutions():
     yes, bordered, judged = moved_to_the_border(range(100, 200), 50)
     assert yes > 20

@@ -77,11 +77,6 @@ def test_claims_over_parts_are_true():
     assert min(made.values()) > 20, made
 
 
-@pytest.mark.slow
-def test_many_claims():
-    check_claims(400, 1000)
-
-
 def test_balls_over_an_interval_hold_the_unknowns_and_their_slopes():
     compared = 0
     for rng, selection, truth in selections(250):
