@@ -1,4 +1,4 @@
-"""In 3D: boxes of forces that hold one solution, for leaves that stay open near a degenerate one (theory, 12.7)."""
+"""In 3D: boxes of forces that hold one solution, for leaves left open near a degenerate one (theory, section 12.7)."""
 
 from __future__ import annotations
 
