@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Literal
@@ -150,30 +150,17 @@ def branch_graph(
     limits = Deadline.after(started, time_limit)
     try:
         with within(limits):
-            traced, exact, search = _prepared(problem, (a, b), arithmetic, max_nodes, limits, progress)
+            way, search = _prepared(problem, (a, b), arithmetic, max_nodes, limits, progress)
     except TimeOverError:
         late = f"{Stop(StopReason.TIME_LIMIT)} before the body was condensed to its contact nodes"
-        return BranchGraph(
-            problem=problem,
-            exact=None,
-            exact_interval=(a, b),
-            arithmetic=arithmetic,
-            vertices=(),
-            arcs=(),
-            undecided=(late,),
-            stats=GraphStats(seconds=time.perf_counter() - started),
-            pieces=(),
-            make_proof=None,
-        )
-    closed = ClosedPieces()
-    search.closed = closed.pieces
-    candidates = _candidates(search, exact, executor, traced, closed)
+        stats = GraphStats(seconds=time.perf_counter() - started)
+        return BranchGraph(problem, None, (a, b), arithmetic, vertices=(), arcs=(), undecided=(late,), stats=stats)
+    candidates = _candidates(search, way, executor)
     searched = time.perf_counter()
     limits = limits.extended(started)
+    stops = [] if search.stopped is None else [search.stopped]
     with within(limits.part(_JOINED)):
-        made = _make(
-            problem, search, candidates, traced, closed, exact, _stage(progress, "arcs"), limits.part(_WORKED_OUT)
-        )
+        made = way.made(search, candidates, _stage(progress, "arcs"), limits.part(_WORKED_OUT), stops)
     stats = GraphStats(
         pieces=len(search.pieces),
         closed=sum(found.numbers is not None for found in search.pieces),
@@ -206,89 +193,135 @@ def _prepared(
     max_nodes: int | None,
     limits: Deadline,
     progress: Callable[[str, float], object] | None,
-) -> tuple[TracedProblem | None, ExactCondensed | None, IntervalSearch]:
-    """The problem in balls or without rounding, whichever its arcs are followed in, and the search over the interval.
+) -> tuple[_ByBalls | _ByAlgebra, IntervalSearch]:
+    """How arcs are to be worked out, and the search over the interval.
 
     Raises
     ------
     TimeOverError
         The body is so large that the time was over before it was condensed.
     """
-    large = arithmetic == "verified" and problem.n > FAST_EXACT_DOF
-    at_rest = large and never_loaded(problem)
-    traced = _traced(problem, interval) if large and not at_rest else None
-    exact = _condensed(problem, arithmetic, at_rest=at_rest) if traced is None else None
-    zero = traced.origin if exact is None and traced is not None else None if exact is None else exact.zero
+    way = _way(problem, interval, arithmetic)
     search = IntervalSearch(
         problem.condensed,
         interval,
-        zero,
-        _certifier(problem, exact, arithmetic, zero),
+        way.origin,
+        _certifier(problem, way, arithmetic),
         max_nodes=max_nodes,
         deadline=limits.deadline,
         progress=_stage(progress, "search"),
     )
-    return traced, exact, search
+    return way, search
 
 
 @dataclass
 class _Made:
-    """Vertices and arcs, and how they were found."""
+    """Vertices and arcs, how they were found, and what cut that short."""
 
-    exact: ExactCondensed | None
-    followed: Followed | None
+    vertices: Sequence[Vertex]
+    arcs: Sequence[Arc]
+    reasons: Sequence[str]
     stops: list[Stop]
-    vertices: Sequence[Vertex] = ()
-    arcs: Sequence[Arc] = ()
-    reasons: Sequence[str] = ()
+    exact: ExactCondensed | None = None
+    followed: Followed | None = None
 
 
-def _make(
-    problem: ContactProblem,
-    search: IntervalSearch,
-    candidates: set[Codes],
-    traced: TracedProblem | None,
-    closed: ClosedPieces,
-    exact: ExactCondensed | None,
-    tick: Callable[[float], object] | None,
-    limits: Limited,
-) -> _Made:
-    """Arcs in ball arithmetic; without rounding where there is no such way, or it leaves something open.
+@dataclass(frozen=True)
+class _ByAlgebra:
+    """Arcs as functions of alpha in rationals: nothing stays open but what the time does not suffice for."""
 
-    Arcs that are not worked out by the deadline of ``limits`` are left out; what is not put together by the one that
-    holds here stays open.
-    """
-    made = _Made(exact, None, [] if search.stopped is None else [search.stopped])
-    if traced is not None:
+    problem: ContactProblem
+    exact: ExactCondensed
+    followed: Followed | None = None
+
+    @property
+    def origin(self) -> Fraction | None:
+        """The alpha at which g vanishes."""
+        return self.exact.zero
+
+    def close(self, search: IntervalSearch) -> None:
+        """No piece is known that needs no tree."""
+
+    def made(
+        self,
+        search: IntervalSearch,
+        candidates: set[Codes],
+        tick: Callable[[float], object] | None,
+        limits: Limited,
+        stops: list[Stop],
+    ) -> _Made:
+        """Arcs worked out by the deadline of ``limits``; what is not joined by the one that holds here stays open."""
+        a, b = (rational(end) for end in search.interval)
         # after Ctrl-C only as much as takes a moment
-        most = _BOXES_AFTER_INTERRUPT if any(stop.interrupted for stop in made.stops) else None
-        made.followed = follow_selections(
-            traced,
+        few = max(8, _SELECTIONS_AFTER_INTERRUPT // self.problem.p**2)
+        most = few if any(stop.interrupted for stop in stops) else None
+        gluing = glue(self.exact, candidates, a, b, tick, cut_short=bool(stops), most=most, limits=limits)
+        stops += [] if gluing.stopped is None else [gluing.stopped]
+        arcs = make_arcs(gluing)
+        return _Made(make_vertices(gluing, arcs), arcs, gluing.reasons, stops, self.exact, self.followed)
+
+
+@dataclass(frozen=True)
+class _ByBalls:
+    """Arcs in ball arithmetic; by algebra where balls leave something open and that does not take too long."""
+
+    traced: TracedProblem
+    closed: ClosedPieces = field(default_factory=ClosedPieces)
+    exact: None = None
+
+    @property
+    def origin(self) -> Fraction | None:
+        """The alpha at which g vanishes."""
+        return self.traced.origin
+
+    def close(self, search: IntervalSearch) -> None:
+        """Find pieces that need no tree, while there is time."""
+        search.closed = self.closed.pieces
+        with suppress(TimeOverError), within(Deadline(search.deadline)):
+            self.closed.find(self.traced)
+
+    def made(
+        self,
+        search: IntervalSearch,
+        candidates: set[Codes],
+        tick: Callable[[float], object] | None,
+        limits: Limited,
+        stops: list[Stop],
+    ) -> _Made:
+        """Arcs followed by the deadline of ``limits``; see ``_ByAlgebra.made``."""
+        problem = self.traced.problem
+        followed = follow_selections(
+            self.traced,
             search.pieces,
             tick,
-            known=closed.traces,
-            cut_short=bool(made.stops),
-            most=most,
+            known=self.closed.traces,
+            cut_short=bool(stops),
+            # after Ctrl-C only as much as takes a moment
+            most=_BOXES_AFTER_INTERRUPT if any(stop.interrupted for stop in stops) else None,
             limits=limits,
         )
-        joined, stopped = made.followed.joined, made.followed.stopped
-        made.stops += [] if stopped is None else [stopped]
+        joined = followed.joined
+        stops += [] if followed.stopped is None else [followed.stopped]
         large = over() or problem.n > EXACT_DOF_LIMIT or _exact_work(problem, candidates) > LARGEST_EXACT_WORK
-        if (joined.ordered and not joined.open) or made.stops or large:
-            made.vertices, made.arcs = make_traced(traced, joined)
-            made.reasons = made.followed.reasons
-            return made
+        if (joined.ordered and not joined.open) or stops or large:
+            return _Made(*make_traced(self.traced, joined), followed.reasons, stops, followed=followed)
         # several conditions vanish at one alpha, or a selection is singular
-        made.exact = ExactCondensed.from_problem(problem)
-    assert made.exact is not None
-    a, b = (rational(end) for end in search.interval)
-    # after Ctrl-C only as much as takes a moment
-    most = max(8, _SELECTIONS_AFTER_INTERRUPT // problem.p**2) if any(s.interrupted for s in made.stops) else None
-    gluing = glue(made.exact, candidates, a, b, tick, cut_short=bool(made.stops), most=most, limits=limits)
-    made.stops += [] if gluing.stopped is None else [gluing.stopped]
-    made.arcs = make_arcs(gluing)
-    made.vertices, made.reasons = make_vertices(gluing, made.arcs), gluing.reasons
-    return made
+        algebra = _ByAlgebra(problem, ExactCondensed.from_problem(problem), followed)
+        return algebra.made(search, candidates, tick, limits, stops)
+
+
+def _way(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithmetic: Arithmetic) -> _ByBalls | _ByAlgebra:
+    """How arcs are worked out: by algebra where that is fast, and where balls cannot hold the data."""
+    large = arithmetic == "verified" and problem.n > FAST_EXACT_DOF
+    at_rest = large and never_loaded(problem)
+    if large and not at_rest and (traced := _traced(problem, interval)) is not None:
+        return _ByBalls(traced)
+    if arithmetic != "exact" and problem.n > (EXACT_DOF_LIMIT if at_rest else FAST_EXACT_DOF):
+        return _ByAlgebra(problem, ExactCondensed.from_condensed(problem))
+    exact = ExactCondensed.from_problem(problem)
+    if not problem.condensed.definite:
+        check_definite(exact.S)
+    return _ByAlgebra(problem, exact)
 
 
 def _exact_work(problem: ContactProblem, candidates: set[Codes]) -> int:
@@ -311,42 +344,21 @@ def _traced(problem: ContactProblem, interval: tuple[Fraction, Fraction]) -> Tra
         return None
 
 
-def _condensed(problem: ContactProblem, arithmetic: Arithmetic, *, at_rest: bool) -> ExactCondensed:
-    exactly = arithmetic == "exact" or problem.n <= (EXACT_DOF_LIMIT if at_rest else FAST_EXACT_DOF)
-    if not exactly:
-        return ExactCondensed.from_condensed(problem)
-    exact = ExactCondensed.from_problem(problem)
-    if not problem.condensed.definite:
-        check_definite(exact.S)
-    return exact
+def _certifier(problem: ContactProblem, way: _ByBalls | _ByAlgebra, arithmetic: Arithmetic) -> IntervalCertifier:
+    if arithmetic == "exact" and way.exact is not None:
+        return ExactIntervalCertifier(way.exact)
+    return (
+        FastIntervalCertifier() if arithmetic == "fast" else VerifiedIntervalCertifier(problem, way.exact, way.origin)
+    )
 
 
-def _certifier(
-    problem: ContactProblem, exact: ExactCondensed | None, arithmetic: Arithmetic, zero: Fraction | None
-) -> IntervalCertifier:
-    if arithmetic == "exact" and exact is not None:
-        return ExactIntervalCertifier(exact)
-    return FastIntervalCertifier() if arithmetic == "fast" else VerifiedIntervalCertifier(problem, exact, zero)
-
-
-def _candidates(
-    search: IntervalSearch,
-    exact: ExactCondensed | None,
-    executor: Executor | None,
-    traced: TracedProblem | None,
-    closed: ClosedPieces,
-) -> set[Codes]:
-    """The selections that may hold somewhere; Ctrl-C keeps those that were found.
-
-    ``closed`` takes the pieces that need no tree.
-    """
-    if exact is not None and exact.unloaded:
+def _candidates(search: IntervalSearch, way: _ByBalls | _ByAlgebra, executor: Executor | None) -> set[Codes]:
+    """The selections that may hold somewhere; Ctrl-C keeps those that were found."""
+    if way.exact is not None and way.exact.unloaded:
         # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
-        return {(OPEN,) * exact.p}
+        return {(OPEN,) * way.exact.p}
     try:
-        if traced is not None:
-            with suppress(TimeOverError), within(Deadline(search.deadline)):
-                closed.find(traced)
+        way.close(search)
         if executor is None:
             search.run()
         else:

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import networkx as nx
+import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem
-from enumsol.model.statuses import ContactStatus
+from enumsol.model.statuses import ContactStatus, RowKind
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.support.arguments import alpha_list, instance_of, optional_callable
 from enumsol.support.messages import counted
+from enumsol.trusted.selection import row_values
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -221,18 +223,20 @@ def _vanishing(condensed: CondensedProblem, root: Root, node: int, target: Conta
     """Predicted alpha at which the condition that keeps the node from status ``target`` vanishes; None when unknown."""
     if root.dlambda_dalpha is None:
         return None
-    p, alpha, change = condensed.problem.p, float(root.alpha), root.dlambda_dalpha
-    dw = condensed.g1 - condensed.S @ change.T.ravel()
-    F, dF = float(condensed.F0[node] + alpha * condensed.F1[node]), float(condensed.F1[node])
+    alpha, change = float(root.alpha), root.dlambda_dalpha.T.ravel()
+    F = condensed.F0 + alpha * condensed.F1
+    forces, w = (np.concatenate(pair) for pair in ((root.lambda_n, root.lambda_t), (root.u_n, root.u_t)))
     status = root.statuses[node]
     if status is ContactStatus.OPEN:
-        value, rate = root.u_n[node], dw[node]
+        kind = RowKind.PENETRATION
     elif target is ContactStatus.OPEN or (status is not ContactStatus.STICK and target is not ContactStatus.STICK):
-        value, rate = root.lambda_n[node], change[node, 0]
+        kind = RowKind.NORMAL_FORCE
     elif status is ContactStatus.STICK:
-        sign = 1.0 if target is ContactStatus.SLIP_PLUS else -1.0
-        value = F * root.lambda_n[node] - sign * root.lambda_t[node]
-        rate = F * change[node, 0] + dF * root.lambda_n[node] - sign * change[node, 1]
+        kind = RowKind.CONE_PLUS if target is ContactStatus.SLIP_PLUS else RowKind.CONE_MINUS
     else:
-        value, rate = root.u_t[node], dw[p + node]
+        kind = RowKind.SLIP_FORWARD
+    value = row_values(forces, w, F)[kind, node]
+    rate = row_values(change, condensed.g1 - condensed.S @ change, F)[kind, node]
+    if kind in (RowKind.CONE_PLUS, RowKind.CONE_MINUS):
+        rate += condensed.F1[node] * root.lambda_n[node]
     return None if rate == 0 else alpha - float(value) / float(rate)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import Interrupted
@@ -15,7 +15,7 @@ from enumsol.support.arguments import alpha_list, instance_of, optional_callable
 from enumsol.support.workers import Crew
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
     from concurrent.futures import Executor
 
     import pandas as pd
@@ -24,33 +24,6 @@ if TYPE_CHECKING:
     from enumsol.roots.root_set import RootSet
     from enumsol.support.arguments import Alpha, AlphaLike
     from enumsol.support.workers import Job
-
-
-@dataclass
-class _Rows:
-    """Rows of the table by the place of their alpha."""
-
-    alphas: Sequence[Alpha]
-    kinds: Mapping[ContactStatus, str]
-    done: dict[int, dict[str, Any]] = field(default_factory=dict)
-
-    def frame(self) -> pd.DataFrame:
-        import pandas as pd
-
-        columns = [
-            "alpha",
-            "roots",
-            "families",
-            *self.kinds.values(),
-            "index_sum",
-            "complete",
-            "undecided",
-            "stopped",
-            "nodes",
-            "seconds",
-        ]
-        table = pd.DataFrame([self.done[k] for k in sorted(self.done)], columns=columns)
-        return table.astype({"index_sum": "Int64"})  # whole numbers, and missing ones
 
 
 #: Columns with the number of roots at which at least one node has the status.
@@ -112,49 +85,49 @@ def multiplicity_table(
         instance_of(given, ContactProblem, "problem")
     optional_executor(executor)
     optional_callable(progress, "progress")
-    rows = _Rows(alpha_list(alphas), kinds_of(problem))
-    for alpha in rows.alphas:
+    chosen = alpha_list(alphas)
+    for alpha in chosen:
         problem.friction_at(alpha)
-    options = {"arithmetic": arithmetic, **options}
+    row = partial(table_row, problem, options={"arithmetic": arithmetic, **options})
+    done: dict[int, dict[str, Any]] = {}
     try:
-        if executor is None:
-            for k, alpha in enumerate(rows.alphas):
-                rows.done[k] = table_row(problem, alpha, options)
-                if progress is not None:
-                    progress(k + 1, len(rows.alphas))
-        else:
-            _spread(problem, rows, executor, progress, options)
+        for k, found in enumerate(map(row, chosen)) if executor is None else _spread(executor, row, chosen):
+            done[k] = found
+            if progress is not None:
+                progress(len(done), len(chosen))
     except KeyboardInterrupt as interruption:
-        done = len(rows.done)
-        raise Interrupted(
-            f"multiplicity_table was interrupted after {done} of {len(rows.alphas)} alphas", rows.frame()
-        ) from interruption
-    return rows.frame()
+        message = f"multiplicity_table was interrupted after {len(done)} of {len(chosen)} alphas"
+        raise Interrupted(message, _frame(problem, done)) from interruption
+    return _frame(problem, done)
 
 
 def _spread(
-    problem: ContactProblem | ContactProblem3D,
-    rows: _Rows,
-    executor: Executor,
-    progress: Callable[[int, int], object] | None,
-    options: dict[str, Any],
-) -> None:
-    """Hand the alphas to the executor, a limited number ahead of those awaited."""
+    executor: Executor, row: Callable[[Alpha], dict[str, Any]], alphas: Sequence[Alpha]
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Rows with their places as workers finish them; a limited number of alphas is handed out ahead."""
     crew = Crew(executor)
     running: dict[Job, int] = {}
-    waiting = list(enumerate(rows.alphas))[::-1]
+    waiting = list(enumerate(alphas))[::-1]
     try:
         while waiting or running:
             while waiting and crew.room > 0:
                 k, alpha = waiting.pop()
-                running[crew.submit(table_row, problem, alpha, options)] = k
+                running[crew.submit(row, alpha)] = k
             job = crew.next()
             if job is not None:
-                rows.done[running.pop(job)] = job.result
-                if progress is not None:
-                    progress(len(rows.done), len(rows.alphas))
+                yield running.pop(job), job.result
     finally:
         crew.cancel()
+
+
+def _frame(problem: ContactProblem | ContactProblem3D, done: dict[int, dict[str, Any]]) -> pd.DataFrame:
+    """Rows in the order of their places."""
+    import pandas as pd
+
+    counts = ["alpha", "roots", "families", *kinds_of(problem).values(), "index_sum"]
+    columns = [*counts, "complete", "undecided", "stopped", "nodes", "seconds"]
+    table = pd.DataFrame([done[k] for k in sorted(done)], columns=columns)
+    return table.astype({"index_sum": "Int64"})  # whole numbers, and missing ones
 
 
 def table_row(problem: ContactProblem | ContactProblem3D, alpha: Alpha, options: dict[str, Any]) -> dict[str, Any]:

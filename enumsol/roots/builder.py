@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,34 +36,27 @@ if TYPE_CHECKING:
     from enumsol.trusted.at_alpha import VerifiedSelection
 
 
+@dataclass(frozen=True)
 class RootBuilder:
     """Builds the Root objects at one alpha.
 
-    Parameters
+    Attributes
     ----------
     problem, alpha : what was enumerated
-    values : of the points that the components hold
+    points : values of the points that the components hold
     floats : the float solver of the same system, for scaled margins and derivatives
     verified : balls of the verified regular roots by their codes
     """
 
-    def __init__(
-        self,
-        problem: ContactProblem,
-        alpha: Alpha,
-        values: PointValues,
-        floats: FloatSelections,
-        verified: Mapping[Codes, VerifiedSelection],
-    ) -> None:
-        self._problem = problem
-        self._alpha = alpha
-        self._points = values
-        self._floats = floats
-        self._verified = verified
+    problem: ContactProblem
+    alpha: Alpha
+    points: PointValues
+    floats: FloatSelections
+    verified: Mapping[Codes, VerifiedSelection]
 
     def root(self, component: RootComponent) -> Root:
         """The isolated root of a component."""
-        p = self._problem.p
+        p = self.problem.p
         solution = component.solutions[0]
         active_codes = [set(codes) for codes in component.active]
         canonical = tuple(min(codes) for codes in active_codes)
@@ -76,10 +70,10 @@ class RootBuilder:
             statuses.append(next(s for s in STATUSES if s in names))
             active.append(frozenset(names))
         regular = component.regular
-        scaled = force / self._floats.system.force
-        slack = self._floats.slacks(canonical, scaled, w / self._floats.system.length)
+        scaled = force / self.floats.system.force
+        slack = self.floats.slacks(canonical, scaled, w / self.floats.system.length)
         return Root(
-            alpha=self._alpha,
+            alpha=self.alpha,
             statuses=tuple(statuses),
             active=tuple(active),
             lambda_n=force[:p],
@@ -90,33 +84,33 @@ class RootBuilder:
             regular=regular,
             margin=max(float(np.min(slack)), 0.0) if regular else 0.0,
             enclosure=self._enclosure(solution),
-            _condensed=self._problem.condensed,
-            _tangent=SelectionTangent(self._floats, self._problem.condensed, canonical, force, w) if regular else None,
+            _condensed=self.problem.condensed,
+            _tangent=SelectionTangent(self.floats, self.problem.condensed, canonical, force, w) if regular else None,
             _slips=slips,
             _exact_slips=self._points.exact_slips(solution.vertices[0]),
         )
 
     def _slip_signs(self, codes: Codes, solution: SelectionSolution) -> SlipSigns:
         """Signs of u_t: from the ball where it does not hold zero, otherwise those of the solver's arithmetic."""
-        p, ball = self._problem.p, self._verified.get(solution.codes)
+        p, ball = self.problem.p, self.verified.get(solution.codes)
         known: tuple[int | None, ...]
         if ball is None:
-            known = self._points.slip_signs(solution.vertices[0])
+            known = self.points.slip_signs(solution.vertices[0])
         else:
             balls = zip(ball.w[p:].tolist(), ball.w_rad[p:].tolist(), strict=True)
             known = tuple(int(np.sign(w)) if abs(w) > r or w == r == 0 else None for w, r in balls)
-        return SlipSigns(self._problem, self._alpha, codes, known)
+        return SlipSigns(self.problem, self.alpha, codes, known)
 
     def _enclosure(self, solution: SelectionSolution) -> Enclosure | None:
         """Bounds of forces and displacements: from the balls, or the floats next to a rational root."""
-        p, system = self._problem.p, self._floats.system
-        ball = self._verified.get(solution.codes)
+        p, system = self.problem.p, self.floats.system
+        ball = self.verified.get(solution.codes)
         if ball is not None:
             mid = np.concatenate([ball.force * system.force, ball.w * system.length])
             rad = np.concatenate([ball.force_rad * system.force, ball.w_rad * system.length])
             low = np.where(rad > 0, np.nextafter(mid - rad, -np.inf), mid)
             high = np.where(rad > 0, np.nextafter(mid + rad, np.inf), mid)
-        elif (around := self._points.bounds(solution.vertices[0])) is not None:
+        elif (around := self.points.bounds(solution.vertices[0])) is not None:
             low, high = around
         else:
             return None
@@ -125,12 +119,12 @@ class RootBuilder:
 
     def _values(self, codes: Codes, solution: SelectionSolution) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Forces and displacements with the zeros that the statuses impose set exactly."""
-        p, point, ball = self._problem.p, solution.vertices[0], self._verified.get(solution.codes)
+        p, point, ball = self.problem.p, solution.vertices[0], self.verified.get(solution.codes)
         if ball is None:
-            force, w = self._points.forces(point), self._points.displacements(point)
+            force, w = self.points.forces(point), self.points.displacements(point)
         else:
             # the floats' own S and g may be off by more than the ball's radius
-            force, w = ball.force * self._floats.system.force, ball.w * self._floats.system.length
+            force, w = ball.force * self.floats.system.force, ball.w * self.floats.system.length
         for i, code in enumerate(codes):
             if code == OPEN:
                 force[[i, p + i]] = 0.0

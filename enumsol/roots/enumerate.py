@@ -1,4 +1,4 @@
-"""enumerate_roots: every solution at one alpha (theory, sections 2-5)."""
+"""enumerate_roots: every solution at one alpha (theory, sections 2-5); is_unique: whether there is only one."""
 
 from __future__ import annotations
 
@@ -161,10 +161,45 @@ def enumerate_roots(
             else:
                 solvers = Solvers(problem, value, arithmetic, tolerance, engine)
                 _ = solvers.enclosed  # as above
-                search = _Enumeration(solvers, method, progress, proof_path, resumed=resume, started=started)
+                search = _Enumeration(solvers, progress, proof_path, method=method, resumed=resume, started=started)
     except TimeOverError:
         return not_begun(problem, value, arithmetic, method, time.perf_counter() - started)
     return search.run(executor, *counts, seconds)
+
+
+def is_unique(problem: ContactProblem | ContactProblem3D, alpha: AlphaLike, **options: Any) -> bool | None:
+    """Whether the problem has one solution at one alpha, proven either way; None when that stayed open.
+
+    True if all selections are accounted for and one solution is left: by one certificate where that serves (theory,
+    section 6.11), otherwise by the search. False as soon as two solutions are proven, or a continuum. The search then
+    stops, so that False often costs little.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    alpha : float, Fraction, any other real number, or str
+        As for `enumerate_roots`.
+    **options
+        Of `enumerate_roots`, but for ``stop_after``. ``RootSet.unique`` of its result is this answer, and the result
+        tells what stayed open. Arithmetic "fast" proves nothing and gives None.
+
+    Returns
+    -------
+    bool or None
+
+    Raises
+    ------
+    InvalidArgumentError, TooLargeError, Interrupted, OutputError
+        As `enumerate_roots`.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.two_node_square()
+    >>> enumsol.is_unique(problem, 1), enumsol.is_unique(problem, 3.5), enumsol.is_unique(problem, 3.5, max_nodes=1)
+    (True, False, None)
+    """
+    return enumerate_roots(problem, alpha, stop_after=2, **options).unique
 
 
 def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
@@ -190,20 +225,8 @@ def _alone(solution: SelectionSolution) -> bool:
 class _Enumeration(Enumeration[Solvers]):
     """One call of enumerate_roots in 2D."""
 
-    def __init__(
-        self,
-        solvers: Solvers,
-        method: str,
-        progress: Callable[[SearchProgress], object] | None,
-        proof_path: str | Path | None,
-        *,
-        resumed: bool = False,
-        started: float | None = None,
-    ) -> None:
-        super().__init__(solvers, progress, proof_path, resumed=resumed, started=started)
-        self.method = method
-        #: Closed roots that may be the same as others.
-        self.doubtful: list[Codes] = []
+    #: Closed roots that may be the same as others.
+    doubtful: Sequence[Codes] = ()
 
     def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
         counted = [0, 0]
@@ -326,7 +349,7 @@ def roots_of_selections(problem: ContactProblem, alpha: Alpha, selections: Seque
     whole : no others hold
     """
     solvers = Solvers(problem, alpha, "verified", SIGN_TOLERANCE)
-    return _Selected(solvers, "graph", None, None).select(selections, whole=whole)
+    return _Selected(solvers, None, None, method="graph").select(selections, whole=whole)
 
 
 class _Selected(_Enumeration):

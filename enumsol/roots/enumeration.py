@@ -40,6 +40,8 @@ class Enumeration(ABC, Generic[_Solvers]):
     progress : callable or None
     proof_path : path or None
         Where to write the proof (arithmetic "verified"); None keeps it in memory.
+    method : str
+        How selections are found, for the result.
     resumed : bool
         Go on with the proof in that file, if there is one.
     started : time.perf_counter() value, optional
@@ -57,10 +59,11 @@ class Enumeration(ABC, Generic[_Solvers]):
         progress: Callable[[SearchProgress], object] | None,
         proof_path: str | Path | None,
         *,
+        method: str = "tree",
         resumed: bool = False,
         started: float | None = None,
     ) -> None:
-        self.solvers, self.progress = solvers, progress
+        self.solvers, self.progress, self.method = solvers, progress, method
         self.started = time.perf_counter() if started is None else started
         #: The time was over before it was known which roots the solutions form.
         self.late = False
