@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import networkx as nx
 
-from enumsol.branches.elements import CUTS, Arc, Branch, Component, Vertex, VertexKind
+from enumsol.branches.elements import CUTS, Arc, Branch, Component, Vertex, VertexKind, index_sum
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK
 from enumsol.roots.slip_signs import slip_names
 
@@ -109,8 +109,7 @@ def with_exact_zeros(state: Pair, active: ActiveSets) -> Pair:
 
 def degree_of(arcs: Sequence[Arc]) -> int | None:
     """Sum of the indices; None where one is not known."""
-    indices = [arc.index for arc in arcs]
-    return None if any(index is None for index in indices) else sum(index for index in indices if index is not None)
+    return index_sum(arc.index for arc in arcs)
 
 
 def vertex_kind(left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dimension: int) -> VertexKind:

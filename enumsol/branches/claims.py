@@ -21,7 +21,7 @@ from enumsol.branches.lower_bounds import least_at, least_steps
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.condensation.condensed import CondensedProblem
@@ -151,13 +151,9 @@ class Claims:
             else:
                 groups.append([v])
         place = {v.number: k for k, group in enumerate(groups) for v in group}
-        cover = _Cover(len(groups))
-        for arc in self._arcs:
-            cover.add(place[arc.tail], place[arc.head])
-        at = (over + len(group) for group, over in zip(groups, cover.at(), strict=True))
-        return MultiplicitySteps(
-            tuple(Fraction(group[0].alpha) for group in groups), tuple(at), tuple(cover.between()), exact=True
-        )
+        over, between = _cover(((place[arc.tail], place[arc.head]) for arc in self._arcs), len(groups))
+        at = tuple(passing + len(group) for group, passing in zip(groups, over, strict=True))
+        return MultiplicitySteps(tuple(Fraction(group[0].alpha) for group in groups), at, tuple(between), exact=True)
 
     def uniqueness(self) -> Uniqueness:
         """Up to which alpha the solution is unique, or what is known about it."""
@@ -216,20 +212,12 @@ def uniqueness_bound(condensed: CondensedProblem, interval: tuple[float, float])
     return min(b, float(np.min(reached, initial=np.inf)))
 
 
-class _Cover:
-    """How many of some arcs pass over every critical alpha, and over every interval between two of them."""
-
-    def __init__(self, count: int) -> None:
-        self._through, self._beside = np.zeros((2, count + 1), dtype=int)
-
-    def add(self, tail: int, head: int) -> None:
-        self._beside[tail] += 1
-        self._beside[head] -= 1
-        self._through[tail + 1] += 1
-        self._through[head] -= 1
-
-    def at(self) -> list[int]:
-        return [int(n) for n in np.cumsum(self._through)[:-1]]
-
-    def between(self) -> list[int]:
-        return [int(n) for n in np.cumsum(self._beside)[:-2]]
+def _cover(spans: Iterable[tuple[int, int]], count: int) -> tuple[list[int], list[int]]:
+    """How many of some arcs pass over each of ``count`` critical alphas, and over each interval between two of them."""
+    through, beside = np.zeros((2, count + 1), dtype=int)
+    for tail, head in spans:
+        beside[tail] += 1
+        beside[head] -= 1
+        through[tail + 1] += 1
+        through[head] -= 1
+    return np.cumsum(through)[:-1].tolist(), np.cumsum(beside)[:-2].tolist()

@@ -347,9 +347,9 @@ def _traced(problem: ContactProblem, interval: tuple[Fraction, Fraction]) -> Tra
 def _certifier(problem: ContactProblem, way: _ByBalls | _ByAlgebra, arithmetic: Arithmetic) -> IntervalCertifier:
     if arithmetic == "exact" and way.exact is not None:
         return ExactIntervalCertifier(way.exact)
-    return (
-        FastIntervalCertifier() if arithmetic == "fast" else VerifiedIntervalCertifier(problem, way.exact, way.origin)
-    )
+    if arithmetic == "fast":
+        return FastIntervalCertifier()
+    return VerifiedIntervalCertifier(problem, way.exact, way.origin)
 
 
 def _candidates(search: IntervalSearch, way: _ByBalls | _ByAlgebra, executor: Executor | None) -> set[Codes]:

@@ -14,6 +14,8 @@ from enumsol.support.arguments import alpha_value
 from enumsol.support.messages import TextEnum
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     from enumsol.arithmetic.algebraic import CriticalAlpha
@@ -52,6 +54,12 @@ class VertexKind(TextEnum):
     BROKEN = "broken"
     #: On the interval's border.
     END = "end"
+
+
+def index_sum(indices: Iterable[int | None]) -> int | None:
+    """The sum of indices; None where one is not known."""
+    known = list(indices)
+    return None if None in known else sum(index for index in known if index is not None)
 
 
 #: Kinds of vertices at which branches are cut.

@@ -17,7 +17,7 @@ from networkx.utils import UnionFind
 
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.elements import VertexKind
+from enumsol.branches.elements import VertexKind, index_sum
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -104,7 +104,7 @@ class _Tally:
             closed = all(
                 (begin < 0 or arc.tail in inside) and (end > 0 or arc.head in inside) for arc, begin, end in arcs
             )
-            sums = {_sum(below), _sum(above)}
+            sums = {index_sum(below), index_sum(above)}
             self.add(sums.pop() if closed and len(sums) == 1 else None)
 
 
@@ -228,13 +228,3 @@ def _degree(v: Vertex) -> int | None:
     if v.border:
         return left + right
     return left if left == right else None
-
-
-def _sum(indices: Iterable[int | None]) -> int | None:
-    """The sum; None where one is not known."""
-    total = 0
-    for index in indices:
-        if index is None:
-            return None
-        total += index
-    return total

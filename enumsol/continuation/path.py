@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from enumsol.continuation.follower import Follower
 from enumsol.continuation.path_data import PathData, PathStatus
 from enumsol.continuation.path_files import load_path, save_path
+from enumsol.continuation.path_plots import draw_path
 from enumsol.continuation.start import Start
 from enumsol.continuation.tangents import curve_tangent
 from enumsol.continuation.transitions import CurvePoint
@@ -63,42 +64,8 @@ class Path(PathData):
     ('interval left', 1.0, 10.0)
     """
 
-    def plot(
-        self, graph: Any = None, *, node: int = 0, quantity: str = "lambda_n", ax: Any = None, **graph_options: Any
-    ) -> Any:
-        """A figure of the accepted steps as dots, transition points as circles, folds as squares, the start as a star.
-
-        The spacing of the dots is the step control. With a graph its branches are drawn underneath.
-
-        Parameters
-        ----------
-        graph : BranchGraph or None
-            Drawn by its own ``plot`` in a new figure, whose options may be given too.
-        node : int
-            Contact node (row number).
-        quantity : {"lambda_n", "lambda_t", "u_n", "u_t"}
-        ax : matplotlib Axes or None
-            Draw there, for example in ``figure.axes[0]`` of an earlier plot to add a path to it.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Notebooks show it.
-
-        Raises
-        ------
-        MissingDependencyError
-            matplotlib is not installed.
-        InvalidArgumentError
-            An argument is not one of those above.
-        """
-        from enumsol.continuation.path_plots import draw_path  # matplotlib, slow to import
-
-        return draw_path(self, graph, node, quantity, ax, graph_options)
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the path to a .npz file; the problem and the callables of a smooth path are not in it."""
-        save_path(self, path)
+    plot = draw_path
+    save = save_path
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Path:

@@ -19,7 +19,7 @@ _Path = TypeVar("_Path", bound=PathData)
 
 
 def save_path(path: PathData, file: str | os.PathLike[str]) -> None:
-    """Write a path; see Path.save."""
+    """Write the path to a .npz file; the problem and the callables of a smooth path are not in it."""
     report = {
         "kinds": path.kinds,
         "transitions": [_pack(item) for item in path.transitions],

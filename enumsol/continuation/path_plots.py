@@ -15,15 +15,42 @@ if TYPE_CHECKING:
 _QUANTITIES = ("lambda_n", "lambda_t", "u_n", "u_t")
 
 
-def draw_path(path: PathData, graph: Any, node: int, quantity: str, ax: Any, graph_options: dict[str, Any]) -> Any:
-    """See Path.plot."""
+def draw_path(
+    path: PathData, graph: Any = None, *, node: int = 0, quantity: str = "lambda_n", ax: Any = None, **of_graph: Any
+) -> Any:
+    """A figure of the accepted steps as dots, transition points as circles, folds as squares, the start as a star.
+
+    The spacing of the dots is the step control. With a graph its branches are drawn underneath.
+
+    Parameters
+    ----------
+    graph : BranchGraph or None
+        Drawn by its own ``plot`` in a new figure, whose options may be given too.
+    node : int
+        Contact node (row number).
+    quantity : {"lambda_n", "lambda_t", "u_n", "u_t"}
+    ax : matplotlib Axes or None
+        Draw there, for example in ``figure.axes[0]`` of an earlier plot to add a path to it.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Notebooks show it.
+
+    Raises
+    ------
+    MissingDependencyError
+        matplotlib is not installed.
+    InvalidArgumentError
+        An argument is not one of those above.
+    """
     one_of(quantity, "quantity", _QUANTITIES)
     node = row_number(node, "node", path.lambda_n.shape[1])
     if graph is not None and ax is not None:
         raise InvalidArgumentError("graph and ax are both given; draw further paths with path.plot(ax=...) alone")
     if graph is not None:
         # the graph draws a figure of its own; its first panel is this node's, and no zoom shows the path
-        ax = graph.plot(quantity, [path.node_ids[node]], **{"zoom": False, **graph_options}).axes[0]
+        ax = graph.plot(quantity, [path.node_ids[node]], **{"zoom": False, **of_graph}).axes[0]
     elif axes_or_none(ax) is None:
         ax = new_figure().subplots()
     values = getattr(path, quantity)[:, node]

@@ -12,8 +12,7 @@ from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
 from enumsol.roots.at_rest import AtRest
 from enumsol.roots.builder import RootBuilder, in_order, named, root_family
-from enumsol.roots.closed import apart, closed_component
-from enumsol.roots.components import RootComponent, connected_components
+from enumsol.roots.components import RootComponent, apart, closed_component, connected_components
 from enumsol.roots.enumeration import Enumeration, not_begun
 from enumsol.roots.local_degree import local_degree
 from enumsol.roots.root_set import RootSet
