@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -101,21 +101,8 @@ class PathValues:
     dF: NDArray[np.float64]  # noqa: N815 (as above)
 
 
-class ParameterPath(Protocol):
-    """What the continuation needs to know about alpha."""
-
-    problem: ContactProblem
-
-    def at(self, alpha: float) -> PathValues:
-        """Values at any alpha, also where friction would be negative (iterates only)."""
-
-    @property
-    def frictionless(self) -> NDArray[np.bool_]:
-        """Nodes whose friction is zero for every alpha, shape (p,)."""
-
-
 class AffinePath:
-    """The problem's own F0 + alpha F1 and f + alpha load_slope."""
+    """The problem's own F0 + alpha F1 and f + alpha load_slope, also where friction would be negative (iterates)."""
 
     def __init__(self, problem: ContactProblem) -> None:
         self.problem = problem
@@ -209,6 +196,10 @@ class CallablePath:
                     f"SmoothPath.d{name} at alpha = {alpha:g} differs by {error:.2g} from a central difference of "
                     f"{name}; expected the derivative of {name} with respect to alpha"
                 )
+
+
+#: What the continuation needs to know about alpha.
+ParameterPath = AffinePath | CallablePath
 
 
 def _evaluate(

@@ -22,7 +22,7 @@ from enumsol.continuation.tangents import (
     admissible_tangents,
     curve_tangent,
 )
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.model.statuses import ACROSS, CONDITIONS, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -119,17 +119,18 @@ def locate(
     return point if same_curve(equation, start, point) else None
 
 
+def _across(code: int, k: int) -> list[int]:
+    """The statuses on the other side of the k-th inequality of a status."""
+    return [other for other, _ in ACROSS[code, CONDITIONS[code].inequalities[k]]]
+
+
 def flip(equation: CondensedEquation, codes: Codes, x: Vector, which: tuple[int, int]) -> Codes:
     """Statuses after one slack vanished: the selection whose sign row has that one sign changed."""
     i, k = which
-    code = codes[i]
-    if code == OPEN:
+    new = _across(codes[i], k)[0]
+    if codes[i] == OPEN:
         slip = equation.w(x)[equation.p + i]
         new = FRICTIONLESS if equation.frictionless[i] else (SLIP_PLUS if slip > 0 else SLIP_MINUS)
-    elif code == STICK:
-        new = SLIP_MINUS if k else SLIP_PLUS
-    else:
-        new = STICK if k else OPEN
     return (*codes[:i], new, *codes[i + 1 :])
 
 
@@ -139,12 +140,8 @@ def single_flip(before: Codes, after: Codes) -> tuple[int, int] | None:
     if len(changed) != 1:
         return None
     i = changed[0]
-    old, new = before[i], after[i]
-    if OPEN in (old, new):
-        return None if STICK in (old, new) else (i, 0)
-    if old == STICK:
-        return i, int(new == SLIP_MINUS)
-    return (i, 1) if new == STICK else None
+    kinds = range(len(CONDITIONS[before[i]].inequalities))
+    return next(((i, k) for k in kinds if after[i] in _across(before[i], k)), None)
 
 
 def confirm(

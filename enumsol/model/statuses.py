@@ -91,6 +91,21 @@ CONDITIONS = {
     FORWARD: Conditions((_R.CONE_PLUS,), (_R.PENETRATION, _R.CONE_MINUS)),
     BACKWARD: Conditions((_R.CONE_MINUS,), (_R.PENETRATION, _R.CONE_PLUS)),
 }
+#: The status on the other side of a condition, with the condition that vanishes there too.
+ACROSS: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {
+    (OPEN, _R.PENETRATION): (
+        (SLIP_PLUS, _R.NORMAL_FORCE),
+        (SLIP_MINUS, _R.NORMAL_FORCE),
+        (FRICTIONLESS, _R.NORMAL_FORCE),
+    ),
+    (SLIP_PLUS, _R.NORMAL_FORCE): ((OPEN, _R.PENETRATION),),
+    (SLIP_MINUS, _R.NORMAL_FORCE): ((OPEN, _R.PENETRATION),),
+    (FRICTIONLESS, _R.NORMAL_FORCE): ((OPEN, _R.PENETRATION),),
+    (SLIP_PLUS, _R.SLIP_FORWARD): ((STICK, _R.CONE_PLUS),),
+    (SLIP_MINUS, _R.SLIP_BACKWARD): ((STICK, _R.CONE_MINUS),),
+    (STICK, _R.CONE_PLUS): ((SLIP_PLUS, _R.SLIP_FORWARD),),
+    (STICK, _R.CONE_MINUS): ((SLIP_MINUS, _R.SLIP_BACKWARD),),
+}
 #: Final statuses of a node with friction, and of one without.
 FINAL = {True: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), False: (OPEN, FRICTIONLESS)}
 #: Signs of the test functions in the final statuses.

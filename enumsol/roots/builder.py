@@ -16,11 +16,12 @@ from enumsol.model.statuses import (
     STICK,
     UNDECIDED,
     ContactStatus,
+    contact_status,
 )
 from enumsol.roots.linearisation import SelectionTangent
 from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
 from enumsol.roots.root_set import Undecided
-from enumsol.roots.slip_signs import SlipSigns, shown_status, sign_over
+from enumsol.roots.slip_signs import SlipSigns, sign_over
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -155,7 +156,7 @@ def polytope(solution: SelectionSolution, corners: Sequence[Any], solver: Select
     """The roots of one selection; ``corners`` are its vertices, or points equal to them."""
     points = np.array([solver.forces(corner) for corner in corners])
     slips = [solver.slip_signs(vertex) for vertex in solution.vertices]
-    statuses = tuple(shown_status(code, sign_over(s[i] for s in slips)) for i, code in enumerate(solution.codes))
+    statuses = tuple(contact_status(code, sign_over(s[i] for s in slips)) for i, code in enumerate(solution.codes))
     points = points[np.lexsort(points.T[::-1])]
     vertices = np.stack([points[:, : solver.p], points[:, solver.p :]], axis=2)
     return Polytope(statuses, vertices, solution.dimension)

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from enumsol.condensation.data import EXACT_DOF_LIMIT
-from enumsol.model.statuses import FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
+from enumsol.model.statuses import SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -69,11 +69,3 @@ def sign_over(signs: Iterable[int]) -> int:
     """The sign of u_t on a polytope whose corners have these signs; 0 where it takes both or none."""
     found = set(signs) - {0}
     return found.pop() if len(found) == 1 else 0
-
-
-def shown_status(code: int, sign: int) -> ContactStatus:
-    """The status that a code shows; ``sign`` is that of u_t, which names a node in contact without friction."""
-    if code != FRICTIONLESS:
-        return STATUSES[code]
-    names = slip_names(sign)
-    return next(status for status in STATUSES if status in names)

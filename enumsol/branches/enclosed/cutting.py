@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,9 +17,12 @@ from enumsol.branches.enclosed.arc_parts import AlphaBox, ArcPart, ArcPartKind, 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from enumsol.trusted.arcs.over_parts import OverInterval
+    from enumsol.trusted.arcs.over_parts import Expansion, OverInterval
+    from enumsol.trusted.arcs.precise import PreciseExpansion
     from enumsol.trusted.selection import Selection
 
+    #: Conditions of a selection over an interval, in double arithmetic or in many digits.
+    AlphaExpansion = Expansion | PreciseExpansion
     Result = tuple[AlphaBox, list[Interval]]
     Shared = frozenset[Any]
 
@@ -28,37 +31,6 @@ if TYPE_CHECKING:
 _NARROW, _NARROW_ENOUGH = 2.0**-44, 2.0**-16
 #: Halvings of a part that is not decided.
 _HALVINGS = 5
-
-
-class AlphaExpansion(Protocol):
-    """Conditions of a selection over an interval, as arcs.Expansion and precise.PreciseExpansion know them."""
-
-    low: Any
-    high: Any
-    apart: Any
-    final: bool
-
-    @property
-    def rough(self) -> bool:
-        """Whether shorter intervals give smaller errors."""
-
-    def over(self, low: Any, high: Any) -> OverInterval:
-        """What is known over a part."""
-
-    def near(self, condition: int, low: Any, high: Any) -> tuple[Any, Any]:
-        """What should be bounds of the only zero in a part, without proof."""
-
-    def split(self) -> Any:
-        """Where to cut first, so that nothing holds on either side; or None."""
-
-    def zeros(self, condition: int) -> list[Any]:
-        """Where a condition seems to vanish."""
-
-    def flat(self, condition: int) -> bool:
-        """Whether a condition cannot be told from zero."""
-
-    def zero_bounds(self, condition: int, slope: int, low: Any, high: Any) -> Any:
-        """Bounds of the only zero in a part."""
 
 
 class Cutting:
@@ -79,7 +51,8 @@ class Cutting:
 
     def __init__(self, rows: Selection, expansion: AlphaExpansion, *, whole: bool, flat: bool, sharpened: bool) -> None:
         self._narrow = _NARROW_ENOUGH if sharpened else _NARROW
-        self._rows, self._expansion, self._whole, self._keep_flat = rows, expansion, whole, flat
+        self._rows, self._whole, self._keep_flat = rows, whole, flat
+        self._expansion: Any = expansion  # alphas are floats of the one, fractions of the other
         self.low: Number
         self.high: Number
         self.low, self.high = expansion.low, expansion.high

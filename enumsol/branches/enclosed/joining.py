@@ -16,15 +16,7 @@ from typing import TYPE_CHECKING
 from networkx.utils import UnionFind
 
 from enumsol.branches.enclosed.arc_parts import ArcPartKind, parts_between
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.trusted.selection import (
-    CONE_MINUS,
-    CONE_PLUS,
-    NORMAL_FORCE,
-    PENETRATION,
-    SLIP_BACKWARD,
-    SLIP_FORWARD,
-)
+from enumsol.model.statuses import ACROSS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -33,18 +25,6 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import Codes
 
     Bounds = tuple[Fraction, Fraction]
-
-#: The status on the other side of a condition, with the condition that vanishes there too.
-_ACROSS = {
-    (OPEN, PENETRATION): ((SLIP_PLUS, NORMAL_FORCE), (SLIP_MINUS, NORMAL_FORCE), (FRICTIONLESS, NORMAL_FORCE)),
-    (SLIP_PLUS, NORMAL_FORCE): ((OPEN, PENETRATION),),
-    (SLIP_MINUS, NORMAL_FORCE): ((OPEN, PENETRATION),),
-    (FRICTIONLESS, NORMAL_FORCE): ((OPEN, PENETRATION),),
-    (SLIP_PLUS, SLIP_FORWARD): ((STICK, CONE_PLUS),),
-    (SLIP_MINUS, SLIP_BACKWARD): ((STICK, CONE_MINUS),),
-    (STICK, CONE_PLUS): ((SLIP_PLUS, SLIP_FORWARD),),
-    (STICK, CONE_MINUS): ((SLIP_MINUS, SLIP_BACKWARD),),
-}
 
 
 class EventPlaceKind(enum.StrEnum):
@@ -266,7 +246,7 @@ class _Joining:
     def _neighbours(self, event: _Found, by_codes: dict[Codes, list[_Found]]) -> Iterator[_Found]:
         """Events at which the condition across the vanishing one vanishes."""
         node, kind = event.condition
-        for code, across in _ACROSS.get((event.codes[node], kind), ()):
+        for code, across in ACROSS.get((event.codes[node], kind), ()):
             other = (*event.codes[:node], code, *event.codes[node + 1 :])
             for found in by_codes.get(other, ()):
                 if found.condition == (node, across) and found.trace.side == event.trace.side:

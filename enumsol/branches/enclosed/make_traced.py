@@ -12,8 +12,7 @@ from enumsol.arithmetic.rationals import rational
 from enumsol.branches.assembly import make_vertex, sides_of, with_exact_zeros
 from enumsol.branches.elements import Arc
 from enumsol.branches.enclosed.joining import EventPlaceKind
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.roots.slip_signs import shown_status
+from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, contact_status
 
 if TYPE_CHECKING:
     from collections.abc import Sequence, Set
@@ -74,7 +73,7 @@ def _arc(
     signs = _slip_signs(traced, [arc.codes], sample, [{code} for code in arc.codes])
     return Arc(
         number=number,
-        statuses=tuple(map(shown_status, arc.codes, signs)),
+        statuses=tuple(map(contact_status, arc.codes, signs)),
         lo=float(begin),
         hi=float(end),
         tail=ends[0],

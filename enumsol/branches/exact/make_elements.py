@@ -12,10 +12,10 @@ from flint import fmpq
 from enumsol.arithmetic.rationals import rational, to_fraction
 from enumsol.branches.assembly import degree_of, make_vertex, sides_of, with_exact_zeros
 from enumsol.branches.elements import Arc
-from enumsol.model.statuses import RowKind
+from enumsol.model.statuses import RowKind, contact_status
 from enumsol.roots.builder import polytope
 from enumsol.roots.root import RootFamily
-from enumsol.roots.slip_signs import shown_status, sign_over
+from enumsol.roots.slip_signs import sign_over
 from enumsol.selections.functions import SelectionFunctions
 from enumsol.selections.ordered_field import FiberSelections, as_float
 from enumsol.selections.polytopes import dot
@@ -72,7 +72,7 @@ def _arc(gluing: Gluing, number: int, edge: GluedArc) -> Arc:
     sample = to_fraction(fmpq(edge.sample))
     return Arc(
         number=number,
-        statuses=tuple(map(shown_status, edge.codes, _slips(gluing.exact, edge))),
+        statuses=tuple(map(contact_status, edge.codes, _slips(gluing.exact, edge))),
         lo=float(begin),
         hi=float(end),
         tail=edge.tail,
