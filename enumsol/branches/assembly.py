@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 import networkx as nx
 
 from enumsol.branches.elements import CUTS, Arc, Branch, Component, Vertex, VertexKind, index_sum
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK
-from enumsol.roots.slip_signs import slip_names
+from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.roots.slip_signs import named_statuses
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from enumsol.arithmetic.algebraic import CriticalAlpha
     from enumsol.branches.elements import Pair
-    from enumsol.model.statuses import ContactStatus
     from enumsol.roots.root import RootFamily
     from enumsol.selections.solution import ActiveSets, Codes
 
@@ -59,7 +58,7 @@ def make_vertex(
     slip_sign : the sign of u_t at a node, which names the slip where there is no friction
     """
     p, (forces, w) = len(active), state
-    names = named_active(active, slip_sign)
+    statuses, names = named_statuses(active, slip_sign)
     dimension = 0 if family is None else family.dimension
     kind = vertex_kind(*sides, border=border, dimension=dimension) if settled else VertexKind.UNSETTLED
     left, right = map(degree_of, sides) if settled else (None, None)
@@ -68,7 +67,7 @@ def make_vertex(
         alpha=float(alpha),
         kind=kind,
         border=border,
-        statuses=tuple(next(s for s in STATUSES if s in found) for found in names),
+        statuses=statuses,
         active=names,
         lambda_n=forces[:p],
         lambda_t=forces[p:],
@@ -79,18 +78,6 @@ def make_vertex(
         index_right=right,
         selections=tuple(selections),
         exact=alpha,
-    )
-
-
-def named_active(active: ActiveSets, slip_sign: Callable[[int], int]) -> tuple[frozenset[ContactStatus], ...]:
-    """Names of the statuses that hold at every node; ``slip_sign`` gives the sign of u_t where there is no friction."""
-    return tuple(
-        frozenset(
-            name
-            for code in codes
-            for name in (slip_names(slip_sign(node)) if code == FRICTIONLESS else (STATUSES[code],))
-        )
-        for node, codes in enumerate(active)
     )
 
 

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from enumsol.support.arguments import AlphaLike
 
 
+#: Attributes of a root that are those of its node, too.
+_SHOWN = ("statuses", "lambda_n", "lambda_t", "index")
+
+
 class LinkRule(enum.StrEnum):
     """Why two roots are linked; members compare with their texts."""
 
@@ -168,15 +172,7 @@ def link_samples(
     graph = nx.Graph()
     for s, roots in enumerate(root_sets):
         for r, root in enumerate(roots):
-            graph.add_node(
-                (s, r),
-                alpha=float(root.alpha),
-                statuses=root.statuses,
-                lambda_n=root.lambda_n,
-                lambda_t=root.lambda_t,
-                index=root.index,
-                root=root,
-            )
+            graph.add_node((s, r), alpha=float(root.alpha), root=root, **{name: getattr(root, name) for name in _SHOWN})
     ambiguous: list[tuple[tuple[int, int], tuple[int, int]]] = []
     for s, (left, right) in enumerate(itertools.pairwise(root_sets)):
         ambiguous += _link(graph, problem.condensed, s, left, right)

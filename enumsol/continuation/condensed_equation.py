@@ -36,6 +36,7 @@ from enumsol.model.statuses import (
     active_within,
     contact_status,
 )
+from enumsol.trusted.selection import row_values
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -240,10 +241,10 @@ class CondensedEquation:
 
     def _row_values(self, x: Vector) -> Vector:
         """Values of all rows in the order of RowKind, those of the cone over 1 + F, shape (7, p)."""
-        p, F, w = self.p, self.at(x).F, self.w(x)
-        bound, t, cone = F * x[:p], x[p:-1], 1.0 + F
-        rows = [x[:-1], (bound - t) / cone, (bound + t) / cone, -w[:p], w[p:], -w[p:]]
-        return np.concatenate(rows).reshape(-1, p)
+        F = self.at(x).F
+        rows: Vector = row_values(x[:-1], self.w(x), F)
+        rows[[RowKind.CONE_PLUS, RowKind.CONE_MINUS]] /= 1.0 + F
+        return rows
 
     def _of_inequalities(self, codes: Codes, rows: Vector, missing: float) -> Vector:
         kinds = _KINDS[np.array(codes, dtype=np.intp)]

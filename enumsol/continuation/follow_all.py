@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -135,23 +135,18 @@ def follow_all(
     return FollowAllResult(tuple(coverage.paths), report, tuple(coverage.failures), len(coverage.paths) - seeded, graph)
 
 
+@dataclass
 class _Coverage:
     """Paths so far, and the arcs that they passed."""
 
-    def __init__(
-        self,
-        problem: ContactProblem,
-        interval: tuple[float, float],
-        options: ContinuationOptions | None,
-        chart: GraphMap,
-        progress: Callable[[int, int], object] | None,
-    ) -> None:
-        self.problem, self.interval, self.options = problem, interval, options
-        self.graph, self.progress = chart.graph, progress
-        self.chart = chart
-        self.paths: list[Path] = []
-        self.failures: list[tuple[float, str]] = []
-        self.visited: set[int] = set()
+    problem: ContactProblem
+    interval: tuple[float, float]
+    options: ContinuationOptions | None
+    chart: GraphMap
+    progress: Callable[[int, int], object] | None
+    paths: list[Path] = field(default_factory=list)
+    failures: list[tuple[float, str]] = field(default_factory=list)
+    visited: set[int] = field(default_factory=set)
 
     def start(self, start: Any) -> None:
         """Follow a start in both directions unless its arc was passed before."""
@@ -169,13 +164,13 @@ class _Coverage:
                 self.failures.append((float(path.alpha[-1]), path.message))
             self.visited |= audit_on(self.chart, read_points(path, self.problem), DETOUR).visited
             if self.progress is not None:
-                self.progress(len(self.visited), len(self.graph.arcs))
+                self.progress(len(self.visited), len(self.chart.graph.arcs))
             if path.closed:
                 break
 
     def missed_seeds(self) -> Iterator[Any]:
         """Roots on arcs that were not visited so far."""
-        for arc in self.graph.arcs:
+        for arc in self.chart.graph.arcs:
             if arc.dimension or not arc.lo < arc.hi:
                 continue
             for share in _SEEDS:

@@ -21,7 +21,7 @@ from enumsol.model.statuses import (
 from enumsol.roots.linearisation import SelectionTangent
 from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
 from enumsol.roots.root_set import Undecided
-from enumsol.roots.slip_signs import SlipSigns, sign_over
+from enumsol.roots.slip_signs import SlipSigns, named_statuses, sign_over
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -59,24 +59,17 @@ class RootBuilder:
         """The isolated root of a component."""
         p = self.problem.p
         solution = component.solutions[0]
-        active_codes = [set(codes) for codes in component.active]
-        canonical = tuple(min(codes) for codes in active_codes)
+        canonical = tuple(min(codes) for codes in component.active)
         force, w = self._values(canonical, solution)
         slips = self._slip_signs(canonical, solution)
-        statuses, active = [], []
-        for i, codes in enumerate(active_codes):
-            names = {STATUSES[code] for code in codes if code != FRICTIONLESS}
-            if FRICTIONLESS in codes:
-                names |= slips.names(i)
-            statuses.append(next(s for s in STATUSES if s in names))
-            active.append(frozenset(names))
+        statuses, active = named_statuses(component.active, slips.sign)
         regular = component.regular
         scaled = force / self.floats.system.force
         slack = self.floats.slacks(canonical, scaled, w / self.floats.system.length)
         return Root(
             alpha=self.alpha,
-            statuses=tuple(statuses),
-            active=tuple(active),
+            statuses=statuses,
+            active=active,
             lambda_n=force[:p],
             lambda_t=force[p:],
             u_n=w[:p],

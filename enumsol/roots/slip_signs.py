@@ -7,13 +7,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from enumsol.condensation.data import EXACT_DOF_LIMIT
-from enumsol.model.statuses import SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
+from enumsol.model.statuses import FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from enumsol.model.problem import ContactProblem
-    from enumsol.selections.solution import Codes
+    from enumsol.selections.solution import ActiveSets, Codes
     from enumsol.support.arguments import Alpha
 
 
@@ -41,10 +41,6 @@ class SlipSigns:
         known = self.known[node]
         return known if known is not None or self._exact is None else self._exact[node]
 
-    def names(self, node: int) -> frozenset[ContactStatus]:
-        """Statuses that the sign gives to a node in contact without friction: all three where u_t = 0 may hold."""
-        return slip_names(self.sign(node))
-
     @cached_property
     def _exact(self) -> tuple[int, ...] | None:
         """All signs in rationals; None when the problem is too large for them."""
@@ -63,6 +59,21 @@ def slip_names(sign: int | None) -> frozenset[ContactStatus]:
     if not sign:
         return frozenset(STATUSES[code] for code in (STICK, SLIP_PLUS, SLIP_MINUS))
     return frozenset((STATUSES[SLIP_PLUS if sign > 0 else SLIP_MINUS],))
+
+
+def named_statuses(
+    active: ActiveSets, slip_sign: Callable[[int], int | None]
+) -> tuple[tuple[ContactStatus, ...], tuple[frozenset[ContactStatus], ...]]:
+    """Of every node the first status that holds, and all; ``slip_sign`` gives the sign of u_t without friction."""
+    names = tuple(
+        frozenset(
+            name
+            for code in codes
+            for name in (slip_names(slip_sign(node)) if code == FRICTIONLESS else (STATUSES[code],))
+        )
+        for node, codes in enumerate(active)
+    )
+    return tuple(next(status for status in STATUSES if status in held) for held in names), names
 
 
 def sign_over(signs: Iterable[int]) -> int:

@@ -82,8 +82,8 @@ def test_a_sign_that_nothing_decides_leaves_all_three_names(monkeypatch):
     problem = diagonal_problem([1.0, 3.0, 1.0, 3.0], [1.0, 0.0, 1.0, 0.5])
     signs = slip_signs.SlipSigns(problem, 0.0, (4, 4), (None, 1))
     assert signs.sign(0) is None
-    assert {status.value for status in signs.names(0)} == SLIPS[0]
-    assert {status.value for status in signs.names(1)} == SLIPS[1]
+    assert {status.value for status in slip_signs.slip_names(signs.sign(0))} == SLIPS[0]
+    assert {status.value for status in slip_signs.slip_names(signs.sign(1))} == SLIPS[1]
 
 
 def test_branch_graphs_name_such_nodes_exactly():
