@@ -81,7 +81,7 @@ class RootBuilder:
             _condensed=self.problem.condensed,
             _tangent=SelectionTangent(self.floats, self.problem.condensed, canonical, force, w) if regular else None,
             _slips=slips,
-            _exact_slips=self._points.exact_slips(solution.vertices[0]),
+            _exact_slips=self.points.exact_slips(solution.vertices[0]),
         )
 
     def _slip_signs(self, codes: Codes, solution: SelectionSolution) -> SlipSigns:
