@@ -46,7 +46,9 @@ def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> Root
     """Roots and families that the selections have at ``alpha``; in floats where these find all of them."""
     problem = data.problem
     if data.exact is None:
-        return _in_balls(data, alpha, selections)
+        # those that are proven for the problem's data as given
+        positive = tuple(F > 0 for F in exactly_at(Fraction(alpha), *problem.friction))
+        return roots_of_selections(problem, alpha, _codes_at(selections, positive), whole=not data.reasons)
     floats = FloatSelections(problem.condensed.at(alpha).proposals)
     solver: Any = floats
     exact = data.arithmetic != "fast"
@@ -79,13 +81,6 @@ def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> Root
         node_ids=problem.node_ids,
         at_least=whole + int(whole < len(components)) if data.reasons else None,
     )
-
-
-def _in_balls(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> RootSet:
-    """Roots that the selections are proven to have, for the problem's data as given."""
-    positive = [F > 0 for F in exactly_at(Fraction(alpha), *data.problem.friction)]
-    codes = _codes_at(selections, tuple(positive))
-    return roots_of_selections(data.problem, alpha, codes, whole=not data.reasons)
 
 
 def _codes_at(selections: Sequence[Codes], F_positive: tuple[bool, ...]) -> list[Codes]:

@@ -7,15 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.model.statuses import FINAL, OPEN
 from enumsol.roots.components import RootComponent
 from enumsol.selections.solution import SelectionSolution
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-_ALL = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS))
-_FRICTIONLESS = frozenset((OPEN, FRICTIONLESS))
 
 
 class AtRest:
@@ -37,7 +34,7 @@ class AtRest:
     def component(self) -> RootComponent:
         """The root."""
         solution = SelectionSolution((OPEN,) * self._p, (np.zeros(2 * self._p),), 0, 0, strict=False)
-        active = tuple(_ALL if positive else _FRICTIONLESS for positive in self._F_positive)
+        active = tuple(frozenset(FINAL[positive]) for positive in self._F_positive)
         return RootComponent((solution,), active, 0, 1, whole=True)
 
     def forces(self, point: Any) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from enumsol.arithmetic.rationals import rational
 from enumsol.branches.assembly import make_vertex, sides_of, with_exact_zeros
 from enumsol.branches.elements import Arc
 from enumsol.branches.enclosed.joining import EventPlaceKind
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, contact_status
+from enumsol.model.statuses import FINAL, FRICTIONLESS, contact_status
 
 if TYPE_CHECKING:
     from collections.abc import Sequence, Set
@@ -120,8 +120,5 @@ def _active(traced: TracedProblem, place: EventPlace) -> ActiveSets:
     """Codes that hold at every node, or may hold where the place was left open."""
     if place.kind is EventPlaceKind.ORIGIN:
         F0, F1 = traced.problem.friction
-        without = ((F0 == 0) & (F1 == 0)).tolist()
-        return tuple(
-            frozenset((OPEN, FRICTIONLESS) if still else (OPEN, STICK, SLIP_PLUS, SLIP_MINUS)) for still in without
-        )
+        return tuple(frozenset(FINAL[rubs]) for rubs in ((F0 != 0) | (F1 != 0)).tolist())
     return tuple(frozenset(codes) for codes in zip(*place.members, strict=True))

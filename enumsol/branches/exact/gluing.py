@@ -15,7 +15,7 @@ from networkx.utils import UnionFind
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge
 from enumsol.branches.exact.known_selections import KnownSelections
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.model.statuses import FINAL, OPEN
 from enumsol.roots.components import connected_components
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.selections.ordered_field import FiberSelections
@@ -189,10 +189,7 @@ def _joined(known: KnownSelections) -> list[list[SelectionEvent]]:
     origin = exact.origin
     if origin is not None and known.a <= origin <= known.b:
         waiting += _hold_everywhere(known, CriticalAlpha.rational(origin), union)
-    everything = tuple(
-        frozenset((OPEN, FRICTIONLESS) if without else (OPEN, STICK, SLIP_PLUS, SLIP_MINUS))
-        for without in exact.frictionless
-    )
+    everything = tuple(frozenset(FINAL[not without]) for without in exact.frictionless)
     while waiting:
         event = waiting.pop()
         seen[event] = None
