@@ -209,14 +209,10 @@ def continuations(equation: CondensedEquation, arrival: CurvePoint, sign: int) -
     """
     tangents = admissible_tangents(equation, arrival.x, ACTIVE_TOLERANCE)
     back = -arrival.tangent
-    others = [t for t in tangents if not _same(equation, t.vector, back)]
+    others = [t for t in tangents if equation.norm(t.vector - back) > SAME_TANGENT]
     keep = [t for t in others if t.orientation == sign]
     keep.sort(key=lambda t: -equation.dot(t.vector, arrival.tangent))
     return keep, [t for t in others if t.orientation != sign]
-
-
-def _same(equation: CondensedEquation, a: Vector, b: Vector) -> bool:
-    return equation.norm(a - b) <= SAME_TANGENT
 
 
 #: Singular values of a selection's matrix below this fraction of the largest are zero: on a sheet they are so exactly.

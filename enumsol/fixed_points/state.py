@@ -171,14 +171,11 @@ class TrescaState(Sealed):
             columns |= dict(zip("xyz", problem.coordinates.T, strict=False))
         columns["status"] = [status.value for status in self.statuses]
         columns["slip_bound"] = self.slip_bound
-        for name, values in (("F", self.coefficients), ("lambda_t", self.lambda_t), ("u_t", self.u_t)):
+        state = [(name, getattr(self, name)) for name in ("lambda_n", "lambda_t", "u_n", "u_t")]
+        for name, values in (("F", self.coefficients), *state):
             table = values.reshape(p, -1)
             names = [name] if table.shape[1] == 1 else [f"{name}{k + 1}" for k in range(2)]
             columns |= dict(zip(names, table.T, strict=True))
-            if name == "F":
-                columns["lambda_n"] = self.lambda_n
-            elif name == "lambda_t":
-                columns["u_n"] = self.u_n
         return pd.DataFrame(columns)
 
 

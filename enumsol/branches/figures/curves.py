@@ -15,10 +15,6 @@ if TYPE_CHECKING:
 
     from enumsol.branches.elements import Arc
 
-    Vector = NDArray[np.float64]
-    Matrix = NDArray[np.float64]
-    from numpy.typing import NDArray
-
     Floats = NDArray[np.float64]
 
 
@@ -29,10 +25,10 @@ _FIRST, _MOST = 9, 1025
 class Curve(NamedTuple):
     """Points along an arc: alphas (k,), lambda and w there (k, 2p), and the quantities drawn (k, columns)."""
 
-    alphas: Vector
-    forces: Matrix
-    moves: Matrix
-    values: Matrix
+    alphas: Floats
+    forces: Floats
+    moves: Floats
+    values: Floats
 
 
 def curves(
@@ -89,7 +85,7 @@ class _Polygon:
         self._angles = np.linspace(0.0, np.pi, _FIRST)
         self.curve = self._at(self._angles)
 
-    def _at(self, angles: Vector) -> Curve:
+    def _at(self, angles: Floats) -> Curve:
         lo, hi = self._lo, self._hi
         alphas = np.clip(lo + 0.5 * (1.0 - np.cos(angles)) * (hi - lo), lo, hi)
         alphas[angles == np.pi] = hi
@@ -100,7 +96,7 @@ class _Polygon:
         values = np.concatenate([columns(item, forces, moves) for item in self._quantities], axis=1)
         return Curve(alphas, forces, moves, values)
 
-    def refine(self, width: float, height: Vector, tolerance: float) -> None:
+    def refine(self, width: float, height: Floats, tolerance: float) -> None:
         """Halve angles until all chords are close."""
         doubtful = np.full(len(self._angles) - 1, self._lo < self._hi)
         while np.any(doubtful) and len(self._angles) < _MOST:
@@ -115,7 +111,7 @@ class _Polygon:
             doubtful = np.zeros(len(self._angles) - 1, dtype=bool)
             doubtful[place[far]] = doubtful[place[far] + 1] = True
 
-    def _distance(self, k: NDArray[np.intp], new: Curve, width: float, height: Vector) -> Vector:
+    def _distance(self, k: NDArray[np.intp], new: Curve, width: float, height: Floats) -> Floats:
         """Largest distance, over the columns, of points from the chords k."""
         alphas, values = self.curve.alphas, self.curve.values
         run = (alphas[k + 1] - alphas[k])[:, None] / width

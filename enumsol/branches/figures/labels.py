@@ -11,8 +11,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    Points = NDArray[np.float64]
     from enumsol.branches.claims import MultiplicitySteps
+
+    Points = NDArray[np.float64]
 
 
 #: Where along a curve a label may stand, the best place first, and on which sides of it.

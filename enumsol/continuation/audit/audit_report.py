@@ -382,12 +382,9 @@ def _line(item: AuditedPoint | Jump | MissedArc | str) -> str:
 
 
 def _point_record(point: AuditedPoint) -> dict[str, Any]:
-    record = {"path": point.path, "row": point.row, "alpha": point.alpha, **_place_record(point.place, point.branch)}
-    return {**record, "distance": point.distance, **({"reason": point.reason} if point.reason else {})}
-
-
-def _place_record(place: GraphPlace, branch: int) -> dict[str, Any]:
-    return {"place": place.kind.value, "number": place.number, "branch": branch}
+    place = {"place": point.place.kind.value, "number": point.place.number, "branch": point.branch}
+    record = {"path": point.path, "row": point.row, "alpha": point.alpha, **place, "distance": point.distance}
+    return record | ({"reason": point.reason} if point.reason else {})
 
 
 def _jump_record(jump: Jump) -> dict[str, Any]:
