@@ -88,7 +88,7 @@ def multiplicity_table(
     chosen = alpha_list(alphas)
     for alpha in chosen:
         problem.friction_at(alpha)
-    row = partial(table_row, problem, options={"arithmetic": arithmetic, **options})
+    row = partial(table_row, problem, {"arithmetic": arithmetic, **options})
     done: dict[int, dict[str, Any]] = {}
     try:
         for k, found in enumerate(map(row, chosen)) if executor is None else _spread(executor, row, chosen):
@@ -130,7 +130,7 @@ def _frame(problem: ContactProblem | ContactProblem3D, done: dict[int, dict[str,
     return table.astype({"index_sum": "Int64"})  # whole numbers, and missing ones
 
 
-def table_row(problem: ContactProblem | ContactProblem3D, alpha: Alpha, options: dict[str, Any]) -> dict[str, Any]:
+def table_row(problem: ContactProblem | ContactProblem3D, options: dict[str, Any], alpha: Alpha) -> dict[str, Any]:
     """One row of the table (a module-level function, so that other processes can import it)."""
     roots = enumerate_roots(problem, alpha, **options)
     counts = kinds(roots)
