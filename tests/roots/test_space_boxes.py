@@ -1,5 +1,6 @@
 """Degenerate roots in 3D that boxes of forces settle: complete results, several roots, resumed and spread searches."""
 
+import dataclasses
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -10,6 +11,7 @@ from space_proofs import random_problem
 from trees import by_the_tree
 
 from enumsol import enumerate_roots, verify
+from enumsol.trusted.space.leaves import Cause
 
 
 def settled(problem):
@@ -104,3 +106,24 @@ def test_fast_arithmetic_takes_boxes_as_well():
     assert len(roots) == 1
     assert roots[0].enclosure is None
     assert not roots[0].regular
+
+
+@pytest.mark.parametrize("seed", [48, 68])
+def test_what_stays_open_says_why_and_the_hint_helps(seed):
+    """Two roots meet at the solution: with another load there are none or both, beside those that are known."""
+    problem, lam, _, _, _ = degenerate_integers(seed)
+    roots = enumerate_roots(problem, 0, max_nodes=200)
+    (region,) = roots.undecided
+    assert region.reason == Cause.EQUALITY.value
+    assert "perturb the load" in region.hint
+    low, high = region.bounds.lambda_n.T
+    assert np.all((low - 1e-12 <= lam[:, 0]) & (lam[:, 0] <= high + 1e-12))
+    assert (len(roots), roots.at_least, roots.index_sum) == (1, 1, None)
+    sums = set()
+    for sign in (-1, 1):
+        change = 1e-4 * sign * np.max(np.abs(problem.f)) * np.random.default_rng(5).normal(size=problem.n)
+        near = enumerate_roots(dataclasses.replace(problem, f=problem.f + change), 0)
+        assert near.complete
+        assert near.index_sum == 1
+        sums.add(len(near))
+    assert sums == {1, 3}
