@@ -11,7 +11,9 @@ and S has eigenvalues far apart.
 
 ``degenerate`` are problems with three nodes whose search is long all the same: with small integers conditions hold with
 equality, and one region (``largest region``) may take hundreds of leaves; with much friction many selections come near
-to holding. They are kept to see what a change does to them.
+to holding. They are kept to see what a change does to them. ``known_solutions`` are small problems with a known
+solution whose first node just sticks ("limit"), touches without load and slides ("graze"), or is at rest without load
+("rest").
 """
 
 from __future__ import annotations
@@ -20,7 +22,14 @@ from time import process_time
 from typing import TYPE_CHECKING
 
 import enumsol
-from search_in_3d.degenerate import CASES, MAX_NODES as MOST_DEGENERATE, SMOKE_NODES, row as degenerate_row
+from search_in_3d.degenerate import (
+    CASES,
+    KINDS,
+    MAX_NODES as MOST_DEGENERATE,
+    SMOKE_NODES,
+    known_row,
+    row as degenerate_row,
+)
 
 if TYPE_CHECKING:
     from shared.results import Run
@@ -28,7 +37,7 @@ if TYPE_CHECKING:
 #: Cells of the blocks, which have 4, 9, 12, 16 and 25 contact nodes.
 BLOCKS, SMOKE_BLOCKS = ((2, 1, 2), (3, 2, 2), (4, 2, 2), (4, 3, 2), (5, 4, 2)), ((2, 1, 2),)
 FRICTION = (0.3, 0.5, 1.0, 3.0)
-MAX_NODES, MOST_WEDGES = 20_000, 100_000
+MAX_NODES, MOST_WEDGES, MOST_KNOWN = 20_000, 100_000, 200
 #: Cells of the wedges, which have 8 and 12 contact nodes with multipliers at the nodes.
 WEDGES = (1, 1, 2), (2, 1, 2), (2, 2, 2)
 WEDGE_FRICTION = (1.0, 2.0, 3.0)
@@ -93,3 +102,11 @@ def degenerate(run: Run) -> None:
     rows = [degenerate_row(*case, most) for case in CASES]
     cut = [r["case"] for r in rows if not r["ended"]]
     run.table("degenerate", rows, f"cut at {most} nodes: {', '.join(cut) or 'none'}")
+    sizes, count = ((1,), 2) if run.smoke else ((1, 2, 3), 12)
+    rows = [known_row(kind, p, count, SMOKE_NODES if run.smoke else MOST_KNOWN) for kind in KINDS for p in sizes]
+    told = [f"{sum(r['complete'] for r in rows if r['first node'] == kind)} of {count * len(sizes)}" for kind in KINDS]
+    run.table(
+        "known_solutions",
+        rows,
+        *(f"complete where the first node is in the state {kind!r}: {n}" for kind, n in zip(KINDS, told, strict=True)),
+    )
