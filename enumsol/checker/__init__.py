@@ -23,10 +23,10 @@ What checker and search share
       agree;
     - ``condensation.products``, ``condensation.enclosure`` and ``arithmetic.balls``: balls for S, g and F, and the
       proofs that A and S are positive definite;
-    - ``trusted.at_alpha`` and ``trusted.over_interval``: the exclusion inequality, the verified solve of a selection
-      and the contradiction of its equations, at one alpha and over a piece of an interval (the search has a compiled
-      copy of the inequality); ``trusted.energy_bounds``, what multipliers prove; ``trusted.quadratic_forms``, other
-      forms than the energy;
+    - ``trusted.exclusion``: the exclusion inequality, of which the search has a compiled copy, at one alpha and over
+      a piece of an interval (``trusted.over_interval``); ``trusted.energy_bounds``, what multipliers prove;
+      ``trusted.quadratic_forms``, other forms than the energy;
+    - ``trusted.at_alpha``: the verified solve of a selection and the contradiction of its equations;
     - ``trusted.uniqueness``, the test by which a subtree is closed by its only possible solution, and which of these
       solutions are the same; ``trusted.uniqueness_in_contact``, the test that a root is alone below an assignment;
       ``trusted.uniqueness_weights``, the form of both, and ``arithmetic.ball_arrays``, their linear systems of balls;

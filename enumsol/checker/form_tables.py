@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.trusted.quadratic_forms import EnclosedForm, form_margins
+from enumsol.trusted.exclusion import Leaves, exclusion_margins
+from enumsol.trusted.quadratic_forms import EnclosedForm
 
 if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.records import DeclaredForm, ExcludedByForm
+    from enumsol.trusted.exclusion import Terms
 
 
 class FormLeaves:
@@ -18,7 +20,7 @@ class FormLeaves:
 
     def __init__(self) -> None:
         self.declared: list[DeclaredForm] = []
-        self._waiting: dict[int, list[tuple[int, tuple[int, ...], Any, Any]]] = {}
+        self._waiting: dict[int, list[tuple[int, tuple[int, ...], Terms]]] = {}
 
     def __len__(self) -> int:
         return sum(map(len, self._waiting.values()))
@@ -26,7 +28,7 @@ class FormLeaves:
     def add(self, number: int, codes: tuple[int, ...], said: ExcludedByForm) -> None:
         """Take a leaf, to be checked with others."""
         place = len(self.declared) - said.back
-        self._waiting.setdefault(place, []).append((number, codes, said.rows, said.values))
+        self._waiting.setdefault(place, []).append((number, codes, (said.rows, said.values)))
 
     def clear(self) -> None:
         """Let go of the leaves that wait."""
@@ -37,12 +39,9 @@ class FormLeaves:
         failed: list[int] = []
         for place, leaves in self._waiting.items():
             declared = self.declared[place]
-            numbers, codes, rows, values = zip(*leaves, strict=True)
-            leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
+            numbers, codes, terms = zip(*leaves, strict=True)
             with np.errstate(over="ignore", invalid="ignore"):
                 form = EnclosedForm.of(system, declared.codes, declared.multipliers, declared.weight)
-                margins = form_margins(
-                    form, np.array(codes, dtype=np.intp), leaf, np.concatenate(rows), np.concatenate(values)
-                )
+                margins = exclusion_margins(form, Leaves.of(codes, terms))
             failed += np.array(numbers)[~(margins > 0)].tolist()
         return sorted(failed)

@@ -18,7 +18,7 @@ is checked by ``enumsol.checker.arcs``, if the proof says it.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -43,14 +43,8 @@ from enumsol.proof.reading import (
     same,
     units_from,
 )
-from enumsol.trusted.over_interval import (
-    KINDS,
-    EnclosedPiece,
-    as_computed,
-    interval_exclusion_margins,
-    interval_form_margins,
-    piece_forms,
-)
+from enumsol.trusted.exclusion import Leaves, exclusion_margin, exclusion_margins
+from enumsol.trusted.over_interval import KINDS, EnclosedPiece, as_computed
 from enumsol.trusted.status_rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, STICK, UNDECIDED, children_of
 
 if TYPE_CHECKING:
@@ -61,7 +55,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.data import Data
     from enumsol.model.problem import ContactProblem
-    from enumsol.trusted.quadratic_forms import EnclosedForm
+    from enumsol.trusted.exclusion import Terms
 
     Array = NDArray[np.float64]
     Codes = NDArray[np.uint8]
@@ -93,9 +87,9 @@ class _Piece:
     look: int = _LOOK
     #: made when there is something to exclude
     enclosed: EnclosedPiece | None = None
-    #: multipliers of the form declared last, and the form
+    #: multipliers of the form declared last, and the piece with it
     declared: Array | None = None
-    forms: tuple[EnclosedForm, ...] | None = None
+    with_form: EnclosedPiece | None = None
     closed: ClosedPiece | None = None
 
     def declare(self, record: list[Any]) -> None:
@@ -105,7 +99,7 @@ class _Piece:
         declared = np.array([numbers_from(values, self.roots.shape[1]) for values in record[1:]])
         if np.any(declared[2:] < 0):
             raise ValueError("a multiplier of a form is negative and must not be")
-        self.declared, self.forms = declared, None
+        self.declared, self.with_form = declared, None
 
     def leaves(self, *kinds: str) -> Codes:
         """Codes of the leaves of these kinds, shape (k, p); all without a kind."""
@@ -289,36 +283,27 @@ class GraphChecker:
         for kind in ("x", "f"):
             empty = [k for k, record in enumerate(batch) if record[0] == kind]
             if empty:
-                margins = partial(interval_exclusion_margins, self._enclosed(piece))
-                if kind == "f":
-                    margins = partial(interval_form_margins, self._enclosed(piece), self._forms(piece))
+                within = self._enclosed(piece) if kind == "x" else self._with_form(piece)
                 texts = (batch[k][2:] for k in empty)
-                pairs = [multipliers_from(text, KINDS * self.problem.p) for text in texts]
-                self._exclusions(margins, codes[empty].astype(np.intp), pairs)
+                terms = [multipliers_from(text, KINDS * self.problem.p) for text in texts]
+                self._exclusions(within, codes[empty], terms)
 
-    def _exclusions(
-        self,
-        margins_of: Callable[..., Array],
-        codes: NDArray[np.intp],
-        pairs: list[tuple[NDArray[np.intp], Array]],
-    ) -> None:
-        rows, values = zip(*pairs, strict=True)
-        leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
-        margins = margins_of(codes, leaf, np.concatenate(rows), np.concatenate(values))
+    def _exclusions(self, within: EnclosedPiece, codes: Codes, terms: list[Terms]) -> None:
+        margins = exclusion_margins(within, Leaves.of(codes, terms))
         for number in np.flatnonzero(~(margins > 0)):
             # alone it is summed in the order of the search, which may matter for a nearly singular S
-            alone = codes[number : number + 1], np.zeros(len(rows[number]), dtype=np.intp)
-            if not margins_of(*alone, rows[number], values[number])[0] > 0:
+            if not exclusion_margin(within, codes[number], *terms[number]) > 0:
                 self._fail(f"leaf {self.leaves + number + 1}: its multipliers do not exclude it")
-        self.leaves += len(rows)
+        self.leaves += len(terms)
 
-    def _forms(self, piece: _Piece) -> tuple[EnclosedForm, ...]:
-        """The form declared last at both ends of the piece."""
+    def _with_form(self, piece: _Piece) -> EnclosedPiece:
+        """The data at both ends of the piece, with the form declared last."""
+        enclosed = self._enclosed(piece)
         if piece.declared is None:
             raise ValueError("its form was not declared")
-        if piece.forms is None:
-            piece.forms = piece_forms(self._enclosed(piece), piece.declared)
-        return piece.forms
+        if piece.with_form is None:
+            piece.with_form = enclosed.with_form(piece.declared)
+        return piece.with_form
 
     def _enclosed(self, piece: _Piece) -> EnclosedPiece:
         """The data at both ends of the piece, with S proven positive definite."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.model.problem import ContactProblem
 from enumsol.proof import records
 from enumsol.support.arguments import instance_of
-from enumsol.trusted.at_alpha import exclusion_margins, solve_selection
+from enumsol.trusted.at_alpha import solve_selection
+from enumsol.trusted.exclusion import Leaves, exclusion_margins
 from enumsol.trusted.uniqueness_in_contact import lone_root
 
 if TYPE_CHECKING:
@@ -148,12 +149,11 @@ class _WidenedChecker(Checker):
         self.radius = good if good >= SMALLEST else 0.0
         return self.radius > 0
 
-    def _check_exclusions(self, numbers: NDArray[np.intp], leaves: tuple[Any, ...]) -> None:
-        codes, leaf, rows, given = leaves
-        sturdy = given * _sturdiest(self.system, *leaves)[leaf]
+    def _check_exclusions(self, numbers: NDArray[np.intp], leaves: Leaves) -> None:
+        sturdy = leaves.times(_sturdiest(self.system, leaves))
 
         def excluded(system: EnclosedSystem) -> bool:
-            bounds = [exclusion_margins(system, codes, leaf, rows, values) for values in (given, sturdy)]
+            bounds = [exclusion_margins(system, claimed) for claimed in (leaves, sturdy)]
             return bool(np.all(np.maximum(*bounds) > 0))
 
         if not self._passes(excluded):
@@ -197,20 +197,14 @@ class _WidenedChecker(Checker):
         return None if self._passes(holds) else "it does not hold for all data"
 
 
-def _sturdiest(
-    system: EnclosedSystem,
-    codes: NDArray[np.intp],
-    leaf: NDArray[np.intp],
-    rows: NDArray[np.intp],
-    values: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _sturdiest(system: EnclosedSystem, leaves: Leaves) -> NDArray[np.float64]:
     """Positive factors of the leaves' multipliers that make their bounds large against their errors.
 
     With multipliers stretched by t the bound is -a + b t - c t^2, known from three points, and its error grows like
     t^2: their quotient is largest at t = 2 a / b. The multipliers of infeasible leaves may be far from that.
     """
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        zero, one, two = (exclusion_margins(system, codes, leaf, rows, t * values) for t in (0.0, 1.0, 2.0))
+        zero, one, two = (exclusion_margins(system, leaves.times(t)) for t in (0.0, 1.0, 2.0))
         slope = one - zero - 0.5 * (two - 2 * one + zero)
         best = -2 * zero / slope
     return np.where((slope > 0) & np.isfinite(best), np.clip(best, 1 / _STRETCH, _STRETCH), 1.0)

@@ -26,7 +26,8 @@ from enumsol.proof import records
 from enumsol.proof.proof_file import Proof, fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
 from enumsol.support.arguments import instance_of, optional_callable
-from enumsol.trusted.at_alpha import exclusion_margins, holds_no_root, solve_selection
+from enumsol.trusted.at_alpha import holds_no_root, solve_selection
+from enumsol.trusted.exclusion import Leaves, exclusion_margins
 from enumsol.trusted.status_rows import ROW_KINDS, UNDECIDED, coverings_of, row_signs
 from enumsol.trusted.uniqueness_in_contact import lone_root
 
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.trusted.at_alpha import VerifiedSelection
+    from enumsol.trusted.exclusion import Terms
     from enumsol.trusted.uniqueness import ClosedSolution
 
     #: codes of a selection, the vertices of its root set, and its dimension
@@ -128,7 +130,7 @@ class Checker(TreeChecker):
     #: Codes of the strict roots of complete selections.
     strict: list[tuple[int, ...]] = field(default_factory=list)
     _in_doubt: int = 0
-    _waiting: list[tuple[int, tuple[int, ...], Any, Any]] = field(default_factory=list)
+    _waiting: list[tuple[int, tuple[int, ...], Terms]] = field(default_factory=list)
     _by_forms: FormLeaves = field(default_factory=FormLeaves)
 
     # -- header and tree -------------------------------------------------------------------------------------------
@@ -185,15 +187,12 @@ class Checker(TreeChecker):
             self._by_forms.clear()
         if not self._waiting or (not last and len(self._waiting) < _BATCH):
             return
-        numbers, codes, rows, values = zip(*self._waiting, strict=True)
+        numbers, codes, terms = zip(*self._waiting, strict=True)
         self._waiting.clear()
-        leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
-        arrays = np.array(codes, dtype=np.intp), leaf, np.concatenate(rows), np.concatenate(values)
-        self._check_exclusions(np.array(numbers), arrays)
+        self._check_exclusions(np.array(numbers), Leaves.of(codes, terms))
 
-    def _check_exclusions(self, numbers: NDArray[np.intp], leaves: tuple[Any, ...]) -> None:
-        """``leaves``: codes, leaf, rows and values as exclusion_margins takes them."""
-        margins = exclusion_margins(self.system, *leaves)
+    def _check_exclusions(self, numbers: NDArray[np.intp], leaves: Leaves) -> None:
+        margins = exclusion_margins(self.system, leaves)
         for number in numbers[~(margins > 0)]:
             self.fail(f"leaf {number}: its multipliers do not exclude it")
 
@@ -244,7 +243,7 @@ class Checker(TreeChecker):
         self.polytopes.append(((0,) * self.problem.p, [tuple([Fraction(0)] * (2 * self.problem.p))], 0))
 
     def _excluded(self, codes: Codes, said: records.Excluded) -> str | None:
-        self._waiting.append((self.leaves, codes, said.rows, said.values))
+        self._waiting.append((self.leaves, codes, (said.rows, said.values)))
         return None
 
     def _excluded_by_form(self, codes: Codes, said: records.ExcludedByForm) -> str | None:

@@ -5,7 +5,7 @@ S and g as computed, with the bounds of their errors, are in ``condensation.prod
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -147,6 +147,11 @@ class CondensedEnclosure(Sealed):
         F_rad = np.where(inexact, 2 * UNIT * F + TINY, 0.0)
         S, S_rad, g, g_rad = self.in_units(a, force, length)
         return EnclosedSystem(S, S_rad, g, g_rad, F, F_rad)
+
+    def constant_load(self, side: float) -> CondensedEnclosure:
+        """The same with g = side g1 at every alpha, ``side`` 1 or -1: what solutions are beside a zero of g."""
+        none = np.zeros_like(self.g1)
+        return replace(self, g0=side * self.g1, g0_rad=self.g1_rad, g1=none, g1_rad=none)
 
     def in_units(self, alpha: Fraction, force: Array, length: Array) -> tuple[Array, Array, Array, Array]:
         """S and g(alpha) with radii, in units of every row given by powers of two.

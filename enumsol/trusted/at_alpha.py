@@ -1,4 +1,4 @@
-"""The trusted core: exclusion inequalities and verified solves on an EnclosedSystem (theory, sections 6.2-6.4).
+"""The trusted core: verified solves of selections on an EnclosedSystem (theory, sections 6.3 and 6.4).
 
 Everything that makes the word "complete" true for a regular problem passes through the functions of this module,
 in the search and in the checker alike. Codes and row kinds are plain integers with the meaning documented in
@@ -14,60 +14,14 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball, VerifiedSolution, column_scale, verified_solve
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma, upper_norm
-from enumsol.trusted.energy_bounds import margins
 from enumsol.trusted.selection import Selection
-from enumsol.trusted.status_rows import (
-    CONDITIONS,
-    row_signs,
-)
+from enumsol.trusted.status_rows import CONDITIONS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
-
-
-def exclusion_margin(
-    system: EnclosedSystem, codes: Sequence[int], rows: NDArray[np.intp], values: Array, errors: float = 1.0
-) -> float:
-    """Proven lower bound on the energy over one partial assignment (see exclusion_margins)."""
-    leaf = np.zeros(len(rows), dtype=np.intp)
-    return float(exclusion_margins(system, np.array([codes], dtype=np.intp), leaf, rows, values, errors)[0])
-
-
-def exclusion_margins(
-    system: EnclosedSystem,
-    codes: NDArray[np.intp],
-    leaf: NDArray[np.intp],
-    rows: NDArray[np.intp],
-    values: Array,
-    errors: float = 1.0,
-) -> Array:
-    """Proven lower bounds on the energy over partial assignments; positive means that one holds no solution.
-
-    With multipliers that combine to y on S lambda - g and to c on lambda, v = g + c + S y and q = g + c,
-
-        min e  >=  -1/4 v'S^{-1}v + y'g  =  1/2 y'(g - c) - 1/4 y'S y - 1/4 q'S^{-1}q
-
-    and, for any x, q'S^{-1}q = 2 x'q - x'S x + r'S^{-1}r with r = q - S x.
-
-    Parameters
-    ----------
-    system : EnclosedSystem
-    codes : (m, p) array of (partial) status codes
-    leaf : (k,) array, the assignment to which each multiplier belongs
-    rows, values : (k,) arrays of row numbers (kind * p + node) and multipliers. A row that the assignment does not
-        impose, or a multiplier of the wrong sign, makes that assignment's bound -inf.
-    errors : how often the error bound is subtracted (see energy_bounds)
-
-    Returns
-    -------
-    (m,) array
-    """
-    return margins((system,), row_signs(codes, system.F), (system.F, system.F), leaf, rows, values, errors)
 
 
 @dataclass(frozen=True)

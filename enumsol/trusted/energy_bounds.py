@@ -12,73 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma
-from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE, ROW_KINDS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import NDArray
-
     from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
 
 #: Steps of refinement; forms may be hardly convex.
 _REFINEMENTS = 3
-
-
-def margins(
-    ends: Sequence[Any],
-    allowed: NDArray[np.int8],
-    friction: tuple[Array, Array],
-    leaf: NDArray[np.intp],
-    rows: NDArray[np.intp],
-    values: Array,
-    errors: float,
-    bounds_of: Callable[[Any, Array, Array, Array, float], Array] | None = None,
-) -> Array:
-    """Bounds as of exclusion_margins that hold at all ``ends``, -inf where one is not finite.
-
-    Parameters
-    ----------
-    ends : EnclosedSystems that differ in g only, and in F, which enters by its bounds; or an EnclosedForm
-    allowed : (m, p, kinds) array, what the multipliers may be: seven kinds of rows, or nine over an interval
-    friction : two (p,) arrays, the smallest and the largest coefficients; equal where friction is constant
-    bounds_of : what bounds one of ``ends``, by default energy_bounds
-    """
-    m, p, kinds = allowed.shape
-    low, high = friction
-    bad = (rows < 0) | (rows >= kinds * p) | ~np.isfinite(values)
-    rows, values = np.where(bad, 0, rows), np.where(bad, 0.0, values)
-    kind, node = np.divmod(rows, p)
-    signs = allowed[leaf, node, kind]
-    bad |= (signs == FORBIDDEN) | ((signs == NONNEGATIVE) & (values < 0))
-    refused = np.bincount(leaf[bad], minlength=m) > 0
-    # one table per leaf with a row for each kind; several multipliers of a row add up
-    place, count = leaf * (kinds * p) + rows, kinds * p * m
-    table = np.bincount(place, values, minlength=count).reshape(m, kinds, p)
-    size = np.bincount(place, np.abs(values), minlength=count).reshape(m, kinds, p)
-    # what overflows gives no bound
-    with np.errstate(over="ignore", invalid="ignore"):
-        cone_size = size[:, 2] + size[:, 3]
-        y = np.hstack([table[:, 4], table[:, 6] - table[:, 5]])
-        normal, tangential = table[:, 0] + high * (table[:, 2] + table[:, 3]), table[:, 1] - table[:, 2] + table[:, 3]
-        normal_size, tangential_size = size[:, 0] + high * cone_size, size[:, 1] + cone_size
-        if kinds > ROW_KINDS:
-            normal, tangential = normal - low * (table[:, 7] + table[:, 8]), tangential + table[:, 7] - table[:, 8]
-            least_size = size[:, 7] + size[:, 8]
-            normal_size, tangential_size = normal_size + low * least_size, tangential_size + least_size
-        c, c_size = np.hstack([normal, tangential]), np.hstack([normal_size, tangential_size])
-        # The rounded y is as good a choice of multipliers as the exact one: every component belongs to rows of one
-        # sign, or to rows that are free, and sums of one sign keep it. c is not free in this way: cone rows tie its two
-        # halves by F. A component of c is a sum over at most five kinds of rows, four at one alpha, each repeated at
-        # most so often.
-        repeated = int(np.bincount(place, minlength=1).max())
-        c_rad = gamma((5 if kinds > ROW_KINDS else 4) * repeated + 8) * c_size
-        # where friction is constant a cone row may be an equation, and its coefficient must be the exact one
-        c_rad[:, :p] += np.max([end.F_rad for end in ends], axis=0) * (low == high) * cone_size
-        bounds_of = bounds_of or energy_bounds
-        bounds = np.min([bounds_of(end, y, c, c_rad * SAFE, errors) for end in ends], axis=0)
-    return np.where(refused | ~np.isfinite(bounds), -np.inf, bounds)
 
 
 def energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array, errors: float = 1.0) -> Array:

@@ -1,4 +1,4 @@
-"""Exclusion inequalities over an interval of alpha (theory, section 7.9).
+"""What exclusions over an interval of alpha are proven with (theory, section 7.9).
 
 With fixed multipliers the dual bound is concave in alpha: constraint normals are constant (friction enters by its
 extreme values) and right-hand sides affine. Positive at both ends, it is positive in between, and a partial assignment
@@ -18,13 +18,10 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.condensation.enclosure import CondensedEnclosure
-from enumsol.trusted.energy_bounds import form_bounds, margins
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import BACKWARD, FORWARD, ROW_KINDS, STILL, UNDECIDED, row_table
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from enumsol.arithmetic.balls import Array
@@ -51,11 +48,14 @@ class EnclosedPiece:
         At both ends; one where g does not vary.
     low, high : (p,) arrays
         Bounds of the friction coefficients over the piece; equal exactly where friction is constant.
+    forms : tuple of EnclosedForm
+        What bounds at the ends are about; empty for the energy.
     """
 
     ends: tuple[EnclosedSystem, ...]
     low: Array
     high: Array
+    forms: tuple[EnclosedForm, ...] = ()
 
     @classmethod
     def from_enclosure(
@@ -80,22 +80,31 @@ class EnclosedPiece:
             low = np.where(constant, systems[0].F, np.maximum(np.nextafter(low, -np.inf), 0.0))
             high = np.where(constant, systems[0].F, np.nextafter(high, np.inf))
         if origin is not None:
-            direction = 1.0 if b > origin else -1.0
-            zero = np.zeros_like(enclosure.g1)
-            still = CondensedEnclosure(
-                enclosure.S,
-                enclosure.S_rad,
-                direction * enclosure.g1,
-                enclosure.g1_rad,
-                zero,
-                zero,
-                enclosure.stiffness_bound,
-                enclosure.problem,
-            )
-            systems = [still.at(a, force, length)]
+            systems = [enclosure.constant_load(1.0 if b > origin else -1.0).at(a, force, length)]
         elif enclosure.problem.load_slope is None:
             systems = systems[:1]
         return cls(tuple(systems), low, high)
+
+    def with_form(self, multipliers: Array) -> EnclosedPiece:
+        """The same with a form for all alpha of the piece: with F_lo in place of F (theory, section 7.9).
+
+        Parameters
+        ----------
+        multipliers : (4, p) array
+            mu, nu, alpha and beta (see EnclosedForm); the last two are at least zero.
+        """
+        everything = (UNDECIDED,) * len(self.low)
+        # exact coefficients, below those of the piece, where friction varies
+        uncertain = [np.where(self.low == self.high, end.F_rad, 0.0) for end in self.ends]
+        systems = [replace(end, F=self.low, F_rad=rad) for end, rad in zip(self.ends, uncertain, strict=True)]
+        with np.errstate(over="ignore", invalid="ignore"):
+            forms = tuple(EnclosedForm.of(system, everything, multipliers, 0.0) for system in systems)
+        return replace(self, forms=forms)
+
+    def row_signs(self, codes: NDArray[np.intp]) -> NDArray[np.int8]:
+        """What multipliers may be, (m, p, 9), for (partial) status codes (m, p)."""
+        code = np.where((codes == UNDECIDED) & (self.high == 0), STILL, codes)
+        return np.where((self.low == self.high)[:, None], _CONSTANT[code], _VARYING[code])
 
 
 def as_computed(problem: ContactProblem) -> CondensedEnclosure:
@@ -108,77 +117,3 @@ def as_computed(problem: ContactProblem) -> CondensedEnclosure:
 def interval_row_tables() -> NDArray[np.int8]:
     """What the multipliers may be, shape (2, 10, 9), by status code as in rows.row_table; second: friction varies."""
     return np.stack([_CONSTANT, _VARYING])
-
-
-def interval_exclusion_margin(
-    piece: EnclosedPiece, codes: Sequence[int], rows: NDArray[np.intp], values: Array, errors: float = 1.0
-) -> float:
-    """Proven lower bound on the energy over one partial assignment and a piece (see interval_exclusion_margins)."""
-    leaf = np.zeros(len(rows), dtype=np.intp)
-    found = interval_exclusion_margins(piece, np.array([codes], dtype=np.intp), leaf, rows, values, errors)
-    return float(found[0])
-
-
-def interval_exclusion_margins(
-    piece: EnclosedPiece,
-    codes: NDArray[np.intp],
-    leaf: NDArray[np.intp],
-    rows: NDArray[np.intp],
-    values: Array,
-    errors: float = 1.0,
-) -> Array:
-    """Proven lower bounds on the energy over partial assignments and all alpha of a piece; positive excludes.
-
-    Parameters
-    ----------
-    piece : EnclosedPiece
-    codes : (m, p) array of (partial) status codes
-    leaf : (k,) array, the assignment to which each multiplier belongs
-    rows, values : (k,) arrays of row numbers (kind * p + node, nine kinds) and multipliers
-    errors : how often the error bound is subtracted (see energy_bounds)
-
-    Returns
-    -------
-    (m,) array
-    """
-    return margins(piece.ends, _allowed(piece, codes), (piece.low, piece.high), leaf, rows, values, errors)
-
-
-def _allowed(piece: EnclosedPiece, codes: NDArray[np.intp]) -> NDArray[np.int8]:
-    """What multipliers may be, (m, p, 9)."""
-    code = np.where((codes == UNDECIDED) & (piece.high == 0), STILL, codes)
-    return np.where((piece.low == piece.high)[:, None], _CONSTANT[code], _VARYING[code])
-
-
-def piece_forms(piece: EnclosedPiece, multipliers: Array) -> tuple[EnclosedForm, ...]:
-    """A form for all alpha of a piece, at its ends: with F_lo in place of F (theory, section 7.9).
-
-    Parameters
-    ----------
-    piece : EnclosedPiece
-    multipliers : (4, p) array
-        mu, nu, alpha and beta (see EnclosedForm); the last two are at least zero.
-    """
-    everything = (UNDECIDED,) * len(piece.low)
-    # exact coefficients, below those of the piece, where friction varies
-    uncertain = [np.where(piece.low == piece.high, end.F_rad, 0.0) for end in piece.ends]
-    systems = [replace(end, F=piece.low, F_rad=rad) for end, rad in zip(piece.ends, uncertain, strict=True)]
-    with np.errstate(over="ignore", invalid="ignore"):
-        return tuple(EnclosedForm.of(system, everything, multipliers, 0.0) for system in systems)
-
-
-def interval_form_margins(
-    piece: EnclosedPiece,
-    forms: Sequence[EnclosedForm],
-    codes: NDArray[np.intp],
-    leaf: NDArray[np.intp],
-    rows: NDArray[np.intp],
-    values: Array,
-    errors: float = 1.0,
-) -> Array:
-    """The same as interval_exclusion_margins with ``forms`` of piece_forms in place of the energy."""
-    if not all(form.smallest_eigenvalue > 0 for form in forms):
-        return np.full(len(codes), -np.inf)
-    allowed, friction = _allowed(piece, codes), (piece.low, piece.high)
-    with np.errstate(over="ignore", invalid="ignore"):
-        return margins(forms, allowed, friction, leaf, rows, values, errors, form_bounds)

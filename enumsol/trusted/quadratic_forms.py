@@ -18,19 +18,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, gamma, upper_norm
-from enumsol.trusted.energy_bounds import form_bounds, margins
-from enumsol.trusted.status_rows import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED, row_signs
+from enumsol.trusted.status_rows import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
-
-#: Steps of refinement; forms may be hardly convex.
-_REFINEMENTS = 3
 
 
 @dataclass(frozen=True)
@@ -178,43 +172,3 @@ class EnclosedForm:
         """kappa with |fl(x'H x) - x'H x| <= kappa ||x||^2 for every H."""
         size = 4 * len(self.h) + 4
         return float((upper_norm(self.H_rad) + gamma(size) * upper_norm(self.H)) * SAFE)
-
-
-def form_margin(
-    form: EnclosedForm, codes: Sequence[int], rows: NDArray[np.intp], values: Array, errors: float = 1.0
-) -> float:
-    """Proven lower bound on a form over one partial assignment (see form_margins)."""
-    leaf = np.zeros(len(rows), dtype=np.intp)
-    return float(form_margins(form, np.array([codes], dtype=np.intp), leaf, rows, values, errors)[0])
-
-
-def form_margins(
-    form: EnclosedForm,
-    codes: NDArray[np.intp],
-    leaf: NDArray[np.intp],
-    rows: NDArray[np.intp],
-    values: Array,
-    errors: float = 1.0,
-) -> Array:
-    """Proven lower bounds on a form over partial assignments; positive means that one holds no solution.
-
-    With multipliers that combine to y on S lambda - g and to c on lambda, and v = h + c + S y,
-
-        min q  >=  k + y'g - 1/4 v'H^{-1}v
-
-    and, for any x, v'H^{-1}v = 2 x'v - x'H x + r'H^{-1}r with r = v - H x.
-
-    Parameters
-    ----------
-    form : EnclosedForm
-        Of a partial assignment that holds all of these.
-    codes, leaf, rows, values, errors : as of ``point.exclusion_margins``
-
-    Returns
-    -------
-    (m,) array, -inf where the form is not proven positive definite.
-    """
-    if not form.smallest_eigenvalue > 0:
-        return np.full(len(codes), -np.inf)
-    system = form.system
-    return margins((form,), row_signs(codes, system.F), (system.F, system.F), leaf, rows, values, errors, form_bounds)

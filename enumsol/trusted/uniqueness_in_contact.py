@@ -12,7 +12,8 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, gamma
-from enumsol.trusted.at_alpha import exclusion_margin, solve_selection
+from enumsol.trusted.at_alpha import solve_selection
+from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.status_rows import (
     BACKWARD,
     CONTACT,

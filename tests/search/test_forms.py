@@ -15,7 +15,8 @@ from enumsol.checker.stability import stability_radius
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.search import form_policy as policy
 from enumsol.search.solvers import Solvers, as_computed_in_floats
-from enumsol.trusted.quadratic_forms import EnclosedForm, Equations, form_margin
+from enumsol.trusted.exclusion import exclusion_margin
+from enumsol.trusted.quadratic_forms import EnclosedForm, Equations
 from enumsol.trusted.status_rows import row_signs
 
 pytestmark = pytest.mark.usefixtures("tree_only")
@@ -277,7 +278,7 @@ def test_an_indefinite_form_excludes_nothing():
     solvers = Solvers(problem, 1.0, "verified", 1e-9)
     multipliers = -np.ones((4, 3))
     form = EnclosedForm.of(solvers.enclosed, (6, 6, 6), np.abs(multipliers) * [[-1], [0], [1], [1]], 0.0)
-    assert form_margin(form, (6, 6, 6), np.array([0]), np.array([1e6])) == -np.inf
+    assert exclusion_margin(form, (6, 6, 6), np.array([0]), np.array([1e6])) == -np.inf
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -309,7 +310,7 @@ def test_compiled_bounds_are_below_the_exact_one_and_that_of_the_checker(seed):
         exact = constant - (column.transpose() * H.solve(column))[0, 0] / 4
         least = once.margin(codes, rows, values)
         assert _exact(least) <= exact
-        kernel = form_margin(form, codes, rows, values)
+        kernel = exclusion_margin(form, codes, rows, values)
         assert often.margin(codes, rows, values) <= kernel
         assert _exact(kernel) <= exact
         assert float(int(exact.p) / int(exact.q)) - least < 1e-9 * (1 + np.sum(values**2))

@@ -15,7 +15,8 @@ from enumsol import branch_graph, gallery, verify
 from enumsol.relaxation.interval_relaxation import IntervalEngine, IntervalSystem, PieceForm
 from enumsol.search.interval import interval_tree
 from enumsol.search.interval.interval_forms import PairedTerms, better_form
-from enumsol.trusted.over_interval import EnclosedPiece, interval_form_margins, piece_forms
+from enumsol.trusted.exclusion import exclusion_margin
+from enumsol.trusted.over_interval import EnclosedPiece
 
 KINDS = ("friction", "load", "both")
 
@@ -78,16 +79,14 @@ def test_a_piece_with_solutions_is_not_excluded_by_any_form():
                 form = rng.normal(size=(4, problem.p)) * 0.3
                 form[0] += 1.0
                 form[2:] = np.abs(form[2:])
-                forms = piece_forms(piece, form)
-                tried += all(one.smallest_eigenvalue > 0 for one in forms)
+                within = piece.with_form(form)
+                tried += all(one.smallest_eigenvalue > 0 for one in within.forms)
                 for _ in range(20):
                     rows = np.arange(9 * problem.p)[rng.random(9 * problem.p) < 0.7]
                     values = rng.normal(size=len(rows)) * 10.0 ** rng.uniform(-3, 2)
                     # the sign that most rows allow
                     values = np.where(rng.random(len(rows)) < 0.8, np.abs(values), values)
-                    leaf = np.zeros(len(rows), dtype=np.intp)
-                    margin = interval_form_margins(piece, forms, np.array([codes]), leaf, rows, values)
-                    assert not margin[0] > 0
+                    assert not exclusion_margin(within, codes, rows, values) > 0
     assert tried > 50
 
 

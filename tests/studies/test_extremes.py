@@ -17,7 +17,7 @@ from enumsol.condensation import enclosure
 from enumsol.continuation import start_tangents
 from enumsol.search import solvers
 from enumsol.search.solvers import Solvers
-from enumsol.trusted.at_alpha import exclusion_margin
+from enumsol.trusted.exclusion import exclusion_margin
 
 #: Group of the study -> which of its cases: the first, and steps.
 SOME = {"scales": (3, 40), "alphas": (4, 11), "frictions": (1, 6), "materials": (4, 7), "geometries": (1, 5)}

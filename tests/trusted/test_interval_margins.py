@@ -9,7 +9,8 @@ from path_problems import generic_problem
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.search.certifiers._margin import Margins
 from enumsol.search.interval.subintervals import FastIntervalCertifier, IntervalSearch
-from enumsol.trusted.over_interval import KINDS, EnclosedPiece, interval_exclusion_margin, interval_row_tables
+from enumsol.trusted.exclusion import exclusion_margin
+from enumsol.trusted.over_interval import KINDS, EnclosedPiece, interval_row_tables
 from enumsol.trusted.status_rows import FORBIDDEN, FREE
 
 CODES = (0, 1, 2, 3, 5, 6)
@@ -50,7 +51,7 @@ def test_compiled_margins_equal_those_of_the_kernel(kind):
             codes = rng.choice(CODES, size=p)
             rows, values = multipliers(rng, signs_of(piece, codes), rng.choice([0.2, 0.7, 1.0]))
             ours = compiled.margin(tuple(codes.tolist()), rows, values)
-            theirs = interval_exclusion_margin(piece, codes, rows, values, errors=2.0)
+            theirs = exclusion_margin(piece, codes, rows, values, errors=2.0)
             # beyond an end whose bound is not positive the compiled loops do not look
             size = np.sum(np.abs(values)) ** 2 + 1.0
             if theirs > 0:
@@ -74,7 +75,7 @@ def test_both_refuse_the_same_multipliers(kind):
         for row in range(-1, (KINDS + 1) * p):
             codes = rng.choice(CODES, size=p)
             arrays = np.array([row], dtype=np.intp), np.array([rng.choice([-1.0, 1.0, np.nan])])
-            found = compiled.margin(tuple(codes.tolist()), *arrays), interval_exclusion_margin(piece, codes, *arrays)
+            found = compiled.margin(tuple(codes.tolist()), *arrays), exclusion_margin(piece, codes, *arrays)
             assert (found[0] == -np.inf) == (found[1] == -np.inf)
             refused += found[0] == -np.inf
     assert refused > 200
@@ -96,7 +97,7 @@ def test_positive_margins_of_a_search_agree(kind):
             piece = EnclosedPiece.from_enclosure(enclosure, *ends, units.force, units.length, None)
             compiled = Margins(piece.ends, piece.low, piece.high)
             for leaf in part.empty:
-                theirs = interval_exclusion_margin(piece, leaf.codes, leaf.rows, leaf.values, errors=2.0)
+                theirs = exclusion_margin(piece, leaf.codes, leaf.rows, leaf.values, errors=2.0)
                 ours = compiled.margin(leaf.codes, leaf.rows, leaf.values)
                 assert (ours > 0) == (theirs > 0)
                 if theirs > 0:

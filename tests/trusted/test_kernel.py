@@ -13,7 +13,8 @@ from enumsol import enumerate_roots, gallery
 from enumsol.search.certifiers._margin import Margins
 from enumsol.search.solvers import Solvers
 from enumsol.trusted import at_alpha as point
-from enumsol.trusted.at_alpha import exclusion_margin, exclusion_margins, solve_selection
+from enumsol.trusted.at_alpha import solve_selection
+from enumsol.trusted.exclusion import Leaves, exclusion_margin, exclusion_margins
 from enumsol.trusted.status_rows import row_signs
 
 CODES = (0, 1, 2, 3, 5, 6)
@@ -211,9 +212,7 @@ def test_batches_equal_single_leaves():
     codes = rng.choice(CODES, size=(20, 3))
     parts = [random_multipliers(rng, c, system.F, bad=False) for c in codes]
     parts[4] = (np.zeros(0, dtype=np.intp), np.zeros(0))
-    leaf = np.repeat(np.arange(20), [len(rows) for rows, _ in parts])
-    rows, values = (np.concatenate([part[k] for part in parts]) for k in range(2))
-    batch = exclusion_margins(system, codes, leaf, rows, values)
+    batch = exclusion_margins(system, Leaves.of(codes, parts))
     for k, (r, v) in enumerate(parts):
         assert exclusion_margin(system, tuple(codes[k]), r, v) == pytest.approx(batch[k], rel=1e-12, abs=1e-12)
 

@@ -14,7 +14,8 @@ from enumsol import ContactProblem, gallery
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
 from enumsol.condensation.factorization import Factorization
 from enumsol.search.certifiers._margin import Margins
-from enumsol.trusted.at_alpha import exclusion_margin, solve_selection
+from enumsol.trusted.at_alpha import solve_selection
+from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.status_rows import row_signs
 
 

@@ -10,13 +10,11 @@ from enumsol.model.statuses import RowKind
 from enumsol.relaxation.imposed_rows import with_implied
 from enumsol.relaxation.interval_relaxation import IntervalRowKind, interval_rows
 from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
+from enumsol.search.interval.subintervals import IntervalCertifier
 from enumsol.selections.rational_selections import ExactSelections
 
 if TYPE_CHECKING:
     from fractions import Fraction
-
-    import numpy as np
-    from numpy.typing import NDArray
 
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.relaxation.interval_relaxation import IntervalSystem
@@ -29,7 +27,7 @@ _CONES: dict[int, RowKind] = {
 }
 
 
-class ExactIntervalCertifier:
+class ExactIntervalCertifier(IntervalCertifier):
     """Accepts a leaf when the dual bound of its multipliers is positive at both ends of the piece, exactly.
 
     With fixed multipliers the bound is concave in alpha, so that it is positive between the ends too.
@@ -39,7 +37,6 @@ class ExactIntervalCertifier:
     exact : ExactCondensed
     """
 
-    checkable = forms = False
     rational = True
 
     def __init__(self, exact: ExactCondensed) -> None:
@@ -62,11 +59,6 @@ class ExactIntervalCertifier:
 
         terms = list(accepted(leaf.rows, leaf.values, imposed, system.scaled))
         return all(self._positive(terms, *solvers) for solvers in ends)
-
-    def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
-        """Forms are not used."""
-        del piece, system, form
-        return False
 
     def _systems_of(self, piece: Piece) -> list[tuple[ExactSelections, ExactSelections]]:
         """At both ends, with the smallest and with the largest coefficients on the piece."""

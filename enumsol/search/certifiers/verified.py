@@ -14,7 +14,7 @@ import numpy as np
 from enumsol.model.statuses import CONDITIONS, RowKind
 from enumsol.proof import records
 from enumsol.proof.proof_file import coarse, fraction_text
-from enumsol.search.certifiers.margins import energy_margin, margin_of_form
+from enumsol.search.certifiers.margins import FORM_ERRORS, energy_margin, margin_of_form
 from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
 from enumsol.search.certifiers.recording import WIDEN, RecordingCertifier
 from enumsol.search.fathoming import propose, without_load
@@ -54,8 +54,6 @@ _ROW_NAMES = {
 }
 #: Rounding the multipliers hardly lowers bounds above this: for a wedge, 10 of 28,196 bounds are halved.
 _CLEAR = 1e-6
-#: How often the error bound of an exclusion with a form is subtracted.
-_FORM_ERRORS = 4.0
 
 
 class VerifiedCertifier(RecordingCertifier):
@@ -127,7 +125,7 @@ class VerifiedCertifier(RecordingCertifier):
         """The same with a form in place of the energy."""
         margin = self._form_margins.get(form)
         if margin is None:
-            margin = self._form_margins[form] = margin_of_form(form, _FORM_ERRORS)
+            margin = self._form_margins[form] = margin_of_form(form, FORM_ERRORS)
         proven = _proven(margin, codes, rows, values)
         if proven is None:
             self._escalations.refined += 1

@@ -12,7 +12,7 @@ import time
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -82,41 +82,31 @@ class SearchedPiece:
     numbers: PieceNumbers | None = None
 
 
-class IntervalCertifier(Protocol):
-    """Decides in one arithmetic whether multipliers prove a leaf empty on the whole piece."""
+class IntervalCertifier:
+    """Base of certifiers, which decide in one arithmetic whether multipliers prove a leaf empty on the whole piece."""
 
     #: Whether leaves may be excluded by forms other than the energy.
-    forms: bool
-
-    @property
-    def rational(self) -> bool:
-        """Whether rationals decide what is left open, so that floats only propose."""
-
-    @property
-    def checkable(self) -> bool:
-        """Whether a checker can repeat what was accepted so far, so that it makes a proof."""
+    forms: bool = False
+    #: Whether rationals decide what is left open, so that floats only propose.
+    rational: bool = False
+    #: Whether a checker can repeat what was accepted so far, so that it makes a proof.
+    checkable: bool = False
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
+        raise NotImplementedError
 
     def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
         """Whether the form of these multipliers is proven convex on the piece."""
+        return False
 
 
-class FastIntervalCertifier:
+class FastIntervalCertifier(IntervalCertifier):
     """Floats: the result of the engine is trusted."""
-
-    checkable = forms = rational = False
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Accept the pruning."""
-        del piece, system, leaf
         return True
-
-    def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
-        """Floats prove nothing."""
-        del piece, system, form
-        return False
 
 
 @dataclass(frozen=True)
