@@ -35,6 +35,11 @@ class Ball:
         """No radius."""
         return cls(np.asarray(mid), np.zeros_like(np.asarray(mid)))
 
+    @classmethod
+    def joined(cls, *parts: Ball) -> Ball:
+        """One below the other."""
+        return cls(np.concatenate([part.mid for part in parts]), np.concatenate([part.rad for part in parts]))
+
     def __matmul__(self, other: Ball) -> Ball:
         k = gamma(self.mid.shape[-1] + 4)
         left, right = np.abs(self.mid), np.abs(other.mid)
@@ -48,6 +53,9 @@ class Ball:
     def __sub__(self, other: Ball) -> Ball:
         mid = self.mid - other.mid
         return Ball(mid, (self.rad + other.rad + 2 * UNIT * np.abs(mid)) * SAFE + TINY)
+
+    def __neg__(self) -> Ball:
+        return Ball(-self.mid, self.rad)
 
     def __mul__(self, other: Ball) -> Ball:
         mid = self.mid * other.mid
@@ -73,9 +81,39 @@ class Ball:
         return self.mid.ndim
 
     @property
+    def T(self) -> Ball:  # noqa: N802 (as of an array)
+        """The transpose."""
+        return Ball(self.mid.T, self.rad.T)
+
+    @property
     def size(self) -> Array:
         """Largest absolute values."""
         return np.asarray((np.abs(self.mid) + self.rad) * SAFE)
+
+    @property
+    def high(self) -> Array:
+        """Upper ends, up to rounding."""
+        return self.mid + self.rad
+
+    @property
+    def low(self) -> Array:
+        """Lower ends, up to rounding."""
+        return self.mid - self.rad
+
+    @property
+    def finite(self) -> bool:
+        """Whether all numbers are bounded."""
+        return bool(np.all(np.isfinite(self.mid)) and np.all(np.isfinite(self.rad)))
+
+    @property
+    def symmetric(self) -> Ball:
+        """The symmetric part of square matrices: it lies in the mean of both triangles."""
+        mid = 0.5 * (self.mid + self.mid.T)
+        return Ball(mid, (np.maximum(self.rad, self.rad.T) + 4 * UNIT * np.abs(mid)) * SAFE)
+
+    def copy(self) -> Ball:
+        """Another one that may be changed."""
+        return Ball(self.mid.copy(), self.rad.copy())
 
 
 def smaller(one: Ball, other: Ball) -> Ball:

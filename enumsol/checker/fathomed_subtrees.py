@@ -40,8 +40,8 @@ def closed_by_balls(system: EnclosedSystem, said: Closed, force: Array) -> tuple
         return "its only solution is not proven to be a root", None
     mid, radius = said.enclosure.numbers(2 * system.p)
     with np.errstate(over="ignore", invalid="ignore"):
-        inside = (np.abs(mid - ball.force * force) + ball.force_rad * force) * SAFE <= radius
-    inside |= (ball.force_rad == 0) & (mid == 0) & (radius >= 0)
+        inside = (np.abs(mid - ball.force.mid * force) + ball.force.rad * force) * SAFE <= radius
+    inside |= (ball.force.rad == 0) & (mid == 0) & (radius >= 0)
     refusal = said.enclosure.refusal(ball.sign, inside=bool(np.all(inside)))
     return refusal, ball if np.all(inside) else None
 

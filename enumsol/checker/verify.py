@@ -269,10 +269,10 @@ class Checker(TreeChecker):
         self.regular += 1
         self.strict.append(codes)
         self._locate(ball)
-        centre, radius = said.numbers(len(ball.force))
+        centre, radius = said.numbers(2 * self.problem.p)
         with np.errstate(over="ignore", invalid="ignore"):
-            reach = np.abs(centre - ball.force * self.force) + ball.force_rad * self.force
-            inside = reach * SAFE + np.where(ball.force_rad > 0, _SUBNORMAL, 0.0) <= radius
+            reach = np.abs(centre - ball.force.mid * self.force) + ball.force.rad * self.force
+            inside = reach * SAFE + np.where(ball.force.rad > 0, _SUBNORMAL, 0.0) <= radius
         return said.refusal(ball.det_sign, inside=bool(np.all(inside)))
 
     def _closed(self, codes: Codes, said: records.Closed) -> str | None:

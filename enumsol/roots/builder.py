@@ -91,7 +91,7 @@ class RootBuilder:
         if ball is None:
             known = self.points.slip_signs(solution.vertices[0])
         else:
-            balls = zip(ball.w[p:].tolist(), ball.w_rad[p:].tolist(), strict=True)
+            balls = zip(ball.w.mid[p:].tolist(), ball.w.rad[p:].tolist(), strict=True)
             known = tuple(int(np.sign(w)) if abs(w) > r or w == r == 0 else None for w, r in balls)
         return SlipSigns(self.problem, self.alpha, codes, known)
 
@@ -100,8 +100,8 @@ class RootBuilder:
         p, system = self.problem.p, self.floats.system
         ball = self.verified.get(solution.codes)
         if ball is not None:
-            mid = np.concatenate([ball.force * system.force, ball.w * system.length])
-            rad = np.concatenate([ball.force_rad * system.force, ball.w_rad * system.length])
+            mid = np.concatenate([ball.force.mid * system.force, ball.w.mid * system.length])
+            rad = np.concatenate([ball.force.rad * system.force, ball.w.rad * system.length])
             low = np.where(rad > 0, np.nextafter(mid - rad, -np.inf), mid)
             high = np.where(rad > 0, np.nextafter(mid + rad, np.inf), mid)
         elif (around := self.points.bounds(solution.vertices[0])) is not None:
@@ -118,7 +118,7 @@ class RootBuilder:
             force, w = self.points.forces(point), self.points.displacements(point)
         else:
             # the floats' own S and g may be off by more than the ball's radius
-            force, w = ball.force * self.floats.system.force, ball.w * self.floats.system.length
+            force, w = ball.force.mid * self.floats.system.force, ball.w.mid * self.floats.system.length
         for i, code in enumerate(codes):
             if code == OPEN:
                 force[[i, p + i]] = 0.0

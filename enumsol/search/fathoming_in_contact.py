@@ -7,19 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.model.statuses import (
-    BACKWARD,
-    CONTACT,
-    FORWARD,
-    FRICTIONLESS,
-    OPEN,
-    SLIP_MINUS,
-    SLIP_PLUS,
-    STICK,
-    UNDECIDED,
-)
+from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.definite import DEFINITE, Nodes
 from enumsol.search.descent import Descent
+from enumsol.trusted.selection import Unknowns
+from enumsol.trusted.status_rows import refines, slip_directions
 from enumsol.trusted.uniqueness_in_contact import numbers_of
 
 if TYPE_CHECKING:
@@ -50,15 +42,7 @@ class KnownRoot:
 
     def below(self, codes: Codes) -> bool:
         """Whether it lies below an assignment."""
-        return all(mine in _MAY.get(code, (code,)) for mine, code in zip(self.selection, codes, strict=True))
-
-
-_MAY = {
-    CONTACT: (STICK, SLIP_PLUS, SLIP_MINUS),
-    UNDECIDED: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS),
-    FORWARD: (OPEN, SLIP_PLUS),
-    BACKWARD: (OPEN, SLIP_MINUS),
-}
+        return all(refines(mine, code) for mine, code in zip(self.selection, codes, strict=True))
 
 
 @dataclass(frozen=True)
@@ -83,18 +67,16 @@ class Lone:
     """
 
     def __init__(self, system: ScaledSystem, codes: Codes, known: KnownRoot, relaxation: Relaxation) -> None:
-        p, F, status = system.p, system.F, np.array(codes)
+        F, status = system.F, np.array(codes)
         self._system, self._known = system, known
         nodes, own = numbers_of(codes, (F > 0).tolist())
-        self._nodes, slip = nodes, np.isin(status, (SLIP_PLUS, FORWARD)) * F
-        slip = slip - np.isin(status, (SLIP_MINUS, BACKWARD)) * F
-        self.places = np.concatenate([nodes, p + nodes[own]])
-        rows = system.S[self.places]
-        self.R = rows[:, self.places]
-        self.R[:, : len(nodes)] += rows[:, p + nodes] * slip[nodes]
+        self._nodes = nodes
+        at = Unknowns(system.p, nodes, own, slip_directions(codes)[nodes])
+        self.places = at.places
+        self.R = at.columns(system.S[at.places], F)
         self.touching = np.isin(status[nodes], _TOUCHING)
         self.stuck = status[nodes[own]] == STICK
-        self.nodes = self._at_root(nodes, np.flatnonzero(own))
+        self.nodes = self._at_root(nodes, at.normal)
         self.spare = self._spare(relaxation)
 
     def _at_root(self, nodes: NDArray[np.intp], normal: NDArray[np.intp]) -> Nodes:

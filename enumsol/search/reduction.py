@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.model.statuses import BACKWARD, FORWARD, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.definite import Nodes
 from enumsol.search.numbers import WeightSource, weights_of
 from enumsol.support.deadlines import look
-from enumsol.trusted.selection import Selection
+from enumsol.trusted.selection import Selection, Unknowns
+from enumsol.trusted.status_rows import slip_directions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -49,17 +50,15 @@ class Reduction:
         chosen = set(self.free)
         fixed = Selection([OPEN if i in chosen else code for i, code in enumerate(codes)])
         self.nodes = np.array(self.free, dtype=np.intp)
-        self.slides = np.arange(len(self.nodes)) >= len(free)
-        self.rubbing = (F[self.nodes] > 0) & ~self.slides
-        self.places = np.concatenate([self.nodes, p + self.nodes[self.rubbing]])
-        self.tangential = np.where(self.rubbing, len(self.free) + np.cumsum(self.rubbing) - 1, -1)
-        self.turn = np.array([(sliding.get(i, 0) == FORWARD) - (sliding.get(i, 0) == BACKWARD) for i in self.free])
-        self.turn = self.turn * F[self.nodes]
+        slides = np.arange(len(self.nodes)) >= len(free)
+        self.rubbing = (F[self.nodes] > 0) & ~slides
+        directions = slip_directions([sliding.get(i, OPEN) for i in self.free])
+        self._at = Unknowns(p, self.nodes, self.rubbing, directions)
+        self.places, self.tangential = self._at.places, self._at.tangential
         self._friction, self._F = F[self.nodes], F[self.nodes[self.rubbing]]
         rows = fixed.unknown
         self.E = fixed.forces(np.eye(len(rows)), F)
-        across = S[:, self.places]
-        across[:, : len(self.free)] += S[:, p + self.nodes] * self.turn
+        across = self._at.columns(S, F)
         self.M = M = S[rows] @ self.E
         self.sign = int(np.linalg.slogdet(M)[0])
         # a singular matrix is refused by whoever proves something of it
@@ -75,9 +74,7 @@ class Reduction:
     def forces(self, x: Array) -> Array:
         """lambda for the forces of the nodes that are free or slide."""
         force = np.asarray(self.E @ (self.Z[:, 0] - self.Z[:, 1:] @ x))
-        force[self.places] = x
-        turned = self.turn != 0
-        force[self.system.p + self.nodes[turned]] = (self.turn * x[: len(self.free)])[turned]
+        self._at.put(x, self.system.F, force)
         return force
 
     def solution(self, force: Array, w: Array) -> tuple[Array, list[int]] | None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball, VerifiedSolution, column_scale, verified_solve
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma, upper_norm
-from enumsol.trusted.selection import Selection
+from enumsol.trusted.selection import Selection, row_values
 from enumsol.trusted.status_rows import CONDITIONS
 
 if TYPE_CHECKING:
@@ -25,37 +25,45 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class VerifiedSelection:
-    """A selection whose matrix is proven regular for all data in the enclosure, and its one solution as balls.
+class EnclosedSolution:
+    """The one solution of some equations as balls, and the conditions that a root has to satisfy.
 
     Attributes
     ----------
-    force, force_rad : (2p,) arrays
+    force : Ball of shape (2p,)
         lambda.
-    w, w_rad : (2p,) arrays
-        w = g - S lambda, exact zeros where the selection sets them.
-    slack, slack_rad : arrays
-        The selection's inequalities; a root needs all of them to be nonnegative.
-    det_sign : int
+    w : Ball of shape (2p,)
+        w = g - S lambda, exact zeros where the statuses set them.
+    slack : Ball
+        Of the inequalities; a root needs all of them to be nonnegative.
     """
 
-    force: Array
-    force_rad: Array
-    w: Array
-    w_rad: Array
-    slack: Array
-    slack_rad: Array
-    det_sign: int
+    force: Ball
+    w: Ball
+    slack: Ball
 
     @property
     def is_root(self) -> bool:
-        """All conditions hold strictly: exactly one root, regular."""
-        return bool(np.all(self.slack > self.slack_rad))
+        """All conditions hold strictly: exactly one root."""
+        return bool(np.all(self.slack.mid > self.slack.rad))
 
     @property
     def is_excluded(self) -> bool:
         """Some condition is broken strictly: no root."""
-        return bool(np.any(self.slack < -self.slack_rad))
+        return bool(np.any(self.slack.mid < -self.slack.rad))
+
+
+@dataclass(frozen=True)
+class VerifiedSelection(EnclosedSolution):
+    """A selection whose matrix is proven regular for all data in the enclosure, and its one solution as balls.
+
+    Attributes
+    ----------
+    det_sign : int
+        Of the matrix.
+    """
+
+    det_sign: int
 
 
 def solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSelection | None:
@@ -113,8 +121,8 @@ def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSe
     if solved is None:
         return None
     force = selection.forces(Ball(solved.y * scale, solved.radius * scale + TINY), F)
-    w = g - (S @ force[:, None])[:, 0]
-    w.mid[rows], w.rad[rows] = 0.0, 0.0
+    w = g - S @ force
+    w[rows] = 0.0
     found = _conditions(codes, F, force, w, solved.sign)
     if found.is_root or found.is_excluded:
         return found
@@ -143,17 +151,7 @@ def _closer(system: EnclosedSystem, selection: Selection, solved: VerifiedSoluti
     return np.asarray((error * (1 + size) + size * np.abs(system.g)) * SAFE * SAFE + TINY)
 
 
-def row_balls(F: Ball, force: Ball, w: Ball) -> Ball:
-    """Values of the seven rows of every node, shape (7, p), for balls of F, lambda and w."""
-    p = len(F.mid)
-    n, t = force[:p], force[p:]
-    bound = F * n
-    up, down = bound - t, bound + t
-    values = np.stack([n.mid, t.mid, up.mid, down.mid, -w.mid[:p], w.mid[p:], -w.mid[p:]])
-    return Ball(values, np.stack([n.rad, t.rad, up.rad, down.rad, w.rad[:p], w.rad[p:], w.rad[p:]]))
-
-
 def _conditions(codes: Sequence[int], F: Ball, force: Ball, w: Ball, sign: int) -> VerifiedSelection:
     kinds, nodes = np.array([(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][1]]).T
-    slack = row_balls(F, force, w)[kinds, nodes]
-    return VerifiedSelection(force.mid, force.rad, w.mid, w.rad, slack.mid, slack.rad, sign)
+    slack = row_values(force, w, F)[kinds, nodes]
+    return VerifiedSelection(force, w, slack, sign)

@@ -17,6 +17,8 @@ from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
 NORMAL_FORCE, TANGENTIAL_FORCE, CONE_PLUS, CONE_MINUS, PENETRATION, SLIP_FORWARD, SLIP_BACKWARD = range(7)
 
 
@@ -124,11 +126,53 @@ class Selection:
         return _joined(moves, y[: len(self.closed)], bound - stuck, bound + stuck)
 
 
+class Unknowns:
+    """Forces of some nodes: lambda_n, and lambda_t where it is neither zero nor a multiple of lambda_n.
+
+    Parameters
+    ----------
+    p : number of contact nodes
+    nodes : int array
+    own : bool array, those of them with a lambda_t of their own
+    directions : 1 or -1 for each node whose lambda_t is F or -F times lambda_n, else 0
+
+    Attributes
+    ----------
+    places : int array, of lambda_n of all these nodes and of lambda_t of those that have one, in lambda
+    normal, tangential : numbers among ``nodes`` of those with a lambda_t; its place among the forces, -1 without one
+    side : int array, numbers among ``nodes`` of those whose lambda_t turns with lambda_n
+    """
+
+    def __init__(self, p: int, nodes: NDArray[np.intp], own: NDArray[np.bool_], directions: NDArray[np.intp]) -> None:
+        self.nodes, self.normal = nodes, np.flatnonzero(own)
+        self.places = np.concatenate([nodes, p + nodes[own]])
+        self.tangential = np.where(own, len(nodes) + np.cumsum(own) - 1, -1)
+        self.side = np.flatnonzero(directions)
+        self._turned, self._directions = nodes[self.side], directions[self.side]
+        self._along = p + self._turned
+
+    def columns(self, S: Any, F: Any) -> Any:
+        """S, or any of its rows, with a column for each of these forces."""
+        columns = S[:, self.places]
+        if len(self.side):
+            turned = S[:, self._along] * signed(F[self._turned], self._directions)
+            columns[:, self.side] = columns[:, self.side] + turned
+        return columns
+
+    def put(self, x: Any, F: Any, force: Any) -> None:
+        """Put these forces into lambda."""
+        force[self.places] = x
+        force[self._along] = x[self.side] * signed(F[self._turned], self._directions)
+
+
 def row_values(force: Any, w: Any, F: Any) -> Any:
     """Values of the seven rows of every node, shape (7, p), in the order of their kinds (see status_rows)."""
-    p = len(F)
+    p = F.shape[0]
     bound, t = F * force[:p], force[p:]
-    return np.array([force[:p], t, bound - t, bound + t, -w[:p], w[p:], -w[p:]])
+    rows = force[:p], t, bound - t, bound + t, -w[:p], w[p:], -w[p:]
+    if isinstance(F, Ball):
+        return Ball(np.stack([row.mid for row in rows]), np.stack([row.rad for row in rows]))
+    return np.array(rows)
 
 
 def signed(values: Any, signs: Any) -> Any:
@@ -153,5 +197,5 @@ def _filled(like: Any, shape: tuple[int, ...], zero: Any) -> Any:
 
 def _joined(*parts: Any) -> Any:
     if isinstance(parts[0], Ball):
-        return Ball(np.concatenate([part.mid for part in parts]), np.concatenate([part.rad for part in parts]))
+        return Ball.joined(*parts)
     return np.concatenate(parts)

@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 #: Rows of a node at one alpha.
@@ -63,6 +65,14 @@ def row_table() -> NDArray[np.int8]:
 def row_signs(codes: NDArray[np.intp], F: NDArray[np.float64]) -> NDArray[np.int8]:
     """What the multipliers of all rows may be, shape (..., p, 7), for (partial) status codes of shape (..., p)."""
     return np.asarray(_ROWS[np.where((codes == UNDECIDED) & (F == 0), STILL, codes)])
+
+
+_DIRECTIONS = np.array([0, 0, 1, -1, 0, 0, 0, 1, -1])
+
+
+def slip_directions(codes: Sequence[int] | NDArray[np.intp]) -> NDArray[np.intp]:
+    """1 or -1 where a (partial) status makes lambda_t F or -F times lambda_n, else 0."""
+    return np.asarray(_DIRECTIONS[np.asarray(codes, dtype=np.intp)])
 
 
 def children_of(code: int, *, friction: bool) -> tuple[int, ...]:

@@ -14,8 +14,8 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball, determinant_sign, solution
 from enumsol.arithmetic.balls import SAFE
-from enumsol.trusted.at_alpha import row_balls, solve_selection
-from enumsol.trusted.selection import Selection
+from enumsol.trusted.at_alpha import EnclosedSolution, solve_selection
+from enumsol.trusted.selection import Selection, Unknowns, row_values
 from enumsol.trusted.status_rows import (
     BACKWARD,
     CONDITIONS,
@@ -28,6 +28,7 @@ from enumsol.trusted.status_rows import (
     UNDECIDED,
     final_codes,
     refines,
+    slip_directions,
 )
 from enumsol.trusted.uniqueness_weights import Components, Weights
 
@@ -53,48 +54,30 @@ def core_of(selection: Sequence[int], free: Sequence[int]) -> Codes:
 
 
 @dataclass(frozen=True)
-class ClosedSolution:
+class ClosedSolution(EnclosedSolution):
     """The one solution of a reduced problem as balls, in scaled units.
 
     Attributes
     ----------
     core : status codes, UNDECIDED at the free nodes, FORWARD or BACKWARD at those that slide
-    force, force_rad, w, w_rad : (2p,) arrays
-        lambda and w = g - S lambda.
     possible : per node the final codes that may hold there; those of a fixed node that holds strictly are its own only
     sign : int
         Sign of the determinant of the fixed nodes' equations: the index, if the conditions below hold strictly.
-    slack, slack_rad : arrays
+    slack : Ball
         The conditions of the fixed nodes, and of every sliding one: the sign of its slip, unless it is open.
     regular : VerifiedSelection or None
         Its selection's solution, where its balls were taken for it.
     """
 
     core: Codes
-    force: Array
-    force_rad: Array
-    w: Array
-    w_rad: Array
     possible: tuple[frozenset[int], ...]
     sign: int
-    slack: Array
-    slack_rad: Array
     regular: VerifiedSelection | None = None
-
-    @property
-    def is_root(self) -> bool:
-        """All conditions hold strictly: exactly one root has this core."""
-        return bool(np.all(self.slack > self.slack_rad))
-
-    @property
-    def is_excluded(self) -> bool:
-        """A condition is broken strictly: no root has this core."""
-        return bool(np.any(self.slack < -self.slack_rad))
 
     @property
     def is_wide(self) -> bool:
         """The balls hardly tell where it lies."""
-        return bool(np.max(self.force_rad, initial=0.0) > _WIDE * np.max(np.abs(self.force), initial=0.0))
+        return bool(np.max(self.force.rad, initial=0.0) > _WIDE * np.max(np.abs(self.force.mid), initial=0.0))
 
 
 def closed_solution(
@@ -167,17 +150,14 @@ class Reduced(Components):
 
     Attributes
     ----------
-    nodes : int array
-        Those that are free, then those that slide.
-    turn : Ball
-        lambda_t of a sliding node is so many times its lambda_n, +-F; zero for free nodes.
+    at : Unknowns
+        Of the nodes that are free, then of those that slide.
     E, Z : Ball
         lambda = E y + P x, and y = Z (1, -x): the fixed nodes' forces for x.
     h : Ball
     """
 
     rows: NDArray[np.intp]
-    turn: Ball
     E: Ball
     Z: Ball
     h: Ball
@@ -190,25 +170,17 @@ class Reduced(Components):
         for i, (code, F) in enumerate(zip(selection, system.F, strict=True)):
             if code not in final_codes(F > 0) and not (code in _SLIDING and F > 0 and i not in chosen):
                 return None
-        p, status = system.p, np.array(core_of(selection, free), dtype=np.intp)
+        status = np.array(core_of(selection, free), dtype=np.intp)
         slides = np.isin(status, _SLIDING)
         nodes = np.concatenate([np.array(free, dtype=np.intp), np.flatnonzero(slides)])
-        rubbing = (system.F[nodes] > 0) & ~slides[nodes]
-        places = np.concatenate([nodes, p + nodes[rubbing]])
-        tangential = np.full(len(nodes), -1, dtype=np.intp)
-        tangential[rubbing] = len(nodes) + np.arange(np.count_nonzero(rubbing))
-        slip = np.where(np.isin(status, (SLIP_PLUS, FORWARD)), 1.0, 0.0)
-        slip -= np.where(np.isin(status, (SLIP_MINUS, BACKWARD)), 1.0, 0.0)
+        own = (system.F[nodes] > 0) & ~slides[nodes]
+        at = Unknowns(system.p, nodes, own, slip_directions(status[nodes]))
         fixed, (S, g, F) = Selection(np.where(slides | (status == UNDECIDED), OPEN, status).tolist()), system.balls
         rows = fixed.unknown
         forms = fixed.forces(Ball.exact(np.eye(len(rows))), F)
         M = S[rows] @ forms
         sign = determinant_sign(M)
-        turn = Ball((slip * system.F)[nodes], (abs(slip) * system.F_rad)[nodes])
-        across = S[:, places]
-        side = np.flatnonzero(slides[nodes])
-        turned = across[:, side] + S[:, p + nodes[side]] * turn[side]
-        across.mid[:, side], across.rad[:, side] = turned.mid, turned.rad
+        across, places = at.columns(S, F), at.places
         above = across[rows]
         right = Ball(np.column_stack([g.mid[rows], above.mid]), np.column_stack([g.rad[rows], above.rad]))
         Z = solution(M, right) if sign else None
@@ -216,18 +188,17 @@ class Reduced(Components):
             return None
         moved = (S[places] @ forms) @ Z
         R, h = across[places] - moved[:, 1:], g[places] - moved[:, 0]
-        return cls(system, selection, nodes, places, tangential, R, rows, turn, forms, Z, h, sign)
+        return cls(system, selection, at, R, rows, forms, Z, h, sign)
 
     def enclosed(self, numbers: Weights, force: Array) -> ClosedSolution | None:
         """The solution as a ball, None where it is not proven to exist and to be the only one."""
-        if len(self.nodes) == self.system.p and not any(code in _SLIDING for code in self.selection):
+        if len(self.at.nodes) == self.system.p and not any(code in _SLIDING for code in self.selection):
             # all nodes are free: where its selection holds strictly, that is closer than (6.10) if Q is hardly definite
             root = solve_selection(self.system, self.selection)
             if root is not None and root.is_root:
                 # R is S and h is g: so these are x and w here, and w is closer than R times the radii of x gives it
-                x = Ball(root.force[self.places], root.force_rad[self.places])
-                w = Ball(root.w[self.places], root.w_rad[self.places])
-                numbers = numbers.beside(x, self.tangential[numbers.normal])
+                x, w = root.force[self.at.places], root.w[self.at.places]
+                numbers = numbers.beside(x, self.at.tangential[numbers.normal])
                 alone = self._alone(x, w, numbers, self.least(numbers))
                 return None if alone is None else replace(alone, regular=root)
         least = self.least(numbers)
@@ -239,10 +210,10 @@ class Reduced(Components):
             return None
         x = Ball(x.mid, (x.rad + reach) * SAFE)
         w = self._displacements(x)
-        for i, node in enumerate(self.nodes):
+        for i, node in enumerate(self.at.nodes):
             # open at every solution
             if self.selection[node] == OPEN and w.mid[i] + w.rad[i] < 0:
-                x.rad[[i, self.tangential[i]] if self.tangential[i] >= 0 else i] = 0.0
+                x.rad[[i, self.at.tangential[i]] if self.at.tangential[i] >= 0 else i] = 0.0
         return self._alone(x, self._displacements(x), numbers, least)
 
     def _alone(self, x: Ball, w: Ball, numbers: Weights, least: float) -> ClosedSolution | None:
@@ -251,58 +222,53 @@ class Reduced(Components):
 
     def _displacements(self, x: Ball) -> Ball:
         """w of the free components."""
-        return self.h - (self.R @ Ball(x.mid[:, None], x.rad[:, None]))[:, 0]
+        return self.h - self.R @ x
 
     def _point(self, force: Array, numbers: Weights) -> Ball:
         """Forces in the cones, with the statuses of the selection, near the given ones."""
-        mid = np.array([0.0 if self.selection[i] == OPEN else max(float(force[i]), 0.0) for i in self.nodes])
-        turned = Ball.exact(mid[self.tangential >= 0]) * numbers.slope
-        radii = np.where(mid[self.tangential >= 0] > 0, turned.rad, 0.0)
+        mid = np.array([0.0 if self.selection[i] == OPEN else max(float(force[i]), 0.0) for i in self.at.nodes])
+        turned = Ball.exact(mid[self.at.tangential >= 0]) * numbers.slope
+        radii = np.where(mid[self.at.tangential >= 0] > 0, turned.rad, 0.0)
         return Ball(np.concatenate([mid, turned.mid]), np.concatenate([np.zeros(len(mid)), radii]))
 
     def _distance(self, point: Array, w: Ball, numbers: Weights) -> float:
         """Bound of the numerator of theory, (6.10), for a point that is a solution with another h."""
-        size, change = w.size, np.zeros(len(self.places))
-        up, down = np.maximum(w.mid + w.rad, 0.0) * SAFE, np.maximum(w.rad - w.mid, 0.0) * SAFE
-        gap = np.maximum(-(w.mid + w.rad), 0.0) / SAFE
+        size, change = w.size, np.zeros(len(self.at.places))
+        up, down = np.maximum(w.high, 0.0) * SAFE, np.maximum(w.rad - w.mid, 0.0) * SAFE
+        gap = np.maximum(-w.high, 0.0) / SAFE
         if not np.all(np.isfinite(size)):
             return np.inf
-        for i, node in enumerate(self.nodes):
-            code, t = self.selection[node], self.tangential[i]
+        for i, node in enumerate(self.at.nodes):
+            code, t = self.selection[node], self.at.tangential[i]
             apart = code == OPEN or (code in _SLIDING and point[i] == 0)
             change[i] = up[i] if apart else size[i]
             if t >= 0:
                 slips = {STICK: size[t], SLIP_PLUS: down[t], SLIP_MINUS: up[t]}
-                change[t] = numbers.beyond(t - len(self.nodes), gap[i], up[t], down[t]) if apart else slips[code]
+                change[t] = numbers.beyond(t - len(self.at.nodes), gap[i], up[t], down[t]) if apart else slips[code]
         return numbers.moved(change)
 
     def _solution(self, x: Ball, w_free: Ball) -> ClosedSolution:
         system, p = self.system, self.system.p
-        y = self.Z[:, 0] - (self.Z[:, 1:] @ Ball(x.mid[:, None], x.rad[:, None]))[:, 0]
-        force = (self.E @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
-        free = [int(node) for node in self.nodes if self.selection[node] not in _SLIDING]
+        (S, g, F), at = system.balls, self.at
+        force = self.E @ (self.Z[:, 0] - self.Z[:, 1:] @ x)
+        free = [int(node) for node in at.nodes if self.selection[node] not in _SLIDING]
         core = core_of(self.selection, free)
         status = np.array(core)
         fixed = (status != UNDECIDED) & ~np.isin(status, _SLIDING)
         idle = np.concatenate([~fixed | (status == OPEN), ~fixed | (status == OPEN) | (status == FRICTIONLESS)])
-        force.mid[idle], force.rad[idle] = 0.0, 0.0
-        force.mid[self.places], force.rad[self.places] = x.mid, x.rad
-        side = np.flatnonzero(np.isin(status[self.nodes], _SLIDING))
-        turned = x[side] * self.turn[side]
-        force.mid[p + self.nodes[side]], force.rad[p + self.nodes[side]] = turned.mid, turned.rad
-        S, g, F = system.balls
-        w = g - (S @ Ball(force.mid[:, None], force.rad[:, None]))[:, 0]
-        w.mid[self.places], w.rad[self.places] = w_free.mid, w_free.rad
-        w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
-        conditions = row_balls(F, force, w)
+        force[idle] = 0.0
+        at.put(x, F, force)
+        w = g - S @ force
+        w[at.places], w[self.rows] = w_free, 0.0
+        conditions = row_values(force, w, F)
         values, radii = conditions.mid, conditions.rad
         tests = [(values[kind, i], radii[kind, i]) for i in np.flatnonzero(fixed) for kind in CONDITIONS[core[i]][1]]
-        tests += [self._slides(core[node], values[:, node], radii[:, node]) for node in self.nodes[side]]
-        slack, slack_rad = (np.array(part) for part in (zip(*tests, strict=True) if tests else ((), ())))
+        tests += [self._slides(core[node], values[:, node], radii[:, node]) for node in at.nodes[at.side]]
+        slack = Ball(*(np.array(part) for part in (zip(*tests, strict=True) if tests else ((), ()))))
         possible = tuple(
             frozenset((core[i],)) if fixed[i] else self._possible(i, values[:, i], radii[:, i]) for i in range(p)
         )
-        return ClosedSolution(core, force.mid, force.rad, w.mid, w.rad, possible, self.sign, slack, slack_rad)
+        return ClosedSolution(force, w, slack, core, possible, self.sign)
 
     @staticmethod
     def _slides(code: int, values: Array, radii: Array) -> tuple[float, float]:

@@ -14,10 +14,9 @@ from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, gamma
 from enumsol.trusted.at_alpha import solve_selection
 from enumsol.trusted.exclusion import exclusion_margin
+from enumsol.trusted.selection import Unknowns
 from enumsol.trusted.status_rows import (
-    BACKWARD,
     CONTACT,
-    FORWARD,
     FRICTIONLESS,
     OPEN,
     ROW_KINDS,
@@ -27,6 +26,7 @@ from enumsol.trusted.status_rows import (
     UNDECIDED,
     final_codes,
     refines,
+    slip_directions,
 )
 from enumsol.trusted.uniqueness_weights import Components, Weights
 
@@ -78,35 +78,25 @@ def lone_root(
         if root is None or not root.is_root:
             return None
         part = _components(system, codes, selection)
-        numbers = Weights.of(part, np.concatenate([weights, np.zeros(np.count_nonzero(part.tangential >= 0))]))
+        numbers = Weights.of(part, np.concatenate([weights, np.zeros(len(part.at.normal))]))
         if numbers is None or not _allowed(part, codes, numbers, strengths, root, rows, values):
             return None
-        x, w = (Ball(a[part.places], r[part.places]) for a, r in ((root.force, root.force_rad), (root.w, root.w_rad)))
-        numbers = numbers.beside(x, part.tangential[numbers.normal])
+        x, w = root.force[part.at.places], root.w[part.at.places]
+        numbers = numbers.beside(x, part.at.tangential[numbers.normal])
         least = part.least(numbers, _squares(part, strengths))
         return root if part.serves(numbers, x, w, least) else None
 
 
 def _components(system: EnclosedSystem, codes: Sequence[int], selection: Sequence[int]) -> Components:
     """lambda of the nodes that are not open, with lambda_t = +-F lambda_n put in where the assignment has that."""
-    p, status = system.p, np.array(codes, dtype=np.intp)
     nodes, own = numbers_of(codes, (system.F > 0).tolist())
-    slip = np.where(np.isin(status, (SLIP_PLUS, FORWARD)), 1.0, 0.0)
-    slip -= np.where(np.isin(status, (SLIP_MINUS, BACKWARD)), 1.0, 0.0)
-    places = np.concatenate([nodes, p + nodes[own]])
-    tangential = np.full(len(nodes), -1, dtype=np.intp)
-    tangential[own] = len(nodes) + np.arange(np.count_nonzero(own))
-    S = system.balls[0][places]
-    side = np.flatnonzero(slip[nodes])
-    turn = Ball((slip * system.F)[nodes[side]], system.F_rad[nodes[side]])
-    R, turned = S[:, places], S[:, nodes[side]] + S[:, p + nodes[side]] * turn
-    R.mid[:, side], R.rad[:, side] = turned.mid, turned.rad
-    return Components(system, tuple(selection), nodes, places, tangential, R)
+    at, (S, _, F) = Unknowns(system.p, nodes, own, slip_directions(codes)[nodes]), system.balls
+    return Components(system, tuple(selection), at, at.columns(S[at.places], F))
 
 
 def _squares(part: Components, strengths: Array) -> Ball | None:
     """Rows of (S d)_n and (S d)_t, each times the root of its strength."""
-    factors = np.sqrt(strengths.ravel()[part.places])
+    factors = np.sqrt(strengths.ravel()[part.at.places])
     used = np.flatnonzero(factors)
     return part.R[used] * Ball.exact(factors[used][:, None]) if len(used) else None
 
@@ -125,18 +115,17 @@ def _allowed(
     normal, tangential = strengths
     if not np.all(np.isfinite(strengths)) or np.any(strengths < 0) or np.any(tangential[status != STICK] > 0):
         return False
-    place = np.flatnonzero((normal[part.nodes] > 0) & ~np.isin(status[part.nodes], _TOUCHING))
-    loose = part.nodes[place]
+    place = np.flatnonzero((normal[part.at.nodes] > 0) & ~np.isin(status[part.at.nodes], _TOUCHING))
+    loose = part.at.nodes[place]
     if not len(loose):
         return True
-    force = Ball(root.force, root.force_rad)
-    left = Ball.exact(numbers.mu[place]) * force[loose]
-    nu = np.zeros(len(part.nodes))
+    left = Ball.exact(numbers.mu[place]) * root.force[loose]
+    nu = np.zeros(len(part.at.nodes))
     nu[numbers.normal] = numbers.nu
-    left = left + Ball.exact(nu[place]) * force[p + loose]
+    left = left + Ball.exact(nu[place]) * root.force[p + loose]
     # the roots of strengths are rounded
     needed = normal[loose] * gaps(system, codes, rows, values)[loose] * SAFE + TINY
-    return bool(np.all(np.array(part.selection)[loose] != OPEN) and np.all(needed <= (left.mid - left.rad) / SAFE))
+    return bool(np.all(np.array(part.selection)[loose] != OPEN) and np.all(needed <= left.low / SAFE))
 
 
 def gaps(system: EnclosedSystem, codes: Sequence[int], rows: NDArray[np.intp], values: Array) -> Array:
@@ -154,8 +143,8 @@ def gaps(system: EnclosedSystem, codes: Sequence[int], rows: NDArray[np.intp], v
     c = table[0] + system.F * (table[2] + table[3])
     error = gamma(4 * len(rows) + 8) * (size[0] + system.F * cone) + system.F_rad * cone * SAFE
     S, g, _ = system.balls
-    pushed = S[:p] @ Ball.exact(np.concatenate([table[4], table[6] - table[5]])[:, None])
-    twice = g[:p] - Ball(c, error * SAFE + TINY) - pushed[:, 0]
+    pushed = S[:p] @ Ball.exact(np.concatenate([table[4], table[6] - table[5]]))
+    twice = g[:p] - Ball(c, error * SAFE + TINY) - pushed
     diagonal = np.diagonal(system.S)[:p] + np.diagonal(system.S_rad)[:p]
     reach = np.sqrt(max(-least, 0.0) * diagonal) * SAFE * SAFE + TINY
     return np.asarray((np.maximum(twice.rad - twice.mid, 0.0) * 0.5 + reach) * SAFE)

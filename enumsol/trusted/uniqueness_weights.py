@@ -9,7 +9,7 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, upper_norm
-from enumsol.trusted.status_rows import SLIP_MINUS, SLIP_PLUS
+from enumsol.trusted.status_rows import slip_directions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
     from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
-
-_SIGNS = {SLIP_PLUS: 1, SLIP_MINUS: -1}
+    from enumsol.trusted.selection import Unknowns
 
 
 @dataclass(frozen=True)
@@ -53,13 +52,13 @@ class Weights:
         mu and kappa are positive, |nu| F <= mu, |theta| <= F; theta = +-F at nodes that slip in the selection; tau is
         not negative, and theta = 0 where it is positive. None where this is not so.
         """
-        system, m, normal = part.system, len(part.nodes), np.flatnonzero(part.tangential >= 0)
+        system, m, normal = part.system, len(part.at.nodes), part.at.normal
         if len(numbers) != m + 4 * len(normal) or not np.all(np.isfinite(numbers)):
             return None
         mu, (kappa, nu, share, tau) = numbers[:m], numbers[m:].reshape(4, -1)
-        nodes = part.nodes[normal]
+        nodes = part.at.nodes[normal]
         friction = system.balls[2][nodes]
-        sides = np.array([_SIGNS.get(part.selection[i], 0) for i in nodes])
+        sides = slip_directions(part.selection)[nodes]
         wrong = (np.abs(share) > 1) | ((sides != 0) & (share != sides)) | ((tau > 0) & (share != 0))
         wrong |= np.abs(nu) * friction.size * SAFE + TINY > mu[normal]
         if np.any(wrong) or np.any(mu <= 0) or np.any(kappa <= 0) or np.any(tau < 0):
@@ -71,9 +70,9 @@ class Weights:
 
     def at(self, part: Components, point: Sequence[Any], w: Sequence[Any]) -> Weights | None:
         """With theta = lambda_t / lambda_n where lambda_n > 0 at a rational solution; None if they do not serve it."""
-        p, slope = part.system.p, Ball(self.slope.mid.copy(), self.slope.rad.copy())
+        p, slope = part.system.p, self.slope.copy()
         for k, i in enumerate(self.normal):
-            node = int(part.nodes[i])
+            node = int(part.at.nodes[i])
             if self.tau[k] > 0:
                 continue
             if point[node] != 0:
@@ -149,31 +148,25 @@ class Components:
     ----------
     system : EnclosedSystem
     selection : status codes; those of the nodes below name the slip at a solution
-    nodes : int array
-    places : int array
-        Of x in lambda: lambda_n of all these nodes, then lambda_t of those with friction whose lambda_t is no multiple
-        of lambda_n.
-    tangential : int array
-        Place of lambda_t among them, for all nodes; -1 where there is none.
+    at : Unknowns
+        Which components.
     R : Ball
     """
 
     system: EnclosedSystem
     selection: tuple[int, ...]
-    nodes: NDArray[np.intp]
-    places: NDArray[np.intp]
-    tangential: NDArray[np.intp]
+    at: Unknowns
     R: Ball
 
     def form(self, numbers: Weights) -> Ball:
         """D'R, of which (6.9) is the symmetric part."""
-        R, n, t = self.R, np.flatnonzero(self.tangential >= 0), self.tangential[self.tangential >= 0]
-        form = Ball(R.mid.copy(), R.rad.copy())
-        along = R[: len(self.nodes)] * Ball.exact(numbers.mu[:, None])
+        R, n = self.R, self.at.normal
+        form, t = R.copy(), self.at.tangential[n]
+        along = R[: len(self.at.nodes)] * Ball.exact(numbers.mu[:, None])
         turned = (numbers.slope * Ball.exact(numbers.kappa))[:, None]
         across = R[n] * Ball.exact(numbers.nu[:, None]) + R[t] * Ball.exact(numbers.kappa[:, None])
-        for rows, part in ((np.arange(len(self.nodes)), along), (n, along[n] - R[t] * turned), (t, across)):
-            form.mid[rows], form.rad[rows] = part.mid, part.rad
+        for rows, part in ((np.arange(len(self.at.nodes)), along), (n, along[n] - R[t] * turned), (t, across)):
+            form[rows] = part
         return form
 
     def least(self, numbers: Weights, further: Ball | None = None) -> float:
@@ -181,29 +174,25 @@ class Components:
 
         ``further``: rows whose squares are added to the form.
         """
-        if not len(self.places):
+        if not len(self.at.places):
             return 1.0
         used = np.flatnonzero(numbers.tau > 0)
         normal, tau = numbers.normal[used], numbers.tau[used]
         # weights at least kappa F / sqrt(tau), for any rounding
         weight = numbers.kappa[used] * numbers.friction.size[used] / np.sqrt(tau) * SAFE + TINY
-        T = self.R[self.tangential[normal]] * Ball.exact(weight[:, None])
-        square = Ball(T.mid.T, T.rad.T) @ T
+        T = self.R[self.at.tangential[normal]] * Ball.exact(weight[:, None])
+        square = T.T @ T
         Q = self.form(numbers) - Ball(0.5 * square.mid, 0.5 * square.rad)
         if further is not None:
-            Q = Q + Ball(further.mid.T, further.rad.T) @ further
+            Q = Q + further.T @ further
         Q.mid[normal, normal] -= 0.5 * tau
         Q.rad[normal, normal] += UNIT * (np.abs(Q.mid[normal, normal]) + tau)
-        mid = 0.5 * (Q.mid + Q.mid.T)
-        # the symmetric part of the form lies in the mean of both triangles
-        rad = (np.maximum(Q.rad, Q.rad.T) + 4 * UNIT * np.abs(mid)) * SAFE
-        if not (np.all(np.isfinite(mid)) and np.all(np.isfinite(rad))):
-            return 0.0
-        return float((dense_eigenvalue_bound(mid) - upper_norm(rad)) / SAFE)
+        Q = Q.symmetric
+        return float((dense_eigenvalue_bound(Q.mid) - upper_norm(Q.rad)) / SAFE) if Q.finite else 0.0
 
     def serves(self, numbers: Weights, x: Ball, w: Ball, least: float) -> bool:
         """Whether Q is definite for every theta that a solution in a ball may have."""
-        n, t = numbers.normal, self.tangential[numbers.normal]
+        n, t = numbers.normal, self.at.tangential[numbers.normal]
         off = np.array([numbers.off(k, x[a], x[b], w[a], w[b]) for k, (a, b) in enumerate(zip(n, t, strict=True))])
         # at each of them Q is not smaller than this
         return bool(least > upper_norm(numbers.kappa * off * upper_norm(self.R[t].size, axis=1)) * SAFE)

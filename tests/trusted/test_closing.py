@@ -64,10 +64,10 @@ def test_what_is_proven_is_so(seed):
         (point,) = points
         for k, value in enumerate(point):
             x = float(value) / scaled.force[k]
-            assert abs(x - ball.force[k]) <= ball.force_rad[k] + 1e-14 * (1 + abs(x))
+            assert abs(x - ball.force.mid[k]) <= ball.force.rad[k] + 1e-14 * (1 + abs(x))
             w = float(forms.move(1, k)[-1] + sum((a * b for a, b in zip(forms.move(1, k), point, strict=False)), 0))
             w /= scaled.length[k]
-            assert abs(w - ball.w[k]) <= ball.w_rad[k] + 1e-14 * (1 + abs(w))
+            assert abs(w - ball.w.mid[k]) <= ball.w.rad[k] + 1e-14 * (1 + abs(w))
         judge = Closings(forms, friction, [[exact(float(x)) for x in unit] for unit in (scaled.length, scaled.force)])
         judge.serves(judge.numbers(numbers.tolist(), selection, reduced), reduced, point)
         values = [v for i in reduced.fixed for v in judge.conditions(core[i], i, point)]

@@ -229,7 +229,7 @@ def _check_selection(system, S, g, F, codes):
     point, free = _affine(equations)
     assert not free
     w = [g[r] - sum(S[r][k] * point[k] for k in range(2 * p)) for r in range(2 * p)]
-    for exact, mid, rad in ((point, ball.force, ball.force_rad), (w, ball.w, ball.w_rad)):
+    for exact, mid, rad in ((point, ball.force.mid, ball.force.rad), (w, ball.w.mid, ball.w.rad)):
         for x, m, r in zip(exact, mid.tolist(), rad.tolist(), strict=True):
             assert abs(x - Fraction(m)) <= Fraction(r)
     least = min(_at(row, point) for row in inequalities)
@@ -314,9 +314,9 @@ def test_displacements_of_ill_conditioned_selections(monkeypatch):
                 continue
             ball = solve_selection(system, codes)
             point_of, _ = _affine(_conditions(*exact, codes)[0])
-            for r in np.flatnonzero(ball.w_rad > 0):
+            for r in np.flatnonzero(ball.w.rad > 0):
                 w = exact[1][r] - sum(exact[0][r][k] * point_of[k] for k in range(4))
-                assert abs(w - Fraction(float(ball.w[r]))) <= Fraction(float(radii[0][r]))
-                times.append(radii[0][r] / (np.abs(system.S) @ ball.force_rad + system.g_rad)[r])
+                assert abs(w - Fraction(float(ball.w.mid[r]))) <= Fraction(float(radii[0][r]))
+                times.append(radii[0][r] / (np.abs(system.S) @ ball.force.rad + system.g_rad)[r])
     assert len(times) > 300
     assert np.quantile(times, 0.2) < 0.2

@@ -68,7 +68,7 @@ class Case:
         relaxation = self.engine.root(*self.rows.over(codes, range(self.p)))
         if relaxation.pruned or relaxation.stalled:
             return None
-        known = KnownRoot(root[0], root[1].force, root[1].w)
+        known = KnownRoot(root[0], root[1].force.mid, root[1].w.mid)
         proposal = Proposed(self.scaled, codes, known, relaxation).proposal()
         return None if proposal is None else [proposal.weights, proposal.strengths, *relaxation.multipliers()]
 
@@ -176,8 +176,8 @@ def test_gaps_hold_at_all_roots():
     for _, case, codes, _selection, (_, _, rows, values) in cases(range(120)):
         bounds = gaps(case.system, codes, rows, values)
         for other, root in case.roots:
-            if KnownRoot(other, root.force, root.w).below(codes):
-                assert np.all(-root.w[: case.p] <= bounds + 1e-12)
+            if KnownRoot(other, root.force.mid, root.w.mid).below(codes):
+                assert np.all(-root.w.mid[: case.p] <= bounds + 1e-12)
         terms = [
             (int(row), exact(float(value)) * case.units[0 if row // case.p < 4 else 1][row % case.p])
             for row, value in zip(rows, values, strict=True)

@@ -107,7 +107,7 @@ def test_selections_hold_for_every_corner(width):
             point, free = _affine(equations)
             assert not free
             w = [g[r] - sum(S[r][k] * point[k] for k in range(2 * p)) for r in range(2 * p)]
-            for exact, mid, rad in ((point, ball.force, ball.force_rad), (w, ball.w, ball.w_rad)):
+            for exact, mid, rad in ((point, ball.force.mid, ball.force.rad), (w, ball.w.mid, ball.w.rad)):
                 assert all(
                     abs(x - Fraction(m)) <= Fraction(r)
                     for x, m, r in zip(exact, mid.tolist(), rad.tolist(), strict=True)

@@ -169,7 +169,7 @@ class VerifiedCertifier(RecordingCertifier):
         else:
             self._known.append(codes)
             if ball is not None:
-                self._take_note(ball.force, ball.w)
+                self._take_note(ball.force.mid, ball.w.mid)
             points = [[_fraction(v) for v in vertex] for vertex in solution.vertices]
             self._leaf(records.RootSetRecord(points, solution.dimension))
         return solution
@@ -222,8 +222,9 @@ class VerifiedCertifier(RecordingCertifier):
         """The same for a selection whose conditions are not decided, without rationals."""
         if near is None:
             return None
-        self._take_note(near.force, near.w)
-        proposal = propose(self._scaled, codes, (near.force, near.w), exactly=False)
+        point = near.force.mid, near.w.mid
+        self._take_note(*point)
+        proposal = propose(self._scaled, codes, point, exactly=False)
         ball = None if proposal is None else self._proven(proposal)
         return None if proposal is None or ball is None or ball.is_wide else self._closed_by(proposal, ball)
 
@@ -240,7 +241,7 @@ class VerifiedCertifier(RecordingCertifier):
 
     def _closed_by(self, proposal: Proposal, ball: ClosedSolution) -> list[SelectionSolution] | None:
         """Write a leaf and give its solutions; None where a root could not be told from another one."""
-        record = proposal.named, proposal.free, proposal.numbers, ball.force * self._scaled.force
+        record = proposal.named, proposal.free, proposal.numbers, ball.force.mid * self._scaled.force
         if ball.is_excluded:
             self._escalations.balls += 1
             self._leaf(records.Closed(*record))
@@ -253,7 +254,7 @@ class VerifiedCertifier(RecordingCertifier):
                 return None
             self._verified[ball.core] = ball
             solution = SelectionSolution(
-                ball.core, (ball.force,), 0, 0, strict=False, index=ball.sign, possible=ball.possible
+                ball.core, (ball.force.mid,), 0, 0, strict=False, index=ball.sign, possible=ball.possible
             )
         self._escalations.balls += 1
         self._leaf(records.Closed(*record, self._ball(ball, ball.sign)))
@@ -268,7 +269,7 @@ class VerifiedCertifier(RecordingCertifier):
         if regular is None or not regular.is_root:
             return None
         self._verified[codes] = regular
-        return SelectionSolution(codes, (regular.force,), 0, regular.det_sign, strict=True)
+        return SelectionSolution(codes, (regular.force.mid,), 0, regular.det_sign, strict=True)
 
     def add(self, part: Certified) -> None:
         """Take over what the certifier of a subtree has proven."""
@@ -289,7 +290,7 @@ class VerifiedCertifier(RecordingCertifier):
         """Write a leaf with a regular root, made of its enclosure."""
         self._verified[codes] = ball
         self._leaf(leaf(self._ball(ball, ball.det_sign)))
-        return SelectionSolution(codes, (ball.force,), 0, ball.det_sign, strict=True)
+        return SelectionSolution(codes, (ball.force.mid,), 0, ball.det_sign, strict=True)
 
     def _undecided(self, codes: Codes, reason: str, hint: str) -> UndecidedPart:
         self._escalations.undecided += 1
@@ -299,7 +300,7 @@ class VerifiedCertifier(RecordingCertifier):
     def _ball(self, found: VerifiedSelection | ClosedSolution, index: int | None) -> EnclosureRecord:
         """Where a root is, in the problem's units."""
         force = self._scaled.force
-        return records.EnclosureRecord(found.force * force, found.force_rad * force * WIDEN, index)
+        return records.EnclosureRecord(found.force.mid * force, found.force.rad * force * WIDEN, index)
 
 
 def _proven(margin: Margin, codes: Codes, rows: NDArray[np.intp], values: Array) -> Array | None:
@@ -329,12 +330,13 @@ def _reason(codes: Codes, ball: VerifiedSelection | None, node_ids: Sequence[Any
     hint = "the problem is too large for exact arithmetic; perturb the load, or condense the body to its contact nodes"
     if ball is None:
         return "the matrix of a selection may be singular", hint
-    if not (np.all(np.isfinite(ball.slack)) and np.all(np.isfinite(ball.slack_rad))):
+    if not ball.slack.finite:
         return "the solution of a selection overflows float64", "scale the data"
     names = [
         _ROW_NAMES[kind].format(node)
         for node, code in zip(node_ids, codes, strict=True)
         for kind in CONDITIONS[code].inequalities
     ]
-    k = int(np.argmin(np.where(np.abs(ball.slack) <= ball.slack_rad, np.abs(ball.slack), np.inf)))
-    return f"{names[k]} is zero to {abs(ball.slack[k]) + ball.slack_rad[k]:.0e} (scaled)", hint
+    slack = np.abs(ball.slack.mid)
+    k = int(np.argmin(np.where(slack <= ball.slack.rad, slack, np.inf)))
+    return f"{names[k]} is zero to {slack[k] + ball.slack.rad[k]:.0e} (scaled)", hint
