@@ -11,8 +11,7 @@ import numpy as np
 from enumsol.branches.enclosed.arc_parts import ArcPartKind
 from enumsol.proof.proof_file import Proof, packed
 from enumsol.proof.reading import fits
-from enumsol.proof.writer import ProofWriter
-from enumsol.search.proof_header import unit_exponents
+from enumsol.proof.writer import ProofWriter, unit_exponents
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

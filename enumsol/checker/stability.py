@@ -173,11 +173,9 @@ class _WidenedChecker(Checker):
         return "it was proven for the given data alone"
 
     def _no_root(self, codes: Codes, said: records.NoRoot) -> str | None:
-        del said
         return self._for_all(lambda system: (ball := solve_selection(system, codes)) is not None and ball.is_excluded)
 
     def _regular_root(self, codes: Codes, said: records.RegularRoot) -> str | None:
-        del said
         self.regular += 1
         return self._for_all(lambda system: (ball := solve_selection(system, codes)) is not None and ball.is_root)
 

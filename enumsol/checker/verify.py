@@ -251,7 +251,6 @@ class Checker(TreeChecker):
         return None
 
     def _no_root(self, codes: Codes, said: records.NoRoot) -> str | None:
-        del said
         if holds_no_root(self.system, codes, solve_selection(self.system, codes)):
             return None
         return "its candidate does not break a condition strictly, nor do its equations contradict each other"
@@ -337,7 +336,6 @@ class Checker(TreeChecker):
     def _no_rational_root(self, codes: Codes, said: records.NoRootInRationals) -> str | None:
         from enumsol.checker.hull import hull_of_selections
 
-        del said
         return "it holds a root" if hull_of_selections(self.rational, codes).points else None
 
     def _root_set(self, codes: Codes, said: records.RootSetRecord) -> str | None:

@@ -209,12 +209,10 @@ class TreeChecker:
         return {**self._tests(), UndecidedRecord: self._undecided, Unloaded: self._unloaded}
 
     def _undecided(self, codes: Codes, said: UndecidedRecord) -> str | None:
-        del codes
         self.undecided += 1
         return None if isinstance(said.reason, str) else "its reason is no text"
 
     def _unloaded(self, codes: Codes, said: Unloaded) -> str | None:
-        del said
         unloaded = all(code == UNDECIDED for code in codes) and self.problem.is_unloaded(self.alpha)
         # g = 0: by the energy bound nothing but lambda = 0 solves
         self._at_rest()

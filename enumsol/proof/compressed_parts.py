@@ -75,3 +75,32 @@ class Recorder(Protocol):
 
     def add(self, part: Part) -> None:
         """Append records that were encoded elsewhere."""
+
+
+class KeptRecords:
+    """Keeps records: of a search that may begin again, or of a task whose records are sent as one part."""
+
+    def __init__(self) -> None:
+        self._records: list[Any] = []
+
+    def write(self, record: Any) -> None:
+        """Keep a record."""
+        self._records.append(record)
+
+    def add(self, part: Part) -> None:
+        """Keep records that were encoded elsewhere."""
+        self._records.append(part)
+
+    def release(self, recorder: Recorder) -> None:
+        """Hand the records on."""
+        for record in self._records:
+            (recorder.add if isinstance(record, Part) else recorder.write)(record)
+        self._records.clear()
+
+    def drop(self) -> None:
+        """Forget the records."""
+        self._records.clear()
+
+    def part(self) -> Part | None:
+        """All records, none of which was encoded elsewhere, as one part; None if there are none."""
+        return Part.of([encoded(record) for record in self._records]) if self._records else None

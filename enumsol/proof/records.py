@@ -83,14 +83,12 @@ class Record:
     @classmethod
     def check(cls, record: list[Any], limits: Limits) -> None:
         """Raise RecordError where a record has another number of entries, or may not stand at its place."""
-        del limits
         if len(record) not in cls.sizes:
             raise RecordError(cls.unfit.format(len(record), " or ".join(map(str, cls.sizes))))
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> Any:
         """The same from the entries after the first, of which there are as many as there must be."""
-        del limits
         return cls(*entries)
 
     def write(self) -> list[Any]:
@@ -257,7 +255,6 @@ class RegularRoot(Solved):
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> RegularRoot:
         """The enclosure."""
-        del limits
         return cls(EnclosureRecord(*entries))
 
     def entries(self) -> Iterable[Any]:

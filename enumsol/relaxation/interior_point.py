@@ -126,10 +126,8 @@ class _InteriorPointRelaxation:
 
     def forced(self, codes: Codes) -> tuple[int, ...]:
         """None: this method bounds a child only by solving it."""
-        del codes
         return ()
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on, solved from scratch."""
-        del last
         return self._engine.solved(self._on | dict(zip(rows, modes, strict=True)))

@@ -23,8 +23,7 @@ from enumsol.model.statuses import (
     UNDECIDED,
 )
 from enumsol.search.fathoming_in_contact import KnownRoot, Lone
-from enumsol.search.numbers import WeightSource
-from enumsol.search.reduction import NEAR, Reduction
+from enumsol.search.reduction import NEAR, Reduction, WeightSource
 from enumsol.selections.solution import SelectionSolution
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""When a search turns from the energy to a tighter form (theory, section 5.8).
+"""When a search turns from the energy to a tighter form, at one alpha and over an interval (theory, sections 5.8, 7.8).
 
 A form costs as much as hundreds of nodes of the tree, and does not pay everywhere. So a search begins with the energy;
 one that is still far from its end after many nodes tries a form at its root, and begins again with it if that is worth
@@ -7,16 +7,22 @@ it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from enumsol.proof.compressed_parts import Part, Recorder
+import numpy as np
+
+from enumsol.condensation.enclosure import EnclosedSystem
+from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, FormEngine
+from enumsol.search.splitting import ImposedRows, PlaneSplitting
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from enumsol.condensation.condensed import ScaledSystem
-    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.relaxation.engine import Engine
-    from enumsol.search.splitting import ImposedRows
+    from enumsol.relaxation.interval_relaxation import IntervalSystem
     from enumsol.selections.solution import Codes
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
@@ -44,18 +50,9 @@ class Forms:
 
     def __init__(self, scaled: ScaledSystem, enclosed: EnclosedSystem) -> None:
         self._scaled, self._enclosed = scaled, enclosed
-        self._engine: Engine | None = None
-        self._form: EnclosedForm | None = None
-
-    @property
-    def in_use(self) -> bool:
-        """Whether the search goes on with forms."""
-        return self._engine is not None
-
-    @property
-    def form(self) -> EnclosedForm | None:
-        """That form."""
-        return self._form
+        #: Relaxations with the form in use, and that form; None for the energy.
+        self.engine: Engine | None = None
+        self.form: EnclosedForm | None = None
 
     def due(self, nodes: int, covered: float) -> bool:
         """Whether it is time to try a form."""
@@ -67,11 +64,11 @@ class Forms:
 
     def use(self, engine: Any, form: EnclosedForm | None) -> None:
         """Go on with a form that is known already, or with the energy."""
-        if form is not None and form is self._form:
+        if form is not None and form is self.form:
             return
-        self._form = form
-        usable = form is not None and isinstance(engine, ActiveSetEngine) and form.smallest_eigenvalue > 0
-        self._engine = FormEngine(engine, self._scaled, form) if usable and form is not None else None
+        self.form, self.engine = form, None
+        if form is not None and isinstance(engine, ActiveSetEngine) and form.smallest_eigenvalue > 0:
+            self.engine = FormEngine(engine, self._scaled, form)
 
     def pay(self, engine: Any, codes: Codes, rows: ImposedRows) -> bool:
         """Whether a form at the root of the search is clearly tighter than the energy; if so it is in use."""
@@ -80,14 +77,8 @@ class Forms:
         form = ascended(self._scaled, self._enclosed, engine, codes, rows.over(codes, range(len(codes))))
         if form is None or not form.smallest_eigenvalue > 0:
             return False
-        self._form, self._engine = form, FormEngine(engine, self._scaled, form)
+        self.use(engine, form)
         return True
-
-    @property
-    def engine(self) -> Engine:
-        """Relaxations with the form of the root."""
-        assert self._engine is not None
-        return self._engine
 
 
 def ascended(
@@ -120,36 +111,46 @@ def ascended(
     return found[0]
 
 
-class HeldRecords:
-    """Keeps the records of a search that may begin again.
+@dataclass(frozen=True, eq=False)
+class PairedTerms:
+    """The form (D lambda)'(S lambda - g) with D of (5.11), that does not depend on the piece.
 
-    Parameters
+    D maps (lambda_n, lambda_t) of a node to (mu lambda_n + nu lambda_t, delta lambda_n + s lambda_t). The form is at
+    most zero at every solution for any friction F with |delta| <= F s.
+
+    Attributes
     ----------
-    recorder : Recorder
-        Takes them when they are released.
+    terms : (4, p) array
+        mu, nu, delta and s of every node.
     """
 
-    def __init__(self, recorder: Recorder) -> None:
-        self.recorder = recorder
-        self._records: list[Any] = []
+    terms: NDArray[np.float64]
 
-    def write(self, record: Any) -> None:
-        """Keep a record."""
-        self._records.append(record)
+    @classmethod
+    def of(cls, multipliers: NDArray[np.float64], F: NDArray[np.float64]) -> PairedTerms:
+        """The form of multipliers mu, nu, alpha and beta (theory, section 5.8) with coefficients F."""
+        mu, nu, alpha, beta = multipliers
+        return cls(np.stack([mu, nu, F * (beta - alpha), alpha + beta]))
 
-    def add(self, part: Part) -> None:
-        """Keep records that were encoded elsewhere."""
-        self._records.append(part)
+    def multipliers(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
+        """mu, nu, alpha and beta with other coefficients, which are at least as large."""
+        mu, nu, delta, s = self.terms
+        return np.stack([mu, nu, np.maximum(0.5 * (s - delta / F), 0.0), np.maximum(0.5 * (s + delta / F), 0.0)])
 
-    def release(self) -> None:
-        """Hand the records on."""
-        for record in self._records:
-            if isinstance(record, Part):
-                self.recorder.add(record)
-            else:
-                self.recorder.write(record)
-        self._records.clear()
 
-    def drop(self) -> None:
-        """Forget the records."""
-        self._records.clear()
+def better_form(system: IntervalSystem) -> PairedTerms | None:
+    """A form that is clearly tighter than the energy over the piece; None: there is none.
+
+    It is sought for the load at the middle and the least friction of the piece, with which it is used. Where that is
+    zero at some node none is sought.
+    """
+    if not np.all(system.F_lo > 0):
+        return None
+    scaled = replace(system.scaled, g=system.g, F=system.F_lo)
+    zero = np.zeros_like
+    enclosed = EnclosedSystem(scaled.S, zero(scaled.S), scaled.g, zero(scaled.g), scaled.F, zero(scaled.F))
+    codes = (UNDECIDED,) * scaled.p
+    rows = ImposedRows(PlaneSplitting(scaled.F), scaled.p).over(codes, range(scaled.p))
+    engine = ActiveSetEngine(replace(scaled, F=system.F))
+    found = ascended(scaled, enclosed, engine, codes, rows)
+    return None if found is None else PairedTerms.of(found.multipliers, system.F_lo)

@@ -101,14 +101,8 @@ class SearchOutcome:
         self.solutions += part.solutions
         self.undecided += part.undecided
         self.stopped = self.stopped or part.stopped
-        self.nodes += part.nodes
-        self.pruned += part.pruned
-        self.selections += part.selections
-        self.qps += part.qps
-        self.fallback_qps += part.fallback_qps
-        self.presolved += part.presolved
-        self.closed += part.closed
-        self.resumed += part.resumed
+        for count in ("nodes", "pruned", "selections", "qps", "fallback_qps", "presolved", "closed", "resumed"):
+            setattr(self, count, getattr(self, count) + getattr(part, count))
 
     def count_unexamined(self) -> None:
         """Have the reason of an early end say how many subtrees all parts of the search left."""

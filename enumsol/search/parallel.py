@@ -15,7 +15,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from enumsol.proof.compressed_parts import Part, encoded
+from enumsol.proof.compressed_parts import KeptRecords
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.search.tree import TreeNode
 from enumsol.support.workers import Crew
@@ -24,12 +24,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
     from concurrent.futures import Executor
 
-    from enumsol.proof.compressed_parts import Recorder
+    from enumsol.proof.compressed_parts import Part, Recorder
     from enumsol.search.certifiers.protocol import Certified, Certifier
     from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress
     from enumsol.search.resume import Reader
     from enumsol.search.tree import TreeSearch
-    from enumsol.selections.solution import Codes
     from enumsol.support.workers import Job
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
@@ -77,24 +76,6 @@ class Searchable(Protocol):
         """First record of a proof."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Root:
-    """A subtree that waits, as it is sent to a worker (see TreeNode)."""
-
-    codes: Codes
-    changed: int
-    weight: float
-    forced: tuple[int, ...] | None
-
-    @classmethod
-    def of(cls, item: TreeNode) -> _Root:
-        return cls(item.codes, item.changed, item.weight, item.forced)
-
-    @property
-    def node(self) -> TreeNode:
-        return TreeNode(None, self.codes, self.changed, last=False, weight=self.weight, forced=self.forced)
-
-
 @dataclass(frozen=True)
 class _Sent:
     """What a worker makes its solvers from, and uses for many tasks."""
@@ -120,7 +101,7 @@ class _Answer:
     records: Part | None
     certified: Certified
     covered: float
-    rest: list[_Root]
+    rest: list[TreeNode]
 
 
 @dataclass(eq=False)
@@ -128,7 +109,7 @@ class _Part:
     """A part of the tree: subtrees that follow on each other, the first one last."""
 
     place: tuple[int, ...]
-    roots: Sequence[_Root]
+    roots: Sequence[TreeNode]
     answer: _Answer | None = None
     further: Sequence[_Part] = ()
 
@@ -196,17 +177,17 @@ class Spread:
         self.cancel()
         items: list[TreeNode] = []
         for item in waiting:
-            items += [root.node for root in item.roots] if isinstance(item, _Part) else [item]
+            items += item.roots if isinstance(item, _Part) else [item]
         limits, done = self._search.limits, self._search.outcome.nodes
         first = FIRST if limits.max_nodes is None else min(FIRST, limits.max_nodes - done)
         rest = self._search.examined(items, first, limits.deadline)
-        parts = self._parts((), [_Root.of(item) for item in rest])
+        parts = self._parts((), [item.sent() for item in rest])
         for part in parts:
             heapq.heappush(self._waiting, part)
         self._hand_out()
         return parts[::-1]
 
-    def _parts(self, place: tuple[int, ...], roots: list[_Root]) -> list[_Part]:
+    def _parts(self, place: tuple[int, ...], roots: list[TreeNode]) -> list[_Part]:
         """In the order of the tree; of the subtrees the last ones are near its root, and so large."""
         groups = [[root] for root in roots[:ALONE][::-1]]
         if roots[ALONE:]:
@@ -250,8 +231,8 @@ class Spread:
         rest = None if most is None else most - search.outcome.nodes
         if rest is not None and answer.outcome.nodes > rest:
             # the last part before the limit is shorter
-            left = search.examined([root.node for root in part.roots], rest)
-            return self._parts(part.place, [_Root.of(item) for item in left])
+            left = search.examined(part.roots, rest)
+            return self._parts(part.place, [item.sent() for item in left])
         search.outcome.add(answer.outcome)
         search.certifier.add(answer.certified)
         if answer.records is not None:
@@ -275,30 +256,11 @@ class Spread:
         self.cancel()
 
 
-class _Records:
-    """Records of a part of a proof."""
-
-    def __init__(self) -> None:
-        self._lines: list[str] = []
-
-    def write(self, record: Any) -> None:
-        """Append one record."""
-        self._lines.append(encoded(record))
-
-    def add(self, part: Part) -> None:
-        """Nothing is searched by others from here."""
-        raise AssertionError("a worker has no workers")
-
-    def part(self) -> Part | None:
-        """All of them; None if there are none."""
-        return Part.of(self._lines) if self._lines else None
-
-
 _local = threading.local()
 
 
 def _search_part(
-    key: bytes, data: bytes | None, roots: Sequence[_Root], nodes: int, seconds: float | None
+    key: bytes, data: bytes | None, roots: Sequence[TreeNode], nodes: int, seconds: float | None
 ) -> _Answer | None:
     """Search a part, in a worker; every thread makes what it needs once. None where it was not given that yet."""
     if getattr(_local, "key", None) != key:
@@ -307,7 +269,7 @@ def _search_part(
         remake, _local.form, _local.sliding, _local.known = pickle.loads(data)
         _local.solvers, _local.key = remake(), key
     solvers: Searchable = _local.solvers.fresh()
-    records = _Records()
+    records = KeptRecords()
     certifier = solvers.certifier(records)
     certifier.sliding.update(_local.sliding)
     search = solvers.search(certifier)
@@ -316,6 +278,6 @@ def _search_part(
     if search.forms is not None:
         search.forms.use(search.engine, _local.form)
     deadline = None if seconds is None else time.perf_counter() + seconds
-    rest = search.examined([root.node for root in roots], nodes, deadline)
-    left = [_Root.of(item) for item in rest]
+    rest = search.examined(roots, nodes, deadline)
+    left = [item.sent() for item in rest]
     return _Answer(search.outcome, records.part(), certifier.certified, search.covered, left)

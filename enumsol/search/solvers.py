@@ -12,11 +12,11 @@ from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError
+from enumsol.proof.writer import point_header, unit_exponents
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.fathoming import Closer
 from enumsol.search.form_policy import Forms
-from enumsol.search.proof_header import point_header, unit_exponents
 from enumsol.search.resume import PlaneReader
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import TreeSearch, make_engine

@@ -19,11 +19,12 @@ from typing import TYPE_CHECKING, Any
 from enumsol.condensation.condensed import ScaledSystem
 from enumsol.errors import MissingDependencyError
 from enumsol.model.statuses import UNDECIDED
+from enumsol.proof.compressed_parts import KeptRecords
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import Engine, Relaxation, not_compiled
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart
-from enumsol.search.form_policy import Forms, HeldRecords
+from enumsol.search.form_policy import Forms
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting, branching_node
 from enumsol.selections.solution import Codes
@@ -54,6 +55,10 @@ class TreeNode:
     weight: float
     #: Presolve: nodes with one child that is not excluded, to be branched on first; None once there were no more.
     forced: tuple[int, ...] | None = None
+
+    def sent(self) -> TreeNode:
+        """The same as it is sent to a worker, where it begins without its parent."""
+        return replace(self, parent=None, last=False)
 
 
 def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
@@ -142,14 +147,13 @@ class TreeSearch:
         if self.forms is None:
             self.loop(start, None)
             return self.outcome
-        certifier = self.certifier
-        held = HeldRecords(certifier.recorder)
-        certifier.recorder = held
+        certifier, held = self.certifier, KeptRecords()
+        recorder, certifier.recorder = certifier.recorder, held
         try:
             stack = self._begin(start, held, self.forms)
         finally:
-            certifier.recorder = held.recorder
-            held.release()
+            certifier.recorder = recorder
+            held.release(recorder)
         self.loop(stack, None)
         return self.outcome
 
@@ -168,7 +172,7 @@ class TreeSearch:
             self.report(self.covered)
         return found is not None
 
-    def _begin(self, start: list[TreeNode], held: HeldRecords, forms: Forms) -> list[Any]:
+    def _begin(self, start: list[TreeNode], held: KeptRecords, forms: Forms) -> list[Any]:
         """Search until it is known how the search goes on: from the beginning, if that is better; what still waits."""
 
         def due() -> bool:
@@ -194,7 +198,7 @@ class TreeSearch:
         except TimeOverError:
             return False
 
-    def _forget(self, held: HeldRecords) -> None:
+    def _forget(self, held: KeptRecords) -> None:
         held.drop()
         self.certifier.forget()
         self.outcome.forget()
@@ -400,7 +404,7 @@ class TreeSearch:
     def _root(self, codes: Codes, engine: Any = None) -> Relaxation:
         """The relaxation of a partial assignment without a parent; by default with the form in use, if there is one."""
         if engine is None:
-            engine = self.engine if self.forms is None or not self.forms.in_use else self.forms.engine
+            engine = (None if self.forms is None else self.forms.engine) or self.engine
         relaxation: Relaxation = engine.root(*self._rows.over(codes, range(len(codes))))
         return relaxation
 

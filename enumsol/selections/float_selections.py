@@ -194,7 +194,6 @@ class FloatSelections:
 
     def bounds(self, point: NDArray[np.float64]) -> None:
         """Floats prove no bounds."""
-        del point
 
     def exact_slips(self, point: NDArray[np.float64]) -> None:
         """Floats are not exact."""

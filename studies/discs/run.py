@@ -26,8 +26,7 @@ import numpy as np
 
 import enumsol
 from enumsol.model.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.search.numbers import WeightSource, weights_of
-from enumsol.search.reduction import NEAR, Reduction
+from enumsol.search.reduction import NEAR, Reduction, WeightSource, weights_of
 from grazing.run import SOFT, STIFF
 from shared.results import yes
 

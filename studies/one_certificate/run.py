@@ -47,7 +47,7 @@ from enumsol import gallery
 from enumsol.branches.claims import uniqueness_bound
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search.fathoming import propose
-from enumsol.search.numbers import WeightSource
+from enumsol.search.reduction import WeightSource
 from one_certificate.graphs import graphs
 from shared.clock import least_time, timed
 from shared.figures import BLUE, GREEN, GREY, ORANGE, RED, panels

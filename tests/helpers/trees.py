@@ -7,7 +7,7 @@ import pytest
 from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.search import fathoming as closing
 from enumsol.search.fathoming import Closer
-from enumsol.search.numbers import WeightSource
+from enumsol.search.reduction import WeightSource
 from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.search.space.space_fathoming import SpaceCloser
 

@@ -7,7 +7,7 @@ import pytest
 from flint import fmpq, fmpq_mat
 
 from enumsol.search.definite import Nodes
-from enumsol.search.numbers import WeightSource, weights_of
+from enumsol.search.reduction import WeightSource, weights_of
 
 
 def exact(values):

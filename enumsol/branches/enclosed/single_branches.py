@@ -15,7 +15,7 @@ import numpy as np
 from enumsol.branches.enclosed.joining import EventPlaceKind, join
 from enumsol.search.chains import Chains, LoadedSystem, SelectionCurve
 from enumsol.search.interval.subintervals import Piece, whole_pieces
-from enumsol.search.numbers import WeightSource
+from enumsol.search.reduction import WeightSource
 from enumsol.support.deadlines import look
 from enumsol.trusted.arcs.only_branch import PieceNumbers, only_roots
 

@@ -67,7 +67,6 @@ class FastCertifier(WithoutProof):
 
     def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, none or one, if it can hold one only; within the tolerance."""
-        del near
         solver = self._selections
         if proposal is None or proposal.weights is None:
             return None

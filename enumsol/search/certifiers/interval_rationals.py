@@ -9,7 +9,7 @@ from enumsol.condensation.exact import ExactSystem
 from enumsol.model.statuses import RowKind
 from enumsol.relaxation.imposed_rows import with_implied
 from enumsol.relaxation.interval_relaxation import IntervalRowKind, interval_rows
-from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
+from enumsol.search.certifiers.rational_certifier import accepted, energy_bound_positive
 from enumsol.search.interval.subintervals import IntervalCertifier
 from enumsol.selections.rational_selections import ExactSelections
 

@@ -1,9 +1,11 @@
-"""What every certifier offers to the search, whatever its arithmetic."""
+"""What every certifier offers to the search, and what those have in common that write a proof or none."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, Protocol
+
+from enumsol.proof.records import Branching, UndecidedRecord, Unloaded
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -12,8 +14,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.proof.compressed_parts import Part, Recorder
+    from enumsol.proof.records import Record
     from enumsol.selections.solution import Codes
     from enumsol.trusted.quadratic_forms import EnclosedForm
+
+
+#: The balls written into a proof are wider than those found by this factor, so that a checker's own balls fit in.
+WIDEN = 4.0
 
 
 @dataclass(frozen=True)
@@ -63,10 +70,8 @@ class Escalations:
 
     def add(self, other: Escalations) -> None:
         """Add the counts of another part of the search."""
-        self.balls += other.balls
-        self.rationals += other.rationals
-        self.refined += other.refined
-        self.undecided += other.undecided
+        for count in fields(self):
+            setattr(self, count.name, getattr(self, count.name) + getattr(other, count.name))
 
 
 @dataclass(frozen=True)
@@ -176,3 +181,45 @@ class WithoutProof:
         """There is nothing to write, and nothing to forget."""
 
     branching = skipped = unloaded = forget = _nothing
+
+
+class RecordingCertifier:
+    """Base of these certifiers: it writes what needs no proof, and keeps count.
+
+    Parameters
+    ----------
+    recorder : Recorder
+        Where the records of the proof go.
+    """
+
+    def __init__(self, recorder: Recorder) -> None:
+        self.recorder = recorder
+        self.sliding: dict[int, int] = {}
+        self._verified: dict[Codes, Any] = {}
+        self._leaves = 0
+
+    def branching(self, node: int, children: Sequence[int]) -> None:
+        """Write a branching of the tree."""
+        self.recorder.write(Branching(node, list(children)).write())
+
+    def skipped(self, codes: Codes, reason: str) -> None:
+        """Write a subtree that was not examined."""
+        self._leaf(UndecidedRecord(reason))
+
+    def unloaded(self) -> None:
+        """Write the proof of the unloaded body."""
+        self._leaf(Unloaded())
+
+    def add(self, part: Certified) -> None:
+        """Take over what the certifier of a subtree has proven."""
+        self._verified |= part.verified
+        self._leaves += part.leaves
+        self.sliding |= part.sliding
+
+    def forget(self) -> None:
+        """Forget what was proven."""
+        self._verified, self._leaves = {}, 0
+
+    def _leaf(self, leaf: Record) -> None:
+        self._leaves += 1
+        self.recorder.write(leaf.write())

@@ -1,12 +1,17 @@
-"""The certifier of arithmetic "exact": every conclusion in rationals (theory, section 6.5)."""
+"""The certifier of arithmetic "exact": every conclusion in rationals (theory, section 6.5).
+
+The checker has a dual bound of its own, ``enumsol.checker.rational``; a test compares the two.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from flint import fmpq, fmpq_mat
+
+from enumsol.arithmetic.rationals import rational
 from enumsol.model.statuses import OPEN, SLIDING, RowKind
-from enumsol.relaxation.imposed_rows import imposed_rows
-from enumsol.search.certifiers.dual_bound import accepted, energy_bound_positive
+from enumsol.relaxation.imposed_rows import INEQUALITY, imposed_rows
 from enumsol.search.certifiers.float_certifier import solve_or_open
 from enumsol.search.certifiers.protocol import WithoutProof
 from enumsol.search.fathoming import holds_below, propose
@@ -15,6 +20,8 @@ from enumsol.support.deadlines import look
 from enumsol.trusted.uniqueness import only_solution
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -22,6 +29,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.search.certifiers.protocol import Bound, UndecidedPart
     from enumsol.search.fathoming import Point, Proposal
+    from enumsol.selections.polytopes import Form
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.selections.solution import Codes
 
@@ -29,6 +37,33 @@ if TYPE_CHECKING:
 
 
 _NEWTON_STEPS = 8
+_DISPLACEMENTS = (RowKind.PENETRATION, RowKind.SLIP_FORWARD, RowKind.SLIP_BACKWARD)
+
+
+def accepted(
+    rows: NDArray[np.intp],
+    values: NDArray[np.float64],
+    imposed: Callable[[int], Mapping[int, int]],
+    scaled: ScaledSystem,
+) -> Iterator[tuple[int, int, Any]]:
+    """Kind, node and multiplier, in the problem's units, of the rows that a node imposes and signs that they admit."""
+    for row, value in zip(rows, values, strict=True):
+        kind, node = divmod(int(row), scaled.p)
+        mode = imposed(node).get(kind)
+        if mode is None or (mode == INEQUALITY and value <= 0):
+            continue
+        unit = scaled.force[node] if kind in _DISPLACEMENTS else scaled.length[node]
+        yield kind, node, rational(float(value)) * rational(float(unit))
+
+
+def energy_bound_positive(g: tuple[Any, ...], inverse: Any, terms: Iterable[tuple[Any, Form]]) -> bool:
+    """Whether -1/4 v' S^-1 v - sum u * constant > 0 with v = g + sum u * form, for multipliers u of affine forms."""
+    v, total = list(g), fmpq(0)
+    for u, (form, constant) in terms:
+        v = [a + u * b for a, b in zip(v, form, strict=True)]
+        total -= u * constant
+    column = fmpq_mat([[a] for a in v])
+    return bool(4 * total > (column.transpose() * (inverse * column))[0, 0])
 
 
 class ExactCertifier(WithoutProof):
@@ -49,7 +84,6 @@ class ExactCertifier(WithoutProof):
 
     def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
-        del near
         found = self._closing(codes, proposal)
         return None if found is None else found[1]
 

@@ -15,8 +15,7 @@ from enumsol.model.statuses import CONDITIONS, RowKind
 from enumsol.proof import records
 from enumsol.proof.proof_file import coarse, fraction_text
 from enumsol.search.certifiers.margins import FORM_ERRORS, energy_margin, margin_of_form
-from enumsol.search.certifiers.protocol import Certified, Escalations, UndecidedPart
-from enumsol.search.certifiers.recording import WIDEN, RecordingCertifier
+from enumsol.search.certifiers.protocol import WIDEN, Certified, Escalations, RecordingCertifier, UndecidedPart
 from enumsol.search.fathoming import propose, without_load
 from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution

@@ -13,8 +13,7 @@ from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, RegularRoot, 
 from enumsol.proof.space_records import LEAVES, BoxedRoot, ExcludedInSpace, OnlyRoot
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine
-from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart
-from enumsol.search.certifiers.recording import WIDEN, RecordingCertifier
+from enumsol.search.certifiers.protocol import WIDEN, Certified, RecordingCertifier, Refine, UndecidedPart
 from enumsol.search.resume import RecordedBound
 from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.trusted.space.leaves import Cause, Open, SpaceRoot, settle

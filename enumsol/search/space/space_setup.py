@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+from enumsol.proof.writer import point_header, unit_exponents
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Unrecorded
-from enumsol.search.proof_header import point_header, unit_exponents
 from enumsol.search.space.space_fathoming import SpaceCloser
 from enumsol.search.space.space_search import SpaceCertifier, SpaceReader, SpaceSplitting
 from enumsol.search.tree import TreeSearch

@@ -350,7 +350,6 @@ class PreciseExpansion:
 
     def near(self, condition: int, low: Number, high: Number) -> tuple[Number, Number]:
         """As in arcs.Expansion; bounds are found at once, by ``zero_bounds``."""
-        del condition, high
         return low, low
 
     def zeros(self, condition: int) -> list[Fraction]:
@@ -367,7 +366,6 @@ class PreciseExpansion:
 
     def zero_bounds(self, condition: int, slope: int, low: Number, high: Number) -> tuple[Fraction, Fraction]:
         """Bounds of the only zero of a condition in a part, at whose ends it has opposite signs."""
-        del slope
         part = Fraction(low), Fraction(high)
         return self._selection.enclosed(condition, *part) or part
 
