@@ -90,6 +90,14 @@ def _two_sum(a: Array, b: Array) -> tuple[Array, Array]:
     return s, (a - (s - z)) + (b - z)
 
 
+def factor_above(M: Array, shift: float = 0.0) -> Array | None:
+    """The Cholesky factor of M - shift I; None where the factorization does not run to its end."""
+    try:
+        return np.asarray(np.linalg.cholesky(M - shift * np.eye(len(M)) if shift else M))
+    except np.linalg.LinAlgError:
+        return None
+
+
 def dense_eigenvalue_bound(S: Array) -> float:
     """Lower bound on the smallest eigenvalue of a symmetric dense matrix; at most 0 when none positive was proven.
 
@@ -105,14 +113,10 @@ def dense_eigenvalue_bound(S: Array) -> float:
     for _ in range(4):
         if not shift > slack:
             break
-        shifted = S - shift * np.eye(n)
-        try:
-            np.linalg.cholesky(shifted)
-        except np.linalg.LinAlgError:
-            shift *= 0.5
-            continue
-        # forming the shifted diagonal rounds once, and so do the two differences here
-        return (shift - slack - 4 * UNIT * (float(np.max(np.abs(np.diagonal(S)))) + shift)) / SAFE
+        if factor_above(S, shift) is not None:
+            # forming the shifted diagonal rounds once, and so do the two differences here
+            return (shift - slack - 4 * UNIT * (float(np.max(np.abs(np.diagonal(S)))) + shift)) / SAFE
+        shift *= 0.5
     return 0.0
 
 

@@ -28,7 +28,7 @@ class FormLeaves:
     def add(self, number: int, codes: tuple[int, ...], said: ExcludedByForm) -> None:
         """Take a leaf, to be checked with others."""
         place = len(self.declared) - said.back
-        self._waiting.setdefault(place, []).append((number, codes, (said.rows, said.values)))
+        self._waiting.setdefault(place, []).append((number, codes, said.terms))
 
     def clear(self) -> None:
         """Let go of the leaves that wait."""

@@ -151,14 +151,13 @@ class Checker(TreeChecker):
             if not self.problem.known_exactly:
                 raise RefusedError("a proof about S and g as computed, of a problem whose slip offset is a ball")
             scaled = self.problem.condensed.at(self.alpha)
-            zero = np.zeros_like
             with np.errstate(over="ignore", invalid="ignore"):
                 pair = self.force[:, None] / self.length[None, :]
                 S, g = scaled.S * pair, scaled.g / self.length
             finite = np.all(np.isfinite(S)) and np.all(np.isfinite(g))
             if not finite or np.any(np.array(self.friction) & (scaled.F == 0)):
                 raise RefusedError("S, g or F over- or underflow in the proof's units")
-            enclosed = EnclosedSystem(S, zero(S), g, zero(g), scaled.F, 4 * np.spacing(scaled.F))
+            enclosed = EnclosedSystem.as_computed(S, g, scaled.F)
         else:
             enclosed = self.enclosed().at(self.alpha, self.force, self.length)
         if not enclosed.smallest_eigenvalue > 0:
@@ -243,7 +242,7 @@ class Checker(TreeChecker):
         self.polytopes.append(((0,) * self.problem.p, [tuple([Fraction(0)] * (2 * self.problem.p))], 0))
 
     def _excluded(self, codes: Codes, said: records.Excluded) -> str | None:
-        self._waiting.append((self.leaves, codes, (said.rows, said.values)))
+        self._waiting.append((self.leaves, codes, said.terms))
         return None
 
     def _excluded_by_form(self, codes: Codes, said: records.ExcludedByForm) -> str | None:
@@ -330,7 +329,8 @@ class Checker(TreeChecker):
         p = self.problem.p
         signs = row_signs(np.array(codes), np.array(self.friction, dtype=float))
         units = [Fraction(self.length[r % p] if r // p < 4 else self.force[r % p]) for r in range(ROW_KINDS * p)]
-        positive = self.rational.energy_bound_positive(signs, said.rows.tolist(), said.values.tolist(), units)
+        rows, values = (part.tolist() for part in said.terms)
+        positive = self.rational.energy_bound_positive(signs, rows, values, units)
         return None if positive else "its multipliers do not exclude it in rational arithmetic"
 
     def _no_rational_root(self, codes: Codes, said: records.NoRootInRationals) -> str | None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from enumsol.arithmetic.balls import factor_above
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.support.arguments import Alpha, alpha_value
 from enumsol.support.immutable import Sealed, sealed
@@ -164,11 +165,7 @@ def lifted(S: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _definite(S: NDArray[np.float64]) -> bool:
     """Whether S less its rounding is positive definite."""
-    try:
-        np.linalg.cholesky(S - _rounding(S) * np.diag(np.diagonal(S)))
-    except np.linalg.LinAlgError:
-        return False
-    return True
+    return factor_above(S - _rounding(S) * np.diag(np.diagonal(S))) is not None
 
 
 def _rounding(S: NDArray[np.float64]) -> float:

@@ -77,14 +77,6 @@ class ProblemData(CondensableData, Protocol):
     node_ids: tuple[Any, ...]
 
     @property
-    def Bn(self) -> sp.csr_array:  # noqa: N802 (the field's letter)
-        """Normal displacement of the contact nodes."""
-
-    @property
-    def Bt(self) -> sp.csr_array:  # noqa: N802 (as above)
-        """Tangential displacement of the contact nodes."""
-
-    @property
     def p(self) -> int:
         """Number of contact nodes."""
 

@@ -241,6 +241,11 @@ class EnclosedSystem:
     F: Array
     F_rad: Array
 
+    @classmethod
+    def as_computed(cls, S: Array, g: Array, F: Array, *, exactly: bool = False) -> EnclosedSystem:
+        """S and g as they were computed in floats, without radii; F too, or within its rounding."""
+        return cls(S, np.zeros_like(S), g, np.zeros_like(g), F, np.zeros_like(F) if exactly else 4 * np.spacing(F))
+
     @property
     def p(self) -> int:
         """Number of contact nodes."""

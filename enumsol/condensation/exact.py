@@ -213,7 +213,7 @@ def _condensed(problem: ProblemData) -> _Parts:
             f'arithmetic="exact" condenses at most n = {EXACT_DOF_LIMIT} degrees of freedom in rationals and the '
             f"problem has n = {n}; use another arithmetic, or condense the body to its contact nodes first"
         )
-    B = rational_matrix(np.vstack([problem.Bn.toarray(), problem.Bt.toarray()]))
+    B = rational_matrix(problem.contact_rows.toarray())
     slope = np.zeros(n) if problem.load_slope is None else problem.load_slope
     loads = rational_matrix(np.column_stack([problem.f, slope]))
     rhs = [[*row, *load] for row, load in zip(B.transpose().tolist(), loads.tolist(), strict=True)]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from flint import fmpq_mat
 
 from enumsol.arithmetic.rationals import rational, rational_matrix
@@ -47,8 +46,7 @@ def exact_matrices(problem: ProblemData) -> tuple[Any, Any]:
             f"the problem has n = {problem.n} degrees of freedom; expected at most {EXACT_DOF_LIMIT} for rational "
             "arithmetic"
         )
-    B = np.vstack([problem.Bn.toarray(), problem.Bt.toarray()])
-    return rational_matrix(problem.A.toarray()), rational_matrix(B)
+    return rational_matrix(problem.A.toarray()), rational_matrix(problem.contact_rows.toarray())
 
 
 def solved(A: Any, rhs: Any) -> Any:

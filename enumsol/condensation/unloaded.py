@@ -27,15 +27,11 @@ if TYPE_CHECKING:
 
 
 class CondensedData(ProblemData, Protocol):
-    """A problem's data, as given and condensed in floats."""
+    """A problem's data, as given and condensed."""
 
     @property
     def condensed(self) -> CondensedProblem:
         """S, g0 and g1 as computed."""
-
-
-class EnclosedData(ProblemData, Protocol):
-    """A problem's data, as given and condensed in balls."""
 
     @property
     def enclosure(self) -> CondensedEnclosure:
@@ -74,7 +70,7 @@ def vanishing_alpha(problem: CondensedData, data: Data) -> Fraction | None:
     return None if zero is None else Fraction(int(zero.p), int(zero.q))
 
 
-def never_loaded(problem: EnclosedData) -> bool:
+def never_loaded(problem: CondensedData) -> bool:
     """Whether g is known to vanish at every alpha, for A, Bn, Bt, f, load_slope, gap and slip_offset as given.
 
     With more than EXACT_DOF_LIMIT degrees of freedom only where all loads, gap and slip offset are zero.

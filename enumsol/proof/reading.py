@@ -16,6 +16,7 @@ import numpy as np
 
 from enumsol.condensation.affine import exactly_at
 from enumsol.errors import InvalidArgumentError
+from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.status_rows import UNDECIDED
 
 if TYPE_CHECKING:
@@ -143,7 +144,7 @@ def bytes_from(text: str) -> bytes:
     return data
 
 
-def multipliers_from(texts: list[Any], most: int) -> tuple[NDArray[np.intp], Array]:
+def multipliers_from(texts: list[Any], most: int) -> Terms:
     """Rows, whole numbers below ``most``, and their multipliers, as many and at most ``most`` of them, from base64."""
     if len(texts) != 2 or not all(isinstance(text, str) for text in texts):
         raise ValueError("its multipliers are no two texts")
@@ -158,7 +159,7 @@ def multipliers_from(texts: list[Any], most: int) -> tuple[NDArray[np.intp], Arr
         raise ValueError(f"row {np.max(row)} does not exist; there are {most}")
     if not np.all(np.isfinite(value)):
         raise ValueError("a multiplier is not finite")
-    return row, value
+    return Terms(row, value)
 
 
 def numbers_from(values: Any, size: int) -> Array:

@@ -17,6 +17,7 @@ import numpy as np
 
 from enumsol.proof.proof_file import packed
 from enumsol.proof.reading import codes_from, multipliers_from, numbers_from, quoted
+from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, ROW_KINDS, UNDECIDED, final_codes, refines
 from enumsol.trusted.uniqueness_in_contact import numbers_of
 
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
     Codes = tuple[int, ...]
     Array = NDArray[np.float64]
-    Rows = NDArray[np.intp]
 
 _SLIDING = FORWARD, BACKWARD
 #: Codes that are not final.
@@ -96,8 +96,15 @@ class Record:
         return [self.kind, *(value.tolist() if isinstance(value, np.ndarray) else value for value in self.entries())]
 
     def entries(self) -> Iterable[Any]:
-        """What follows the kind."""
-        return [getattr(self, field.name) for field in fields(self)]  # type: ignore[arg-type]
+        """What follows the kind: the fields, arrays as one list, multipliers as two texts and enclosures by parts."""
+        for field in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            if isinstance(value, Terms):
+                yield from packed(*value)
+            elif isinstance(value, EnclosureRecord):
+                yield from value
+            else:
+                yield value.ravel() if isinstance(value, np.ndarray) else value
 
 
 def table_of(*records: type[Record]) -> dict[str, type[Any]]:
@@ -257,10 +264,6 @@ class RegularRoot(Solved):
         """The enclosure."""
         return cls(EnclosureRecord(*entries))
 
-    def entries(self) -> Iterable[Any]:
-        """Those of the enclosure."""
-        return self.enclosure
-
 
 # -- leaves in two dimensions ------------------------------------------------------------------------------------------
 
@@ -275,17 +278,12 @@ class Excluded(Exclusion):
 
     kind, sizes = "x", (3,)
 
-    rows: Rows
-    values: Array
+    terms: Terms
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> Excluded:
         """The multipliers from two texts."""
-        return cls(*multipliers_from(entries, ROW_KINDS * limits.p))
-
-    def entries(self) -> Iterable[Any]:
-        """Two texts."""
-        return packed(self.rows, self.values)
+        return cls(multipliers_from(entries, ROW_KINDS * limits.p))
 
 
 class ExcludedInRationals(Excluded):
@@ -301,8 +299,7 @@ class ExcludedByForm(Exclusion):
     kind, sizes = "f", (4,)
 
     back: int
-    rows: Rows
-    values: Array
+    terms: Terms
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> ExcludedByForm:
@@ -312,11 +309,7 @@ class ExcludedByForm(Exclusion):
             raise RecordError("its form was not declared")
         if not limits.declared[-back].holds(limits.codes):
             raise RecordError("its form was made for another assignment")
-        return cls(back, *multipliers_from(entries[1:], ROW_KINDS * limits.p))
-
-    def entries(self) -> Iterable[Any]:
-        """The place of the form, and two texts."""
-        return self.back, *packed(self.rows, self.values)
+        return cls(back, multipliers_from(entries[1:], ROW_KINDS * limits.p))
 
 
 class NoRootInRationals(NoRoot):
@@ -417,7 +410,7 @@ class Alone(Record):
     Attributes
     ----------
     selection : final codes
-    weights, strengths, rows, values : arrays, as ``trusted.uniqueness_in_contact.lone_root`` takes them
+    weights, strengths, terms : arrays, as ``trusted.uniqueness_in_contact.lone_root`` takes them
     enclosure : EnclosureRecord
     """
 
@@ -426,8 +419,7 @@ class Alone(Record):
     selection: Codes
     weights: Array
     strengths: Array
-    rows: Rows
-    values: Array
+    terms: Terms
     enclosure: EnclosureRecord
 
     @classmethod
@@ -438,17 +430,12 @@ class Alone(Record):
         weights = numbers_from(entries[1], len(nodes) + 3 * int(np.count_nonzero(own)))
         strengths = numbers_from(entries[2], 2 * limits.p).reshape(2, -1)
         terms = multipliers_from(entries[3:5], ROW_KINDS * limits.p)
-        return cls(selection, weights, strengths, *terms, EnclosureRecord(*entries[5:]))
-
-    def entries(self) -> Iterable[Any]:
-        """Strengths as one list, multipliers as two texts."""
-        terms = packed(self.rows, self.values)
-        return self.selection, self.weights, self.strengths.ravel(), *terms, *self.enclosure
+        return cls(selection, weights, strengths, terms, EnclosureRecord(*entries[5:]))
 
     @property
     def arguments(self) -> tuple[Any, ...]:
         """Those of ``trusted.uniqueness_in_contact.lone_root`` after the assignment."""
-        return self.selection, self.weights, self.strengths, self.rows, self.values
+        return self.selection, self.weights, self.strengths, *self.terms
 
 
 #: All kinds of leaves in 2D.

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
 
+from enumsol.arithmetic.balls import factor_above
 from enumsol.relaxation.active_set import ActiveSetRelaxation, FormEngine
 from enumsol.relaxation.imposed_rows import row_normals
 from enumsol.support.deadlines import look
@@ -139,11 +140,7 @@ class FormAscent:
     def _subspace(self, codes: Codes) -> _Subspace:
         p, status = self._scaled.p, np.asarray(codes)
         a = Equations.of(self._enclosed, codes).a
-        across = np.eye(2 * p)
-        if len(a):
-            Q, R, _ = qr(a.T, pivoting=True)
-            size = np.abs(np.diagonal(R))
-            across = Q[:, int(np.sum(size > _DEPENDENT * size[0])) :]
+        across = _complement(a) if len(a) else np.eye(2 * p)
         normal = status == UNDECIDED
         tangential = (normal | (status == CONTACT)) & (self._scaled.F > 0)
         live = np.flatnonzero(np.concatenate([normal, normal & tangential, tangential, tangential]))
@@ -152,10 +149,7 @@ class FormAscent:
     def _factor(self, form: EnclosedForm, space: _Subspace) -> Array | None:
         """The Cholesky factor of a form on the subspace; None where it is not convex there."""
         whole = space.across.shape[1] == len(form.h)
-        try:
-            return np.asarray(np.linalg.cholesky(form.H if whole else space.across.T @ form.H @ space.across))
-        except np.linalg.LinAlgError:
-            return None
+        return factor_above(form.H if whole else space.across.T @ form.H @ space.across)
 
     def _plain(self, codes: Codes, multipliers: Array, weight: float = 0.0) -> EnclosedForm:
         return EnclosedForm.of(self._enclosed, codes, multipliers.reshape(4, -1), weight)
@@ -253,15 +247,12 @@ class FormAscent:
         normals = row_normals(scaled.p, scaled.F, scaled.S, numbers) @ space.across
         free = space.across
         if len(normals):
-            Q, R, _ = qr(normals.T, pivoting=True)
-            size = np.abs(np.diagonal(R))
-            free = free @ Q[:, int(np.sum(size > _DEPENDENT * max(size[0], 1e-300))) :]
+            free = free @ _complement(normals)
         if not free.shape[1]:
             return np.zeros((len(live), len(live)))
         slopes = self._left(free) * right[:, None] + self._right(scaled.S @ free) * left[:, None]
-        try:
-            factor = np.linalg.cholesky(free.T @ found.form.H @ free)
-        except np.linalg.LinAlgError:
+        factor = factor_above(free.T @ found.form.H @ free)
+        if factor is None:
             return np.zeros((len(live), len(live)))
         moved = solve_triangular(factor, slopes[live].T, lower=True)
         return np.asarray(0.5 * (moved.T @ moved))
@@ -285,8 +276,11 @@ class FormAscent:
 
 
 def _is_convex(H: Array, mean: float) -> bool:
-    try:
-        np.linalg.cholesky(H - _CURVATURE * mean * np.eye(len(H)))
-    except np.linalg.LinAlgError:
-        return False
-    return True
+    return factor_above(H, _CURVATURE * mean) is not None
+
+
+def _complement(rows: Array) -> Array:
+    """Columns that span what is orthogonal to some rows."""
+    Q, R, _ = qr(rows.T, pivoting=True)
+    size = np.abs(np.diagonal(R))
+    return np.asarray(Q[:, int(np.sum(size > _DEPENDENT * max(size[0], 1e-300))) :])

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.arithmetic.balls import factor_above
 from enumsol.condensation.condensed import CondensedSystem, ScaledSystem
 from enumsol.errors import InvalidProblemError, MissingDependencyError
 from enumsol.model.statuses import CONDITIONS, SLIP_MINUS, SLIP_PLUS, RowKind
@@ -150,9 +151,7 @@ class PieceForm:
 
         turned = combined(system.S)
         H = 0.5 * (turned + turned.T)
-        try:
-            np.linalg.cholesky(H - _CURVATURE * np.mean(np.diagonal(H)) * np.eye(2 * p))
-        except np.linalg.LinAlgError:
+        if factor_above(H, _CURVATURE * np.mean(np.diagonal(H))) is None:
             return None
         return cls(H, combined(system.g), combined(system.half))
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.arithmetic.balls import factor_above
 from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
@@ -119,9 +120,8 @@ class Descent:
         mu, kappa, nu, rho, side = self._split(z)
         mean, count = np.mean(np.concatenate([mu, kappa])), len(mu) + len(kappa)
         M = self._form(mu, kappa, nu, rho) + weight * mean * H
-        try:
-            L = np.linalg.cholesky(M)
-        except np.linalg.LinAlgError:
+        L = factor_above(M)
+        if L is None:
             return _BEYOND, np.zeros_like(z)
         P = np.linalg.inv(M)
         # slopes of -log det M, which are -tr(P dM)

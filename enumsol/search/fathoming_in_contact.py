@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.arithmetic.balls import factor_above
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.definite import DEFINITE, Nodes
 from enumsol.search.descent import Descent
@@ -115,7 +116,7 @@ class Lone:
         by_mu[:count] += normal
         for mu in _FACTORS:
             form = fixed + mu * by_mu
-            if _is_definite(0.5 * (form + form.T)):
+            if factor_above(0.5 * (form + form.T), DEFINITE) is not None:
                 return np.concatenate([np.full(count, mu), np.ones(b), np.zeros(b), share, np.zeros(b)])
         if not descent:
             return None
@@ -136,12 +137,3 @@ class Lone:
         strengths[0, self._nodes] = np.where(self.touching, _STIFF, mu * self.spare[0] + nu * self.spare[1])
         strengths[1, self._nodes[self.nodes.normal[self.stuck]]] = _STIFF
         return LoneProposal(self._known.selection, numbers[: count + 3 * b], strengths)
-
-
-def _is_definite(form: Array) -> bool:
-    form[np.diag_indices_from(form)] -= DEFINITE
-    try:
-        np.linalg.cholesky(form)
-    except np.linalg.LinAlgError:
-        return False
-    return True

@@ -147,8 +147,7 @@ def better_form(system: IntervalSystem) -> PairedTerms | None:
     if not np.all(system.F_lo > 0):
         return None
     scaled = replace(system.scaled, g=system.g, F=system.F_lo)
-    zero = np.zeros_like
-    enclosed = EnclosedSystem(scaled.S, zero(scaled.S), scaled.g, zero(scaled.g), scaled.F, zero(scaled.F))
+    enclosed = EnclosedSystem.as_computed(scaled.S, scaled.g, scaled.F, exactly=True)
     codes = (UNDECIDED,) * scaled.p
     rows = ImposedRows(PlaneSplitting(scaled.F), scaled.p).over(codes, range(scaled.p))
     engine = ActiveSetEngine(replace(scaled, F=system.F))

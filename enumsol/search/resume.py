@@ -103,15 +103,14 @@ class PlaneReader:
         """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
         limits = records.Limits(codes, self._friction, self._declared)
         if record[0] != records.ExcludedByForm.kind:
-            plain = records.Excluded.read(record, limits)
-            return RecordedBound(plain.rows, plain.values)
+            return RecordedBound(*records.Excluded.read(record, limits).terms)
         said = records.ExcludedByForm.read(record, limits)
-        return RecordedBound(said.rows, said.values, self._enclosed_form(self._declared[-said.back]))
+        return RecordedBound(*said.terms, self._enclosed_form(self._declared[-said.back]))
 
     def lone(self, codes: Codes, record: list[Any]) -> tuple[LoneProposal, Bound]:
         """What is said to show that a root is alone below it; ValueError where the record makes no sense."""
         said = records.Alone.read(record, records.Limits(codes, self._friction))
-        return LoneProposal(said.selection, said.weights, said.strengths), RecordedBound(said.rows, said.values)
+        return LoneProposal(said.selection, said.weights, said.strengths), RecordedBound(*said.terms)
 
     def _enclosed_form(self, said: records.DeclaredForm) -> EnclosedForm:
         if self._enclosed is None:

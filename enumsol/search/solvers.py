@@ -25,7 +25,6 @@ from enumsol.selections.float_selections import FloatSelections
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from enumsol.condensation.condensed import ScaledSystem
     from enumsol.model.problem import ContactProblem
     from enumsol.proof.compressed_parts import Recorder
     from enumsol.relaxation.engine import Engine
@@ -126,7 +125,7 @@ class Solvers:
             pass
         if self._in_rationals or not self.problem.known_exactly:
             return None, "problem"
-        enclosed = as_computed_in_floats(system)
+        enclosed = EnclosedSystem.as_computed(system.S, system.g, system.F)
         return (enclosed if _positive(enclosed) else None), "condensed"
 
     @property
@@ -184,8 +183,10 @@ class Solvers:
     @cached_property
     def _forms(self) -> Forms | None:
         """Forms for a long search; None where the energy is the only one, or there are no balls to prove them by."""
-        system = as_computed_in_floats(self.scaled) if self.arithmetic == "fast" else self.enclosed
-        return None if self.arithmetic == "exact" or system is None else Forms(self.scaled, system)
+        scaled = self.scaled
+        fast = self.arithmetic == "fast"
+        system = EnclosedSystem.as_computed(scaled.S, scaled.g, scaled.F) if fast else self.enclosed
+        return None if self.arithmetic == "exact" or system is None else Forms(scaled, system)
 
     def remake(self) -> Callable[[], Solvers]:
         """Makes the same again, also in another process."""
@@ -217,12 +218,6 @@ class Solvers:
         """
         units = unit_exponents(self.scaled.force, self.scaled.length)
         return point_header(self.problem, self.alpha, self.data, units)
-
-
-def as_computed_in_floats(system: ScaledSystem) -> EnclosedSystem:
-    """S and g as computed, without radii."""
-    zero = np.zeros_like
-    return EnclosedSystem(system.S, zero(system.S), system.g, zero(system.g), system.F, 4 * np.spacing(system.F))
 
 
 def _positive(system: EnclosedSystem) -> bool:

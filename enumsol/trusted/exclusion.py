@@ -15,7 +15,7 @@ in alpha (see ``trusted.over_interval``). ``trusted.energy_bounds`` has the boun
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -34,8 +34,12 @@ if TYPE_CHECKING:
     from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
 
-    #: Row numbers, kind * p + node, and their multipliers.
-    Terms = tuple[NDArray[np.intp], Array]
+
+class Terms(NamedTuple):
+    """Row numbers, kind * p + node, and their multipliers."""
+
+    rows: NDArray[np.intp]
+    values: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +79,7 @@ def exclusion_margin(
     errors: float = 1.0,
 ) -> float:
     """Proven lower bound over one partial assignment (see exclusion_margins)."""
-    return float(exclusion_margins(within, Leaves.of([codes], [(rows, values)]), errors)[0])
+    return float(exclusion_margins(within, Leaves.of([codes], [Terms(rows, values)]), errors)[0])
 
 
 def exclusion_margins(

@@ -42,7 +42,7 @@ SEARCH = (
 )
 #: What may write a false proof and accept it: of these modules the search uses no more than these names; None: all.
 SHARED = {
-    "arithmetic.balls": {"SAFE", "TINY", "UNIT", "upper_norm"},
+    "arithmetic.balls": {"SAFE", "TINY", "UNIT", "factor_above", "upper_norm"},
     "arithmetic.rationals": {"as_objects", "is_positive_definite", "rational", "rational_matrix", "to_fraction"},
     "condensation.affine": {"exactly_at"},
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
@@ -51,7 +51,7 @@ SHARED = {
     "trusted.arcs.only_branch": {"PieceNumbers", "only_roots"},
     "trusted.arcs.selection_balls": None,
     "trusted.arcs.over_parts": None,
-    "trusted.exclusion": {"exclusion_margin"},
+    "trusted.exclusion": {"Terms", "exclusion_margin"},
     "trusted.over_interval": {"EnclosedPiece", "as_computed"},
     "trusted.arcs.precise": None,
     "trusted.positions": {"tangential_positions"},

@@ -12,9 +12,9 @@ from rational_forms import Data, Forms, _value
 
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.checker.stability import stability_radius
-from enumsol.condensation.enclosure import CondensedEnclosure
+from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
 from enumsol.search import form_policy as policy
-from enumsol.search.solvers import Solvers, as_computed_in_floats
+from enumsol.search.solvers import Solvers
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.quadratic_forms import EnclosedForm, Equations
 from enumsol.trusted.status_rows import row_signs
@@ -286,7 +286,8 @@ def test_compiled_bounds_are_below_the_exact_one_and_that_of_the_checker(seed):
     margins = pytest.importorskip("enumsol.search.certifiers._margin").FormMargins
     rng = np.random.default_rng(seed)
     p = int(rng.integers(1, 4))
-    system = as_computed_in_floats(slipping(seed, p).condensed.at(1.0).scaled)
+    scaled = slipping(seed, p).condensed.at(1.0).scaled
+    system = EnclosedSystem.as_computed(scaled.S, scaled.g, scaled.F)
     S, g = fmpq_mat([[_exact(x) for x in row] for row in system.S]), [_exact(x) for x in system.g]
     codes = tuple(int(c) for c in rng.choice((0, 1, 2, 3, 5, 6), size=p))
     signs = row_signs(np.array(codes), system.F)

@@ -20,6 +20,7 @@ from enumsol.search.fathoming import propose, without_load
 from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution
 from enumsol.trusted.at_alpha import VerifiedSelection, holds_no_root, solve_selection
+from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.status_rows import FREE, NONNEGATIVE, row_signs
 from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, same_solution
 from enumsol.trusted.uniqueness_in_contact import lone_root
@@ -108,14 +109,13 @@ class VerifiedCertifier(RecordingCertifier):
         if self._margin is not None:
             if (proven := _proven(self._margin, codes, rows, values)) is not None:
                 self._escalations.balls += 1
-                self._leaf(records.Excluded(rows, proven))
+                self._leaf(records.Excluded(Terms(rows, proven)))
                 return True
         elif (certifier := self._exact()) is not None and certifier.excluded(codes, relaxation):
             # no balls for an S that is positive definite only within rounding
             self._escalations.rationals += 1
             # the certifier passes over multipliers that prove nothing, a checker refuses them
-            kept = self._allowed(codes, rows, values)
-            self._leaf(records.ExcludedInRationals(*kept))
+            self._leaf(records.ExcludedInRationals(self._allowed(codes, rows, values)))
             return True
         self._escalations.refined += 1
         return False
@@ -133,15 +133,15 @@ class VerifiedCertifier(RecordingCertifier):
             self._forms[form] = len(self._forms)
             self.recorder.write(records.DeclaredForm(form.codes, form.multipliers, form.weight).write())
         self._escalations.balls += 1
-        self._leaf(records.ExcludedByForm(len(self._forms) - self._forms[form], rows, proven))
+        self._leaf(records.ExcludedByForm(len(self._forms) - self._forms[form], Terms(rows, proven)))
         return True
 
-    def _allowed(self, codes: Codes, rows: NDArray[np.intp], values: Array) -> tuple[NDArray[np.intp], Array]:
+    def _allowed(self, codes: Codes, rows: NDArray[np.intp], values: Array) -> Terms:
         """Those rows and multipliers that may prove something."""
         kind, node = np.divmod(rows, self._scaled.p)
         signs = row_signs(np.array(codes), self._scaled.F)[node, kind]
         keep = (signs == FREE) | ((signs == NONNEGATIVE) & (values > 0))
-        return rows[keep], values[keep]
+        return Terms(rows[keep], values[keep])
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in a complete selection."""
@@ -206,12 +206,12 @@ class VerifiedCertifier(RecordingCertifier):
         if self._enclosed is None:
             return None
         terms = self._allowed(codes, *bound.multipliers())
-        given = (proposal.selection, proposal.weights, proposal.strengths, *terms)
-        root = lone_root(self._enclosed, codes, *given)
+        given = proposal.selection, proposal.weights, proposal.strengths
+        root = lone_root(self._enclosed, codes, *given, *terms)
         if root is None:
             return None
         self._escalations.balls += 1
-        return [self._regular(proposal.selection, root, partial(records.Alone, *given))]
+        return [self._regular(proposal.selection, root, partial(records.Alone, *given, terms))]
 
     def _take_note(self, force: Array, w: Array) -> None:
         """Take note of nodes that slide without load at a solution."""

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_norm, upper_sum
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, factor_above, gamma, upper_norm, upper_sum
 from enumsol.trusted.arcs.over_parts import expansions
 from enumsol.trusted.arcs.series import bernstein_values
+from enumsol.trusted.selection import signed
 from enumsol.trusted.status_rows import OPEN
 
 if TYPE_CHECKING:
@@ -143,7 +144,7 @@ class _Along:
         first, last = (Ball(np.zeros(p), np.zeros(p)) for _ in friction)
         ends = first, last
         for theta, F in zip(ends, friction, strict=True):
-            theta.mid[rows.slip], theta.rad[rows.slip] = rows.slip_signs * F.mid[rows.slip], F.rad[rows.slip]
+            theta[rows.slip] = signed(F[rows.slip], rows.slip_signs)
         off = np.zeros(p)
         if len(rows.stick):
             loaded = self._normal[rows.stick_columns]
@@ -194,7 +195,7 @@ class _Along:
             (p + rows.stick, _longer(self._stuck), 1.0),
             (p + rows.slip, bound, rows.slip_signs[:, None]),
         ):
-            force.mid[places], force.rad[places] = signs * part.mid, part.rad
+            force[places] = signed(part, signs)
         g0, g1 = system.g0[p + nodes], system.g1[p + nodes]
         middle, radius = (Ball.exact(np.full(1, value)) for value in (series.middle, series.radius))
         t = Ball(np.repeat(self._t.mid, len(nodes), axis=0), np.repeat(self._t.rad, len(nodes), axis=0))
@@ -212,7 +213,7 @@ class _Along:
         turned = (theta * Ball.exact(numbers.kappa))[:, None]
         across = S[:p] * Ball.exact(numbers.nu[:, None]) + S[p:] * Ball.exact(numbers.kappa[:, None])
         along = along - S[p:] * turned
-        return Ball(np.concatenate([along.mid, across.mid]), np.concatenate([along.rad, across.rad]))
+        return Ball.joined(along, across)
 
     def _taken(self, off: Array) -> Ball:
         """What a theta that is off by so much takes from the form at most."""
@@ -222,7 +223,7 @@ class _Along:
         weight = self._numbers.kappa[nodes] * off[nodes] * SAFE
         # weights at least kappa rho / |r|, for any rounding
         T = S[p + nodes] * Ball.exact((np.sqrt(weight / length) * SAFE + TINY)[:, None])
-        square = Ball(T.mid.T, T.rad.T) @ T
+        square = T.T @ T
         taken = Ball(0.5 * square.mid, 0.5 * square.rad)
         taken.mid[nodes, nodes] += 0.5 * weight * length * SAFE
         taken.rad[nodes, nodes] += 4 * UNIT * taken.mid[nodes, nodes]
@@ -231,20 +232,15 @@ class _Along:
 
 def _definite(form: Ball, margin: float) -> bool:
     """Whether the symmetric parts of all matrices in a ball are positive definite."""
-    mid = 0.5 * (form.mid + form.mid.T)
-    # the symmetric part of the form lies in the mean of both triangles
-    rad = (np.maximum(form.rad, form.rad.T) + 4 * UNIT * np.abs(mid)) * SAFE
-    if not (np.all(np.isfinite(mid)) and np.all(np.isfinite(rad))):
+    form = form.symmetric
+    if not form.finite:
         return False
+    mid = form.mid
     k, largest = gamma(len(mid) + 2), float(np.max(np.abs(np.diagonal(mid)), initial=0.0))
     # a Cholesky factorization that runs to its end proves M >= -gamma trace (Rump 2006)
-    slack = k / (1 - k) * float(np.trace(np.abs(mid))) + float(upper_norm(rad)) + margin * largest
+    slack = k / (1 - k) * float(np.trace(np.abs(mid))) + float(upper_norm(form.rad)) + margin * largest
     shift = (slack + 8 * UNIT * largest) * (1.0 + 8 * UNIT) * SAFE + TINY
-    try:
-        np.linalg.cholesky(mid - shift * np.eye(len(mid)))
-    except np.linalg.LinAlgError:
-        return False
-    return True
+    return factor_above(mid, shift) is not None
 
 
 def _between(polynomials: Ball, ends: tuple[float, float]) -> tuple[Array, Array]:
