@@ -151,7 +151,7 @@ class PieceForm:
 
         turned = combined(system.S)
         H = 0.5 * (turned + turned.T)
-        if factor_above(H, _CURVATURE * np.mean(np.diagonal(H))) is None:
+        if factor_above(H, _CURVATURE * float(np.mean(np.diagonal(H)))) is None:
             return None
         return cls(H, combined(system.g), combined(system.half))
 
