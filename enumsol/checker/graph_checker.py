@@ -350,7 +350,7 @@ def covers(roots: Codes, leaves: Codes, friction: Sequence[bool]) -> bool:
     while cells:
         cell, targets, found = cells.pop()
         if targets is not None and len(targets) == 1:
-            cell, found, targets = targets[0], found[_within(found, targets[0])], None
+            cell, found, targets = targets[0], found[np.all(_refines(found, targets[0]), axis=1)], None
         elif targets is not None and np.any(np.all(targets == cell, axis=1)):
             targets = None
         if targets is None and np.any(np.all(found == cell, axis=1)):
@@ -378,13 +378,7 @@ def _split(cell: Codes, refinements: Codes, friction: Sequence[bool]) -> int | N
     return None
 
 
-def _within(leaves: Codes, root: Codes) -> NDArray[np.bool_]:
-    """Which assignments are ``root`` or refine it."""
-    held = (root == CONTACT) & (leaves >= STICK) & (leaves <= SLIP_MINUS)
-    return np.asarray(np.all((leaves == root) | (root == UNDECIDED) | held, axis=1))
-
-
-def _refines(codes: Codes, child: int) -> NDArray[np.bool_]:
-    """Which codes of a node are ``child`` or refine it, where none is coarser."""
-    held = (codes >= STICK) & (codes <= SLIP_MINUS) & (child == CONTACT)
-    return np.asarray((codes == child) | held)
+def _refines(codes: Codes, coarse: int | Codes) -> NDArray[np.bool_]:
+    """Which codes are ``coarse`` or refine it."""
+    held = (coarse == CONTACT) & (codes >= STICK) & (codes <= SLIP_MINUS)
+    return np.asarray((codes == coarse) | (coarse == UNDECIDED) | held)

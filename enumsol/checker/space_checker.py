@@ -44,7 +44,6 @@ class SpaceChecker(TreeChecker):
     boxed: list[tuple[tuple[int, ...], BoxedSolution]] = field(default_factory=list)
     #: What boxes hold that were tested.
     known: dict[bytes, BoxedSolution | None] = field(default_factory=dict)
-    doubtful: int = 0
 
     # -- header and tree -------------------------------------------------------------------------------------------
 
@@ -158,10 +157,6 @@ class SpaceChecker(TreeChecker):
         return said.refusal(found.index, inside=bool(np.all(inside)))
 
     # -- counting --------------------------------------------------------------------------------------------------
-
-    @property
-    def _doubtful(self) -> int:
-        return self.doubtful
 
     def _count(self) -> tuple[int, int]:
         """Roots that two leaves share count once; what cannot be told apart leaves the count open."""

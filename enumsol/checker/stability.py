@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
-from enumsol.checker.verify import Checker, verify
+from enumsol.checker.verify import Checker, FormLeaves, verify
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.model.problem import ContactProblem
 from enumsol.proof import records
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.checker.form_tables import FormLeaves
     from enumsol.checker.walk import Codes, Test
     from enumsol.proof.proof_file import Proof
     from enumsol.proof.records import Record

@@ -16,7 +16,6 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT
-from enumsol.checker.form_tables import FormLeaves
 from enumsol.checker.graph_checker import GraphChecker
 from enumsol.checker.reports import GraphVerificationReport, HistoryVerificationReport, VerificationReport
 from enumsol.checker.walk import TreeChecker
@@ -28,6 +27,7 @@ from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_f
 from enumsol.support.arguments import instance_of, optional_callable
 from enumsol.trusted.at_alpha import holds_no_root, solve_selection
 from enumsol.trusted.exclusion import Leaves, exclusion_margins
+from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import ROW_KINDS, UNDECIDED, coverings_of, row_signs
 from enumsol.trusted.uniqueness_in_contact import lone_root
 
@@ -119,6 +119,38 @@ def _is_in_space(problem: object) -> bool:
     return isinstance(problem, ContactProblem3D)
 
 
+class FormLeaves:
+    """Forms as they are declared, and leaves that wait to be checked."""
+
+    def __init__(self) -> None:
+        self.declared: list[records.DeclaredForm] = []
+        self._waiting: dict[int, list[tuple[int, tuple[int, ...], Terms]]] = {}
+
+    def __len__(self) -> int:
+        return sum(map(len, self._waiting.values()))
+
+    def add(self, number: int, codes: tuple[int, ...], said: records.ExcludedByForm) -> None:
+        """Take a leaf, to be checked with others."""
+        place = len(self.declared) - said.back
+        self._waiting.setdefault(place, []).append((number, codes, said.terms))
+
+    def clear(self) -> None:
+        """Let go of the leaves that wait."""
+        self._waiting.clear()
+
+    def failing(self, system: EnclosedSystem) -> list[int]:
+        """Check the leaves that wait, form by form; the numbers of those that are not excluded."""
+        failed: list[int] = []
+        for place, leaves in self._waiting.items():
+            declared = self.declared[place]
+            numbers, codes, terms = zip(*leaves, strict=True)
+            with np.errstate(over="ignore", invalid="ignore"):
+                form = EnclosedForm.of(system, declared.codes, declared.multipliers, declared.weight)
+                margins = exclusion_margins(form, Leaves.of(codes, terms))
+            failed += np.array(numbers)[~(margins > 0)].tolist()
+        return sorted(failed)
+
+
 @dataclass
 class Checker(TreeChecker):
     """Checks one proof of a problem in 2D."""
@@ -129,7 +161,6 @@ class Checker(TreeChecker):
     closed: dict[tuple[int, ...], ClosedSolution] = field(default_factory=dict)
     #: Codes of the strict roots of complete selections.
     strict: list[tuple[int, ...]] = field(default_factory=list)
-    _in_doubt: int = 0
     _waiting: list[tuple[int, tuple[int, ...], Terms]] = field(default_factory=list)
     _by_forms: FormLeaves = field(default_factory=FormLeaves)
 
@@ -285,8 +316,8 @@ class Checker(TreeChecker):
     def _locate(self, ball: VerifiedSelection | ClosedSolution) -> None:
         if self.located is not None:
             p = self.problem.p
-            forces = Ball(ball.force * self.force, ball.force_rad * self.force + TINY)
-            self.locate(forces, (ball.w[p:] == 0) & (ball.w_rad[p:] == 0))
+            forces = Ball(ball.force.mid * self.force, ball.force.rad * self.force + TINY)
+            self.locate(forces, (ball.w.mid[p:] == 0) & (ball.w.rad[p:] == 0))
 
     def locate_rational_roots(self) -> None:
         """Add the isolated roots that rationals have found to ``located``."""
@@ -349,10 +380,6 @@ class Checker(TreeChecker):
         self.polytopes.append((codes, hull.points, hull.dimension))
         return None
 
-    @property
-    def _doubtful(self) -> int:
-        return self._in_doubt
-
     # -- counting --------------------------------------------------------------------------------------------------
 
     def _count(self) -> tuple[int, int]:
@@ -382,7 +409,7 @@ class Checker(TreeChecker):
         if self.closed:
             from enumsol.checker.fathomed_subtrees import count_apart
 
-            apart, self._in_doubt = count_apart(self.closed, self.strict + [codes for codes, _, _ in self.polytopes])
+            apart, self.doubtful = count_apart(self.closed, self.strict + [codes for codes, _, _ in self.polytopes])
         return len(found) - len(families) + apart, len(families)
 
     def _meet(self, k: int, m: int) -> bool:

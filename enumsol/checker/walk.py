@@ -46,6 +46,8 @@ class TreeChecker:
     failures: list[str] = field(default_factory=list)
     regular: int = 0
     undecided: int = 0
+    #: undecided parts besides undecided leaves
+    doubtful: int = 0
     leaves: int = 0
     data: Data = "problem"
     #: What was found of the roots, if someone wants to know where they leave the contact nodes: forces in the
@@ -86,16 +88,11 @@ class TreeChecker:
             tuple(self.failures),
             self.regular + isolated,
             families,
-            self.undecided + self._doubtful,
+            self.undecided + self.doubtful,
             self.leaves,
             self.data,
             getattr(self, "alpha", None),
         )
-
-    @property
-    def _doubtful(self) -> int:
-        """UndecidedRecord parts besides undecided leaves."""
-        return 0
 
     def enclosed(self) -> CondensedEnclosure:
         """Balls for S and g of the problem's own data."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -232,13 +232,6 @@ class Condensation(Sealed):
         problem = self.problem
         rhs = problem.load_at(alpha) - problem.contact_rows.T @ forces
         return problem.factorization.solve(np.asarray(rhs))
-
-
-@dataclass(frozen=True)
-class CondensedProblem3D(Condensation):
-    """A 3D problem condensed: rows all normals, then all first, then all second tangents."""
-
-    problem: Any = field(repr=False)  # a ContactProblem3D
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,10 @@ from enumsol.support.deadlines import attended
 from enumsol.support.immutable import Sealed
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
     from enumsol.arithmetic.balls import Array
     from enumsol.condensation.data import CondensableData
     from enumsol.support.arguments import AlphaLike
@@ -137,13 +141,7 @@ class CondensedEnclosure(Sealed):
         """The enclosed system of a 2D problem at one alpha, in units given by powers of two (see ScaledSystem)."""
         a = alpha if isinstance(alpha, Fraction) else Fraction(alpha_value(alpha))
         exact = exactly_at(a, *self.problem.friction)
-        try:
-            F = np.array([float(x) for x in exact])
-        except OverflowError:
-            raise NotEnclosedError(_OVERFLOW) from None
-        inexact = np.array([Fraction(x) != y for x, y in zip(F.tolist(), exact, strict=True)])
-        if np.any(inexact & (F == 0)):
-            raise NotEnclosedError("a friction coefficient underflows float64")
+        F, inexact = nearest_floats(exact)
         F_rad = np.where(inexact, 2 * UNIT * F + TINY, 0.0)
         S, S_rad, g, g_rad = self.in_units(a, force, length)
         return EnclosedSystem(S, S_rad, g, g_rad, F, F_rad)
@@ -180,6 +178,24 @@ class CondensedEnclosure(Sealed):
 #: Smallest quotient of units, far above underflow.
 _LEAST_PAIR = 2.0**-1000
 _OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"
+
+
+def nearest_floats(exact: Sequence[Fraction]) -> tuple[Array, NDArray[np.bool_]]:
+    """Friction coefficients in floats, and which of them are rounded.
+
+    Raises
+    ------
+    NotEnclosedError
+        One over- or underflows.
+    """
+    try:
+        F = np.array([float(x) for x in exact])
+    except OverflowError:
+        raise NotEnclosedError(_OVERFLOW) from None
+    inexact = np.array([Fraction(x) != y for x, y in zip(F.tolist(), exact, strict=True)])
+    if np.any(inexact & (F == 0)):
+        raise NotEnclosedError("a friction coefficient underflows float64")
+    return F, inexact
 
 
 def _float_at(alpha: Fraction) -> tuple[float, float]:

@@ -12,7 +12,7 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.condensed import LARGEST_FRICTION, cholesky_factor, load_unit, node_units
-from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, nearest_floats
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
@@ -192,20 +192,12 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         problem = enclosure.problem
         p = problem.p
         exact = [exactly_at(alpha, *pair) for pair in zip(problem.friction, problem.friction_slope, strict=True)]
-        try:
-            F = np.array([[float(x) for x in column] for column in exact]).T
-        except OverflowError:
-            raise NotEnclosedError(_OVERFLOW) from None
-        inexact = np.array(
-            [[Fraction(y) != x for x, y in zip(*both, strict=True)] for both in zip(exact, F.T, strict=True)]
-        )
-        if np.any(inexact.T & (F == 0)):
-            raise NotEnclosedError("a friction coefficient underflows float64")
+        F, inexact = (np.array(part).T for part in zip(*map(nearest_floats, exact), strict=True))
         if (why := _out_of_range(F)) is not None:
             raise NotEnclosedError(why)
         units = friction_units(F)
         F = F * units
-        F_rad = np.where(inexact.T, 2 * UNIT * F, 0.0)
+        F_rad = np.where(inexact, 2 * UNIT * F, 0.0)
         S, S_rad, g, g_rad = enclosure.in_units(alpha, np.tile(force, 3), np.tile(length, 3))
         tau, rows, node, axis = places(F > 0)
         unit = np.concatenate([np.ones(p), units[node, axis]])

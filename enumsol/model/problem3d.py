@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import scipy.sparse as sp
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.condensation.condensed import CondensedProblem3D
+    from enumsol.condensation.condensed import Condensation
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.model.friction import FrictionTable
     from enumsol.support.arguments import AlphaLike
@@ -164,11 +164,11 @@ class ContactProblem3D(ContactBody):
         return self.load_slope is not None or bool(np.any(self._slope))
 
     @cached_property
-    def condensed(self) -> CondensedProblem3D:
+    def condensed(self) -> Condensation:
         """The problem condensed to its 3p contact forces."""
-        from enumsol.condensation.condensed import CondensedProblem3D  # scipy's solvers come with the first use
+        from enumsol.condensation.condensed import Condensation  # scipy's solvers come with the first use
 
-        return CondensedProblem3D.from_problem(self)
+        return Condensation.from_problem(self)
 
     @cached_property
     def enclosure(self) -> CondensedEnclosure:

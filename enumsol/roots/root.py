@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.condensation.condensed import CondensedProblem, CondensedProblem3D
+    from enumsol.condensation.condensed import Condensation, CondensedProblem
     from enumsol.roots.linearisation import SelectionTangent
     from enumsol.roots.local_branch import LocalBranchTest
     from enumsol.roots.slip_signs import SlipSigns
@@ -131,7 +131,7 @@ class Root(ContactState):
     regular: bool
     margin: float
     enclosure: Enclosure | None = field(repr=False, compare=False)
-    _condensed: CondensedProblem | CondensedProblem3D = field(repr=False, compare=False)
+    _condensed: CondensedProblem | Condensation = field(repr=False, compare=False)
     slip_angle: NDArray[np.float64] | None = field(default=None, compare=False)
     _tangent: SelectionTangent | None = field(repr=False, compare=False, default=None)
     _slips: SlipSigns | None = field(repr=False, compare=False, default=None)

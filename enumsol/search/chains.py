@@ -167,7 +167,7 @@ class Chains:
     def _statuses(self, alpha: float) -> Codes | None:
         system = self.system.at(alpha)
         reduction = self.system.reduction(alpha)
-        found = reduction.solution(np.zeros(2 * system.p), system.g) or reduction.sought()
+        found = reduction.solution((np.zeros(2 * system.p), system.g)) or reduction.solution(None)
         return None if found is None else tuple(found[1])
 
     def _event(self, curve: SelectionCurve, alpha: float) -> tuple[float, int | None] | None:

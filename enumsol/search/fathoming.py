@@ -322,7 +322,7 @@ def propose(
             reduction = Reduction(system, codes, free, sliding)
         except np.linalg.LinAlgError:
             return None
-        found = reduction.sought() if near is None else reduction.solution(*near)
+        found = reduction.solution(near)
         if found is None:
             return None
         x, named = found

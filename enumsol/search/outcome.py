@@ -57,11 +57,6 @@ class SearchLimits:
     max_nodes: int | None = None
     deadline: float | None = None
 
-    @staticmethod
-    def deadline_in(seconds: float | None) -> float | None:
-        """The clock's value this many seconds from now."""
-        return None if seconds is None else time.perf_counter() + seconds
-
     @property
     def over(self) -> bool:
         """Whether the deadline has passed."""

@@ -86,14 +86,12 @@ class Reduction:
         self._at.put(x, self.system.F, force)
         return force
 
-    def solution(self, force: Array, w: Array) -> tuple[Array, list[int]] | None:
-        """Forces and statuses that solve the reduced problem up to NEAR, by Newton's method; None if there are none."""
-        x = self._newton(force[self.places], w[self.places], 1.0)
-        return None if x is None else (x, self._named(x))
+    def solution(self, near: tuple[Array, Array] | None) -> tuple[Array, list[int]] | None:
+        """Forces and statuses that solve the reduced problem up to NEAR, or None.
 
-    def sought(self) -> tuple[Array, list[int]] | None:
-        """The same from far away: along F from frictionless contact."""
-        x = self._along_friction()
+        By Newton's method from lambda and w; ``near`` None: from far away, along F from frictionless contact.
+        """
+        x = self._along_friction() if near is None else self._newton(near[0][self.places], near[1][self.places], 1.0)
         return None if x is None else (x, self._named(x))
 
     def _along_friction(self) -> Array | None:

@@ -105,7 +105,8 @@ class PlaneReader:
         if record[0] != records.ExcludedByForm.kind:
             return RecordedBound(*records.Excluded.read(record, limits).terms)
         said = records.ExcludedByForm.read(record, limits)
-        return RecordedBound(*said.terms, form=self._enclosed_form(self._declared[-said.back]))
+        rows, values = said.terms
+        return RecordedBound(rows, values, self._enclosed_form(self._declared[-said.back]))
 
     def lone(self, codes: Codes, record: list[Any]) -> tuple[LoneProposal, Bound]:
         """What is said to show that a root is alone below it; ValueError where the record makes no sense."""

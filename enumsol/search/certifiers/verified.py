@@ -228,8 +228,8 @@ class VerifiedCertifier(RecordingCertifier):
         return None if proposal is None or ball is None or ball.is_wide else self._closed_by(proposal, ball)
 
     def _proven(self, proposal: Proposal) -> ClosedSolution | None:
-        system = _present(self._enclosed)
-        if proposal.weights is None:
+        system = self._enclosed
+        if proposal.weights is None or system is None:
             return None
         ball = closed_solution(system, proposal.named, proposal.free, proposal.weights, proposal.force)
         return ball if ball is not None and (ball.is_root or ball.is_excluded) else None
@@ -264,7 +264,9 @@ class VerifiedCertifier(RecordingCertifier):
         if any(len(codes) > 1 for codes in ball.possible):
             return None
         codes = tuple(code for (code,) in ball.possible)
-        regular = ball.regular or solve_selection(_present(self._enclosed), codes)
+        regular = ball.regular
+        if regular is None and self._enclosed is not None:
+            regular = solve_selection(self._enclosed, codes)
         if regular is None or not regular.is_root:
             return None
         self._verified[codes] = regular
@@ -308,12 +310,6 @@ def _proven(margin: Margin, codes: Codes, rows: NDArray[np.intp], values: Array)
     if margin(codes, rows, short) > _CLEAR:
         return short
     return values if margin(codes, rows, values) > 0 else None
-
-
-def _present(system: EnclosedSystem | None) -> EnclosedSystem:
-    if system is None:
-        raise AssertionError("there are no balls")
-    return system
 
 
 def _only(codes: Codes) -> tuple[frozenset[int], ...]:
