@@ -29,8 +29,7 @@ from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.model.problem import ContactProblem
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
-from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
+from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
 from enumsol.search.interval.interval_parallel import run_parallel
 from enumsol.search.interval.subintervals import FastIntervalCertifier, IntervalSearch
 from enumsol.search.outcome import Stop, StopReason

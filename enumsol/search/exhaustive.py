@@ -79,8 +79,8 @@ def _candidates(system: ScaledSystem, block: NDArray[np.int8]) -> NDArray[np.boo
     p, F, S, g = system.p, system.F, system.S, system.g
     M, b = selection_systems(S, g, F, block)
     # rows and columns of comparable size, so that the reciprocal condition means something
-    M /= np.max(np.abs(M), axis=2, keepdims=True)
-    scale = np.max(np.abs(selection_systems(S, g, F, block)[0]), axis=2)
+    scale = np.max(np.abs(M), axis=2)
+    M /= scale[:, :, None]
     singular = np.linalg.svd(M, compute_uv=False)
     doubtful = singular[:, -1] <= _SCREEN_RANK * singular[:, 0]
     M[doubtful] = np.eye(2 * p)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import enumsol
 from enumsol.condensation.exact import ExactCondensed
-from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
+from enumsol.search.certifiers.interval_certifiers import VerifiedIntervalCertifier
 from enumsol.search.interval import interval_tree, subintervals as interval
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from enumsol.branches.enclosed.traced import TracedProblem
 from enumsol.branches.exact.gluing import glue
 from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.condensation.exact import ExactCondensed
-from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
+from enumsol.search.certifiers.interval_certifiers import VerifiedIntervalCertifier
 from enumsol.search.interval.subintervals import IntervalSearch
 
 

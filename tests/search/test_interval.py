@@ -15,8 +15,7 @@ from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError, Interrupted, InvalidArgumentError, TooLargeError
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.interval_relaxation import IntervalEngine, IntervalSystem
-from enumsol.search.certifiers.interval_balls import VerifiedIntervalCertifier
-from enumsol.search.certifiers.interval_rationals import ExactIntervalCertifier
+from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
 from enumsol.search.interval import subintervals as interval_search
 from enumsol.search.interval.interval_tree import EmptyLeaf
 from enumsol.search.interval.subintervals import FastIntervalCertifier, IntervalSearch, Piece
