@@ -126,7 +126,7 @@ def test_a_path_in_friction_where_newton_fails():
         for traction in ((0.3, -1.0), (1.0, -0.3)):
             sought = whole(gallery.clamped_block(nx, nx // 2, traction=traction), 5.0)
             start = np.zeros(2 * nx), sought.h
-            found += sought.solution(*start) is None
+            found += sought.solution(start) is None
             x, _ = sought.solution(None)
             assert sought._residual(x, sought.h - sought.R @ x, 1.0) <= 1e-9
     assert found > 1
