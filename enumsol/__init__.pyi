@@ -62,6 +62,7 @@ from .fixed_points import (
 )
 from .histories.growing import HistoryProgress as HistoryProgress, histories as histories
 from .histories.history import History as History
+from .histories.maps import MultiplicityMap as MultiplicityMap, multiplicity_map as multiplicity_map
 from .histories.steps import LoadStep as LoadStep
 from .io import read_problem as read_problem, write_problem as write_problem
 from .io.vtu import write_vtu as write_vtu
@@ -73,7 +74,7 @@ from .model.problem3d import ContactProblem3D as ContactProblem3D
 from .model.slip_mean import SlipMean as SlipMean
 from .model.statuses import ContactStatus as ContactStatus, sign_array as sign_array
 from .proof.proof_file import Proof as Proof, ProofFormatError as ProofFormatError
-from .report import write_report as write_report
+from .report import write_history_report as write_history_report, write_report as write_report
 from .roots.enumerate import enumerate_roots as enumerate_roots, is_unique as is_unique
 from .roots.root import Enclosure as Enclosure, Polytope as Polytope, Root as Root, RootFamily as RootFamily
 from .roots.root_set import RootSet as RootSet, SearchStats as SearchStats, Undecided as Undecided

@@ -22,8 +22,8 @@ def page(name):
     return followed
 
 
-NAMES = ("branches", "command_line", "results", "three_dimensions", "tutorial")
-branches, command_line, results, three_dimensions, tutorial = (page(name) for name in NAMES)
+NAMES = ("branches", "command_line", "histories", "results", "three_dimensions", "tutorial")
+branches, command_line, histories, results, three_dimensions, tutorial = (page(name) for name in NAMES)
 
 
 def test_no_page_is_forgotten():
@@ -105,7 +105,15 @@ def test_results(results):
 def test_reports(command_line):
     assert {path.name for path in command_line["folder"].iterdir()} == {
         "FILE",
+        "node.proof",
         "roots.html",
         "wedge.html",
         "wedge.proof",
     }
+
+
+def test_histories(histories):
+    assert {path.name for path in histories["folder"].iterdir()} >= {"loop.png", "node.html", "wedge.html", "map.png"}
+    assert histories["history"].complete
+    assert histories["history"].counts == (1, 1, 3, 5)
+    assert histories["found"].complete

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from enumsol.cli import audit, fixed_point, follow, gallery, graph, report, roots, solve, table, verify
+from enumsol.cli import audit, fixed_point, follow, gallery, graph, history, report, roots, solve, table, verify
 from enumsol.cli.common import ExitStatus
 from enumsol.cli.quiet import loud_again
 from enumsol.cli.streams import guarded_streams
@@ -32,6 +32,7 @@ app.command("solve")(solve.solve)
 app.command("roots")(roots.roots)
 app.command("table")(table.table)
 app.command("graph")(graph.graph)
+app.command("history")(history.history)
 app.command("report")(report.report)
 app.command("follow")(follow.follow)
 app.command("audit")(audit.audit)

@@ -184,6 +184,8 @@ def mesh_problem(
 def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProblem3D:
     r"""Contact problem that a TOML file describes: the options of `mesh_problem`, with ``mesh`` a path from its folder.
 
+    The file may also have the ``steps`` of a history, which the command ``enumsol history`` reads.
+
     Parameters
     ----------
     path : str or path-like
@@ -211,6 +213,7 @@ def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactP
     try:
         options = _toml(place)
         name = file_path(options.pop("mesh", None), "mesh", "the name of a mesh file in quotes")
+        options.pop("steps", None)  # of enumsol history
         check_keys(options)
         return mesh_problem(place.parent / name, **options)
     except (InvalidArgumentError, InvalidProblemError) as error:

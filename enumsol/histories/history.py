@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.histories.history_data import START
+from enumsol.histories.history_files import load_history, save_history
 from enumsol.histories.history_proof import history_proof
 from enumsol.histories.history_text import history_html, history_text
+from enumsol.model.contact_body import ContactBody
+from enumsol.model.problem import ContactProblem
 from enumsol.roots.root import summary
-from enumsol.support.arguments import positive_integer, shown
+from enumsol.support.arguments import file_path, instance_of, positive_integer, shown
+from enumsol.support.files import writing
 from enumsol.support.immutable import Immutable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+    from pathlib import Path
 
     import pandas as pd
 
     from enumsol.histories.history_data import HistoryData, Node
     from enumsol.histories.stages import Stage
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.root import Root
 
@@ -82,7 +88,7 @@ class History(Immutable):
     def proof(self) -> Proof | None:
         """One proof of the whole for ``enumsol.verify``: all searches, their starts, and which follows which.
 
-        None in fast and exact arithmetic, after ``load``, and where there was no search at all.
+        None in fast and exact arithmetic, and where there was no search at all.
         """
         return history_proof(self.data)
 
@@ -183,6 +189,67 @@ class History(Immutable):
                 }
             )
         return pd.DataFrame(rows).astype({"index": "Int64"}) if rows else pd.DataFrame(rows)
+
+    def plot(self, x: Any = "displacement", y: Any = "alpha", *, ax: Any = None, file: str | Path | None = None) -> Any:
+        """A figure of one quantity of the roots against another, a line for every history.
+
+        Points that several histories share are grey; a point is open where the history was not followed, and a rhombus
+        where the root is not regular.
+
+        Parameters
+        ----------
+        x, y : str or callable
+            "step", "alpha", "displacement" (of the loaded degrees of freedom in the direction in which the load
+            changes), "lambda_n" or "lambda_t" (sums over the contact nodes; in 3D along the first axis), "dissipated"
+            (work of friction since the start), or a function of a `Root`.
+        ax : matplotlib Axes or None
+            Draw there; None: in a new figure.
+        file : path, optional
+            Save the figure there.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        InvalidArgumentError
+            There is no such quantity, or the file cannot be written.
+        MissingDependencyError
+            matplotlib is not installed.
+        """
+        from enumsol.histories.history_plots import draw_history  # matplotlib comes with the first picture
+
+        figure = draw_history(self.data, x, y, ax)
+        if file is not None:
+            place = file_path(file, "file")
+            with writing(place, "file"):
+                figure.savefig(place, dpi=150)
+        return figure
+
+    def save(self, file: str | Path) -> None:
+        """Write the history, with the proofs of its searches, as JSON; the problem is not part of the file.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The file cannot be written.
+        """
+        save_history(self.data, file)
+
+    @classmethod
+    def load(cls, file: str | Path, problem: ContactProblem | ContactProblem3D) -> History:
+        """Read a history that `save` wrote, of this problem.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The file cannot be read, holds something else, or a history of another problem.
+        """
+        given: Any = problem
+        if not isinstance(given, ContactBody):
+            instance_of(given, ContactProblem, "problem")
+        return cls(load_history(file, problem))
 
     def completeness(self) -> str:
         """The closing line of the printed history."""

@@ -35,6 +35,11 @@ def history_html(history: HistoryData) -> str:
     return html_lines([_heading(history)]) + html_table(_HEADS, _rows(history)) + tree + html_lines(_notes(history))
 
 
+def steps_table(history: HistoryData) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Heads and rows of the table of the steps."""
+    return _HEADS, _rows(history)
+
+
 def tree_lines(history: HistoryData, most: int = _TREE) -> Iterator[str]:
     """The tree, a line per node: only below a branching it is indented.
 

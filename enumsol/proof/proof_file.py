@@ -129,10 +129,20 @@ class Proof:
             The proof's own file cannot be read any more.
         """
         place = file_path(path, "path")
-        with self._open() as file:
-            data = file.read()
+        data = self.content()
         with writing(place, "path"):
             place.write_bytes(data)
+
+    def content(self) -> bytes:
+        """The bytes of the proof file.
+
+        Raises
+        ------
+        ProofFormatError
+            The file cannot be read any more.
+        """
+        with self._open() as file:
+            return file.read()
 
     @classmethod
     def load(cls, path: str | Path) -> Proof:

@@ -1,7 +1,8 @@
-"""Reports: all solutions, over an interval of alpha or at one, as one HTML page that needs no network."""
+"""Reports as HTML pages that need no network: all solutions, over an interval of alpha or at one, and histories."""
 
 from __future__ import annotations
 
+from enumsol.report.history_page import write_history_report
 from enumsol.report.page import write_report
 
-__all__ = ["write_report"]
+__all__ = ["write_history_report", "write_report"]

@@ -33,6 +33,7 @@ CONCLUSIONS = {
     "fixed_points_basins": ("sign of the index at all: yes", "none of the repelling ones: yes"),
     "fixed_points_scaling": ("all converged: yes", "Newton needed no help: yes"),
     "grazing": ("chains: all complete and checked: yes; at most", "rows of equal discs: 4 of 4 complete"),
+    "histories": ("all complete and unique, proven: yes", "unique until step 2, complete: yes"),
     "jamming_wedge": ("jams from F = 1.37, from coarse to fine; at most 5 solutions", "all complete, proven: yes"),
     "paper_examples": ("all 19 facts hold", "no arc or continuum missed, no jump"),
     "peers": ("enumsol: ended on 3 of 3", "4^p selections: ended on 3 of 3"),

@@ -1,0 +1,208 @@
+"""``enumsol history``: every history of solutions that steps of load may leave behind."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from enumsol.cli.common import TOML, ExitStatus, finish, load_any_problem, so_far, workers
+from enumsol.cli.options import (
+    OUTPUT,
+    PLOT,
+    Arithmetic,
+    JsonFile,
+    MaxNodes,
+    PlotFile,
+    ProblemArgument,
+    Quiet,
+    count,
+    csv,
+    file,
+    seconds,
+)
+from enumsol.cli.output import as_json, check_outputs, check_plot, check_writable, deliver, write_figure
+from enumsol.cli.progress import Display
+from enumsol.errors import InvalidArgumentError
+
+if TYPE_CHECKING:
+    from enumsol.histories.growing import HistoryProgress
+    from enumsol.histories.history import History
+
+Drawn = Literal["step", "alpha", "displacement", "lambda_n", "lambda_t", "dissipated"]
+
+
+def history(
+    problem: ProblemArgument,
+    steps: Annotated[
+        str | None,
+        typer.Option(
+            metavar="STEPS",
+            help="A CSV file with the columns alpha, friction or f0, f1, ...; or a list of alphas such as 0,1/2,1,0. "
+            "Default: the key steps of a .toml PROBLEM.",
+            show_default=False,
+        ),
+    ] = None,
+    arithmetic: Annotated[
+        Arithmetic,
+        typer.Option(
+            help="verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. "
+            "exact: rationals throughout, for small problems in 2D."
+        ),
+    ] = "verified",
+    follow: Annotated[
+        Literal["all", "nearest"], typer.Option(help="Which roots of a step start the next one: all, or the nearest.")
+    ] = "all",
+    merge: Annotated[
+        float | None,
+        typer.Option(metavar="LENGTH", help="Join ends whose contact nodes are no further apart.", show_default=False),
+    ] = None,
+    refine: Annotated[
+        bool, typer.Option("--refine", help="Halve the increments until the statuses no longer change.")
+    ] = False,
+    max_branches: Annotated[int | None, count("Follow at most N different ends of a step.")] = None,
+    max_nodes: MaxNodes = None,
+    time_limit: Annotated[float | None, seconds("Stop after this time.")] = None,
+    jobs: Annotated[int, count("Number of processes that search.")] = 1,
+    proof_file: Annotated[str | None, file("--proof", "Write the proof of the whole (verified).")] = None,
+    save: Annotated[str | None, file("--save", "Write the history for History.load.")] = None,
+    report: Annotated[
+        str | None, file("--report", "Write an HTML page with the tree, the figures and the bodies.")
+    ] = None,
+    json_file: JsonFile = None,
+    csv_file: Annotated[str | None, csv("root")] = None,
+    plot: PlotFile = None,
+    x: Annotated[Drawn, typer.Option("--x", help="What is drawn across.", rich_help_panel=PLOT)] = "displacement",
+    y: Annotated[Drawn, typer.Option("--y", help="What is drawn upwards.", rich_help_panel=PLOT)] = "alpha",
+    title: Annotated[
+        str | None, typer.Option(metavar="TEXT", help="Heading of the page; default: PROBLEM.", rich_help_panel=OUTPUT)
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Find all histories of solutions of PROBLEM over a sequence of loads.
+
+    Every root of a step starts the next one: slip is counted from where it leaves the contact nodes. Prints the number
+    of roots and histories after every step, the tree of the roots, and up to which step the history is unique.
+
+    Exit status: 0 if the history is complete (in fast arithmetic, which proves nothing: if nothing is known to be
+    missing); 3 if something remained undecided, a limit ended it or roots were not followed; 2 on bad input; 130 on
+    Ctrl-C, after printing what was found so far; 74 if a result could not be written; 141 if the program that read it
+    has ended.
+    """
+    check_outputs(json=json_file, csv=csv_file)
+    check_plot(plot)
+    for option, path in (("--proof", proof_file), ("--save", save), ("--report", report)):
+        if path == "-":
+            raise InvalidArgumentError(f"{option} is -; expected the name of a file")
+        check_writable(path, option)
+    if proof_file is not None and arithmetic != "verified":
+        raise InvalidArgumentError(f"--proof is given with {arithmetic} arithmetic; expected verified")
+    given, body = _steps(problem, steps), load_any_problem(problem)
+    limits = {"max_branches": max_branches, "max_nodes": max_nodes, "time_limit": time_limit}
+    options = {"arithmetic": arithmetic, "follow": follow, "merge": merge, "refine": refine, **limits}
+    found, ended = so_far(lambda: _search(body, given, jobs, options))
+
+    def write_page(path: str) -> None:
+        from enumsol.report.history_page import write_history_report  # numpy: not for --help
+
+        write_history_report(found, path, title=problem if title is None else title)
+
+    deliver(
+        (proof_file, lambda path: _write_proof(found, path)),
+        (save, found.save),
+        (report, write_page),
+        (plot, lambda path: write_figure(path, found.plot(x, y))),
+        json_file=json_file,
+        csv_file=csv_file,
+        text=lambda: repr(found),
+        content=lambda: as_json({"problem": problem, **_content(found)}),
+        frame=found.to_frame,
+    )
+    finish(ended, ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
+
+
+def _search(problem: Any, steps: Any, jobs: int, options: dict[str, Any]) -> History:
+    from enumsol.histories.growing import histories  # numpy and scipy: not for --help
+
+    with workers(jobs) as executor, _HistoryDisplay() as display:
+        return histories(problem, steps, executor=executor, progress=display, **options)
+
+
+class _HistoryDisplay(Display):
+    """Progress of a history."""
+
+    def __init__(self) -> None:
+        super().__init__("stepping")
+
+    def __call__(self, state: HistoryProgress) -> None:
+        """Show where the history is."""
+        of_step = state.stages / (state.stages + state.waiting)
+        share = (state.step - 1 + of_step) / state.steps
+        self.show(share, f"step {state.step} of {state.steps}, {state.waiting} starts left, {state.roots:,} roots")
+
+
+def _steps(problem: str, steps: str | None) -> Any:
+    """The steps of the option, or of the problem's TOML file.
+
+    Raises
+    ------
+    InvalidArgumentError
+        There are none, or they cannot be read.
+    """
+    from enumsol.histories.steps import read_steps  # numpy: not for --help
+
+    if steps is not None:
+        if Path(steps).suffix.lower() == ".csv" or Path(steps).is_file():
+            return read_steps(steps)
+        return [part.strip() for part in steps.split(",")]
+    said = _told(Path(problem)) if problem.endswith(TOML) else None
+    if said is None:
+        raise InvalidArgumentError(
+            "--steps is missing; expected a CSV file, a list of alphas, or steps in a .toml file"
+        )
+    if isinstance(said, str):
+        return read_steps(Path(problem).parent / said)
+    if isinstance(said, list) and said and all(isinstance(item, dict) for item in said):
+        return [_of_table(k, item) for k, item in enumerate(said, 1)]
+    return said
+
+
+def _told(place: Path) -> Any:
+    """What a TOML file says of steps; what is wrong with the file is said where the problem is read."""
+    try:
+        return tomllib.loads(place.read_text(encoding="utf-8")).get("steps")
+    except (OSError, ValueError):
+        return None
+
+
+def _of_table(number: int, item: dict[str, Any]) -> Any:
+    from enumsol.histories.steps import LoadStep  # as above
+
+    unknown = item.keys() - {"alpha", "friction"}
+    if unknown:
+        raise InvalidArgumentError(f"step {number} has {', '.join(sorted(unknown))}; expected alpha and friction")
+    return LoadStep(**item)
+
+
+def _write_proof(found: History, path: str) -> None:
+    if found.proof is None:
+        raise InvalidArgumentError("no proof can be written: nothing was searched")
+    found.proof.save(path)
+
+
+def _content(found: History) -> dict[str, Any]:
+    """The history, for JSON."""
+    return {
+        "arithmetic": found.arithmetic,
+        "steps": [repr(step) for step in found.steps],
+        "complete": found.complete,
+        "unique_until": found.unique_until,
+        "histories": found.counts,
+        "branchings": found.branchings,
+        "ends": found.ends,
+        "reasons": found.reasons,
+        "increments": None if found.refinement is None else str(found.refinement),
+        "roots": found.to_frame().to_dict(orient="records"),
+    }

@@ -1,0 +1,437 @@
+"""multiplicity_map: the number of solutions over alpha and a second parameter (theory, section 13.4)."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.branches.construction import branch_graph
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.histories.map_rows import MapFold, MapRow
+from enumsol.model.problem import ContactProblem
+from enumsol.model.restart import SlipStart, restarted
+from enumsol.support.arguments import (
+    alpha_interval,
+    alpha_value,
+    exact_number,
+    file_path,
+    finite_number,
+    instance_of,
+    optional_callable,
+    optional_executor,
+    optional_seconds,
+    shown,
+)
+from enumsol.support.array_arguments import vector_of
+from enumsol.support.files import writing
+from enumsol.support.immutable import Immutable
+from enumsol.support.messages import counted
+from enumsol.support.workers import Crew
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from concurrent.futures import Executor
+    from pathlib import Path
+
+    import pandas as pd
+
+    from enumsol.support.arguments import Alpha, AlphaLike
+    from enumsol.support.workers import Job
+
+_EXPECTED = (
+    'expected {"friction": values}, {"gap": values}, {"load": (direction, values)}, or a pair of a function of a value '
+    "that returns a problem and the values"
+)
+
+
+def multiplicity_map(
+    problem: ContactProblem | None,
+    alphas: tuple[AlphaLike, AlphaLike],
+    over: Any,
+    *,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], object] | None = None,
+    time_limit: float | None = None,
+    **options: Any,
+) -> MultiplicityMap:
+    """The number of solutions over alpha and a second parameter: a branch graph at every value of the latter.
+
+    Parameters
+    ----------
+    problem : ContactProblem or None
+        None where ``over`` makes the problems.
+    alphas : (a, b)
+        The interval of alpha of every graph.
+    over : mapping or pair
+        The second parameter and its values: ``{"friction": values}`` (a constant coefficient at all nodes),
+        ``{"gap": values}`` (at all nodes) [length], ``{"load": (direction, values)}`` with a direction of shape (n,)
+        that is added to f, times the value; or ``(make, values)`` with a function of a value that returns a problem,
+        for example with another mesh.
+    executor : concurrent.futures.Executor, optional
+        Makes several graphs at a time. A function ``make`` must be one that other processes can import.
+    progress : callable, optional
+        Called with the numbers of values done and of all.
+    time_limit : float, optional
+        Stop after this many seconds; what was done by then is kept.
+    **options
+        Of `branch_graph`: ``arithmetic``, ``max_nodes``.
+
+    Returns
+    -------
+    MultiplicityMap
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument cannot be used.
+    Interrupted
+        On Ctrl-C; ``partial`` is the map of the values done.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> square = enumsol.gallery.two_node_square()
+    >>> found = enumsol.multiplicity_map(square, (0, 5), {"gap": [0, 0.1]})
+    >>> print(found)
+    MultiplicityMap over gap, 2 values, alpha in [0, 5]
+         gap  solutions  unique until
+           0  1 5 3                 3
+         0.1  1 3 5            3.6087
+    complete: yes (proven at these values; says nothing about those between)
+    """
+    interval = alpha_interval(alphas, "alphas")
+    name, make, values = _parameter(problem, over)
+    optional_executor(executor)
+    optional_callable(progress, "progress")
+    if "interval" in options or "progress" in options:
+        raise InvalidArgumentError("interval and progress are no options here; expected those of branch_graph")
+    work = _Rows(name, interval, values, make, options, optional_seconds(time_limit))
+    try:
+        if executor is None:
+            work.one_by_one(progress)
+        else:
+            work.spread(executor, progress)
+    except (KeyboardInterrupt, Interrupted) as interruption:
+        done = f"{len(work.done)} of {counted(len(values), 'value')}"
+        raise Interrupted(
+            f"multiplicity_map was interrupted after {done}", work.result("interrupted")
+        ) from interruption
+    return work.result()
+
+
+@dataclass
+class _Rows:
+    """The rows of a map while they are made."""
+
+    name: str
+    interval: tuple[Alpha, Alpha]
+    values: list[float]
+    make: Callable[[float], ContactProblem]
+    options: dict[str, Any]
+    seconds: float | None
+    started: float = field(default_factory=time.perf_counter)
+    done: dict[int, MapRow] = field(default_factory=dict)
+
+    def one_by_one(self, progress: Callable[[int, int], object] | None) -> None:
+        """In this process."""
+        for k, value in enumerate(self.values):
+            if self._over():
+                return
+            self._add(k, map_row(self.make, value, self.interval, self._limited()), progress)
+
+    def spread(self, executor: Executor, progress: Callable[[int, int], object] | None) -> None:
+        """By an executor, a limited number ahead of those awaited."""
+        crew, waiting = Crew(executor), list(enumerate(self.values))[::-1]
+        running: dict[Job, int] = {}
+        try:
+            while (waiting and not self._over()) or running:
+                while waiting and crew.room > 0 and not self._over():
+                    k, value = waiting.pop()
+                    running[crew.submit(map_row, self.make, value, self.interval, self._limited())] = k
+                job = crew.next()
+                if job is not None:
+                    self._add(running.pop(job), job.result, progress)
+        finally:
+            crew.cancel()
+
+    def _over(self) -> bool:
+        return self.seconds is not None and time.perf_counter() - self.started > self.seconds
+
+    def _limited(self) -> dict[str, Any]:
+        """The options with the time that is left."""
+        if self.seconds is None:
+            return self.options
+        return {**self.options, "time_limit": max(self.seconds - (time.perf_counter() - self.started), 1e-3)}
+
+    def _add(self, place: int, row: MapRow, progress: Callable[[int, int], object] | None) -> None:
+        self.done[place] = row
+        if progress is not None:
+            progress(len(self.done), len(self.values))
+
+    def result(self, reason: str | None = None) -> MultiplicityMap:
+        """The map of what was done."""
+        left = [value for k, value in enumerate(self.values) if k not in self.done]
+        why = reason or ("stopped by the time limit" if left else None)
+        missing = f"{why}, {counted(len(left), 'value')} not done" if why is not None else None
+        rows = tuple(self.done[k] for k in sorted(self.done))
+        ends = float(self.interval[0]), float(self.interval[1])
+        return MultiplicityMap(self.name, ends, rows, missing)
+
+
+def map_row(
+    make: Callable[[float], ContactProblem], value: float, interval: tuple[Alpha, Alpha], options: dict[str, Any]
+) -> MapRow:
+    """One row of a map (a module-level function, so that other processes can import it)."""
+    started = time.perf_counter()
+    graph = branch_graph(instance_of(make(value), ContactProblem, "the problem that over makes"), interval, **options)
+    steps, uniqueness = graph.claims.steps(), graph.claims.uniqueness()
+    arcs = {vertex.number: [] for vertex in graph.folds}  # type: dict[int, list[tuple[str, ...]]]
+    for arc in graph.arcs:
+        for end in {arc.tail, arc.head} & arcs.keys():
+            arcs[end].append(tuple(status.value for status in arc.statuses))
+    folds = tuple(MapFold(fold.alpha, tuple(sorted(arcs[fold.number]))) for fold in graph.folds)
+    return MapRow(
+        value=value,
+        alphas=steps.alphas,
+        at_alphas=steps.at,
+        between=steps.between,
+        exact=steps.exact,
+        folds=folds,
+        complete=graph.complete,
+        reasons=tuple(graph.reasons),
+        limit=uniqueness.limit,
+        unique=uniqueness.throughout,
+        seconds=time.perf_counter() - started,
+    )
+
+
+class MultiplicityMap(Immutable):
+    """The number of solutions over alpha and a second parameter (made by ``multiplicity_map``).
+
+    Everything said is proven at the values of the second parameter only: nothing is known between them.
+
+    Attributes
+    ----------
+    name : str
+        Of the second parameter.
+    interval : (float, float)
+        Of alpha.
+    rows : tuple of MapRow
+        One for every value, in the order given.
+    complete : bool
+        Every row is proven to be complete, and none is missing.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> found = enumsol.multiplicity_map(enumsol.gallery.two_node_square(), (0, 5), {"gap": [0, 0.1]})
+    >>> found.multiplicity_at(0, 3.5), found.multiplicity_at(0.1, 3.5), len(found.curves)
+    (5, 1, 3)
+    """
+
+    def __init__(self, name: str, interval: tuple[float, float], rows: tuple[MapRow, ...], missing: str | None) -> None:
+        self.name, self.interval, self.rows, self.missing = name, interval, rows, missing
+        self._freeze()
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The values of the second parameter that were done."""
+        return tuple(row.value for row in self.rows)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every row is proven to be complete, and none is missing."""
+        return self.missing is None and bool(self.rows) and all(row.complete for row in self.rows)
+
+    def multiplicity_at(self, value: float, alpha: AlphaLike) -> int:
+        """Number of solutions at one of the values and an alpha; a lower bound where the row is not exact.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The map has no such value, or alpha is outside the interval.
+        """
+        row = next((row for row in self.rows if row.value == value), None)
+        if row is None:
+            raise InvalidArgumentError(f"value is {shown(value)}; expected one of the values of the map")
+        exact = alpha_value(alpha)
+        if not self.interval[0] <= exact <= self.interval[1]:
+            raise InvalidArgumentError(f"alpha is {float(exact):g}; expected it in the interval {list(self.interval)}")
+        for k, critical in enumerate(row.alphas):
+            if exact == critical:
+                return row.at_alphas[k]
+            if exact < critical:
+                return row.between[k - 1]
+        return row.between[-1]
+
+    @cached_property
+    def curves(self) -> tuple[tuple[tuple[int, float], ...], ...]:
+        """Folds of neighbouring rows linked to curves: pairs of the row's number and alpha.
+
+        Folds are linked that have the same arcs, by their statuses; several of these in one row keep their order.
+        This is a guess and no proof: between two values anything may happen.
+        """
+        open_curves: dict[tuple[Any, int], list[tuple[int, float]]] = {}
+        found: list[list[tuple[int, float]]] = []
+        order = sorted(range(len(self.rows)), key=lambda k: self.rows[k].value)
+        for k in order:
+            going: dict[tuple[Any, int], list[tuple[int, float]]] = {}
+            counts: dict[Any, int] = {}
+            for fold in self.rows[k].folds:
+                place = (fold.statuses, counts.get(fold.statuses, 0))
+                counts[fold.statuses] = place[1] + 1
+                curve = open_curves.get(place)
+                if curve is None:
+                    curve = []
+                    found.append(curve)
+                curve.append((k, fold.alpha))
+                going[place] = curve
+            open_curves = going
+        return tuple(tuple(curve) for curve in found)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per value and range of alpha with one number of solutions.
+
+        Columns: value; first and last of the range; solutions, exact (or a lower bound); complete (the value's graph).
+        """
+        import pandas as pd
+
+        return pd.DataFrame(
+            [
+                {
+                    "value": row.value,
+                    "first": float(row.alphas[k]),
+                    "last": float(row.alphas[k + 1]),
+                    "solutions": count,
+                    "exact": row.exact,
+                    "complete": row.complete,
+                }
+                for row in self.rows
+                for k, count in enumerate(row.between)
+            ],
+            columns=["value", "first", "last", "solutions", "exact", "complete"],
+        )
+
+    def plot(self, *, ax: Any = None, file: str | Path | None = None) -> Any:
+        """A figure: alpha across, the second parameter upwards, numbers of solutions by colour, folds as curves.
+
+        What is proven is drawn as lines in full colour at the values; the pale colour around them only fills the
+        space between, and dashed curves link folds. The region in which the solution is unique is white.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes or None
+        file : path, optional
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        InvalidArgumentError
+            The file cannot be written.
+        MissingDependencyError
+            matplotlib is not installed.
+        """
+        from enumsol.histories.map_plots import draw_map  # matplotlib comes with the first picture
+
+        figure = draw_map(self.name, self.rows, self.curves, self.completeness(), ax)
+        if file is not None:
+            place = file_path(file, "file")
+            with writing(place, "file"):
+                figure.savefig(place, dpi=150)
+        return figure
+
+    def completeness(self) -> str:
+        """The closing line of the printed map."""
+        if self.missing is not None:
+            return f"complete: no ({self.missing})"
+        if self.complete:
+            return "complete: yes (proven at these values; says nothing about those between)"
+        return f"complete: no (not proven at {sum(not row.complete for row in self.rows)} of {len(self.rows)} values)"
+
+    def __repr__(self) -> str:
+        low, high = self.interval
+        lines = [
+            f"MultiplicityMap over {self.name}, {counted(len(self.rows), 'value')}, alpha in [{low:g}, {high:g}]",
+        ]
+        width = max((len(_counts(row)) for row in self.rows), default=9)
+        lines.append(f"{self.name:>8}  {'solutions':<{max(width, 9)}}  {'unique until':>12}")
+        lines += [f"{row.value:>8.5g}  {_counts(row):<{max(width, 9)}}  {_limit(row):>12}" for row in self.rows]
+        return "\n".join([*lines, self.completeness()])
+
+
+def _counts(row: MapRow) -> str:
+    """The numbers of solutions between critical alphas, in their order."""
+    text = " ".join(str(count) for k, count in enumerate(row.between) if k == 0 or count != row.between[k - 1])
+    return text if row.exact else f"at least {text}"
+
+
+def _limit(row: MapRow) -> str:
+    if row.unique:
+        return "the end"
+    return "not known" if row.limit is None else f"{row.limit:.6g}"
+
+
+# -- the second parameter ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Replaced:
+    """Makes a problem with another value of a field; other processes can import it."""
+
+    problem: ContactProblem
+    name: str
+    direction: Any = None
+
+    def __call__(self, value: float) -> ContactProblem:
+        """The problem at this value."""
+        if self.name == "load":
+            load = self.problem.f + value * self.direction
+            if self.problem.load_slope is not None:
+                return dataclasses.replace(self.problem, f=load)
+            with suppress(NotEnclosedError):
+                _ = self.problem.enclosure  # made once, as are the factors: the matrices are the same
+            return restarted(self.problem, SlipStart.of(self.problem), load)
+        return dataclasses.replace(self.problem, **{self.name: value})
+
+
+def _parameter(problem: Any, over: Any) -> tuple[str, Callable[[float], ContactProblem], list[float]]:
+    """The name of the second parameter, what makes a problem of a value, and the values.
+
+    Raises
+    ------
+    InvalidArgumentError
+        They are none.
+    """
+    if isinstance(over, tuple) and len(over) == 2 and callable(over[0]):
+        return getattr(over[0], "__name__", "value"), over[0], _numbers(over[1])
+    if not isinstance(over, Mapping) or len(over) != 1:
+        raise InvalidArgumentError(f"over is {shown(over)}; {_EXPECTED}")
+    ((name, given),) = over.items()
+    if name not in ("friction", "gap", "load"):
+        raise InvalidArgumentError(f"over is {shown(over)}; {_EXPECTED}")
+    body = instance_of(problem, ContactProblem, "problem")
+    if name != "load":
+        return name, _Replaced(body, name), _numbers(given)
+    if not isinstance(given, tuple) or len(given) != 2:
+        raise InvalidArgumentError(f"over is {shown(over)}; {_EXPECTED}")
+    return name, _Replaced(body, name, vector_of(given[0], "direction", body.n)), _numbers(given[1])
+
+
+def _numbers(values: Any) -> list[float]:
+    if isinstance(values, (str, bytes)) or exact_number(values) is not None or not np.iterable(values):
+        raise InvalidArgumentError(f"the values of over are {shown(values)}; expected a sequence of numbers")
+    found = [finite_number(value, "a value of over") for value in values]
+    if not found or len(set(found)) < len(found):
+        raise InvalidArgumentError("the values of over are none, or one occurs twice; expected different numbers")
+    return found

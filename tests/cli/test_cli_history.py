@@ -1,0 +1,101 @@
+"""``enumsol history``: steps from a list, a CSV file and a TOML file; its outputs and exit statuses."""
+
+import csv
+import json
+
+import meshio
+import pytest
+from command_line import assert_refused, run
+
+import enumsol
+from enumsol import History, Proof, verify, write_problem
+
+NODE = ("history", "gallery:one-node-6.1")
+
+
+@pytest.fixture
+def wedge(tmp_path, pulled_wedge):
+    write_problem(pulled_wedge, tmp_path / "wedge.npz")
+    (tmp_path / "steps.csv").write_text("alpha\n-1\n0\n1/2  # pulled\n1\n")
+    return tmp_path / "wedge.npz", tmp_path / "steps.csv"
+
+
+@pytest.fixture
+def pulled_wedge():
+    import dataclasses
+
+    wedge = enumsol.gallery.wedge(2, 2, friction=(1.0, 0.0))
+    return dataclasses.replace(wedge, f=0 * wedge.f, load_slope=wedge.f)
+
+
+def test_everything_is_written(capsys, wedge, tmp_path, pulled_wedge):
+    problem, steps = wedge
+    files = {name: tmp_path / f"out.{name}" for name in ("proof", "save", "report", "json", "csv")}
+    options = [part for name, path in files.items() for part in (f"--{name}", path)]
+    status, out, err = run(capsys, "history", problem, "--steps", steps, *options, "--plot", tmp_path / "out.png")
+    assert (status, err) == (0, "")
+    assert out.splitlines()[0] == "History of 4 steps: 5 histories (verified)"
+    assert out.endswith("complete: yes (proven), unique until step 2\n")
+    report = verify(pulled_wedge, Proof.load(files["proof"]))
+    assert report.complete
+    assert run(capsys, "verify", problem, files["proof"])[0] == 0
+    content = json.loads(files["json"].read_text())
+    assert content["histories"] == [1, 1, 3, 5]
+    assert content["complete"] is True
+    rows = list(csv.DictReader(files["csv"].read_text().splitlines()))
+    assert [row["step"] for row in rows] == list("1233344444")
+    loaded = History.load(files["save"], pulled_wedge)
+    assert repr(loaded) == out.rstrip("\n")
+    assert verify(pulled_wedge, loaded.proof).complete
+    page = files["report"].read_text()
+    assert "complete: yes (proven), unique until step 2" in page
+    assert "└─ 4.4 4 stick" in page
+    assert page.count('data-step="') == 4
+    assert page.count("data:image/png") == 8
+    assert (tmp_path / "out.png").stat().st_size > 10_000
+
+
+def test_steps_stand_in_the_toml_file_of_a_mesh(capsys, tmp_path):
+    cells = [("quad", [[0, 1, 2, 3]]), ("line", [[0, 1], [2, 3]])]
+    mesh = meshio.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], cells, cell_data={"part": [[0], [1, 2]]})
+    mesh.write(tmp_path / "square.vtu")
+    text = (
+        "mesh = 'square.vtu'\ngroups = 'part'\nyoung = 2.5\npoisson = 0.25\nclamp = '2'\ncontact = '1'\n"
+        "load = {'1' = [0.0, -0.2]}\nload_slope = {'1' = [0.3, 0.0]}\nfriction = 0.5\n"
+    )
+    place = tmp_path / "square.toml"
+    place.write_text(text + "steps = [0, 1, '-1/2']\n")
+    status, out, _ = run(capsys, "history", place)
+    assert status == 0
+    assert "unique until step 3" in out
+    assert run(capsys, "roots", place, "--alpha", 1)[0] == 0
+    place.write_text(text + "[[steps]]\nalpha = 0\n[[steps]]\nalpha = 1\nfriction = 0.1\n")
+    assert "History of 2 steps" in run(capsys, "history", place)[1]
+    place.write_text("steps = 'steps.csv'\n" + text)
+    (tmp_path / "steps.csv").write_text("alpha, friction\n0, 0.5\n1, 0.25\n")
+    assert "History of 2 steps" in run(capsys, "history", place)[1]
+    place.write_text(text + "[[steps]]\nalph = 0\n")
+    assert_refused(*run(capsys, "history", place), "step 1 has alph; expected alpha and friction")
+
+
+def test_what_is_left_open_is_an_exit_status(capsys, wedge):
+    problem, steps = wedge
+    status, out, _ = run(capsys, "history", problem, "--steps", steps, "--follow", "nearest")
+    assert status == 3
+    assert "(not followed)" in out
+    assert run(capsys, "history", problem, "--steps", steps, "--max-branches", 1)[0] == 3
+    assert run(capsys, *NODE, "--steps", "5,4", "--arithmetic", "fast")[0] == 0
+    status, out, _ = run(capsys, *NODE, "--steps", "5,4", "--refine")
+    assert status == 0
+    assert "increments: " in out
+
+
+def test_bad_input_is_one_sentence(capsys, tmp_path):
+    assert_refused(*run(capsys, *NODE), "--steps is missing; expected a CSV file")
+    assert_refused(*run(capsys, *NODE, "--steps", "1,x"), "step 2: alpha is 'x'")
+    assert_refused(*run(capsys, *NODE, "--steps", tmp_path / "none.csv"), "cannot be read")
+    table = tmp_path / "steps.csv"
+    table.write_text("alpha,load\n1,2\n")
+    assert_refused(*run(capsys, *NODE, "--steps", table), "steps has the columns alpha, load")
+    assert_refused(*run(capsys, *NODE, "--steps", "1", "--proof", "-"), "--proof is -")
+    assert_refused(*run(capsys, *NODE, "--steps", "1", "--proof", tmp_path / "p", "--arithmetic", "fast"), "--proof")
