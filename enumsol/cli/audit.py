@@ -10,7 +10,7 @@ import typer
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far
 from enumsol.cli.graph import build, read_graph
 from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, csv, file, number
-from enumsol.cli.output import as_json, check_outputs, deliver
+from enumsol.cli.output import check_outputs, deliver
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
 
@@ -98,7 +98,7 @@ def audit(
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: _as_text(report, found),
-        content=lambda: as_json({"problem": problem, **report.summary(), "graph": found.summary()}),
+        content=lambda: {"problem": problem, **report.summary(), "graph": found.summary()},
         frame=report.to_frame,
     )
     finish(ended, _status(report))

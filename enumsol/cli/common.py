@@ -218,14 +218,9 @@ def workers(jobs: int) -> Iterator[Executor | None]:
     if jobs == 1:
         yield None
         return
-    # only for several processes
-    import multiprocessing
+    from enumsol.cli.pool import RenewedPool  # loky: only for several processes
 
-    from enumsol.cli.pool import RenewedPool
-
-    before = set(multiprocessing.active_children())
-    pool = RenewedPool(capped(jobs))
-    try:
+    with RenewedPool(capped(jobs)) as pool:
         try:
             pool.renew()
         except OSError as error:
@@ -233,5 +228,3 @@ def workers(jobs: int) -> Iterator[Executor | None]:
                 f"--jobs is {jobs}, and the system starts no more processes ({error.strerror}); expected fewer"
             ) from error
         yield pool
-    finally:
-        pool.end(set(multiprocessing.active_children()) - before)

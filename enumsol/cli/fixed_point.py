@@ -8,7 +8,15 @@ import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, so_far
 from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, Quiet, VtuFile, count, csv, file, number
-from enumsol.cli.output import as_json, check_outputs, check_places, check_plot, check_vtu, deliver, write_figure
+from enumsol.cli.output import (
+    check_named_files,
+    check_outputs,
+    check_places,
+    check_plot,
+    check_vtu,
+    deliver,
+    write_figure,
+)
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
@@ -76,7 +84,7 @@ def fixed_point(
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: repr(found),
-        content=lambda: as_json(_content(found, problem)),
+        content=lambda: _content(found, problem),
         frame=found.to_frame,
     )
     finish(ended, ExitStatus.DONE if found.converged else ExitStatus.INCOMPLETE)
@@ -85,9 +93,8 @@ def fixed_point(
 def _check_combination(starts: int | None, npz_file: str | None, vtu_file: str | None, plot_file: str | None) -> None:
     if starts is None and plot_file is not None:
         raise InvalidArgumentError("--plot is given without --starts; expected both, for a picture of what is reached")
+    check_named_files(", but it is a binary file", npz=npz_file, vtu=vtu_file)
     for option, path in (("--npz", npz_file), ("--vtu", vtu_file)):
-        if path == "-":
-            raise InvalidArgumentError(f"{option} is -, but it is a binary file; expected the name of a file")
         if starts is not None and path is not None:
             raise InvalidArgumentError(f"{option} and --starts are both given; expected one of them")
 
@@ -162,7 +169,7 @@ def _basins(
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: _basin_text(table, len(roots), roots.completeness()),
-        content=lambda: as_json({"problem": name, "alpha": float(alpha), **_basin_content(table, len(roots))}),
+        content=lambda: {"problem": name, "alpha": float(alpha), **_basin_content(table, len(roots))},
         frame=lambda: table,
     )
     finish(ended, ExitStatus.DONE if table["root"].notna().all() else ExitStatus.INCOMPLETE)

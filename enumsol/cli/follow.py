@@ -7,27 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from enumsol.cli import options
 from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, parse_alpha, parse_interval
 from enumsol.cli.graph import read_graph
-from enumsol.cli.options import (
-    PLOT,
-    STEPS,
-    Arithmetic,
-    DrawnQuantity,
-    FirstAlpha,
-    JsonFile,
-    LastAlpha,
-    PlotFile,
-    ProblemArgument,
-    Quiet,
-    count,
-    csv,
-    file,
-    node,
-    number,
-    step,
-)
-from enumsol.cli.output import as_json, check_outputs, check_plot, deliver, write_figure
+from enumsol.cli.output import check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display, SearchDisplay
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.support.messages import counted
@@ -55,36 +38,41 @@ OneTangent = Annotated[
 ]
 CheckSteps = Annotated[
     bool,
-    step(None, "Refuse steps that may have left the branch. Otherwise the algorithm runs as printed in the paper."),
+    options.step(
+        None, "Refuse steps that may have left the branch. Otherwise the algorithm runs as printed in the paper."
+    ),
 ]
 #: Ends of a path at which nothing is left to follow.
 _ARRIVED = ("interval left", "closed")
 
 
 def follow(
-    problem: ProblemArgument,
-    first: FirstAlpha,
-    last: LastAlpha,
-    start: Annotated[str, number("--start", "Alpha at which the starts are enumerated.")],
+    problem: options.ProblemArgument,
+    first: options.FirstAlpha,
+    last: options.LastAlpha,
+    start: Annotated[str, options.number("--start", "Alpha at which the starts are enumerated.")],
     root: OneRoot = None,
     direction: Direction = "both",
     tangent: OneTangent = None,
-    arithmetic: Annotated[Arithmetic, typer.Option(help="Arithmetic of the enumeration of the starts.")] = "verified",
-    h_max: Annotated[float, step("LENGTH", "Longest step.")] = 1.0,
-    h_min: Annotated[float, step("LENGTH", "Shortest step.")] = 1e-5,
-    h_init: Annotated[float | None, step("LENGTH", "First step; default: 0.05, or h-max.")] = None,
-    eps: Annotated[float, step("NORM", "Convergence tolerance of the corrections.")] = 1e-6,
-    max_steps: Annotated[int, count("Stop a path after N steps.", panel=STEPS)] = 5000,
+    arithmetic: Annotated[
+        options.Arithmetic, typer.Option(help="Arithmetic of the enumeration of the starts.")
+    ] = "verified",
+    h_max: Annotated[float, options.step("LENGTH", "Longest step.")] = 1.0,
+    h_min: Annotated[float, options.step("LENGTH", "Shortest step.")] = 1e-5,
+    h_init: Annotated[float | None, options.step("LENGTH", "First step; default: 0.05, or h-max.")] = None,
+    eps: Annotated[float, options.step("NORM", "Convergence tolerance of the corrections.")] = 1e-6,
+    max_steps: Annotated[int, options.count("Stop a path after N steps.", panel=options.STEPS)] = 5000,
     check_steps: CheckSteps = True,
-    json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("point, for enumsol audit")] = None,
-    plot_file: PlotFile = None,
+    json_file: options.JsonFile = None,
+    csv_file: Annotated[str | None, options.csv("point, for enumsol audit")] = None,
+    plot_file: options.PlotFile = None,
     graph_file: Annotated[
-        str | None, file("--graph", "Draw the paths over this graph, written by enumsol graph --save.", PLOT)
+        str | None,
+        options.file("--graph", "Draw the paths over this graph, written by enumsol graph --save.", options.PLOT),
     ] = None,
-    quantity: DrawnQuantity = "lambda_n",
-    label: Annotated[str | None, node("--node", "LABEL", "Contact node to draw; default: the first.")] = None,
-    quiet: Quiet = False,
+    quantity: options.DrawnQuantity = "lambda_n",
+    label: Annotated[str | None, options.node("--node", "LABEL", "Contact node to draw; default: the first.")] = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Follow branches of solutions of PROBLEM from its roots at one alpha.
 
@@ -101,12 +89,12 @@ def follow(
         raise InvalidArgumentError("--graph is given without --plot; expected both")
     if tangent is not None and (root is None or direction == "both"):
         raise InvalidArgumentError("--tangent is given without --root or --direction; expected one root and direction")
-    options = _options(h_max, h_min, h_init, eps, max_steps, check_steps)
+    steps = _steps(h_max, h_min, h_init, eps, max_steps, check_steps)
     interval, alpha, signs = parse_interval(first, last), parse_alpha(start, "--start"), _directions(direction)
     body = load_problem(problem)
     row = node_row(body, label)
     over = None if graph_file is None else read_graph(graph_file, body)
-    followed = _Followed(body, (float(interval[0]), float(interval[1])), options, tangent)
+    followed = _Followed(body, (float(interval[0]), float(interval[1])), steps, tangent)
     ended: Interrupted | None = None
     try:
         followed.run(_starts(body, interval, alpha, arithmetic, root), signs, alone=root is not None)
@@ -119,13 +107,13 @@ def follow(
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: followed.as_text() + (" (interrupted)" if ended else ""),
-        content=lambda: as_json({**about, **followed.content()}),
+        content=lambda: {**about, **followed.content()},
         frame=followed.frame,
     )
     finish(ended, ExitStatus.DONE if followed.arrived else ExitStatus.INCOMPLETE)
 
 
-def _options(
+def _steps(
     h_max: float, h_min: float, h_init: float | None, eps: float, max_steps: int, check_steps: bool
 ) -> ContinuationOptions:
     from enumsol.continuation import ContinuationOptions
@@ -150,7 +138,11 @@ def _directions(text: str) -> tuple[int, ...]:
 
 
 def _starts(
-    problem: ContactProblem, interval: tuple[Alpha, Alpha], alpha: Alpha, arithmetic: Arithmetic, root: int | None
+    problem: ContactProblem,
+    interval: tuple[Alpha, Alpha],
+    alpha: Alpha,
+    arithmetic: options.Arithmetic,
+    root: int | None,
 ) -> list[tuple[int, Root]]:
     if not interval[0] <= alpha <= interval[1]:
         low, high = (float(end) for end in interval)
@@ -179,12 +171,16 @@ class _Followed:
 
     problem: ContactProblem
     interval: tuple[float, float]
-    options: ContinuationOptions
+    steps: ContinuationOptions
     tangent: int | None
-    paths: list[Path] = field(default_factory=list)
-    labels: list[tuple[int, int]] = field(default_factory=list)
+    found: list[tuple[int, int, Path]] = field(default_factory=list)  # number of the root, direction, path
     failures: list[tuple[int, int, str]] = field(default_factory=list)
     passed: dict[int, int] = field(default_factory=dict)
+
+    @property
+    def paths(self) -> list[Path]:
+        """The paths alone."""
+        return [path for _, _, path in self.found]
 
     def run(self, starts: Sequence[tuple[int, Root]], signs: tuple[int, ...], *, alone: bool) -> None:
         """Follow each start; Interrupted leaves what there is."""
@@ -205,7 +201,7 @@ class _Followed:
         from enumsol.continuation import AmbiguousStart, follow as follow_path
 
         try:
-            path = follow_path(self.problem, root, sign, self.interval, self.options, tangent=self.tangent)
+            path = follow_path(self.problem, root, sign, self.interval, self.steps, tangent=self.tangent)
         except AmbiguousStart as error:
             # the one root that was asked for: bad input; one among many: noted
             if alone:
@@ -213,14 +209,10 @@ class _Followed:
             self.failures.append((number, sign, str(error)))
             return False
         except Interrupted as interruption:
-            self._keep(number, sign, interruption.partial)
+            self.found.append((number, sign, interruption.partial))
             raise
-        self._keep(number, sign, path)
+        self.found.append((number, sign, path))
         return path.closed
-
-    def _keep(self, number: int, sign: int, path: Path | Any) -> None:
-        self.paths.append(path)
-        self.labels.append((number, sign))
 
     @property
     def arrived(self) -> bool:
@@ -230,7 +222,7 @@ class _Followed:
     def as_text(self) -> str:
         """The printed paths."""
         lines = []
-        for k, ((root, sign), path) in enumerate(zip(self.labels, self.paths, strict=True)):
+        for k, (root, sign, path) in enumerate(self.found):
             lines += [f"path {k}, from root {root} in direction {sign:+d}: {path!r}", ""]
         lines += [f"root {number} lies on path {k}" for number, k in self.passed.items()]
         lines += [f"root {number} in direction {sign:+d}: {reason}" for number, sign, reason in self.failures]
@@ -243,7 +235,7 @@ class _Followed:
         import pandas as pd
 
         frames = []
-        for k, ((root, sign), path) in enumerate(zip(self.labels, self.paths, strict=True)):
+        for k, (root, sign, path) in enumerate(self.found):
             one = path.to_frame()
             for at, (name, value) in enumerate((("path", k), ("root", root), ("direction", sign))):
                 one.insert(at, name, value)
@@ -253,10 +245,7 @@ class _Followed:
     def content(self) -> dict[str, Any]:
         """Everything, for JSON."""
         return {
-            "paths": [
-                {"root": number, "direction": sign, **_content(path)}
-                for (number, sign), path in zip(self.labels, self.paths, strict=True)
-            ],
+            "paths": [{"root": number, "direction": sign, **_content(path)} for number, sign, path in self.found],
             "passed": [{"root": number, "path": k} for number, k in self.passed.items()],
             "failures": [{"root": number, "direction": sign, "reason": why} for number, sign, why in self.failures],
         }

@@ -93,8 +93,6 @@ def write(
     about = {"name": entry.name, "file": file, "alpha": entry.alpha, "fingerprint": problem.fingerprint}
     deliver(
         json_file=json_file,
-        csv_file=None,
         text=lambda: f"wrote {entry.name} to {file}; try: enumsol {command} {file} --alpha {entry.alpha:g}",
-        content=lambda: as_json(about),
-        frame=None,
+        content=lambda: about,
     )

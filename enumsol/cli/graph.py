@@ -6,25 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from enumsol.cli import options
 from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, note, parse_interval, so_far, workers
-from enumsol.cli.options import (
-    PLOT,
-    Arithmetic,
-    FirstAlpha,
-    JsonFile,
-    LastAlpha,
-    MaxNodes,
-    Overview,
-    PlotFile,
-    ProblemArgument,
-    Quiet,
-    count,
-    csv,
-    file,
-    node,
-    seconds,
-)
-from enumsol.cli.output import as_json, check_outputs, check_plot, check_writable, deliver, write_figure
+from enumsol.cli.output import check_named_files, check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
 
@@ -35,7 +19,7 @@ if TYPE_CHECKING:
 
 
 HowExact = Annotated[
-    Arithmetic,
+    options.Arithmetic,
     typer.Option(
         help="verified: rigorous error bounds, with proof. fast: the search trusts floats, never proven. "
         "exact: rationals throughout, with proof, slow beyond ten contact nodes."
@@ -44,31 +28,33 @@ HowExact = Annotated[
 
 
 def graph(
-    problem: ProblemArgument,
-    first: FirstAlpha,
-    last: LastAlpha,
+    problem: options.ProblemArgument,
+    first: options.FirstAlpha,
+    last: options.LastAlpha,
     arithmetic: HowExact = "verified",
-    max_nodes: MaxNodes = None,
-    time_limit: Annotated[float | None, seconds("Stop after this time.")] = None,
-    jobs: Annotated[int, count("Number of processes that search.")] = 1,
-    save_file: Annotated[str | None, file("--save", "Write the graph, for enumsol audit and follow.")] = None,
-    json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("arc")] = None,
-    proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), for enumsol verify.")] = None,
-    graphml_file: Annotated[str | None, file("--graphml", "Write GraphML for other programs.")] = None,
-    plot_file: PlotFile = None,
+    max_nodes: options.MaxNodes = None,
+    time_limit: options.TimeLimit = None,
+    jobs: options.Jobs = 1,
+    save_file: Annotated[str | None, options.file("--save", "Write the graph, for enumsol audit and follow.")] = None,
+    json_file: options.JsonFile = None,
+    csv_file: Annotated[str | None, options.csv("arc")] = None,
+    proof_file: Annotated[
+        str | None, options.file("--proof", "Write the proof (verified), for enumsol verify.")
+    ] = None,
+    graphml_file: Annotated[str | None, options.file("--graphml", "Write GraphML for other programs.")] = None,
+    plot_file: options.PlotFile = None,
     quantity: Annotated[
-        Overview | None,
+        options.Overview | None,
         typer.Option(
             help="Quantity drawn against alpha: an overview (default: norm of the contact forces), or one of nodes.",
-            rich_help_panel=PLOT,
+            rich_help_panel=options.PLOT,
         ),
     ] = None,
     nodes: Annotated[
-        str | None, node("--nodes", "LABELS", "Contact nodes to draw, such as 0,3; default: up to three.")
+        str | None, options.node("--nodes", "LABELS", "Contact nodes to draw, such as 0,3; default: up to three.")
     ] = None,
-    units: Annotated[str | None, node("--units", "FORCE,LENGTH", "Units for the figure, such as N,mm.")] = None,
-    quiet: Quiet = False,
+    units: Annotated[str | None, options.node("--units", "FORCE,LENGTH", "Units for the figure, such as N,mm.")] = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Find all solutions of PROBLEM for every alpha of an interval, as branches of arcs.
 
@@ -80,10 +66,7 @@ def graph(
     74 if a result could not be written; 141 if the program that read it has ended.
     """
     check_outputs(json=json_file, csv=csv_file)
-    for option, path in (("--save", save_file), ("--graphml", graphml_file), ("--proof", proof_file)):
-        if path == "-":
-            raise InvalidArgumentError(f"{option} is -; expected the name of a file")
-        check_writable(path, option)
+    check_named_files(save=save_file, graphml=graphml_file, proof=proof_file)
     check_plot(plot_file)
     interval, body = parse_interval(first, last), load_problem(problem)
     chosen = None if nodes is None else [body.node_ids[node_row(body, label.strip())] for label in nodes.split(",")]
@@ -100,7 +83,7 @@ def graph(
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: graph_as_text(found),
-        content=lambda: as_json({"problem": problem, **as_content(found)}),
+        content=lambda: {"problem": problem, **as_content(found)},
         frame=found.to_frame,
     )
     finish(ended, ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
@@ -134,7 +117,7 @@ def write_proof(found: BranchGraph, path: str) -> None:
 def build(
     problem: ContactProblem,
     interval: tuple[Alpha, Alpha],
-    arithmetic: Arithmetic = "verified",
+    arithmetic: options.Arithmetic = "verified",
     jobs: int = 1,
     **limits: Any,
 ) -> BranchGraph:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from inspect import Parameter, signature
 from os.path import isdir
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from enumsol.cli.quiet import set_quiet
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 #: Groups of options in the help of every command.
 LIMITS, OUTPUT, PLOT, STEPS = "Limits", "Output", "Plot", "Steps"
@@ -48,6 +52,21 @@ def csv(text: str) -> Any:
     return file("--csv", f"Write a table with one row per {text}; - is stdout.")
 
 
+def with_options(*options: Parameter, after: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Of a command: its last argument, ``**named``, are these options, after so many arguments of its own."""
+
+    def decorated(command: Callable[..., None]) -> Callable[..., None]:
+        # typer reads both
+        signed = signature(command, eval_str=True)
+        *own, _ = signed.parameters.values()
+        signed = signed.replace(parameters=[*own[:after], *options, *own[after:]])
+        command.__signature__ = signed  # type: ignore[attr-defined]
+        command.__annotations__ |= {option.name: option.annotation for option in options}
+        return command
+
+    return decorated
+
+
 def problem_names(incomplete: str) -> list[str]:
     """What an argument PROBLEM may become: problems of the gallery, and files and directories that may hold one."""
     from glob import escape, glob  # for a shell that completes only
@@ -76,6 +95,8 @@ Arithmetic = Literal["verified", "fast", "exact"]
 Quantity = Literal["lambda_n", "lambda_t", "u_n", "u_t"]
 FirstAlpha = Annotated[str, number("--from", "First alpha: a number or a fraction.")]
 LastAlpha = Annotated[str, number("--to", "Last alpha: a number or a fraction.")]
+TimeLimit = Annotated[float | None, seconds("Stop after this time.")]
+Jobs = Annotated[int, count("Number of processes that search.")]
 MaxNodes = Annotated[int | None, count("Stop after N nodes of the tree.")]
 Quiet = Annotated[
     bool,

@@ -72,12 +72,14 @@ def write_text(path: str, text: str) -> None:
 def deliver(
     *more: Output,
     json_file: str | None,
-    csv_file: str | None,
     text: Callable[[], str],
-    content: Callable[[], str],
-    frame: Callable[[], pd.DataFrame] | None,
+    content: Callable[[], Any],
+    csv_file: str | None = None,
+    frame: Callable[[], pd.DataFrame] | None = None,
 ) -> None:
     """Write results: text on stdout, unless a file is to be written there or --quiet is given; JSON; a table; ``more``.
+
+    ``content`` is what JSON holds, or its text.
 
     Raises
     ------
@@ -86,7 +88,7 @@ def deliver(
     """
     outputs: tuple[Output, ...] = (
         (None if "-" in (json_file, csv_file) or is_quiet() else "-", lambda path: write_text(path, text())),
-        (json_file, lambda path: write_text(path, content())),
+        (json_file, lambda path: write_text(path, as_json(content()))),
         (csv_file, lambda path: write_text(path, _csv(frame))),
         *more,
     )
@@ -123,6 +125,20 @@ def check_outputs(**paths: str | None) -> None:
     if len(on_stdout) > 1:
         raise InvalidArgumentError(f"{' and '.join(on_stdout)} are both -; expected one of them to be a file")
     for name, path in paths.items():
+        check_writable(path, f"--{name}")
+
+
+def check_named_files(kind: str = "", **paths: str | None) -> None:
+    """Refuse results that cannot be written or cannot go to stdout (``kind`` says why); named as their options are.
+
+    Raises
+    ------
+    InvalidArgumentError
+        As `check_writable`, or one is ``-``.
+    """
+    for name, path in paths.items():
+        if path == "-":
+            raise InvalidArgumentError(f"--{name} is -{kind}; expected the name of a file")
         check_writable(path, f"--{name}")
 
 
@@ -189,9 +205,7 @@ def check_plot(path: str | None) -> None:
         raise MissingDependencyError(
             '--plot needs matplotlib, which is not installed; install it with: pip install "enumsol[plots]"'
         )
-    if path == "-":
-        raise InvalidArgumentError("--plot is -, but a figure is a binary file; expected the name of a file")
-    check_writable(path, "--plot")
+    check_named_files(", but a figure is a binary file", plot=path)
     from matplotlib.backend_bases import FigureCanvasBase
 
     known = FigureCanvasBase.get_supported_filetypes()
@@ -215,17 +229,18 @@ def write_figure(path: str, figure: Any) -> None:
 
 
 def as_json(content: Any) -> str:
-    """JSON text of dictionaries, sequences, arrays and numbers; what is not finite is null."""
-    return json.dumps(_plain(content), indent=1)
+    """JSON text of dictionaries, sequences, arrays and numbers; what is not finite is null. A text is JSON already."""
+    return content if isinstance(content, str) else json.dumps(plain(content), indent=1)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Dictionaries, lists and numbers that JSON can hold, as in `as_json`."""
     if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, Fraction):
-        return _plain(float(value))
+        return plain(float(value))
     if hasattr(value, "tolist"):  # arrays and numbers of numpy, which is not imported for --help
-        return _plain(value.tolist())
+        return plain(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 from enumsol.cli.quiet import is_quiet
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import TracebackType
 
     from rich.progress import Progress, TaskID
 
@@ -23,7 +21,7 @@ _PROGRESS_DELAY = 1.0
 _LEAST_SHARE = 0.02
 
 
-class Display(AbstractContextManager[Any]):
+class Display:
     """A progress bar on stderr, shown on a terminal when the work lasts.
 
     Parameters
@@ -58,12 +56,7 @@ class Display(AbstractContextManager[Any]):
         """A callback that takes how many are done, and of how many."""
         return lambda done, of: self.show(done / max(of, 1), f"{done:,} of {of:,} {unit}")
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Take the bar away."""
         if self._progress is not None:
             self._progress.stop()

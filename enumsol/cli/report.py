@@ -8,47 +8,40 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from enumsol.cli import options
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_interval, so_far
 from enumsol.cli.graph import HowExact, as_content, build, graph_as_text, parse_units, write_proof
-from enumsol.cli.options import (
-    OUTPUT,
-    FirstAlpha,
-    JsonFile,
-    LastAlpha,
-    MaxNodes,
-    ProblemArgument,
-    Quiet,
-    count,
-    file,
-    seconds,
-)
-from enumsol.cli.output import as_json, check_outputs, check_writable, deliver
-from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.cli.output import check_named_files, check_outputs, deliver
+from enumsol.errors import MissingDependencyError
 
 if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
 
 
 def report(
-    problem: ProblemArgument,
-    first: FirstAlpha,
-    last: LastAlpha,
+    problem: options.ProblemArgument,
+    first: options.FirstAlpha,
+    last: options.LastAlpha,
     output: Annotated[
-        str, typer.Option("--output", "-o", metavar="FILE", help="File of the page, .html.", rich_help_panel=OUTPUT)
+        str,
+        typer.Option("--output", "-o", metavar="FILE", help="File of the page, .html.", rich_help_panel=options.OUTPUT),
     ] = "report.html",
     arithmetic: HowExact = "verified",
-    max_nodes: MaxNodes = None,
-    time_limit: Annotated[float | None, seconds("Stop after this time.")] = None,
-    jobs: Annotated[int, count("Number of processes that search.")] = 1,
+    max_nodes: options.MaxNodes = None,
+    time_limit: options.TimeLimit = None,
+    jobs: options.Jobs = 1,
     title: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="Heading of the page; default: PROBLEM.", rich_help_panel=OUTPUT)
+        str | None,
+        typer.Option(metavar="TEXT", help="Heading of the page; default: PROBLEM.", rich_help_panel=options.OUTPUT),
     ] = None,
     units: Annotated[
-        str | None, typer.Option(metavar="FORCE,LENGTH", help="Units, such as N,mm.", rich_help_panel=OUTPUT)
+        str | None, typer.Option(metavar="FORCE,LENGTH", help="Units, such as N,mm.", rich_help_panel=options.OUTPUT)
     ] = None,
-    proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), to pass on with the page.")] = None,
-    json_file: JsonFile = None,
-    quiet: Quiet = False,
+    proof_file: Annotated[
+        str | None, options.file("--proof", "Write the proof (verified), to pass on with the page.")
+    ] = None,
+    json_file: options.JsonFile = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Find all solutions of PROBLEM for every alpha of an interval, and write one HTML page about them.
 
@@ -59,10 +52,7 @@ def report(
     Exit status: as enumsol graph. If the graph is not complete, the page is written all the same and says so.
     """
     check_outputs(json=json_file)
-    for option, path in (("--output", output), ("--proof", proof_file)):
-        if path == "-":
-            raise InvalidArgumentError(f"{option} is -; expected the name of a file")
-        check_writable(path, option)
+    check_named_files(output=output, proof=proof_file)
     if find_spec("plotly") is None:
         raise MissingDependencyError.of("reports", "plotly", "report")
     interval, body, names = parse_interval(first, last), load_problem(problem), parse_units(units)
@@ -79,10 +69,8 @@ def report(
         (proof_file, lambda path: write_proof(found, path)),
         (output, write),
         json_file=json_file,
-        csv_file=None,
         text=lambda: graph_as_text(found),
-        content=lambda: as_json({"problem": problem, "report": output, **as_content(found)}),
-        frame=found.to_frame,
+        content=lambda: {"problem": problem, "report": output, **as_content(found)},
     )
     finish(ended, ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
 

@@ -6,6 +6,8 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
+from enumsol.cli.output import plain
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -15,7 +17,6 @@ if TYPE_CHECKING:
 #: The table over contact nodes is printed when it has at most so many rows.
 _ROWS = 24
 _STATS = ("nodes", "pruned", "selections", "qps", "fallback_qps", "closed", "seconds", "resumed")
-_FIELDS = ("lambda_n", "lambda_t", "u_n", "u_t")
 
 
 def roots_as_text(found: RootSet) -> str:
@@ -83,25 +84,25 @@ def roots_as_json(found: RootSet, problem: str) -> str:
         "undecided": [_undecided(item) for item in found.undecided],
         "stats": {name: getattr(stats, name) for name in _STATS},
     }
-    return "{\n" + ",\n".join(f"{json.dumps(key)}: {_lines(value)}" for key, value in content.items()) + "\n}"
+    return "{\n" + ",\n".join(f"{json.dumps(key)}: {_lines(value)}" for key, value in plain(content).items()) + "\n}"
 
 
 def _lines(value: Any) -> str:
     """JSON with one line per entry of a list of objects."""
     if isinstance(value, list) and value and isinstance(value[0], dict):
-        return "[\n" + ",\n".join(json.dumps(item, allow_nan=False) for item in value) + "\n]"
-    return json.dumps(value, allow_nan=False, default=str)
+        return "[\n" + ",\n".join(json.dumps(item) for item in value) + "\n]"
+    return json.dumps(value, default=str)
 
 
 def _root(root: Root) -> dict[str, Any]:
     return {
         "statuses": [status.value for status in root.statuses],
         "active": [sorted(status.value for status in holds) for holds in root.active],
-        **{name: getattr(root, name).tolist() for name in _FIELDS},
-        "enclosure": _bounds(root.enclosure),
+        **_fields(root),
+        "enclosure": None if root.enclosure is None else _fields(root.enclosure),
         "index": root.index,
         "regular": root.regular,
-        "margin": _finite(root.margin),
+        "margin": root.margin,
         **(_in_space(root) if root.lambda_t.ndim == 2 else _in_plane(root)),
     }
 
@@ -121,8 +122,7 @@ def _image(found: RootSet, k: int) -> dict[str, Any]:
 
 
 def _in_plane(root: Root) -> dict[str, Any]:
-    slope = root.dlambda_dalpha
-    return {"condition": _finite(root.condition), "dlambda_dalpha": None if slope is None else slope.tolist()}
+    return {"condition": root.condition, "dlambda_dalpha": root.dlambda_dalpha}
 
 
 def _in_space(root: Any) -> dict[str, Any]:
@@ -133,11 +133,12 @@ def _undecided(item: Undecided) -> dict[str, Any]:
     content = {"statuses": [_status(s) for s in item.statuses], "reason": item.reason, "hint": item.hint}
     if item.slip_angle is None:
         return content
-    return {**content, "leaves": item.leaves, "slip_angle": _angles(item.slip_angle), "bounds": _bounds(item.bounds)}
+    bounds = None if item.bounds is None else _fields(item.bounds)
+    return {**content, "leaves": item.leaves, "slip_angle": _angles(item.slip_angle), "bounds": bounds}
 
 
-def _bounds(box: Enclosure | None) -> dict[str, Any] | None:
-    return None if box is None else {name: getattr(box, name).tolist() for name in _FIELDS}
+def _fields(of: Root | Enclosure) -> dict[str, Any]:
+    return {name: getattr(of, name) for name in ("lambda_n", "lambda_t", "u_n", "u_t")}
 
 
 def _angles(angles: Any) -> list[list[float] | None]:
@@ -153,7 +154,7 @@ def _family(family: RootFamily) -> dict[str, Any]:
             {
                 "statuses": [status.value for status in part.statuses],
                 "dimension": part.dimension,
-                "vertices": part.vertices.tolist(),
+                "vertices": part.vertices,
             }
             for part in family.polytopes
         ],
@@ -162,7 +163,3 @@ def _family(family: RootFamily) -> dict[str, Any]:
 
 def _status(status: Any) -> str | None:
     return status if status is None or isinstance(status, str) else str(status.value)
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, NoReturn
+from dataclasses import dataclass
+from inspect import Parameter, signature
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 
@@ -17,14 +19,15 @@ from enumsol.cli.options import (
     ProblemArgument,
     Quiet,
     ReportFile,
+    TimeLimit,
     VtuFile,
     count,
     csv,
     file,
     number,
-    seconds,
+    with_options,
 )
-from enumsol.cli.output import check_outputs, check_places, check_scripts, check_vtu, check_writable, deliver
+from enumsol.cli.output import check_named_files, check_outputs, check_places, check_scripts, check_vtu, deliver
 from enumsol.cli.progress import SearchDisplay
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
@@ -65,7 +68,6 @@ MirrorAxis = Annotated[
         show_default=False,
     ),
 ]
-TimeLimit = Annotated[float | None, seconds("Stop after this time.")]
 Jobs = Annotated[int, count("Number of processes that search (tree).")]
 ProofFile = Annotated[str | None, file("--proof", "Write the proof (verified).")]
 Resume = Annotated[
@@ -75,25 +77,105 @@ Resume = Annotated[
 CsvFile = Annotated[str | None, csv("root and contact node")]
 
 
-def roots(
-    problem: ProblemArgument,
-    alpha: AtAlpha,
-    arithmetic: HowExact = "verified",
-    method: HowSearched = "tree",
-    unique: Unique = False,
-    stop_after: StopAfter = None,
-    max_nodes: MaxNodes = None,
-    time_limit: TimeLimit = None,
-    jobs: Jobs = 1,
-    mirror: MirrorAxis = None,
-    proof_file: ProofFile = None,
-    resume: Resume = False,
-    json_file: JsonFile = None,
-    csv_file: CsvFile = None,
-    vtu_file: VtuFile = None,
-    report_file: ReportFile = None,
-    quiet: Quiet = False,
-) -> None:
+@dataclass(frozen=True)
+class Search:
+    """A search at one alpha as its options describe it; every field is an option, in the order of the help.
+
+    Attributes
+    ----------
+    *_file : names of the files that results go to; None where there is none
+    unique : whether the only question is if there is one solution
+    mirror : the direction across which roots are paired
+    """
+
+    arithmetic: HowExact = "verified"
+    method: HowSearched = "tree"
+    unique: Unique = False
+    stop_after: StopAfter = None
+    max_nodes: MaxNodes = None
+    time_limit: TimeLimit = None
+    jobs: Jobs = 1
+    mirror: MirrorAxis = None
+    proof_file: ProofFile = None
+    resume: Resume = False
+    json_file: JsonFile = None
+    csv_file: CsvFile = None
+    vtu_file: VtuFile = None
+    report_file: ReportFile = None
+
+    @classmethod
+    def options(cls, *without: str) -> list[Parameter]:
+        """The fields as options of a command, but for some."""
+        fields = signature(cls, eval_str=True).parameters.values()
+        return [field.replace(kind=Parameter.KEYWORD_ONLY) for field in fields if field.name not in without]
+
+    def check(self) -> None:
+        """Refuse options that contradict each other, and results that cannot be written.
+
+        Raises
+        ------
+        InvalidArgumentError, MissingDependencyError
+            As `check_outputs` and `check_vtu`, the proof is to go to stdout, or there is none to resume; or options
+            contradict each other.
+        """
+        if self.jobs > 1 and self.method != "tree":
+            raise InvalidArgumentError(
+                f"--jobs is {self.jobs} with the exhaustive method; expected 1 job, or the method tree"
+            )
+        check_outputs(json=self.json_file, csv=self.csv_file)
+        check_named_files(", but a proof is a binary file", proof=self.proof_file)
+        check_vtu(self.vtu_file)
+        check_named_files(report=self.report_file)
+        if self.resume and self.proof_file is None:
+            raise InvalidArgumentError(
+                "--resume is given without --proof; expected the file of the proof to resume from"
+            )
+        if self.unique and self.stop_after is not None:
+            raise InvalidArgumentError(
+                f"--stop-after is {self.stop_after} with --unique, which stops at the second root"
+            )
+
+    def answer(
+        self, name: str, problem: ContactProblem | ContactProblem3D, alpha: Alpha, source: str | None
+    ) -> NoReturn:
+        """Search, write what was found, and end the command.
+
+        ``source`` is what other commands take for the problem, None where there is no such file.
+        """
+        check_places(self.vtu_file, problem, name)
+        check_scripts(self.report_file, problem)
+        check_mirror(problem, alpha, self.mirror)
+        found, ended = so_far(lambda: self._found(problem, alpha))
+        if self.mirror is not None and len(found):
+            found = found.mirrored(self.mirror)
+        deliver(
+            (self.vtu_file, lambda path: _write_vtu(problem, found, path)),
+            (self.report_file, lambda path: _write_page(found, path, name, _commands(found, source, self.proof_file))),
+            json_file=self.json_file,
+            csv_file=self.csv_file,
+            text=lambda: root_report.uniqueness(found) if self.unique else root_report.roots_as_text(found),
+            content=lambda: root_report.roots_as_json(found, name),
+            frame=found.to_frame,
+        )
+        partly = [name for name, path in (("the CSV", self.csv_file), ("--vtu", self.vtu_file)) if path is not None]
+        if partly and found.families:
+            families = counted(len(found.families), "family", "families")
+            holds = "hold" if len(partly) > 1 else "holds"
+            note(f"{' and '.join(partly)} {holds} the isolated roots only, --json the {families} too")
+        finish(ended, ExitStatus.DONE if self.unique and found.unique is not None else _status(found))
+
+    def _found(self, problem: ContactProblem | ContactProblem3D, alpha: Alpha) -> RootSet:
+        from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help
+
+        names = ("arithmetic", "method", "max_nodes", "time_limit", "resume")
+        options: dict[str, Any] = {name: getattr(self, name) for name in names}
+        options |= {"stop_after": 2 if self.unique else self.stop_after, "proof_path": self.proof_file}
+        with workers(self.jobs) as executor, SearchDisplay() as display:
+            return enumerate_roots(problem, alpha, executor=executor, progress=display, **options)
+
+
+@with_options(*Search.options(), after=2)
+def roots(problem: ProblemArgument, alpha: AtAlpha, *, quiet: Quiet = False, **options: Any) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
 
     Prints a table of the roots and whether it is complete; lambda_n and lambda_t are nodal forces, not pressures. The
@@ -104,93 +186,10 @@ def roots(
     search short, or the indices do not add up to +1; 2 on bad input; 130 on Ctrl-C, after printing what was found so
     far; 74 if a result could not be written; 141 if the program that read it has ended.
     """
-    if jobs > 1 and method != "tree":
-        raise InvalidArgumentError(f"--jobs is {jobs} with the exhaustive method; expected 1 job, or the method tree")
-    files = Files(proof_file, json_file, csv_file, vtu_file, report_file, source=problem)
-    files.check(resume=resume)
-    if unique and stop_after is not None:
-        raise InvalidArgumentError(f"--stop-after is {stop_after} with --unique, which stops at the second root")
-    limits: dict[str, Any] = {
-        "stop_after": 2 if unique else stop_after,
-        "max_nodes": max_nodes,
-        "time_limit": time_limit,
-    }
-    options = {"arithmetic": arithmetic, "method": method, "proof_path": proof_file, "resume": resume, **limits}
+    search = Search(**options)
+    search.check()
     value = parse_alpha(alpha)
-    answer(problem, load_any_problem(problem), value, jobs, options, files, mirror, unique=unique)
-
-
-class Files(NamedTuple):
-    """The files that the results of a search go to; None where there is none.
-
-    ``source`` is what other commands take for the problem, None where there is no such file.
-    """
-
-    proof: str | None
-    json: str | None
-    csv: str | None
-    vtu: str | None
-    report: str | None
-    source: str | None
-
-    def check(self, *, resume: bool) -> None:
-        """Refuse results that cannot be written.
-
-        Raises
-        ------
-        InvalidArgumentError, MissingDependencyError
-            As `check_outputs` and `check_vtu`, the proof is to go to stdout, or there is none to resume.
-        """
-        check_outputs(json=self.json, csv=self.csv)
-        if self.proof == "-":
-            raise InvalidArgumentError("--proof is -, but a proof is a binary file; expected the name of a file")
-        check_writable(self.proof, "--proof")
-        check_vtu(self.vtu)
-        if self.report == "-":
-            raise InvalidArgumentError("--report is -; expected the name of a file")
-        check_writable(self.report, "--report")
-        if resume and self.proof is None:
-            raise InvalidArgumentError(
-                "--resume is given without --proof; expected the file of the proof to resume from"
-            )
-
-
-def answer(
-    name: str,
-    problem: ContactProblem | ContactProblem3D,
-    alpha: Alpha,
-    jobs: int,
-    options: dict[str, Any],
-    files: Files,
-    mirror: str | None = None,
-    *,
-    unique: bool = False,
-) -> NoReturn:
-    """Search with the options of `enumerate_roots`, write what was found, and end the command.
-
-    With ``unique`` the question is only whether there is one solution; across ``mirror`` roots are paired.
-    """
-    check_places(files.vtu, problem, name)
-    check_scripts(files.report, problem)
-    check_mirror(problem, alpha, mirror)
-    found, ended = so_far(lambda: _search(problem, alpha, jobs, **options))
-    if mirror is not None and len(found):
-        found = found.mirrored(mirror)
-    deliver(
-        (files.vtu, lambda path: _write_vtu(problem, found, path)),
-        (files.report, lambda path: _write_page(found, path, name, files)),
-        json_file=files.json,
-        csv_file=files.csv,
-        text=lambda: root_report.uniqueness(found) if unique else root_report.roots_as_text(found),
-        content=lambda: root_report.roots_as_json(found, name),
-        frame=found.to_frame,
-    )
-    partly = [name for name, path in (("the CSV", files.csv), ("--vtu", files.vtu)) if path is not None]
-    if partly and found.families:
-        families = counted(len(found.families), "family", "families")
-        holds = "hold" if len(partly) > 1 else "holds"
-        note(f"{' and '.join(partly)} {holds} the isolated roots only, --json the {families} too")
-    finish(ended, ExitStatus.DONE if unique and found.unique is not None else _status(found))
+    search.answer(problem, load_any_problem(problem), value, problem)
 
 
 def check_mirror(problem: ContactProblem | ContactProblem3D, alpha: Alpha, mirror: str | None) -> None:
@@ -218,29 +217,22 @@ def _write_vtu(problem: ContactProblem | ContactProblem3D, found: RootSet, path:
     write_vtu(problem, found, path)
 
 
-def _write_page(found: RootSet, path: str, name: str, files: Files) -> None:
+def _write_page(found: RootSet, path: str, name: str, commands: list[str]) -> None:
     from enumsol.report import write_report  # numpy: not for --help
 
-    write_report(found, path, title=name, commands=_commands(found, files))
+    write_report(found, path, title=name, commands=commands)
 
 
-def _commands(found: RootSet, files: Files) -> list[str]:
+def _commands(found: RootSet, source: str | None, proof: str | None) -> list[str]:
     """How a reader checks the proof; none where there is none, or no file of the problem."""
-    if found.proof is None or files.source is None:
+    if found.proof is None or source is None:
         return []
-    problem = shlex.quote(files.source)
-    if files.proof is not None:
-        return [f"enumsol verify {problem} {shlex.quote(files.proof)}"]
+    problem = shlex.quote(source)
+    if proof is not None:
+        return [f"enumsol verify {problem} {shlex.quote(proof)}"]
     # -1 would be read as an option
     again = f"enumsol roots {problem} --alpha={shlex.quote(str(found.alpha))} --proof roots.proof"
     return [again, f"enumsol verify {problem} roots.proof"]
-
-
-def _search(problem: ContactProblem | ContactProblem3D, alpha: Alpha, jobs: int, **options: Any) -> RootSet:
-    from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help
-
-    with workers(jobs) as executor, SearchDisplay() as display:
-        return enumerate_roots(problem, alpha, executor=executor, progress=display, **options)
 
 
 def _status(found: RootSet) -> ExitStatus:

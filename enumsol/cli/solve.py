@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from inspect import Parameter, signature
+from inspect import Parameter
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from enumsol.cli.common import GALLERY, TOML, load_any_problem, note, parse_alpha, refuse_misspelt
-from enumsol.cli.options import LIMITS, OUTPUT, JsonFile, MaxNodes, Quiet, ReportFile, VtuFile
-from enumsol.cli.roots import (
-    CsvFile,
-    Files,
-    HowExact,
-    Jobs,
-    MirrorAxis,
-    ProofFile,
-    Resume,
-    StopAfter,
-    TimeLimit,
-    answer,
-)
+from enumsol.cli.options import LIMITS, OUTPUT, Quiet, with_options
+from enumsol.cli.roots import Search
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -147,23 +136,11 @@ MESH_OPTIONS = {
 }
 
 
-def _with_mesh_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The command, whose ``**texts`` are options of their own in its signature, which typer reads."""
-    own = signature(command, eval_str=True)
-    mesh, *others, _ = own.parameters.values()
-    options = [
-        Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=_annotation(name, given))
-        for name, given in MESH_OPTIONS.items()
-    ]
-    command.__signature__ = own.replace(parameters=[mesh, *options, *others])  # type: ignore[attr-defined]
-    command.__annotations__ |= {option.name: option.annotation for option in options}
-    return command
-
-
-def _annotation(name: str, given: Given) -> Any:
+def _option(name: str, given: Given) -> Parameter:
     flag = "--" + name.replace("_", "-")
     how = typer.Option(flag, metavar=given.metavar, help=given.help, rich_help_panel=given.panel, show_default=False)
-    return Annotated[list[str] | None, how] if given.repeated else Annotated[str | None, how]
+    annotation = Annotated[list[str] | None, how] if given.repeated else Annotated[str | None, how]
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
 
 AtAlpha = Annotated[
@@ -188,7 +165,14 @@ Output = Annotated[
 ]
 
 
-@_with_mesh_options
+_OPTIONS = (
+    *(_option(name, given) for name, given in MESH_OPTIONS.items()),
+    Parameter("alpha", Parameter.KEYWORD_ONLY, default=None, annotation=AtAlpha),
+    *Search.options("method", "unique"),
+)
+
+
+@with_options(*_OPTIONS, after=1)
 def solve(
     mesh: Annotated[
         str,
@@ -197,22 +181,9 @@ def solve(
         ),
     ],
     *,
-    alpha: AtAlpha = None,
-    arithmetic: HowExact = "verified",
-    stop_after: StopAfter = None,
-    max_nodes: MaxNodes = None,
-    time_limit: TimeLimit = None,
-    jobs: Jobs = 1,
-    mirror: MirrorAxis = None,
-    proof_file: ProofFile = None,
-    resume: Resume = False,
-    json_file: JsonFile = None,
-    csv_file: CsvFile = None,
-    vtu_file: VtuFile = None,
-    report_file: ReportFile = None,
     output: Output = None,
     quiet: Quiet = False,
-    **texts: Any,
+    **options: Any,
 ) -> None:
     """Build a contact problem from MESH and find all its solutions.
 
@@ -222,14 +193,15 @@ def solve(
 
     Exit status: as enumsol roots.
     """
+    texts = {name: options.pop(name) for name in MESH_OPTIONS}
     given = {
         name: MESH_OPTIONS[name].read(text, "--" + name.replace("_", "-"))
         for name, text in texts.items()
         if text is not None
     }
-    source = output if output is not None else mesh if mesh.endswith(TOML) else None
-    files = Files(proof_file, json_file, csv_file, vtu_file, report_file, source)
-    files.check(resume=resume)
+    alpha = options.pop("alpha")
+    search = Search(**options)
+    search.check()
     value = None if alpha is None else parse_alpha(alpha)
     problem = _problem(mesh, given)
     if _at_rest(problem):
@@ -240,9 +212,8 @@ def solve(
         if output is not None:
             return
         raise InvalidArgumentError("--alpha is missing, on which friction or load depend; expected it, or --output")
-    limits: dict[str, Any] = {"stop_after": stop_after, "max_nodes": max_nodes, "time_limit": time_limit}
-    options = {"arithmetic": arithmetic, "proof_path": proof_file, "resume": resume, **limits}
-    answer(mesh, problem, value or 0.0, jobs, options, files, mirror)
+    source = output if output is not None else mesh if mesh.endswith(TOML) else None
+    search.answer(mesh, problem, value or 0.0, source)
 
 
 def _problem(mesh: str, options: dict[str, Any]) -> ContactProblem | ContactProblem3D:

@@ -9,7 +9,7 @@ import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, parse_interval, so_far, workers
 from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, count, csv, number, seconds
-from enumsol.cli.output import as_json, check_outputs, deliver
+from enumsol.cli.output import check_outputs, deliver
 from enumsol.cli.progress import Display
 from enumsol.errors import EnumsolError, InvalidArgumentError
 
@@ -76,7 +76,7 @@ def table(
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: _as_text(frame, len(values), ended),
-        content=lambda: as_json({"problem": problem, "arithmetic": arithmetic, **_content(frame, values, ended)}),
+        content=lambda: {"problem": problem, "arithmetic": arithmetic, **_content(frame, values, ended)},
         frame=lambda: frame,
     )
     finish(ended, ExitStatus.INCOMPLETE if len(_open(frame)) else ExitStatus.DONE)

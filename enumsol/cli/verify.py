@@ -10,7 +10,7 @@ import typer
 
 from enumsol.cli.common import ExitStatus, load_any_problem
 from enumsol.cli.options import JsonFile, ProblemArgument, Quiet
-from enumsol.cli.output import as_json, check_outputs, deliver
+from enumsol.cli.output import check_outputs, deliver
 from enumsol.cli.quiet import is_quiet
 
 if TYPE_CHECKING:
@@ -49,10 +49,8 @@ def verify(
     about = {"problem": problem, "proof": proof, "fingerprint": body.fingerprint}
     deliver(
         json_file=json_file,
-        csv_file=None,
         text=lambda: repr(report),
-        content=lambda: as_json({**about, **_content(report)}),
-        frame=None,
+        content=lambda: {**about, **_content(report)},
     )
     if not report.ok:
         raise typer.Exit(ExitStatus.BAD_INPUT)

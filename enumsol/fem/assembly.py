@@ -31,17 +31,15 @@ from enumsol.fem.mesh_checks import (
     unit_vectors,
     vectors_of_all,
 )
-from enumsol.fem.numbering import gathered
-from enumsol.fem.restrained import Supports, movable, plain_dofs
+from enumsol.fem.restrained import Supports, gathered, movable, plain_dofs
 from enumsol.model.cells import numbers_of_nodes
 from enumsol.model.mesh import BodyMesh
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import ArrayLike, NDArray
-
     from enumsol.model.problem import ContactProblem
+    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 
 def stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) -> sp.csc_array:
@@ -79,7 +77,7 @@ def stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) ->
     return nodal_basis(*plane_mesh(points, cells)).stiffness(lam, mu)
 
 
-def plane_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def plane_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[Floats, Integers]:
     """Points (N, 2) and cells as arrays.
 
     Raises
@@ -91,7 +89,7 @@ def plane_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[NDArray[np.float64]
     return nodes, elements(cells, "cells", numbers_of_nodes(2), len(nodes))
 
 
-def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> NDArray[np.float64]:
+def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> Floats:
     """Stiffness (6, 6) of one P1 triangle in closed form, without quadrature: simple data give exact entries.
 
     Parameters
@@ -127,7 +125,7 @@ def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> NDArray
     return np.asarray(K.reshape(6, 6) / (2.0 * doubled))
 
 
-def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> NDArray[np.float64]:
+def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> Floats:
     """Nodal forces of tractions constant on each edge, (N, 2) [force, per unit thickness].
 
     Parameters
@@ -159,7 +157,7 @@ def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> NDA
     return gathered(ends, np.tile(0.5 * lengths[:, None], 2), density, len(nodes))
 
 
-def _quadratic_shares(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _quadratic_shares(corners: Floats) -> Floats:
     """Integrals (k, 3) of the shape functions over quadratic edges with nodes (k, 3, 2), by three Gauss points."""
     shares = np.zeros(corners.shape[:2])
     for place, weight in ((-np.sqrt(0.6), 5 / 9), (0.0, 8 / 9), (np.sqrt(0.6), 5 / 9)):
@@ -169,7 +167,7 @@ def _quadratic_shares(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     return shares
 
 
-def body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -> NDArray[np.float64]:
+def body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -> Floats:
     """Nodal forces of a body force constant on each cell, (N, 2) [force, per unit thickness].
 
     Parameters

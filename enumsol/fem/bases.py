@@ -19,10 +19,7 @@ from enumsol.model.cells import KINDS, by_kind
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+    from enumsol.support.array_types import Floats, Integers
 
 #: An area or volume below this share of the squared or cubed extent of its cell is rounding.
 FLAT = 1e-14

@@ -17,13 +17,9 @@ from enumsol.support.array_arguments import plain_array, real_array, real_matrix
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import ArrayLike, NDArray
-
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+    from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
 #: Of two places of one node, as a share of the extent of the mesh.
 _SAME = 1e-9
@@ -147,7 +143,7 @@ def _nodes_of(basis: Any) -> tuple[Integers, Floats]:
     return dofs, np.ascontiguousarray(where[:, :, 0].T)
 
 
-def _held(held: Any, count: int) -> NDArray[np.bool_]:
+def _held(held: Any, count: int) -> Mask:
     numbers = held.flatten() if hasattr(held, "nodal_ix") else held
     array = plain_array(numbers, "held", error=InvalidArgumentError)
     mask = np.zeros(count, dtype=bool)

@@ -19,13 +19,9 @@ from enumsol.support.arguments import finite_number, one_of, shown
 from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.named_parts import PartedMesh
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+    from enumsol.support.array_types import Floats, Integers, Mask
 
 #: Positions in a plane of symmetry may differ from it by this share of the extent of the body.
 _SAME = 1e-9
@@ -166,7 +162,7 @@ def check_held(mesh: PartedMesh, supports: Supports, springs: sp.csc_array) -> N
             )
 
 
-def _rigid_motions(points: Floats, inside: NDArray[np.bool_]) -> Floats:
+def _rigid_motions(points: Floats, inside: Mask) -> Floats:
     """Displacements (d N, 3) or (d N, 6) by translations and rotations of nodes, in units of their extent."""
     own = points[inside]
     places = np.where(inside[:, None], (points - own.mean(axis=0)) / np.max(np.ptp(own, axis=0)), 0.0)

@@ -16,14 +16,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     import scipy.sparse as sp
-    from numpy.typing import NDArray
 
     from enumsol.fem.restrained import ContactRows, Supports
     from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem3d import ContactProblem3D
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+    from enumsol.support.array_types import Floats, Integers
 
 #: Cosine of the angle between axes that are perpendicular up to rounding, by dimension.
 _SKEW = {2: 1e-12, 3: 1e-10}

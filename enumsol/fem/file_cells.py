@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.cells import KINDS, TRIANGLES, as_quadrilaterals, boundary_facets, numbers_of_nodes
+from enumsol.model.cells import KINDS, TRIANGLES, as_quadrilaterals, boundary_facets, facet_rows, numbers_of_nodes
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+    from enumsol.support.array_types import Floats, Integers
 
 #: By dimension: the facets of each kind of cell. Hexahedra with 20 nodes become such with 27.
 FACET_OF = {d: {kind.file_name: kind.file_facets for (e, _), kind in KINDS.items() if e == d} for d in (2, 3)}
@@ -124,8 +121,7 @@ def with_centres(facets: Integers, cells: Integers, name: str) -> Integers:
         One is no facet of a cell.
     """
     every = cells[:, _SIDES].reshape(-1, 9)
-    known = {tuple(key): row for row, key in enumerate(np.sort(every[:, :4], axis=1).tolist())}
-    rows = [known.get(tuple(key), -1) for key in np.sort(facets[:, :4], axis=1).tolist()]
+    rows = facet_rows(facets, every, 4)
     if -1 in rows:
         raise InvalidArgumentError(f"{name} has facets that belong to no cell; expected facets of the body")
     return np.asarray(every[rows])

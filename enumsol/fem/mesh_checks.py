@@ -14,13 +14,13 @@ from enumsol.support.arguments import finite_number, one_of, positive_number, sh
 from enumsol.support.array_arguments import plain_array, real_array, short_vector
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
 #: Largest coordinates of which areas and volumes are computed, by dimension.
 LARGEST_COORDINATE = {2: 1e150, 3: 1e100}
 
 
-def positions(points: ArrayLike, dimension: int) -> NDArray[np.float64]:
+def positions(points: ArrayLike, dimension: int) -> Floats:
     """Positions of nodes, (N, dimension), small enough for areas and volumes."""
     nodes = real_array(points, "points", error=InvalidArgumentError)
     if nodes.ndim != 2 or nodes.shape[1] != dimension:
@@ -34,7 +34,7 @@ def positions(points: ArrayLike, dimension: int) -> NDArray[np.float64]:
     return nodes
 
 
-def elements(value: ArrayLike, name: str, corners: int | tuple[int, ...], count: int) -> NDArray[np.int64]:
+def elements(value: ArrayLike, name: str, corners: int | tuple[int, ...], count: int) -> Integers:
     """Nodes of each element, (k, corners) with k >= 1, all below ``count``."""
     array = plain_array(value, name, error=InvalidArgumentError)
     numbers = (corners,) if isinstance(corners, int) else corners
@@ -44,7 +44,7 @@ def elements(value: ArrayLike, name: str, corners: int | tuple[int, ...], count:
     return node_numbers(array.ravel(), name, count, distinct=False).reshape(array.shape)
 
 
-def node_numbers(value: ArrayLike, name: str, count: int, *, distinct: bool = True) -> NDArray[np.int64]:
+def node_numbers(value: ArrayLike, name: str, count: int, *, distinct: bool = True) -> Integers:
     """Node numbers below ``count``, (k,) with k >= 1."""
     array = plain_array(value, name, error=InvalidArgumentError)
     if array.ndim != 1 or array.size == 0 or array.dtype.kind not in "iu":
@@ -60,7 +60,7 @@ def node_numbers(value: ArrayLike, name: str, count: int, *, distinct: bool = Tr
     return array.astype(np.int64)
 
 
-def check_every_node_is_used(cells: NDArray[np.int64], count: int, name: str, kind: str) -> None:
+def check_every_node_is_used(cells: Integers, count: int, name: str, kind: str) -> None:
     """Raise InvalidArgumentError if a node belongs to no cell: it would have no stiffness."""
     used = np.unique(cells)
     if len(used) != count:
@@ -109,7 +109,7 @@ def lame(young: float, poisson: float, plane: Literal["strain", "stress"] = "str
     return E * nu / ((1 + nu) * (1 - (nu if stress else 2 * nu))), E / (2 * (1 + nu))
 
 
-def held_mask(held: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def held_mask(held: ArrayLike, shape: tuple[int, ...]) -> Mask:
     """Mask (N, dimension) of held components, of node numbers or a mask."""
     array = plain_array(held, "held", error=InvalidArgumentError)
     mask = np.zeros(shape, dtype=bool)
@@ -123,7 +123,7 @@ def held_mask(held: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     return mask
 
 
-def vectors_of_all(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def vectors_of_all(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Floats:
     """Vectors (k, dimension), one each or one for all."""
     array = real_array(value, name, error=InvalidArgumentError)
     if array.ndim == 1:
@@ -133,7 +133,7 @@ def vectors_of_all(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArr
     return array
 
 
-def unit_vectors(vectors: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+def unit_vectors(vectors: Floats, name: str) -> Floats:
     """Vectors (k, dimension) scaled to length one."""
     lengths = np.linalg.norm(vectors, axis=1)
     if np.any(lengths == 0):
@@ -141,7 +141,7 @@ def unit_vectors(vectors: NDArray[np.float64], name: str) -> NDArray[np.float64]
     return np.asarray(vectors / lengths[:, None])
 
 
-def spring_stiffnesses(springs: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def spring_stiffnesses(springs: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """Stiffnesses of springs to the ground, (N, dimension)."""
     values = vectors_of_all(springs, "springs", shape)
     if np.min(values) < 0:
@@ -149,7 +149,7 @@ def spring_stiffnesses(springs: ArrayLike, shape: tuple[int, ...]) -> NDArray[np
     return values
 
 
-def nodal_vectors(forces: ArrayLike | None, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def nodal_vectors(forces: ArrayLike | None, name: str, shape: tuple[int, ...]) -> Floats:
     """Forces on all nodes in the order of degrees of freedom, (dimension N,); zero for None."""
     if forces is None:
         return np.zeros(shape[0] * shape[1])

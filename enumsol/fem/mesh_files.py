@@ -15,7 +15,7 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fem.file_cells import GROUPS_ONLY, body_cells, body_kinds, facets_of_sets, solid_cells, with_centres
 from enumsol.fem.mesh_checks import positions
-from enumsol.fem.named_parts import ALL, PartedMesh
+from enumsol.fem.named_parts import ALL, PartedMesh, SolidMesh
 from enumsol.support.arguments import file_path, shown
 from enumsol.support.files import unreadable
 from enumsol.support.messages import shortened
@@ -23,11 +23,7 @@ from enumsol.support.messages import shortened
 if TYPE_CHECKING:
     import os
 
-    from numpy.typing import NDArray
-
-    from enumsol.fem.solid_meshes import SolidMesh
-
-    Integers = NDArray[np.int64]
+    from enumsol.support.array_types import Floats, Integers, NDArray
 
 #: Third coordinates of a plane mesh may differ by this share of its extent.
 _PLANE = 1e-9
@@ -200,24 +196,11 @@ def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
             f"expected {facet} cells, best in groups with names ({GROUPS_ONLY} its parts need some, too)"
         )
     sets = {name: rows[rows >= 0] for name, rows in sets.items() if np.any(rows >= 0)}
-    return _made(dimension, nodes, inside, facets, sets)
+    made = PartedMesh if dimension == 2 else SolidMesh
+    return made(nodes, inside, MappingProxyType(facets), MappingProxyType(sets))
 
 
-def _made(
-    dimension: int,
-    nodes: NDArray[np.float64],
-    cells: Integers,
-    facets: dict[str, Integers],
-    sets: dict[str, Integers],
-) -> PartedMesh:
-    if dimension == 2:
-        return PartedMesh(nodes, cells, MappingProxyType(facets), MappingProxyType(sets))
-    from enumsol.fem.solid_meshes import SolidMesh  # not for plane meshes
-
-    return SolidMesh(nodes, cells, MappingProxyType(facets), MappingProxyType(sets))
-
-
-def _plane(points: NDArray[Any]) -> NDArray[np.float64]:
+def _plane(points: NDArray[Any]) -> Floats:
     """Points (N, 2) of a plane mesh."""
     if points.ndim == 2 and points.shape[1] == 3:
         nodes = positions(points, 3)

@@ -31,14 +31,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from numpy.typing import ArrayLike, NDArray
-
     from enumsol.fem.bases import NodalBasis
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
     Names = str | Sequence[str]
     Vectors = Mapping[str, ArrayLike] | None
 

@@ -14,7 +14,7 @@ from enumsol.support.arguments import positive_integer, positive_number
 from enumsol.support.array_arguments import plain_array
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 #: Largest number of cells along one side of a mesh.
 MOST_CELLS = 10_000
@@ -34,12 +34,12 @@ class Mesh:
         Nodes of the four sides with their corners, from left to right or from bottom to top.
     """
 
-    points: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-    bottom: NDArray[np.int64]
-    top: NDArray[np.int64]
-    left: NDArray[np.int64]
-    right: NDArray[np.int64]
+    points: Floats
+    triangles: Integers
+    bottom: Integers
+    top: Integers
+    left: Integers
+    right: Integers
 
     def parted(self) -> PartedMesh:
         """The same with its sides as parts named bottom, top, left and right, for `mesh_problem`."""
@@ -107,7 +107,7 @@ def trapezoid(nx: int, ny: int, bottom: float, top: float, height: float) -> Mes
     return _structured(nx, ny, x, y, mirrored=True)
 
 
-def edges_along(nodes: ArrayLike) -> NDArray[np.int64]:
+def edges_along(nodes: ArrayLike) -> Integers:
     """Edges between consecutive nodes, (k - 1, 2), as for the nodes of a side of a mesh.
 
     Parameters
@@ -134,7 +134,7 @@ def edges_along(nodes: ArrayLike) -> NDArray[np.int64]:
     return np.stack([line[:-1], line[1:]], axis=1)
 
 
-def _structured(nx: int, ny: int, x: NDArray[np.float64], y: NDArray[np.float64], *, mirrored: bool) -> Mesh:
+def _structured(nx: int, ny: int, x: Floats, y: Floats, *, mirrored: bool) -> Mesh:
     number = np.arange((nx + 1) * (ny + 1)).reshape(ny + 1, nx + 1)
     a, b = number[:-1, :-1].ravel(), number[:-1, 1:].ravel()
     c, d = number[1:, 1:].ravel(), number[1:, :-1].ravel()

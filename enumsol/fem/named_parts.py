@@ -17,8 +17,7 @@ from enumsol.support.arguments import shown
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from enumsol.support.array_types import Floats, Integers
 
 #: The name of all facets where nothing names groups of them.
 ALL = "boundary"
@@ -44,12 +43,12 @@ class PartedMesh:
         Nodes of parts that are given by nodes.
     """
 
-    points: NDArray[np.float64]
-    cells: NDArray[np.int64]
-    facets: Mapping[str, NDArray[np.int64]]
-    node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=lambda: MappingProxyType({}))
+    points: Floats
+    cells: Integers
+    facets: Mapping[str, Integers]
+    node_sets: Mapping[str, Integers] = field(default_factory=lambda: MappingProxyType({}))
 
-    def part(self, name: str) -> NDArray[np.int64]:
+    def part(self, name: str) -> Integers:
         """Facets of this name.
 
         Raises
@@ -61,7 +60,7 @@ class PartedMesh:
             raise self._unknown(name, "facets", self.facets)
         return self.facets[name]
 
-    def nodes(self, name: str) -> NDArray[np.int64]:
+    def nodes(self, name: str) -> Integers:
         """Nodes of this name, or of the facets of this name, in order.
 
         Raises
@@ -103,3 +102,19 @@ class PartedMesh:
         if self.node_sets:
             lines.append("  nodes   " + ", ".join(f"{name} ({len(part)})" for name, part in self.node_sets.items()))
         return "\n".join(lines)
+
+
+class SolidMesh(PartedMesh):
+    """A mesh of tetrahedra or hexahedra with named sets of facets.
+
+    Attributes
+    ----------
+    points : (N, 3) array
+        Positions of the nodes [length].
+    cells : (M, k) int array
+        Nodes of each tetrahedron (k = 4 or 10) or hexahedron (k = 8 or 27), in the order of VTK.
+    facets : mapping of names to (k, m) int arrays
+        Nodes of the triangles (m = 3 or 6) or quadrilaterals (m = 4 or 9) of parts of the boundary.
+    node_sets : mapping of names to (k,) int arrays
+        Nodes of parts that are given by nodes.
+    """

@@ -16,7 +16,7 @@ from enumsol.support.arguments import instance_of
 from enumsol.support.array_arguments import vector_of
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from enumsol.support.array_types import ArrayLike, Floats
 
 #: Columns that are solved for at a time.
 _BLOCK = 64
@@ -38,10 +38,10 @@ class MeshNorms:
 
     G: sp.csc_array
     Bn: sp.csr_array
-    areas: NDArray[np.float64]
+    areas: Floats
 
     @cached_property
-    def dual(self) -> NDArray[np.float64]:
+    def dual(self) -> Floats:
         """Bn G^-1 Bn', (p, p)."""
         from enumsol.condensation.factorization import Factorization  # scipy's solvers come with the first use
 

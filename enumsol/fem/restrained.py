@@ -16,11 +16,7 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
-    Mask = NDArray[np.bool_]
+    from enumsol.support.array_types import Floats, Integers, Mask
 
 #: Components of unit normals below this are rounding of a right angle.
 RIGHT_ANGLE = 1e-9
@@ -176,6 +172,14 @@ def restrained(
         stiffness = sp.csc_array(coupled @ stiffness @ coupled + own)
     slope = None if forces_slope is None else kept * forces_slope[left]
     return Restrained(stiffness, kept * load[left], slope, left)
+
+
+def gathered(cells: Integers, shares: Floats, density: Floats, count: int) -> Floats:
+    """Nodal forces (count, dimension): ``shares`` (k, corners) of the densities (k, dimension) on cells."""
+    forces = np.zeros((count, density.shape[1]))
+    for corner in range(cells.shape[1]):
+        np.add.at(forces, cells[:, corner], shares[:, corner, None] * density)
+    return forces
 
 
 def plain_dofs(shape: tuple[int, ...]) -> Integers:

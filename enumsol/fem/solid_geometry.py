@@ -12,13 +12,10 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import FLAT
 from enumsol.fem.mesh_checks import check_every_node_is_used, elements, positions
-from enumsol.model.cells import HEXAHEDRON, KINDS, boundary_facets
+from enumsol.model.cells import HEXAHEDRON, KINDS, boundary_facets, facet_rows
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+    from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
 _GAUSS_2 = (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)), (0.5, 0.5)
 _GAUSS_3 = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)), (5 / 18, 8 / 18, 5 / 18)
@@ -52,7 +49,7 @@ def solid_mesh(points: ArrayLike, cells: ArrayLike, kinds: tuple[int, ...] = (4,
     return nodes, bodies
 
 
-def _refuse(wrong: NDArray[np.bool_], found: str) -> None:
+def _refuse(wrong: Mask, found: str) -> None:
     if np.any(wrong):
         raise InvalidArgumentError(f"cells row {int(np.argmax(wrong))} {found}")
 
@@ -98,11 +95,11 @@ def outward(facets: Integers, cells: Integers) -> Integers:
     """
     boundary = boundary_facets(3, cells)
     if facets.shape[1] != boundary.shape[1]:
+        name = KINDS[3, cells.shape[1]].name
         raise InvalidArgumentError(
-            f"contact has facets of {facets.shape[1]} nodes; expected {boundary.shape[1]}, as {_name(cells)} have"
+            f"contact has facets of {facets.shape[1]} nodes; expected {boundary.shape[1]}, as {name} have"
         )
-    known = {tuple(key): row for row, key in enumerate(np.sort(boundary, axis=1).tolist())}
-    rows = [known.get(tuple(key), -1) for key in np.sort(facets, axis=1).tolist()]
+    rows = facet_rows(facets, boundary, facets.shape[1])
     if -1 in rows:
         k = rows.index(-1)
         raise InvalidArgumentError(
@@ -112,10 +109,6 @@ def outward(facets: Integers, cells: Integers) -> Integers:
     if len(set(rows)) != len(rows):
         raise InvalidArgumentError("contact names a facet twice; expected distinct facets")
     return boundary[rows]
-
-
-def _name(cells: Integers) -> str:
-    return KINDS[3, cells.shape[1]].name
 
 
 def facet_vectors(nodes: Floats, facets: Integers) -> Floats:

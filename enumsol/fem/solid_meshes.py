@@ -1,4 +1,4 @@
-"""Meshes of bodies in three dimensions: boxes, and what a mesh and its named facets are."""
+"""Meshes of boxes in three dimensions, and blocks of facets of a surface."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.mesh_checks import elements, positions
-from enumsol.fem.named_parts import PartedMesh
+from enumsol.fem.named_parts import SolidMesh
 from enumsol.model.cells import KINDS, boundary_facets
 from enumsol.support.arguments import one_of, positive_integer, shown
 from enumsol.support.array_arguments import short_vector
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
     Cells = Literal["hexahedra", "tetrahedra"]
 
@@ -25,22 +25,6 @@ MOST_CELLS_OF_A_SIDE = 1_000
 _SAME = 1e-9
 #: The six tetrahedra of a cell: ways along its edges from its first corner to the opposite one.
 _PATHS = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
-
-
-class SolidMesh(PartedMesh):
-    """A mesh of tetrahedra or hexahedra with named sets of facets.
-
-    Attributes
-    ----------
-    points : (N, 3) array
-        Positions of the nodes [length].
-    cells : (M, k) int array
-        Nodes of each tetrahedron (k = 4 or 10) or hexahedron (k = 8 or 27), in the order of VTK.
-    facets : mapping of names to (k, m) int arrays
-        Nodes of the triangles (m = 3 or 6) or quadrilaterals (m = 4 or 9) of parts of the boundary.
-    node_sets : mapping of names to (k,) int arrays
-        Nodes of parts that are given by nodes.
-    """
 
 
 def box(nx: int, ny: int, nz: int, size: ArrayLike = (1.0, 1.0, 1.0), cells: Cells = "hexahedra") -> SolidMesh:
@@ -88,7 +72,7 @@ def box(nx: int, ny: int, nz: int, size: ArrayLike = (1.0, 1.0, 1.0), cells: Cel
     return SolidMesh(points, bodies, _sides(points, bodies, lengths))
 
 
-def _sides(points: NDArray[np.float64], cells: NDArray[np.int64], size: NDArray[np.float64]) -> Any:
+def _sides(points: Floats, cells: Integers, size: Floats) -> Any:
     facets = boundary_facets(3, cells)
     corners = points[facets]
     names = (("left", "right"), ("front", "back"), ("bottom", "top"))
@@ -101,7 +85,7 @@ def _sides(points: NDArray[np.float64], cells: NDArray[np.int64], size: NDArray[
     )
 
 
-def blocks(points: ArrayLike, facets: ArrayLike, ratio: int) -> NDArray[np.int64]:
+def blocks(points: ArrayLike, facets: ArrayLike, ratio: int) -> Integers:
     """Labels (k,) of facets in a rectangular grid, joined to blocks of ratio by ratio cells of the grid.
 
     The grid lies in a plane perpendicular to an axis, its cells are quadrilaterals or pairs of triangles, and need not
@@ -149,7 +133,7 @@ def blocks(points: ArrayLike, facets: ArrayLike, ratio: int) -> NDArray[np.int64
     return np.asarray(block[:, 1] * (block[:, 0].max() + 1) + block[:, 0])
 
 
-def _steps(values: NDArray[np.float64], same: float) -> NDArray[np.int64]:
+def _steps(values: Floats, same: float) -> Integers:
     """For each value how many smaller ones there are, not counting those that are the same."""
     order = np.argsort(values, kind="stable")
     step = np.concatenate([[0], np.cumsum(np.diff(values[order]) > same)])

@@ -23,12 +23,8 @@ from enumsol.support.array_arguments import plain_array, real_array
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import ArrayLike, NDArray
-
     from enumsol.model.problem3d import ContactProblem3D
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+    from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
 
 def solid_contact_problem(
@@ -157,7 +153,7 @@ def _contact_facets(contact: ArrayLike, count: int) -> Integers:
     return elements(contact, "contact", (3, 4), count)
 
 
-def _rows(surface: ContactSurface, held: NDArray[np.bool_], kind: str, ratio: int, patches: Any) -> Multipliers:
+def _rows(surface: ContactSurface, held: Mask, kind: str, ratio: int, patches: Any) -> Multipliers:
     width = positive_integer(ratio, "ratio")
     if kind == "nodes":
         if width != 1 or patches is not None:

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 import scipy.sparse as sp
 
 from enumsol.fem.bases import nodal_basis
 from enumsol.fem.mesh_checks import elements, lame_coefficients, positions, vectors_of_all
-from enumsol.fem.numbering import gathered
+from enumsol.fem.restrained import gathered
 from enumsol.fem.solid_geometry import facet_quadrature, shape_volumes, solid_mesh
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from enumsol.support.array_types import ArrayLike, Floats
 
 
 def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) -> sp.csc_array:
@@ -53,7 +52,7 @@ def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, floa
     return nodal_basis(*solid_mesh(points, cells)).stiffness(lam, mu)
 
 
-def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -> NDArray[np.float64]:
+def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -> Floats:
     """Nodal forces of a body force constant on each cell, (N, 3) [force].
 
     Parameters
@@ -80,7 +79,7 @@ def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -
     return gathered(bodies, shape_volumes(nodes, bodies), values, len(nodes))
 
 
-def facet_forces(points: ArrayLike, facets: ArrayLike, traction: ArrayLike) -> NDArray[np.float64]:
+def facet_forces(points: ArrayLike, facets: ArrayLike, traction: ArrayLike) -> Floats:
     """Nodal forces of tractions constant on each facet, (N, 3) [force].
 
     Parameters

@@ -10,13 +10,12 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import nodal_basis
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.support.array_types import ArrayLike, Floats
 
 
-def cell_stresses(problem: ContactProblem | ContactProblem3D, u: ArrayLike) -> NDArray[np.float64]:
+def cell_stresses(problem: ContactProblem | ContactProblem3D, u: ArrayLike) -> Floats:
     """Mean stress of every cell of the body, (M, d, d), for displacements u of shape (n,) [force / length^2].
 
     ``sigma = lambda tr(epsilon) I + 2 mu epsilon`` with the Lame coefficients that the problem was made with. In 2D
@@ -69,7 +68,7 @@ def cell_stresses(problem: ContactProblem | ContactProblem3D, u: ArrayLike) -> N
     return stresses
 
 
-def von_mises(stresses: NDArray[np.float64]) -> NDArray[np.float64]:
+def von_mises(stresses: Floats) -> Floats:
     """The equivalent stress of von Mises of stresses (M, 3, 3), (M,)."""
     deviator = stresses - np.trace(stresses, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3.0
     return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2))))

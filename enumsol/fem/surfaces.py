@@ -12,17 +12,15 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.construction import default_axes
 from enumsol.fem.mesh_checks import unit_vectors, vectors_of_all
-from enumsol.fem.restrained import means_of_nodes
+from enumsol.fem.restrained import gathered, means_of_nodes
 from enumsol.fem.solid_geometry import facet_quadrature, facet_vectors
 from enumsol.support.array_arguments import plain_array, real_array
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import ArrayLike, NDArray
+    from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
     Field = ArrayLike | Callable[[Floats], ArrayLike]
 
 #: How far axes may be from right angles and length one, for rounding.
@@ -121,7 +119,7 @@ class Multipliers:
     rows_of_facets: Integers | None = None
 
 
-def on_nodes(surface: ContactSurface, held: NDArray[np.bool_]) -> Multipliers:
+def on_nodes(surface: ContactSurface, held: Mask) -> Multipliers:
     """A row for every node of the surface that is not held entirely (L^H = W^h).
 
     Raises
@@ -139,15 +137,13 @@ def on_nodes(surface: ContactSurface, held: NDArray[np.bool_]) -> Multipliers:
     free = nodes[~np.all(held[nodes], axis=1)]
     if not len(free):
         raise InvalidArgumentError("contact has held nodes only; expected free ones")
-    count = len(surface.points)
-    areas, vectors = np.zeros(count), np.zeros((count, 3))
-    for corner in range(surface.facets.shape[1]):
-        np.add.at(areas, surface.facets[:, corner], surface.shares[:, corner])
-        np.add.at(vectors, surface.facets[:, corner], surface.vectors)
-    return Multipliers(means_of_nodes(free, count), areas[free], surface.points[free], vectors[free], free.tolist())
+    facets, shares, count = surface.facets, surface.shares, len(surface.points)
+    areas = gathered(facets, shares, np.ones((len(facets), 1)), count)[free, 0]
+    vectors = gathered(facets, np.ones_like(shares), surface.vectors, count)[free]
+    return Multipliers(means_of_nodes(free, count), areas, surface.points[free], vectors, free.tolist())
 
 
-def on_patches(surface: ContactSurface, patches: ArrayLike, held: NDArray[np.bool_]) -> Multipliers:
+def on_patches(surface: ContactSurface, patches: ArrayLike, held: Mask) -> Multipliers:
     """A row for every patch of facets that is not held entirely: its mean displacement.
 
     Raises

@@ -17,7 +17,7 @@ from enumsol.support.arguments import finite_number, nonnegative_number, positiv
 from enumsol.support.array_arguments import short_vector
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from enumsol.support.array_types import ArrayLike, Floats
 
     Friction = float | tuple[ArrayLike, ArrayLike]
 
@@ -263,9 +263,7 @@ def wedge(
     >>> problem.p, len(enumsol.enumerate_roots(problem, alpha=1))
     (8, 3)
     """
-    angle = math.radians(positive_number(half_angle, "half_angle"))
-    if angle > math.radians(80.0):
-        raise InvalidArgumentError(f"half_angle is {shown(half_angle)}; expected degrees between 0 and 80")
+    angle = inclination(half_angle)
     width, height = positive_number(width, "width"), positive_number(height, "height")
     mesh = fem.trapezoid(nx, ny, width, width + 2.0 * height * math.tan(angle), height)
     # the top row stands in the mouth of the notch, out of contact, and carries springs and pull
@@ -341,19 +339,45 @@ def _triangles(count: int) -> BodyMesh:
     return BodyMesh(points, np.arange(3 * count).reshape(-1, 3), sp.kron(sp.eye_array(count), turn))
 
 
-def _one_node_stiffness(lame: Pair) -> NDArray[np.float64]:
+def _one_node_stiffness(lame: Pair) -> Floats:
     lam, mu = lame_coefficients(lame, 2)
     return 0.5 * np.array([[lam + 3 * mu, -(lam + mu)], [-(lam + mu), lam + 3 * mu]])
 
 
-def _top_springs(mesh: fem.Mesh, springs: Pair) -> NDArray[np.float64]:
-    total = short_vector(springs, "springs", 2)
-    if np.min(total) <= 0:
-        raise InvalidArgumentError(
-            f"springs is {shown(springs)}; expected two stiffnesses > 0, otherwise nothing holds the wedge"
-        )
+def _top_springs(mesh: fem.Mesh, springs: Pair) -> Floats:
     share = np.full(len(mesh.top), 1.0 / (len(mesh.top) - 1))
     share[[0, -1]] *= 0.5
     values = np.zeros_like(mesh.points)
-    values[mesh.top] = share[:, None] * total
+    values[mesh.top] = share[:, None] * holding(springs, 2)
     return values
+
+
+def inclination(degrees: float) -> float:
+    """Inclination of the sides of a wedge, in radians.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is not between 0 and 80 degrees.
+    """
+    angle = math.radians(positive_number(degrees, "half_angle"))
+    if angle > math.radians(80.0):
+        raise InvalidArgumentError(f"half_angle is {shown(degrees)}; expected degrees between 0 and 80")
+    return angle
+
+
+def holding(springs: ArrayLike, dimension: int) -> Floats:
+    """Stiffnesses of springs that hold a wedge.
+
+    Raises
+    ------
+    InvalidArgumentError
+        They are not positive, one in each direction.
+    """
+    total = short_vector(springs, "springs", dimension)
+    if np.min(total) <= 0:
+        number = {2: "two", 3: "three"}[dimension]
+        raise InvalidArgumentError(
+            f"springs is {shown(springs)}; expected {number} stiffnesses > 0, otherwise nothing holds the wedge"
+        )
+    return total

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.support.arguments import finite_number, positive_integer, positive_number, shown
+from enumsol.gallery.problems import holding, inclination
+from enumsol.support.arguments import finite_number, positive_integer
 from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from enumsol.fem.solid_meshes import SolidMesh
+    from enumsol.fem.named_parts import SolidMesh
     from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 #: A public test of the contact community: one contact, with friction 0.1.
 _COMPLIANCE = ((15.0, -1.0, -2.0), (-1.0, 14.0, 1.0), (-2.0, 1.0, 16.0))
@@ -211,9 +211,7 @@ def wedge3d(
     from enumsol.fem.solids import facet_forces
 
     layers = positive_integer(nz, "nz", least=2)
-    angle = math.radians(positive_number(half_angle, "half_angle"))
-    if angle > math.radians(80.0):
-        raise InvalidArgumentError(f"half_angle is {shown(half_angle)}; expected degrees between 0 and 80")
+    angle = inclination(half_angle)
     mesh = box(nx, ny, layers, size)
     # the topmost layer stands in the mouth of the notch, out of contact, and carries springs and pull
     walls = [_lower_layers(mesh, side, layers) for side in ("left", "right")]
@@ -240,20 +238,16 @@ def wedge3d(
     )
 
 
-def _lower_layers(mesh: SolidMesh, side: str, layers: int) -> NDArray[np.int64]:
+def _lower_layers(mesh: SolidMesh, side: str, layers: int) -> Integers:
     """Facets of a side of a box but for those of the topmost layer of cells."""
     facets = mesh.facets[side]
     height = mesh.points[:, 2]
     return np.asarray(facets[np.max(height[facets], axis=1) < (layers - 0.5) / layers * np.max(height)])
 
 
-def _top_springs(points: NDArray[np.float64], top: NDArray[np.int64], springs: ArrayLike) -> NDArray[np.float64]:
+def _top_springs(points: Floats, top: Integers, springs: ArrayLike) -> Floats:
     from enumsol.fem.solids import facet_forces  # as above
 
-    total = short_vector(springs, "springs", 3)
-    if np.min(total) <= 0:
-        raise InvalidArgumentError(
-            f"springs is {shown(springs)}; expected three stiffnesses > 0, otherwise nothing holds the wedge"
-        )
+    total = holding(springs, 3)
     shares = facet_forces(points, top, total)
     return np.asarray(shares * (total / shares.sum(axis=0)))

@@ -27,9 +27,8 @@ from enumsol.model.problem import ContactProblem
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
     from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.support.array_types import Floats, NDArray
 
     Problem = ContactProblem | ContactProblem3D
 
@@ -84,7 +83,7 @@ def write(problem: Problem, path: Path) -> None:
         group.create_group("info")["title"] = np.bytes_(f"contact problem with {problem.p} nodes, written by enumsol")
 
 
-def _isotropic(problem: Problem) -> NDArray[np.float64]:
+def _isotropic(problem: Problem) -> Floats:
     """The coefficient of every node."""
     if isinstance(problem, ContactProblem):
         return problem.friction[0]

@@ -5,17 +5,13 @@ from __future__ import annotations
 import difflib
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from enumsol.errors import InvalidProblemError
 from enumsol.support.messages import shortened
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping
-
-    from numpy.typing import NDArray
 
 #: Version of the layout that is written, and the newest that can be read.
 FORMAT_VERSION = 1
@@ -113,24 +109,6 @@ LAYOUT_3D = Layout(
     | {"f1": "friction_1", "mu1": "friction_1", "f2": "friction_2", "mu2": "friction_2"}
     | {"area": "areas", "cells": "mesh_cells", "dofs": "mesh_dofs"},
 )
-
-
-def constant_friction(value: Any, layout: Layout) -> NDArray[np.float64]:
-    """The array ``friction``, one number.
-
-    Raises
-    ------
-    InvalidProblemError
-        It is several.
-    """
-    array = np.asarray(value)
-    if array.ndim:
-        choice = " and ".join(layout.frictions[1])
-        raise InvalidProblemError(
-            f"friction is an array of shape {array.shape}, which is ambiguous; expected one number, "
-            f"or {choice}, each a number or an array of shape (p,)"
-        )
-    return array
 
 
 def layout_of(names: Iterable[str]) -> Layout:

@@ -13,10 +13,7 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+    from enumsol.support.array_types import Floats, Integers
 
 #: Cosine of the angle up to which the boundary of a solid counts as smooth across an edge.
 _SMOOTH = float(np.cos(np.radians(20.0)))
@@ -181,6 +178,12 @@ def boundary_facets(dimension: int, cells: Integers) -> Integers:
     facets = np.concatenate(parts)
     _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
     return np.asarray(facets[np.sort(first[count == 1])])
+
+
+def facet_rows(facets: Integers, among: Integers, corners: int) -> list[int]:
+    """The row of each of the facets ``among`` others, by their first ``corners`` nodes in any order; -1 for none."""
+    known = {tuple(key): row for row, key in enumerate(np.sort(among[:, :corners], axis=1).tolist())}
+    return [known.get(tuple(key), -1) for key in np.sort(facets[:, :corners], axis=1).tolist()]
 
 
 def facet_outlines(facets: Integers) -> Integers:

@@ -17,15 +17,16 @@ from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.support.arguments import alpha_value, shown
 from enumsol.support.array_arguments import real_array, real_matrix
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import ArrayLike, NDArray
-
+    from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.condensation.factorization import Factorization
     from enumsol.condensation.products import Products
     from enumsol.support.arguments import AlphaLike
+    from enumsol.support.array_types import ArrayLike, Floats, NDArray
 
 #: An asymmetry of A up to this fraction of max|A| is rounding of the user's assembly and is averaged away.
 ASYMMETRY_TOLERANCE = 1e-12
@@ -51,10 +52,10 @@ class ContactBody(Immutable):
     """
 
     _instead = "build a new problem, or one with other data by dataclasses.replace"
-    slip_offset: NDArray[np.float64]
+    slip_offset: Floats
     #: How far the slip offset may be from ``slip_offset``, and its value where no floats hold it: a step of a history
     #: starts where the step before it ended (see enumsol.model.restart).
-    offset_radius: NDArray[np.float64] | None = None
+    offset_radius: Floats | None = None
     exact_offset: tuple[Fraction, ...] | None = None
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
@@ -135,6 +136,19 @@ class ContactBody(Immutable):
 
         return Products.of(self)
 
+    @cached_property
+    def enclosure(self) -> CondensedEnclosure:
+        """Rigorous enclosure of the condensed problem.
+
+        Raises
+        ------
+        NotEnclosedError
+            A is positive definite only within rounding.
+        """
+        from enumsol.condensation.enclosure import CondensedEnclosure  # as above
+
+        return CondensedEnclosure.from_problem(self, self.products)
+
     def is_unloaded(self, alpha: AlphaLike) -> bool:
         """Whether load, gap and slip offset are exactly zero at alpha: then only lambda = 0, w = 0 solves."""
         a = Fraction(alpha_value(alpha))
@@ -150,11 +164,11 @@ class ContactBody(Immutable):
         return self.offset_radius is None or self.exact_offset is not None
 
     @staticmethod
-    def constant_friction(values: NDArray[np.float64]) -> dict[str, Any]:
+    def constant_friction(values: Floats) -> dict[str, Any]:
         """The attributes of a problem whose coefficients do not depend on alpha, for ``model.restart``."""
         raise NotImplementedError
 
-    def load_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
+    def load_at(self, alpha: AlphaLike) -> Floats:
         """Load f(alpha) = f + alpha load_slope, shape (n,) [force].
 
         Raises
@@ -165,8 +179,10 @@ class ContactBody(Immutable):
         value = float(alpha_value(alpha))
         return self.f.copy() if self.load_slope is None else self.f + value * self.load_slope
 
-    def _digest(self, kind: bytes, vectors: Sequence[NDArray[np.float64]]) -> str:
-        """SHA-256 of the matrices and of ``vectors``, as 64 hexadecimal digits."""
+    def _digest(self, kind: bytes, friction: Sequence[Floats]) -> str:
+        """SHA-256 of all data, as 64 hexadecimal digits."""
+        slope = np.zeros(self.n) if self.load_slope is None else self.load_slope
+        vectors = [self.f, self.gap, *friction, slope, self.slip_offset.ravel()]
         if self.offset_radius is not None:
             kind, vectors = kind + b", from a ball", [*vectors, self.offset_radius.ravel()]
         digest = hashlib.sha256(kind)
@@ -180,12 +196,23 @@ class ContactBody(Immutable):
             digest.update(b"|")
         return digest.hexdigest()
 
+    def _text(self, friction: str) -> str:
+        """What ``repr`` gives; ``friction`` are the coefficients in words."""
+        load = "constant" if self.load_slope is None else "f + alpha load_slope"
+        return (
+            f"{type(self).__name__} with {counted(self.p, 'contact node')}\n"
+            f"  degrees of freedom  {self.n}  (A: {self.A.nnz} nonzeros)\n"
+            f"  friction            {friction}\n"
+            f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"
+            f"  gap                 {span(self.gap)}"
+        )
+
     def __getstate__(self) -> dict[str, Any]:
         # the factorization (SuperLU) cannot be pickled; workers that need it compute it again
         return {key: value for key, value in self.__dict__.items() if key != "factorization"}
 
 
-def friction_values(alpha: Fraction, first: NDArray[np.float64], slope: NDArray[np.float64]) -> NDArray[np.float64]:
+def friction_values(alpha: Fraction, first: Floats, slope: Floats) -> Floats:
     """Coefficients first + alpha slope, rounded once from the exact values: zero and the sign are decided exactly.
 
     Raises
@@ -201,13 +228,13 @@ def friction_values(alpha: Fraction, first: NDArray[np.float64], slope: NDArray[
         ) from None
 
 
-def span(values: NDArray[np.float64]) -> str:
+def span(values: Floats) -> str:
     """The range of some numbers, in words."""
     low, high = float(np.min(values)), float(np.max(values))
     return f"{low:g}" if low == high else f"[{low:g}, {high:g}]"
 
 
-def vector(value: object, name: str, size: int, *, broadcast: bool = False) -> NDArray[np.float64]:
+def vector(value: object, name: str, size: int, *, broadcast: bool = False) -> Floats:
     """Value as a read-only array of the given size; if ``broadcast``, one number stands for all entries.
 
     Raises
@@ -267,7 +294,7 @@ def _check_row_rank(contact: Mapping[str, sp.csr_array]) -> None:
             )
 
 
-def _dependent_rows(unit: sp.csr_array, gram: NDArray[np.float64]) -> NDArray[np.intp]:
+def _dependent_rows(unit: sp.csr_array, gram: Floats) -> NDArray[np.intp]:
     """The rows (of length one) that take part in a linear dependence; empty where there is none."""
     values, vectors = np.linalg.eigh(gram)
     # the Gram matrix squares the singular values: below sqrt(eps) decide by the singular values themselves
@@ -296,7 +323,7 @@ def _node_ids(value: Any, p: int) -> tuple[Any, ...]:
     return ids
 
 
-def _coordinates(value: ArrayLike, p: int, dimension: int) -> NDArray[np.float64]:
+def _coordinates(value: ArrayLike, p: int, dimension: int) -> Floats:
     array = real_array(value, "coordinates")
     if array.shape != (p, dimension):
         raise InvalidProblemError(

@@ -18,9 +18,7 @@ from enumsol.support.immutable import Immutable, Sealed, sealed
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import ArrayLike, NDArray
-
-    Vector = NDArray[np.float64]
+    from enumsol.support.array_types import ArrayLike, Floats
 
 _EXPECTED = "expected a number, a pair (F1, F2) of numbers or (p,) arrays, a FrictionTable, or a callable F(node, slip)"
 #: Slips per node at which a function is sampled for jumps; bisections of the largest step; the share of the step
@@ -35,7 +33,7 @@ class FrictionLaw(Protocol):
     def depends_on_slip(self) -> bool:
         """Whether the coefficients depend on the solution."""
 
-    def at(self, slip: Vector) -> NDArray[np.float64]:
+    def at(self, slip: Floats) -> Floats:
         """Coefficients F1, F2 at slips (p,) [length], shape (p, 2) [-]."""
 
 
@@ -43,10 +41,10 @@ class FrictionLaw(Protocol):
 class ConstantFriction(Sealed):
     """Coefficients that do not depend on the solution, values of shape (p, 2)."""
 
-    values: NDArray[np.float64]
+    values: Floats
     depends_on_slip = False
 
-    def at(self, slip: Vector) -> NDArray[np.float64]:
+    def at(self, slip: Floats) -> Floats:
         """The same coefficients for every slip."""
         return self.values
 
@@ -91,11 +89,11 @@ class FrictionTable(Immutable):
         self.F2 = self.F1 if F2 is None else _column(F2, "F2", len(knots))
         self._freeze()
 
-    def at(self, slip: Vector) -> NDArray[np.float64]:
+    def at(self, slip: Floats) -> Floats:
         """Coefficients F1, F2 at slips (p,) [length], shape (p, 2) [-]."""
         return np.stack([self._interpolated(values, slip) for values in (self.F1, self.F2)], axis=1)
 
-    def _interpolated(self, values: Vector, slip: Vector) -> Vector:
+    def _interpolated(self, values: Floats, slip: Floats) -> Floats:
         if values.ndim == 1:
             return np.interp(slip, self.slip, values)
         return np.array([np.interp(s, self.slip, row) for s, row in zip(slip, values, strict=True)])
@@ -132,7 +130,7 @@ class FrictionFunction:
     labels: tuple[Any, ...]
     depends_on_slip = True
 
-    def at(self, slip: Vector) -> NDArray[np.float64]:
+    def at(self, slip: Floats) -> Floats:
         """Coefficients F1, F2 at slips (p,) [length], shape (p, 2) [-].
 
         Raises
@@ -176,7 +174,7 @@ def friction_law(value: Any, p: int, labels: tuple[Any, ...]) -> FrictionLaw:
     return ConstantFriction(friction_pair(value, "friction", p))
 
 
-def friction_pair(value: Any, name: str, p: int) -> NDArray[np.float64]:
+def friction_pair(value: Any, name: str, p: int) -> Floats:
     """A number, or a pair of numbers or arrays, as an array of shape (p, 2).
 
     Raises
@@ -193,7 +191,7 @@ def friction_pair(value: Any, name: str, p: int) -> NDArray[np.float64]:
     return np.stack([vector(value[k], f"{name} F{k + 1}", p, broadcast=True) for k in range(2)], axis=1)
 
 
-def warn_of_jumps(law: FrictionLaw, reach: Vector, labels: tuple[Any, ...]) -> None:
+def warn_of_jumps(law: FrictionLaw, reach: Floats, labels: tuple[Any, ...]) -> None:
     """Warn where a coefficient seems to jump as a function of the slip, for slips up to ``reach`` of shape (p,).
 
     The largest step between neighbouring samples of every node is bisected: a step that does not get smaller with the
@@ -223,11 +221,11 @@ def warn_of_jumps(law: FrictionLaw, reach: Vector, labels: tuple[Any, ...]) -> N
         )
 
 
-def _size(change: NDArray[np.float64]) -> Vector:
+def _size(change: Floats) -> Floats:
     return np.asarray(np.max(np.abs(change), axis=1))
 
 
-def _column(value: ArrayLike, name: str, count: int) -> Vector:
+def _column(value: ArrayLike, name: str, count: int) -> Floats:
     array = real_array(value, f"{name} of the friction table")
     if array.ndim not in (1, 2) or array.shape[-1] != count:
         raise InvalidProblemError(

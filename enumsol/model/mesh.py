@@ -13,10 +13,7 @@ from enumsol.support.array_arguments import real_array, real_matrix, vector_of
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 #: How far products of the columns of a motion may be from those of orthonormal ones.
 _ORTHONORMAL = 1e-8

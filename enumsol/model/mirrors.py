@@ -15,10 +15,7 @@ from enumsol.support.array_arguments import real_array, short_vector
 from enumsol.support.immutable import Sealed, sealed
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 #: How far a node may be from the image of another, relative to the extent of the contact nodes, and how far normals and
 #: tangents: meshes are symmetric within rounding, or not at all.

@@ -14,15 +14,13 @@ from enumsol.model.contact_body import ContactBody, friction_values, span, vecto
 from enumsol.model.mesh import BodyMesh
 from enumsol.support.arguments import alpha_value, exact_number, instance_of, shown
 from enumsol.support.immutable import sealed
-from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
-    from numpy.typing import ArrayLike, NDArray
 
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.support.arguments import AlphaLike
+    from enumsol.support.array_types import ArrayLike, Floats
 
 
 class ContactProblem(ContactBody):
@@ -116,24 +114,11 @@ class ContactProblem(ContactBody):
     @cached_property
     def condensed(self) -> CondensedProblem:
         """The problem condensed to its 2p contact forces (theory, section 4.1)."""
-        from enumsol.condensation.condensed import CondensedProblem  # as above
+        from enumsol.condensation.condensed import CondensedProblem  # scipy's solvers come with the first use
 
         return CondensedProblem.from_problem(self)
 
-    @cached_property
-    def enclosure(self) -> CondensedEnclosure:
-        """Rigorous enclosure of the condensed problem.
-
-        Raises
-        ------
-        NotEnclosedError
-            A is positive definite only within rounding.
-        """
-        from enumsol.condensation.enclosure import CondensedEnclosure  # as above
-
-        return CondensedEnclosure.from_problem(self, self.products)
-
-    def friction_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
+    def friction_at(self, alpha: AlphaLike) -> Floats:
         """Coefficients F(alpha) = F0 + alpha F1, shape (p,).
 
         Raises
@@ -150,30 +135,21 @@ class ContactProblem(ContactBody):
         return F
 
     @staticmethod
-    def constant_friction(values: NDArray[np.float64]) -> dict[str, Any]:
+    def constant_friction(values: Floats) -> dict[str, Any]:
         """The attributes of a problem with coefficients that do not depend on alpha, for ``model.restart``."""
         return {"friction": (sealed(values), sealed(np.zeros_like(values)))}
 
     @cached_property
     def fingerprint(self) -> str:
         """SHA-256 of all data, as 64 hexadecimal digits; proofs are bound to it."""
-        slope = np.zeros(self.n) if self.load_slope is None else self.load_slope
-        return self._digest(b"enumsol problem 1", (self.f, self.gap, *self.friction, slope, self.slip_offset))
+        return self._digest(b"enumsol problem 1", self.friction)
 
     def __repr__(self) -> str:
         F0, F1 = self.friction
-        path = f"F0 in {span(F0)}, F1 in {span(F1)}"
-        load = "constant" if self.load_slope is None else "f + alpha load_slope"
-        return (
-            f"ContactProblem with {counted(self.p, 'contact node')}\n"
-            f"  degrees of freedom  {self.n}  (A: {self.A.nnz} nonzeros)\n"
-            f"  friction            F0 + alpha F1,  {path}\n"
-            f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"
-            f"  gap                 {span(self.gap)}"
-        )
+        return self._text(f"F0 + alpha F1,  F0 in {span(F0)}, F1 in {span(F1)}")
 
 
-def _friction(value: Any, p: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _friction(value: Any, p: int) -> tuple[Floats, Floats]:
     hint = "expected a number, or a tuple (F0, F1) of exactly two, each a number or an array of shape (p,)"
     if isinstance(value, tuple):
         if len(value) != 2:

@@ -16,18 +16,16 @@ from enumsol.model.slip_mean import SlipMean
 from enumsol.support.arguments import alpha_value, instance_of
 from enumsol.support.array_arguments import real_array
 from enumsol.support.immutable import sealed
-from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import scipy.sparse as sp
-    from numpy.typing import ArrayLike, NDArray
 
     from enumsol.condensation.condensed import Condensation
-    from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.model.friction import FrictionTable
     from enumsol.support.arguments import AlphaLike
+    from enumsol.support.array_types import ArrayLike, Floats
 
 
 class ContactProblem3D(ContactBody):
@@ -149,7 +147,7 @@ class ContactProblem3D(ContactBody):
         return getattr(self.law, "function", self.law)
 
     @property
-    def friction_slope(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def friction_slope(self) -> tuple[Floats, Floats]:
         """Derivatives of F1 and F2 with respect to alpha, two (p,) arrays."""
         return sealed(self._slope[:, 0]), sealed(self._slope[:, 1])
 
@@ -170,20 +168,7 @@ class ContactProblem3D(ContactBody):
 
         return Condensation.from_problem(self)
 
-    @cached_property
-    def enclosure(self) -> CondensedEnclosure:
-        """Rigorous enclosure of the condensed problem.
-
-        Raises
-        ------
-        NotEnclosedError
-            A is positive definite only within rounding.
-        """
-        from enumsol.condensation.enclosure import CondensedEnclosure  # as above
-
-        return CondensedEnclosure.from_problem(self, self.products)
-
-    def coefficients(self, alpha: AlphaLike, slip: ArrayLike) -> NDArray[np.float64]:
+    def coefficients(self, alpha: AlphaLike, slip: ArrayLike) -> Floats:
         """Coefficients F1, F2 at alpha for slips of shape (p,) [length], shape (p, 2).
 
         Raises
@@ -202,7 +187,7 @@ class ContactProblem3D(ContactBody):
         _check_signs(F, self.node_ids, f" at alpha = {float(exact):g}", error=InvalidArgumentError)
         return F
 
-    def friction_at(self, alpha: AlphaLike) -> NDArray[np.float64]:
+    def friction_at(self, alpha: AlphaLike) -> Floats:
         """Coefficients F1, F2 at alpha, shape (p, 2).
 
         Raises
@@ -221,7 +206,7 @@ class ContactProblem3D(ContactBody):
         )
 
     @staticmethod
-    def constant_friction(values: NDArray[np.float64]) -> dict[str, Any]:
+    def constant_friction(values: Floats) -> dict[str, Any]:
         """The attributes of a problem with coefficients that do not depend on alpha, for ``model.restart``."""
         return {"law": ConstantFriction(values), "_slope": sealed(np.zeros_like(values))}
 
@@ -236,24 +221,15 @@ class ContactProblem3D(ContactBody):
         """
         if self.depends_on_solution:
             raise self._no_constants()
-        slope = np.zeros(self.n) if self.load_slope is None else self.load_slope
-        numbers = (self.f, self.gap, *self.friction, *self.friction_slope, slope, self.slip_offset.ravel())
-        return self._digest(b"enumsol problem in 3D, 1", numbers)
+        return self._digest(b"enumsol problem in 3D, 1", (*self.friction, *self.friction_slope))
 
     def __repr__(self) -> str:
         slope = "" if not np.any(self._slope) else f" + alpha [{span(self._slope[:, 0])}, {span(self._slope[:, 1])}]"
-        load = "constant" if self.load_slope is None else "f + alpha load_slope"
-        return (
-            f"ContactProblem3D with {counted(self.p, 'contact node')}\n"
-            f"  degrees of freedom  {self.n}  (A: {self.A.nnz} nonzeros)\n"
-            f"  friction            {self.law}{slope}\n"
-            f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"
-            f"  gap                 {span(self.gap)}"
-        )
+        return self._text(f"{self.law}{slope}")
 
 
 def _check_signs(
-    F: NDArray[np.float64],
+    F: Floats,
     labels: tuple[Any, ...],
     where: str,
     error: type[InvalidProblemError | InvalidArgumentError] = InvalidProblemError,
@@ -263,7 +239,7 @@ def _check_signs(
         raise error(f"friction F{axis + 1}{where} is {F[node, axis]:g} at contact node {labels[node]}; expected F >= 0")
 
 
-def _slip_offset(value: ArrayLike, p: int) -> NDArray[np.float64]:
+def _slip_offset(value: ArrayLike, p: int) -> Floats:
     array = real_array(value, "slip_offset")
     if array.ndim == 0 and array == 0:
         array = np.zeros((p, 2))
@@ -272,7 +248,7 @@ def _slip_offset(value: ArrayLike, p: int) -> NDArray[np.float64]:
     return sealed(array + 0.0)
 
 
-def _areas(value: ArrayLike, p: int) -> NDArray[np.float64]:
+def _areas(value: ArrayLike, p: int) -> Floats:
     array = vector(value, "areas", p)
     if np.min(array) <= 0:
         raise InvalidProblemError(f"areas has the value {np.min(array):g}; expected areas > 0")

@@ -17,7 +17,7 @@ from enumsol.model.contact_body import ContactBody
 from enumsol.support.immutable import Sealed, sealed
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from enumsol.support.array_types import Floats
 
 _Body = TypeVar("_Body", bound=ContactBody)
 #: What a body has computed of its matrices alone; everything else that it has computed is its own.
@@ -37,8 +37,8 @@ class SlipStart(Sealed):
         The positions where arithmetic is exact and floats do not hold them.
     """
 
-    offset: NDArray[np.float64]
-    radius: NDArray[np.float64] | None = None
+    offset: Floats
+    radius: Floats | None = None
     exact: tuple[Fraction, ...] | None = None
 
     @classmethod
@@ -92,8 +92,8 @@ class SlipStart(Sealed):
 def restarted(
     problem: _Body,
     start: SlipStart,
-    load: NDArray[np.float64] | None = None,
-    friction: NDArray[np.float64] | None = None,
+    load: Floats | None = None,
+    friction: Floats | None = None,
 ) -> _Body:
     """The problem with another slip offset, and where they are given with another load and other coefficients.
 

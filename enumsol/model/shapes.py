@@ -14,9 +14,7 @@ from enumsol.model.statuses import ContactStatus
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from enumsol.support.array_types import Floats, Integers
 
 #: Displacements are drawn so that the largest takes this part of the body's size, and forces likewise.
 _MOVED, _LONGEST = 0.08, 0.16
@@ -46,7 +44,7 @@ class BodyShape:
     """
 
     points: Floats
-    cells: NDArray[np.int64]
+    cells: Integers
     motion: sp.csr_array
     offset: Floats
     weights: sp.csr_array
@@ -114,7 +112,7 @@ def own_scales(largest: Sequence[float], size: float) -> tuple[float, ...]:
     return tuple(round_scale(value, size) if value > 0 else common for value in largest)
 
 
-def slip_directions(problem: Any, root: Any) -> tuple[NDArray[np.int64], Floats]:
+def slip_directions(problem: Any, root: Any) -> tuple[Integers, Floats]:
     """Contact rows in 3D that slip, (k,), and the unit vectors in global axes along which they do, (k, 3)."""
     axes = np.stack([problem.mesh.directions(rows) for rows in (problem.Bt1, problem.Bt2)], axis=1)
     moves = np.einsum("pk,pkc->pc", root.u_t, axes)

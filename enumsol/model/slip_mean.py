@@ -12,7 +12,7 @@ from enumsol.support.array_arguments import real_array, real_matrix, vector_of
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from enumsol.support.array_types import ArrayLike, Floats
 
 #: How far from 1 weights of a mean may add up to.
 _SUM_TOLERANCE = 1e-9
@@ -80,7 +80,7 @@ class SlipMean(Immutable):
         """Weights, sparse (p, q); a new object as T1 is."""
         return self._parts["weights"].matrix()
 
-    def __call__(self, u: ArrayLike) -> NDArray[np.float64]:
+    def __call__(self, u: ArrayLike) -> Floats:
         """Slip of the p contact rows, shape (p,), for u of shape (n,) [length].
 
         Raises

@@ -13,7 +13,7 @@ from enumsol.support.arguments import shown
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from enumsol.support.array_types import Floats, Mask, NDArray
 
 
 class ContactStatus(enum.Enum):
@@ -126,9 +126,7 @@ INEQUALITIES = np.array(
 )
 
 
-def active_within(
-    rows: NDArray[np.float64], friction: Sequence[bool] | NDArray[np.bool_], tolerance: float
-) -> tuple[frozenset[int], ...]:
+def active_within(rows: Floats, friction: Sequence[bool] | Mask, tolerance: float) -> tuple[frozenset[int], ...]:
     """Per node the final codes whose conditions hold within the tolerance, for values of all rows, shape (7, p)."""
     # products of booleans: whether any row that shall vanish, or hold, does not
     broken = _EQUATIONS @ (np.abs(rows) > tolerance) | INEQUALITIES @ (rows < -tolerance)

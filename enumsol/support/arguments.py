@@ -196,12 +196,10 @@ def alpha_list(values: Any, name: str = "alphas") -> list[Alpha]:
     InvalidArgumentError
         It is one number or a text instead of several, or one of them is no alpha.
     """
-    several = None
-    if not isinstance(values, (str, bytes, bytearray)):
-        try:
-            several = iter(values)
-        except TypeError:
-            several = None
+    try:
+        several = None if isinstance(values, (str, bytes, bytearray)) else iter(values)
+    except TypeError:
+        several = None
     if several is None:
         raise InvalidArgumentError(f"{name} is {shown(values)}; expected several numbers, such as [1.0, 2.5]")
     return [alpha_value(value, f"{name}[{k}]") for k, value in enumerate(several)]
@@ -242,12 +240,11 @@ def _in_order(low: N, high: N, value: Any, name: str) -> tuple[N, N]:
 
 
 def _pair(value: Any, name: str) -> list[Any]:
-    ends: list[Any] = []
-    if not isinstance(value, (str, bytes, bytearray, set, frozenset, dict)):
-        try:
-            ends = list(value) if len(value) == 2 else []
-        except TypeError:
-            ends = []
+    unordered = isinstance(value, (str, bytes, bytearray, set, frozenset, dict))
+    try:
+        ends = [] if unordered or len(value) != 2 else list(value)
+    except TypeError:
+        ends = []
     if len(ends) != 2:
         raise _refusal(value, name, "a pair of numbers (first alpha, last alpha)")
     return ends
@@ -259,9 +256,7 @@ def _pair(value: Any, name: str) -> list[Any]:
 
 def positive_integer(value: Any, name: str, least: int = 1, most: int | None = None) -> int:
     """Value as an int of at least ``least`` and, where that is given, at most ``most``."""
-    number = _integer(value)
-    if number is None or number < least:
-        raise _refusal(value, name, f"an integer of at least {least}")
+    number = _whole(value, name, lambda k: k >= least, f"an integer of at least {least}")
     if most is not None and number > most:
         raise _refusal(value, name, f"an integer of at most {most}")
     return number
@@ -269,27 +264,17 @@ def positive_integer(value: Any, name: str, least: int = 1, most: int | None = N
 
 def optional_count(value: Any, name: str) -> int | None:
     """Value as a positive int, or None for no limit."""
-    if value is None:
-        return None
-    number = _integer(value)
-    if number is None or number < 1:
-        raise _refusal(value, name, "a positive integer or None")
-    return number
+    return None if value is None else _whole(value, name, lambda k: k >= 1, "a positive integer or None")
 
 
 def row_number(value: Any, name: str, count: int, expected: str = "") -> int:
     """Value as an int in 0 .. count - 1; ``expected`` says in messages what it counts."""
-    number = _integer(value)
-    if number is None or not 0 <= number < count:
-        raise _refusal(value, name, expected or f"a row number below {count}")
-    return number
+    return _whole(value, name, lambda k: 0 <= k < count, expected or f"a row number below {count}")
 
 
 def optional_seconds(value: Any, name: str = "time_limit") -> float | None:
     """Value as a positive number of seconds, or None for no limit."""
-    if value is None:
-        return None
-    return _real(value, name, lambda x: x > 0, "a positive number of seconds or None")
+    return None if value is None else _real(value, name, lambda x: x > 0, "a positive number of seconds or None")
 
 
 def share(value: Any, name: str = "tolerance") -> float:
@@ -330,13 +315,14 @@ def _real(value: Any, name: str, admissible: Callable[[float], bool], expected: 
     return number
 
 
-def _integer(value: Any) -> int | None:
-    if isinstance(value, (bool, np.bool_)):
-        return None
+def _whole(value: Any, name: str, admissible: Callable[[int], bool], expected: str) -> int:
     try:
-        return operator.index(value)
+        number = None if isinstance(value, (bool, np.bool_)) else operator.index(value)
     except TypeError:
-        return None
+        number = None
+    if number is None or not admissible(number):
+        raise _refusal(value, name, expected)
+    return number
 
 
 def real_or_nan(value: Any) -> float:

@@ -18,9 +18,8 @@ from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.support.arguments import exact_number, shown
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.errors import EnumsolError
+    from enumsol.support.array_types import Floats, Mask, NDArray
 
 #: Integers up to this size are floats.
 _EXACT_INTEGERS = 2**53
@@ -35,7 +34,7 @@ _RAGGED = "rows of different lengths or depths"
 
 def real_array(
     value: Any, name: str, *, error: type[EnumsolError] = InvalidProblemError, finite: bool = True
-) -> NDArray[np.float64]:
+) -> Floats:
     """A new float64 array with exactly the numbers that were given.
 
     Parameters
@@ -112,17 +111,17 @@ def _no_numbers(name: str, found: str, error: type[EnumsolError]) -> EnumsolErro
     return error(f"{name} is not an array of real numbers (found {found}); expected float64 values")
 
 
-def _index(wrong: NDArray[np.bool_]) -> tuple[int, ...]:
+def _index(wrong: Mask) -> tuple[int, ...]:
     """Index of the first True."""
     return tuple(int(k) for k in np.argwhere(wrong)[0])
 
 
-def _as_floats(raw: NDArray[Any]) -> NDArray[np.float64]:
+def _as_floats(raw: NDArray[Any]) -> Floats:
     with np.errstate(over="ignore"):
         return np.array(raw, dtype=np.float64)
 
 
-def _rounded(raw: NDArray[Any], array: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _rounded(raw: NDArray[Any], array: Floats) -> Mask:
     """Where floats, integers or bools are not what they were."""
     lost = np.zeros(raw.shape, dtype=bool)
     if raw.dtype.kind in "iu":
@@ -139,7 +138,7 @@ def _inexact(name: str, value: Any, where: tuple[int, ...], error: type[EnumsolE
     return error(f"{name} has the value {shown(value)}{at}, which float64 would round; expected float64 values")
 
 
-def _from_objects(raw: NDArray[Any], name: str, error: type[EnumsolError]) -> NDArray[np.float64]:
+def _from_objects(raw: NDArray[Any], name: str, error: type[EnumsolError]) -> Floats:
     """Python numbers (integers of any size, fractions, decimals) as float64, refused where that would round."""
     array = np.empty(raw.shape)
     for where in np.ndindex(raw.shape):
@@ -229,9 +228,7 @@ def _triplets(value: Any, name: str, error: type[EnumsolError]) -> tuple[NDArray
     return row, column, entries
 
 
-def _check_sums(
-    entries: NDArray[np.float64], row: NDArray[Any], column: NDArray[Any], name: str, error: type[EnumsolError]
-) -> None:
+def _check_sums(entries: Floats, row: NDArray[Any], column: NDArray[Any], name: str, error: type[EnumsolError]) -> None:
     """Refuse integers at one place whose sum float64 may have rounded."""
     sizes, counts = (sp.csc_array((part, (row, column))) for part in (np.abs(entries), np.ones(len(row))))
     large = (sizes.data >= _EXACT_INTEGERS) & (counts.data > 1)
@@ -240,7 +237,7 @@ def _check_sums(
         raise error(f"{name} has integers at index {where} that add up to 2^53 or more; expected float64 values")
 
 
-def short_vector(value: Any, name: str, size: int) -> NDArray[np.float64]:
+def short_vector(value: Any, name: str, size: int) -> Floats:
     """Value as a finite array of shape (2,) or (3,).
 
     Raises
@@ -258,7 +255,7 @@ def short_vector(value: Any, name: str, size: int) -> NDArray[np.float64]:
     return array
 
 
-def vector_of(value: Any, name: str, size: int) -> NDArray[np.float64]:
+def vector_of(value: Any, name: str, size: int) -> Floats:
     """Value as a finite array of shape (size,).
 
     Raises

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
+    from enumsol.support.array_types import Floats, NDArray
 
 
 def sealed(array: NDArray[Any]) -> NDArray[Any]:
@@ -99,7 +99,7 @@ class SealedMatrix(Sealed):
     """
 
     layout: str
-    data: NDArray[np.float64]
+    data: Floats
     indices: NDArray[np.int_]
     indptr: NDArray[np.int_]
     shape: tuple[int, int]

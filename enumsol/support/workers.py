@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections import deque
 from concurrent.futures import BrokenExecutor, CancelledError
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +33,6 @@ class Job:
     arguments: tuple[Any, ...]
     result: Any = None
     tries: int = 0
-    future: Future[Any] | None = field(default=None, repr=False)
 
 
 class Crew:
@@ -55,7 +54,7 @@ class Crew:
         self.redone = 0
         self._renewals = 0
         self._told = False
-        self._out: set[Job] = set()
+        self._out: dict[Job, Future[Any]] = {}
         self._here: deque[Job] = deque()
         self._done: SimpleQueue[Job] = SimpleQueue()
 
@@ -83,24 +82,21 @@ class Crew:
                 job = self._done.get(timeout=seconds)
             except Empty:
                 return None
-            if job in self._out:
-                self._out.discard(job)
-                if self._finished(job):
-                    return job
+            if job in self._out and self._finished(job, self._out.pop(job)):
+                return job
         raise AssertionError("no task was handed out")
 
     def cancel(self) -> None:
         """Forget what has not been done; what has not begun never will."""
-        for job in self._out:
-            if job.future is not None:
-                job.future.cancel()
+        for future in self._out.values():
+            future.cancel()
         self._out.clear()
         self._here.clear()
 
-    def _finished(self, job: Job) -> bool:
+    def _finished(self, job: Job, future: Future[Any]) -> bool:
         """Whether there is a result; otherwise the task is handed out again."""
         try:
-            job.result = _result_of(_present(job.future))
+            job.result = _result_of(future)
         except _Lost as loss:
             self.redone += 1
             self._tell(f"{loss}; what it had to do is done again")
@@ -111,7 +107,7 @@ class Crew:
     def _hand_out(self, job: Job) -> None:
         while self._executor is not None and job.tries < _TRIES:
             try:
-                job.future = _submitted(self._executor, job)
+                future = _submitted(self._executor, job)
             except _Lost as loss:
                 if self._renewed():
                     self._tell(f"{loss}; what it had to do is done again")
@@ -120,8 +116,8 @@ class Crew:
                 self._tell(f"{loss}; the calling process does the rest", again=True)
                 break
             job.tries += 1
-            self._out.add(job)
-            job.future.add_done_callback(lambda _: self._done.put(job))
+            self._out[job] = future
+            future.add_done_callback(lambda _: self._done.put(job))
             return
         self._here.append(job)
 
@@ -193,11 +189,6 @@ def _call(function: Callable[..., Any], *arguments: Any) -> Any:
         raise
     except Exception as error:
         raise _OwnError(error) from error
-
-
-def _present(future: Future[Any] | None) -> Future[Any]:
-    assert future is not None
-    return future
 
 
 def _one_line(error: BaseException) -> str:

@@ -1,9 +1,8 @@
 """Line 10: `--jobs 1000000` is capped, with a word."""
 
-from concurrent.futures import ProcessPoolExecutor
-
 import pytest
 from command_line import assert_refused, run
+from loky import ProcessPoolExecutor
 
 from enumsol.cli import common
 
@@ -22,7 +21,7 @@ def started(monkeypatch):
         sizes.append(size)
         return ProcessPoolExecutor(1, **options)
 
-    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", pool)
+    monkeypatch.setattr("loky.ProcessPoolExecutor", pool)
     return sizes
 
 
@@ -58,6 +57,6 @@ def test_a_system_that_starts_no_more_processes(capsys, monkeypatch, three_proce
         def submit(self, *_):
             raise BlockingIOError(11, "Resource temporarily unavailable")
 
-    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", Refusing)
+    monkeypatch.setattr("loky.ProcessPoolExecutor", Refusing)
     found = run(capsys, *ROOTS, "--jobs", 2)
     assert_refused(*found, "--jobs is 2", "starts no more processes (Resource temporarily unavailable)")

@@ -1,10 +1,9 @@
 """Processes of ``--jobs`` that are ended in the middle of a result or a task."""
 
-import concurrent.futures
 import errno
+import multiprocessing.popen_spawn_posix
 import subprocess
 import sys
-from concurrent.futures import BrokenExecutor
 
 import pytest
 
@@ -36,28 +35,18 @@ def test_leaving_never_waits(call, wait, tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-def pool_that_raises(error):
-    class Pool(concurrent.futures.Executor):
-        def __init__(self, *_, **__):
-            pass
-
-        def submit(self, *_):
-            raise error
-
-    return Pool
-
-
-def test_a_process_that_dies_while_a_task_is_handed_in(monkeypatch):
-    # the pool's thread closes the pipe between the check that it is whole and the call that uses it
-    monkeypatch.setattr(concurrent.futures, "ProcessPoolExecutor", pool_that_raises(OSError("handle is closed")))
-    pool = RenewedPool(2)
-    pool.renew()
-    with pytest.raises(BrokenExecutor, match="a process died"):
-        pool.submit(int)
-
-
 def test_a_system_that_starts_no_more_processes(monkeypatch):
-    error = OSError(errno.EAGAIN, "Resource temporarily unavailable")
-    monkeypatch.setattr(concurrent.futures, "ProcessPoolExecutor", pool_that_raises(error))
+    started = multiprocessing.popen_spawn_posix.Popen.__init__
+    processes = []
+
+    def one_only(self, process):
+        if processes:
+            raise OSError(errno.EAGAIN, "Resource temporarily unavailable")
+        processes.append(process)
+        started(self, process)
+
+    monkeypatch.setattr("multiprocessing.popen_spawn_posix.Popen.__init__", one_only)
     with pytest.raises(OSError, match="temporarily unavailable"):
         RenewedPool(2).renew()
+    # what was started already does not stay
+    assert not processes[0].is_alive()
