@@ -93,7 +93,7 @@ def fixed_point(
 def _check_combination(starts: int | None, npz_file: str | None, vtu_file: str | None, plot_file: str | None) -> None:
     if starts is None and plot_file is not None:
         raise InvalidArgumentError("--plot is given without --starts; expected both, for a picture of what is reached")
-    check_named_files(", but it is a binary file", npz=npz_file, vtu=vtu_file)
+    check_named_files(", but it is a binary file", npz=npz_file)
     for option, path in (("--npz", npz_file), ("--vtu", vtu_file)):
         if starts is not None and path is not None:
             raise InvalidArgumentError(f"{option} and --starts are both given; expected one of them")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shlex
 from fractions import Fraction
 from importlib.util import find_spec
 from io import BytesIO
@@ -154,11 +155,9 @@ def check_vtu(path: str | None) -> None:
     """
     if path is None:
         return
-    if path == "-":
-        raise InvalidArgumentError("--vtu is -, but it is a binary file; expected the name of a file")
-    if not path.endswith(".vtu"):
+    if path != "-" and not path.endswith(".vtu"):
         raise InvalidArgumentError(f"--vtu is {path!r}; expected a name that ends in .vtu")
-    check_writable(path, "--vtu")
+    check_named_files(", but it is a binary file", vtu=path)
     if find_spec("meshio") is None:
         raise MissingDependencyError(
             '--vtu needs meshio, which is not installed; install it with: pip install "enumsol[meshes]"'
@@ -212,6 +211,18 @@ def check_plot(path: str | None) -> None:
     ending = Path(path).suffix.removeprefix(".").lower()
     if ending not in known:
         raise InvalidArgumentError(f"--plot is {path}; expected a file name that ends in .png, .pdf or .svg")
+
+
+def checking_commands(proven: bool, source: str | None, command: str, place: str, proof: str | None) -> list[str]:
+    """How the reader of a page checks the proof; none where there is none, or no file of the problem.
+
+    ``command`` with the options ``place`` gives the proof again where it is in no file.
+    """
+    if not proven or source is None:
+        return []
+    problem, file = shlex.quote(source), f"{command}.proof" if proof is None else shlex.quote(proof)
+    verify = f"enumsol verify {problem} {file}"
+    return [verify] if proof is not None else [f"enumsol {command} {problem} {place} --proof {file}", verify]
 
 
 def write_figure(path: str, figure: Any) -> None:

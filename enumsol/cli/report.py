@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import shlex
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from enumsol.cli import options
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_interval, so_far
 from enumsol.cli.graph import HowExact, as_content, build, graph_as_text, parse_units, write_proof
-from enumsol.cli.output import check_named_files, check_outputs, deliver
+from enumsol.cli.output import check_named_files, check_outputs, checking_commands, deliver
 from enumsol.errors import MissingDependencyError
-
-if TYPE_CHECKING:
-    from enumsol.branches import BranchGraph
 
 
 def report(
@@ -62,7 +59,9 @@ def report(
     def write(path: str) -> None:
         from enumsol.report import write_report  # numpy: not for --help
 
-        commands = _commands(found, problem, (first, last), proof_file)
+        # -1 would be read as an option
+        place = f"--from={shlex.quote(first)} --to={shlex.quote(last)}"
+        commands = checking_commands(found.proof is not None, problem, "graph", place, proof_file)
         write_report(found, path, title=problem if title is None else title, units=names, commands=commands)
 
     deliver(
@@ -73,15 +72,3 @@ def report(
         content=lambda: {"problem": problem, "report": output, **as_content(found)},
     )
     finish(ended, ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
-
-
-def _commands(found: BranchGraph, problem: str, ends: tuple[str, str], proof: str | None) -> list[str]:
-    """How a reader checks the proof; none where there is none."""
-    if found.proof is None:
-        return []
-    name, low, high = (shlex.quote(text) for text in (problem, *ends))
-    if proof is not None:
-        return [f"enumsol verify {name} {shlex.quote(proof)}"]
-    # -1 would be read as an option
-    again = f"enumsol graph {name} --from={low} --to={high} --proof graph.proof"
-    return [again, f"enumsol verify {name} graph.proof"]

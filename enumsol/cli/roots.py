@@ -9,25 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 
-from enumsol.cli import root_report
+from enumsol.cli import options, root_report
 from enumsol.cli.common import ExitStatus, finish, load_any_problem, note, parse_alpha, so_far, workers
-from enumsol.cli.options import (
-    OUTPUT,
-    Arithmetic,
-    JsonFile,
-    MaxNodes,
-    ProblemArgument,
-    Quiet,
-    ReportFile,
-    TimeLimit,
-    VtuFile,
-    count,
-    csv,
-    file,
-    number,
-    with_options,
+from enumsol.cli.output import (
+    check_named_files,
+    check_outputs,
+    check_places,
+    check_scripts,
+    check_vtu,
+    checking_commands,
+    deliver,
 )
-from enumsol.cli.output import check_named_files, check_outputs, check_places, check_scripts, check_vtu, deliver
 from enumsol.cli.progress import SearchDisplay
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
@@ -41,10 +33,12 @@ if TYPE_CHECKING:
 Method = Literal["tree", "exhaustive"]
 AtAlpha = Annotated[
     str,
-    number("--alpha", "Parameter value: a decimal number, read as float64, or a fraction such as 8/3, taken exactly."),
+    options.number(
+        "--alpha", "Parameter value: a decimal number, read as float64, or a fraction such as 8/3, taken exactly."
+    ),
 ]
 HowExact = Annotated[
-    Arithmetic,
+    options.Arithmetic,
     typer.Option(
         help="verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. "
         "exact: rationals throughout, with proof, for small problems."
@@ -55,7 +49,7 @@ HowSearched = Annotated[
 ]
 
 
-StopAfter = Annotated[int | None, count("Stop at N roots; 2 decides whether the solution is unique.")]
+StopAfter = Annotated[int | None, options.count("Stop at N roots; 2 decides whether the solution is unique.")]
 Unique = Annotated[
     bool, typer.Option("--unique", help="Only report whether there is one solution; stop at a second one.")
 ]
@@ -64,17 +58,19 @@ MirrorAxis = Annotated[
     typer.Option(
         "--mirror",
         help="Direction across which body, supports and load are symmetric: report which roots are mirror images.",
-        rich_help_panel=OUTPUT,
+        rich_help_panel=options.OUTPUT,
         show_default=False,
     ),
 ]
-Jobs = Annotated[int, count("Number of processes that search (tree).")]
-ProofFile = Annotated[str | None, file("--proof", "Write the proof (verified).")]
+Jobs = Annotated[int, options.count("Number of processes that search (tree).")]
+ProofFile = Annotated[str | None, options.file("--proof", "Write the proof (verified).")]
 Resume = Annotated[
     bool,
-    typer.Option("--resume", help="Resume from the proof in --proof FILE, if there is one.", rich_help_panel=OUTPUT),
+    typer.Option(
+        "--resume", help="Resume from the proof in --proof FILE, if there is one.", rich_help_panel=options.OUTPUT
+    ),
 ]
-CsvFile = Annotated[str | None, csv("root and contact node")]
+CsvFile = Annotated[str | None, options.csv("root and contact node")]
 
 
 @dataclass(frozen=True)
@@ -92,19 +88,19 @@ class Search:
     method: HowSearched = "tree"
     unique: Unique = False
     stop_after: StopAfter = None
-    max_nodes: MaxNodes = None
-    time_limit: TimeLimit = None
+    max_nodes: options.MaxNodes = None
+    time_limit: options.TimeLimit = None
     jobs: Jobs = 1
     mirror: MirrorAxis = None
     proof_file: ProofFile = None
     resume: Resume = False
-    json_file: JsonFile = None
+    json_file: options.JsonFile = None
     csv_file: CsvFile = None
-    vtu_file: VtuFile = None
-    report_file: ReportFile = None
+    vtu_file: options.VtuFile = None
+    report_file: options.ReportFile = None
 
     @classmethod
-    def options(cls, *without: str) -> list[Parameter]:
+    def as_options(cls, *without: str) -> list[Parameter]:
         """The fields as options of a command, but for some."""
         fields = signature(cls, eval_str=True).parameters.values()
         return [field.replace(kind=Parameter.KEYWORD_ONLY) for field in fields if field.name not in without]
@@ -150,7 +146,7 @@ class Search:
             found = found.mirrored(self.mirror)
         deliver(
             (self.vtu_file, lambda path: _write_vtu(problem, found, path)),
-            (self.report_file, lambda path: _write_page(found, path, name, _commands(found, source, self.proof_file))),
+            (self.report_file, lambda path: self._write_page(found, path, name, source)),
             json_file=self.json_file,
             csv_file=self.csv_file,
             text=lambda: root_report.uniqueness(found) if self.unique else root_report.roots_as_text(found),
@@ -164,18 +160,26 @@ class Search:
             note(f"{' and '.join(partly)} {holds} the isolated roots only, --json the {families} too")
         finish(ended, ExitStatus.DONE if self.unique and found.unique is not None else _status(found))
 
+    def _write_page(self, found: RootSet, path: str, name: str, source: str | None) -> None:
+        from enumsol.report import write_report  # numpy: not for --help
+
+        # -1 would be read as an option
+        place = f"--alpha={shlex.quote(str(found.alpha))}"
+        commands = checking_commands(found.proof is not None, source, "roots", place, self.proof_file)
+        write_report(found, path, title=name, commands=commands)
+
     def _found(self, problem: ContactProblem | ContactProblem3D, alpha: Alpha) -> RootSet:
         from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help
 
         names = ("arithmetic", "method", "max_nodes", "time_limit", "resume")
-        options: dict[str, Any] = {name: getattr(self, name) for name in names}
-        options |= {"stop_after": 2 if self.unique else self.stop_after, "proof_path": self.proof_file}
+        asked: dict[str, Any] = {name: getattr(self, name) for name in names}
+        asked |= {"stop_after": 2 if self.unique else self.stop_after, "proof_path": self.proof_file}
         with workers(self.jobs) as executor, SearchDisplay() as display:
-            return enumerate_roots(problem, alpha, executor=executor, progress=display, **options)
+            return enumerate_roots(problem, alpha, executor=executor, progress=display, **asked)
 
 
-@with_options(*Search.options(), after=2)
-def roots(problem: ProblemArgument, alpha: AtAlpha, *, quiet: Quiet = False, **options: Any) -> None:
+@options.with_options(*Search.as_options(), after=2)
+def roots(problem: options.ProblemArgument, alpha: AtAlpha, *, quiet: options.Quiet = False, **chosen: Any) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
 
     Prints a table of the roots and whether it is complete; lambda_n and lambda_t are nodal forces, not pressures. The
@@ -186,7 +190,7 @@ def roots(problem: ProblemArgument, alpha: AtAlpha, *, quiet: Quiet = False, **o
     search short, or the indices do not add up to +1; 2 on bad input; 130 on Ctrl-C, after printing what was found so
     far; 74 if a result could not be written; 141 if the program that read it has ended.
     """
-    search = Search(**options)
+    search = Search(**chosen)
     search.check()
     value = parse_alpha(alpha)
     search.answer(problem, load_any_problem(problem), value, problem)
@@ -215,24 +219,6 @@ def _write_vtu(problem: ContactProblem | ContactProblem3D, found: RootSet, path:
     from enumsol.io.vtu import write_vtu  # numpy: not for --help
 
     write_vtu(problem, found, path)
-
-
-def _write_page(found: RootSet, path: str, name: str, commands: list[str]) -> None:
-    from enumsol.report import write_report  # numpy: not for --help
-
-    write_report(found, path, title=name, commands=commands)
-
-
-def _commands(found: RootSet, source: str | None, proof: str | None) -> list[str]:
-    """How a reader checks the proof; none where there is none, or no file of the problem."""
-    if found.proof is None or source is None:
-        return []
-    problem = shlex.quote(source)
-    if proof is not None:
-        return [f"enumsol verify {problem} {shlex.quote(proof)}"]
-    # -1 would be read as an option
-    again = f"enumsol roots {problem} --alpha={shlex.quote(str(found.alpha))} --proof roots.proof"
-    return [again, f"enumsol verify {problem} roots.proof"]
 
 
 def _status(found: RootSet) -> ExitStatus:

@@ -168,7 +168,7 @@ Output = Annotated[
 _OPTIONS = (
     *(_option(name, given) for name, given in MESH_OPTIONS.items()),
     Parameter("alpha", Parameter.KEYWORD_ONLY, default=None, annotation=AtAlpha),
-    *Search.options("method", "unique"),
+    *Search.as_options("method", "unique"),
 )
 
 
