@@ -38,9 +38,10 @@ What checker and search share
     - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings and
       the exclusion inequality; ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds
       and which leaves share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution
-      only; ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the variables
-      in which friction is isotropic; ``model.problem3d``, ``model.slip_mean`` and ``model.friction``, the data and
-      their checks;
+      only; ``trusted.space.boxed_solution``, the test that a box of forces holds exactly one, and which of these are
+      the same; ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
+      variables in which friction is isotropic; ``model.problem3d``, ``model.slip_mean`` and ``model.friction``, the
+      data and their checks;
     - for histories: ``trusted.positions``, where a root leaves the contact nodes; ``model.restart``, the problem of a
       step;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
@@ -52,8 +53,8 @@ What checker and search share
       resumes from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer``
       and ``proof.compressed_parts`` have it. What a record makes of a leaf is not in these classes: a checker tests it;
     - ``model.problem``, ``model.mesh``, ``model.cells``, ``model.contact_body``, ``condensation.data``,
-      ``condensation.condensed``, ``condensation.factorization``, ``support.immutable``, ``support.arguments``,
-      ``support.array_arguments``, ``support.array_types``, ``support.deadlines``, ``support.files``,
+      ``condensation.condensed``, ``condensation.factorization``, ``support.deadlines``, ``support.immutable``,
+      ``support.arguments``, ``support.array_arguments``, ``support.array_types``, ``support.files``,
       ``support.messages`` and ``errors``: the data, their checks and their fingerprint, the factorization of A (no
       bound assumes that it is accurate), S and g as computed;
     - numpy, scipy and python-flint.
@@ -78,8 +79,9 @@ What counts as one root
 
     In 3D a root that slips along the common end of two sectors is found in both. Roots of leaves with the same statuses
     are one if the directions of one lie in the box of angles in which the other is proven to be the only one, and two
-    if their forces differ for certain. Where neither is proven, one more part counts as undecided. A root that closes
-    the whole tree is the only solution, whatever statuses hold there.
+    if their forces differ for certain. Where neither is proven, one more part counts as undecided. Roots that are the
+    only ones in boxes of forces are one if the box of one surely holds the other; so with roots of leaves. A root that
+    closes the whole tree is the only solution, whatever statuses hold there.
 
 Cross-checks
     They use nothing of the proof and are printed with the result. The indices of all roots and families add up to +1,
