@@ -60,12 +60,12 @@ from .fixed_points import (
     solve_tresca as solve_tresca,
     successive_approximations as successive_approximations,
 )
-from .histories.growing import HistoryProgress as HistoryProgress, histories as histories
-from .histories.history import History as History
-from .histories.maps import MultiplicityMap as MultiplicityMap, multiplicity_map as multiplicity_map
-from .histories.steps import LoadStep as LoadStep
 from .io import read_problem as read_problem, write_problem as write_problem
 from .io.vtu import write_vtu as write_vtu
+from .loading.growing import HistoryProgress as HistoryProgress, histories as histories
+from .loading.history import History as History
+from .loading.maps import MultiplicityMap as MultiplicityMap, multiplicity_map as multiplicity_map
+from .loading.steps import LoadStep as LoadStep
 from .model.friction import FrictionTable as FrictionTable
 from .model.mesh import BodyMesh as BodyMesh
 from .model.mirrors import Mirror as Mirror

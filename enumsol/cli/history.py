@@ -28,8 +28,8 @@ from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
-    from enumsol.histories.growing import HistoryProgress
-    from enumsol.histories.history import History
+    from enumsol.loading.growing import HistoryProgress
+    from enumsol.loading.history import History
 
 Drawn = Literal["step", "alpha", "displacement", "lambda_n", "lambda_t", "dissipated"]
 
@@ -124,7 +124,7 @@ def history(
 
 
 def _search(problem: Any, steps: Any, jobs: int, options: dict[str, Any]) -> History:
-    from enumsol.histories.growing import histories  # numpy and scipy: not for --help
+    from enumsol.loading.growing import histories  # numpy and scipy: not for --help
 
     with workers(jobs) as executor, _HistoryDisplay() as display:
         return histories(problem, steps, executor=executor, progress=display, **options)
@@ -151,7 +151,7 @@ def _steps(problem: str, steps: str | None) -> Any:
     InvalidArgumentError
         There are none, or they cannot be read.
     """
-    from enumsol.histories.steps import read_steps  # numpy: not for --help
+    from enumsol.loading.steps import read_steps  # numpy: not for --help
 
     if steps is not None:
         if Path(steps).suffix.lower() == ".csv" or Path(steps).is_file():
@@ -178,7 +178,7 @@ def _told(place: Path) -> Any:
 
 
 def _of_table(number: int, item: dict[str, Any]) -> Any:
-    from enumsol.histories.steps import LoadStep  # as above
+    from enumsol.loading.steps import LoadStep  # as above
 
     unknown = item.keys() - {"alpha", "friction"}
     if unknown:

@@ -13,8 +13,8 @@ import numpy as np
 
 from enumsol._version import find_version
 from enumsol.errors import InvalidArgumentError
-from enumsol.histories.history import History
-from enumsol.histories.history_text import steps_table, tree_lines
+from enumsol.loading.history import History
+from enumsol.loading.history_text import steps_table, tree_lines
 from enumsol.support.arguments import file_path, instance_of
 from enumsol.support.files import writing
 from enumsol.support.messages import counted, html_table

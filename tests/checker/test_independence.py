@@ -32,7 +32,7 @@ SEARCH = (
     "enumsol.branches",
     "enumsol.condensation.exact",
     "enumsol.continuation",
-    "enumsol.histories",
+    "enumsol.loading",
     "enumsol.support.workers",
     "enumsol.relaxation",
     "enumsol.roots",

@@ -8,8 +8,8 @@ from enumsol.proof.reading import rational_text
 from enumsol.proof.writer import ProofWriter
 
 if TYPE_CHECKING:
-    from enumsol.histories.history_data import HistoryData, Node
-    from enumsol.histories.steps import LoadStep
+    from enumsol.loading.history_data import HistoryData, Node
+    from enumsol.loading.steps import LoadStep
     from enumsol.proof.proof_file import Proof
 
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.histories.history_data import HistoryData, Refinement
-from enumsol.histories.stages import Stage
-from enumsol.histories.steps import LoadStep
+from enumsol.loading.history_data import HistoryData, Refinement
+from enumsol.loading.stages import Stage
+from enumsol.loading.steps import LoadStep
 from enumsol.model.restart import SlipStart, restarted
 from enumsol.model.statuses import ContactStatus
 from enumsol.proof.proof_file import Proof

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import networkx as nx
 
-from enumsol.histories.stages import dissipated
+from enumsol.loading.stages import dissipated
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from enumsol.histories.stages import Stage
-    from enumsol.histories.steps import LoadStep
+    from enumsol.loading.stages import Stage
+    from enumsol.loading.steps import LoadStep
 
 #: The number of a step, and of a root in it.
 Node = tuple[int, int]

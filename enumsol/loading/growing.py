@@ -12,11 +12,11 @@ import numpy as np
 
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.histories.history import History
-from enumsol.histories.history_data import HistoryData
-from enumsol.histories.refinement import refined
-from enumsol.histories.stages import Rounding, Stage, case_of, contact_displacements, start_after
-from enumsol.histories.steps import LoadStep, steps_of
+from enumsol.loading.history import History
+from enumsol.loading.history_data import HistoryData
+from enumsol.loading.refinement import refined
+from enumsol.loading.stages import Rounding, Stage, case_of, contact_displacements, start_after
+from enumsol.loading.steps import LoadStep, steps_of
 from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
 from enumsol.model.restart import SlipStart, restarted
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from concurrent.futures import Executor
 
-    from enumsol.histories.history_data import Node
+    from enumsol.loading.history_data import Node
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.roots.root_set import RootSet
 

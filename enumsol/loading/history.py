@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.histories.history_data import START
-from enumsol.histories.history_files import load_history, save_history
-from enumsol.histories.history_proof import history_proof
-from enumsol.histories.history_text import history_html, history_text
+from enumsol.loading.history_data import START
+from enumsol.loading.history_files import load_history, save_history
+from enumsol.loading.history_proof import history_proof
+from enumsol.loading.history_text import history_html, history_text
 from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
 from enumsol.roots.root import summary
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from enumsol.histories.history_data import HistoryData, Node
-    from enumsol.histories.stages import Stage
+    from enumsol.loading.history_data import HistoryData, Node
+    from enumsol.loading.stages import Stage
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.root import Root
@@ -218,7 +218,7 @@ class History(Immutable):
         MissingDependencyError
             matplotlib is not installed.
         """
-        from enumsol.histories.history_plots import draw_history  # matplotlib comes with the first picture
+        from enumsol.loading.history_plots import draw_history  # matplotlib comes with the first picture
 
         figure = draw_history(self.data, x, y, ax)
         if file is not None:

@@ -10,7 +10,7 @@ from enumsol.support.messages import counted, html_lines, html_table
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from enumsol.histories.history_data import HistoryData
+    from enumsol.loading.history_data import HistoryData
 
 #: Lines of the tree, steps of the table and reasons that are printed at most.
 _TREE, _STEPS, _REASONS = 40, 40, 8

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import networkx as nx
 
-from enumsol.histories.history_data import Refinement
+from enumsol.loading.history_data import Refinement
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from enumsol.histories.history_data import HistoryData
-    from enumsol.histories.steps import LoadStep
+    from enumsol.loading.history_data import HistoryData
+    from enumsol.loading.steps import LoadStep
 
     #: The statuses of all nodes at the given steps along one history.
     Shape = tuple[tuple[Any, ...], ...]

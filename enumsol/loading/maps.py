@@ -15,7 +15,7 @@ import numpy as np
 from enumsol.branches.construction import branch_graph
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.histories.map_rows import MapFold, MapRow
+from enumsol.loading.map_rows import MapFold, MapRow
 from enumsol.model.problem import ContactProblem
 from enumsol.model.restart import SlipStart, restarted
 from enumsol.support.arguments import (
@@ -342,7 +342,7 @@ class MultiplicityMap(Immutable):
         MissingDependencyError
             matplotlib is not installed.
         """
-        from enumsol.histories.map_plots import draw_map  # matplotlib comes with the first picture
+        from enumsol.loading.map_plots import draw_map  # matplotlib comes with the first picture
 
         figure = draw_map(self.name, self.rows, self.curves, self.completeness(), ax)
         if file is not None:

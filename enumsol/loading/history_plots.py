@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.histories.history_data import START
+from enumsol.loading.history_data import START
 from enumsol.support.arguments import shown
 from enumsol.support.plotting import axes_or_none, figure_of, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from enumsol.histories.history_data import HistoryData, Node
+    from enumsol.loading.history_data import HistoryData, Node
     from enumsol.roots.root import Root
 
 #: Quantities by their names, with the labels of axes.
