@@ -46,7 +46,7 @@ FUNCTIONS = {
     "ActiveSetEngine.__init__": "ends",
     "connected_components": "ends",
     "RootBuilder.root": "ends",
-    "ContactProblem.enclosure": ENCLOSURE,
+    "ContactBody.enclosure": ENCLOSURE,
     "Enclosure.at": ENCLOSURE,
     "EnclosedSystem.smallest_eigenvalue": ENCLOSURE,
 }
