@@ -13,13 +13,12 @@ from enumsol.arithmetic.balls import SAFE, TINY
 from enumsol.checker.walk import TreeChecker
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.space_condensed import EnclosedSpace
-from enumsol.model.sectors import DEEPEST, SECTORS, level_of
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, rational_from, shown_alpha
 from enumsol.proof.records import Limits, NoRoot, RegularRoot
 from enumsol.proof.space_records import LEAVES, BoxedRoot, ExcludedInSpace, OnlyRoot
 from enumsol.trusted.space.boxed_solution import apart_in_boxes, is_inside, solution_in_box
 from enumsol.trusted.space.leaves import Open, distinct_roots, settle
-from enumsol.trusted.space.sector_rows import STICK, UNDECIDED, sector_children, sector_margin
+from enumsol.trusted.space.sector_rows import STICK, UNDECIDED, is_sector_covering, sector_margin
 from enumsol.trusted.space.space_uniqueness import OnlySolution, only_root, only_solution_in_space
 
 if TYPE_CHECKING:
@@ -70,11 +69,8 @@ class SpaceChecker(TreeChecker):
             raise RefusedError("S is not proven positive definite")
         return enclosed
 
-    def _coverings(self, node: int, code: int) -> tuple[tuple[int, ...], ...]:
-        if code > SECTORS and level_of(code - SECTORS) > DEEPEST:
-            return ()
-        children = sector_children(code, self.tangents[node])
-        return (children,) if children else ()
+    def _covers(self, node: int, code: int, children: list[int]) -> bool:
+        return is_sector_covering(code, children, self.tangents[node])
 
     # -- leaves ----------------------------------------------------------------------------------------------------
 

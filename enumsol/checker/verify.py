@@ -28,7 +28,7 @@ from enumsol.support.arguments import instance_of, optional_callable
 from enumsol.trusted.at_alpha import holds_no_root, solve_selection
 from enumsol.trusted.exclusion import Leaves, exclusion_margins
 from enumsol.trusted.quadratic_forms import EnclosedForm
-from enumsol.trusted.status_rows import ROW_KINDS, UNDECIDED, coverings_of, row_signs
+from enumsol.trusted.status_rows import ROW_KINDS, UNDECIDED, is_covering, row_signs
 from enumsol.trusted.uniqueness_in_contact import lone_root
 
 if TYPE_CHECKING:
@@ -246,8 +246,8 @@ class Checker(TreeChecker):
             raise RefusedError(str(error)) from None
         self._by_forms.declared.append(form)
 
-    def _coverings(self, node: int, code: int) -> tuple[tuple[int, ...], ...]:
-        return coverings_of(code, friction=self.friction[node])
+    def _covers(self, node: int, code: int, children: list[int]) -> bool:
+        return is_covering(code, children, friction=self.friction[node])
 
     def _claim(self, isolated: int, families: int) -> dict[str, int]:
         roots = self.regular + isolated

@@ -103,8 +103,8 @@ class TreeChecker:
     def _read_header(self, header: Any) -> None:
         raise NotImplementedError
 
-    def _coverings(self, node: int, code: int) -> tuple[tuple[int, ...], ...]:
-        """All ways to cover a partial code by others; none for a final one."""
+    def _covers(self, node: int, code: int, children: list[int]) -> bool:
+        """Whether codes, in any order, cover a partial one of a node."""
         raise NotImplementedError
 
     def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
@@ -146,7 +146,7 @@ class TreeChecker:
                 raise RefusedError(f"{len(stack) + 1} subtrees are not accounted for: the tree breaks off")
             if record[0] == Branching.kind:
                 try:
-                    stack.extend(reversed(Branching.covering(record, codes, self._coverings).below(codes)))
+                    stack.extend(reversed(Branching.covering(record, codes, self._covers).below(codes)))
                 except RecordError as error:
                     raise RefusedError(str(error)) from None
             elif record[0] == DeclaredForm.kind:

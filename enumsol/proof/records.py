@@ -130,14 +130,12 @@ class Branching(Record):
     children: list[int]
 
     @classmethod
-    def covering(
-        cls, record: list[Any], codes: Codes, coverings: Callable[[int, int], Iterable[Sequence[int]]]
-    ) -> Branching:
-        """Read the split of an assignment; RecordError unless it is one of the ``coverings`` of its node and code."""
+    def covering(cls, record: list[Any], codes: Codes, covers: Callable[[int, int, list[int]], bool]) -> Branching:
+        """Read the split of an assignment; RecordError unless its codes cover the code of its node."""
         node, children = record[1:] if len(record) in cls.sizes else (None, None)
         if type(node) is int and 0 <= node < len(codes) and isinstance(children, list):
-            allowed = map(sorted, coverings(node, codes[node]))
-            if all(type(code) is int for code in children) and sorted(children) in allowed:
+            known = all(type(code) is int for code in children)
+            if known and covers(node, codes[node], children):
                 return cls(node, children)
         raise RecordError(f"a branching {quoted(record)} does not cover the assignment that it splits")
 

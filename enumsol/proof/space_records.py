@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.model.sectors import DEEPEST
+from enumsol.model.sectors import DEEPEST, RUN
 from enumsol.proof.reading import bytes_from, numbers_from, quoted
 from enumsol.proof.records import (
     ClosingRecord,
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Numbers of directions and sectors in rows are less: tangents may be two levels finer than the finest sector.
-_NUMBERS = 1 << (DEEPEST + 3)
+#: Numbers of directions and sectors in rows are less; directions of tangents are less than RUN.
+_NUMBERS = RUN << DEEPEST
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.model.sectors import SECTORS, end_number, level_of, nearest
+from enumsol.model.sectors import SECTORS, cut, end_number, middle_number, nearest, start_number, width_level
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
 from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY
+from enumsol.relaxation.shaving import Shaving
 from enumsol.trusted.space.sector_rows import (
     ALONG,
     CHORD,
@@ -26,7 +27,7 @@ from enumsol.trusted.space.sector_rows import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -66,6 +67,8 @@ class SpaceEngine:
     ----------
     tangents : list of int
         Number of directions with friction of each node, 0 to 2.
+    turning : (p,) array of bool
+        Nodes with both.
 
     Raises
     ------
@@ -98,6 +101,7 @@ class SpaceEngine:
         self._known: list[dict[tuple[int, int], int]] = [{} for _ in range(p)]
         self._imposed: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
         self.tangents = np.sum(system.tau >= 0, axis=1).tolist()
+        self.turning = np.all(system.tau >= 0, axis=1)
         #: Row by number, for multipliers, and what the program's row is of it.
         self.rows: dict[int, Row] = {}
         self.scale = np.ones(rows)
@@ -165,7 +169,7 @@ def imposed(tau: NDArray[np.intp], node: int, code: int) -> list[tuple[Row, int]
         equations += [(SLIP, node, k) for k in axes]
     if code > SECTORS:
         number = code - SECTORS
-        inequalities += [(TANGENT, node, n) for n in (number, 2 * number + 1, end_number(number))]
+        inequalities += [(TANGENT, node, n) for n in (start_number(number), middle_number(number), end_number(number))]
         inequalities += [(kind, node, number) for kind in (CHORD, LEFT, RIGHT)]
     return [*_with(inequalities, INEQUALITY), *_with(equations, EQUALITY)]
 
@@ -177,7 +181,7 @@ def _with(rows: Iterable[Row], mode: int) -> list[tuple[Row, int]]:
 class SpaceRelaxation:
     """A solved relaxation, with tangents put where its minimiser left the disc."""
 
-    __slots__ = ("_engine", "_found", "_kept", "_state", "bound", "pruned", "stalled")
+    __slots__ = ("_engine", "_excluded", "_found", "_kept", "_shaving", "_state", "bound", "cut", "pruned", "stalled")
 
     form: EnclosedForm | None = None
 
@@ -185,6 +189,11 @@ class SpaceRelaxation:
         self._engine, self._state = engine, state
         #: Children solved already, by their rows.
         self._found: Children = {}
+        #: Those that are excluded, here or above: their multipliers exclude them below, too.
+        self._excluded: Children = {}
+        self._shaving = Shaving()
+        #: The node whose sector is not halved but cut into these parts, if there is one.
+        self.cut: tuple[int, tuple[int, ...]] | None = None
         self._kept: tuple[Array, Array, tuple[NDArray[np.intp], Array]] | None = None
         self._solve(rows, modes)
         for _ in range(ROUNDS):
@@ -208,7 +217,7 @@ class SpaceRelaxation:
         y = self.forces
         tau, p = system.taus(y), system.p
         size, radius = np.linalg.norm(tau, axis=1), y[:p] * system.disc_scale
-        outside = np.flatnonzero(np.all(system.tau >= 0, axis=1) & (size > radius * (1.0 + _OUTSIDE) + 1e-9))
+        outside = np.flatnonzero(self._engine.turning & (size > radius * (1.0 + _OUTSIDE) + 1e-9))
         rows = []
         for node in outside:
             slot = self._engine.slot((TANGENT, int(node), nearest(float(tau[node, 0]), float(tau[node, 1]), _FINE)))
@@ -244,47 +253,77 @@ class SpaceRelaxation:
         return self
 
     def choose(self, codes: Codes) -> int:
-        """The node to branch on; -1 when all are decided and no sector is worth halving before the leaf is tested.
+        """The node to branch on; -1 when the leaf is to be tested.
 
         All children of a candidate are solved, where complementarity is violated most first. The first candidate with
-        at most one child that is not excluded is taken, or else the one that promises the smallest tree. Where none is
-        violated, sectors wider than others are halved if that excludes one half.
+        at most one child that is not excluded is taken, or else the one that promises the smallest tree. Once all
+        statuses are final, slices are cut off the sectors first, and leaves with narrow sectors are tested.
         """
+        self.cut = None
         score = self.violations(codes)
+        if not {CONTACT, UNDECIDED} & set(codes):
+            if self._shaving.leaf_is_due(codes):
+                return -1
+            node = self.shaved(codes, (score > 0.0).tolist())
+            if node >= 0:
+                return node
+        candidates = [node for node in np.argsort(-score, kind="stable").tolist() if score[node] > 0.0]
+        for node in candidates:
+            if sum(rows not in self._excluded for rows, _ in self._parts(node, codes[node])) <= 1:
+                return self._chosen(self.solved_children(node, codes[node]), node)
         best, most = -1, 0.0
-        for node in np.argsort(-score, kind="stable").tolist():
-            if not score[node] > 0.0:
-                break
+        for node in candidates:
             children = self.solved_children(node, codes[node])
             left = np.array([child.bound for child in children.values() if not child.pruned])
             if len(left) <= 1:
-                return self._chosen(node, children)
+                return self._chosen(children, node)
             closed = np.clip((left - self.bound) / max(PRUNE_MARGIN - self.bound, 1e-300), 0.0, 1.0)
             promise = float(score[node] ** _WEIGHT / np.sum(np.exp(-_CLOSED * closed)))
             if not most >= promise:
                 best, most = node, promise
-                self._found = {rows: child._released() for rows, child in children.items() if child.pruned}
-        return best if best >= 0 else self.contracted(codes)
+        return best
 
-    def contracted(self, codes: Codes) -> int:
-        """A node whose sector is wider than another's and of which one half is excluded, or -1."""
-        levels = {node: level_of(code - SECTORS) for node, code in enumerate(codes) if code > SECTORS}
-        deepest = min(max(levels.values(), default=0), _DEEP)
-        for node in sorted((node for node, level in levels.items() if level < deepest), key=levels.__getitem__):
-            children = self.solved_children(node, codes[node])
-            if sum(not child.pruned for child in children.values()) <= 1:
-                return self._chosen(node, children)
+    def shaved(self, codes: Codes, violated: Sequence[bool]) -> int:
+        """A node from whose sector slices are cut off that are excluded, or -1; the parts are kept in ``cut``."""
+        shaving = self._shaving
+        for node in shaving.sectors(codes, violated):
+            parts, rest = [], codes[node] - SECTORS
+            for end in (0, 1):
+                for halvings in shaving.shares(codes, node, end):
+                    part, left = cut(rest, end, halvings)
+                    rows, modes = self._engine.imposed(node, SECTORS + part)
+                    excluded = self._solved({tuple(rows): modes})[tuple(rows)].pruned
+                    shaving.note(codes, node, end, halvings, excluded=excluded)
+                    if excluded:
+                        parts.append(SECTORS + part)
+                        rest = left
+                        break
+            if parts:
+                self.cut = node, (*parts, SECTORS + rest)
+                return node
         return -1
 
-    def _chosen(self, node: int, children: Children) -> int:
+    def _chosen(self, children: Children, node: int) -> int:
         """Keep the children of a node with at most one that is not excluded."""
-        self._found = {rows: child._released() if child.pruned else child for rows, child in children.items()}
+        self._found = {rows: child for rows, child in children.items() if not child.pruned}
         return node
 
     def solved_children(self, node: int, code: int) -> Children:
         """The relaxations of all children of a node, by their rows."""
+        return self._solved(dict(self._parts(node, code)))
+
+    def _parts(self, node: int, code: int) -> list[tuple[tuple[int, ...], list[int]]]:
+        """Rows of all children of a node, and their modes."""
         parts = [self._engine.imposed(node, child) for child in self._engine.children(node, code)]
-        return {tuple(rows): self.child(rows, modes, last=False) for rows, modes in parts}
+        return [(tuple(rows), modes) for rows, modes in parts]
+
+    def _solved(self, parts: dict[tuple[int, ...], list[int]]) -> Children:
+        """Children by their rows; those that are excluded are kept for all that lies below."""
+        children = {rows: self.child(list(rows), modes, last=False) for rows, modes in parts.items()}
+        new = {rows: child for rows, child in children.items() if child.pruned and rows not in self._excluded}
+        if new:
+            self._excluded = {**self._excluded, **{rows: child._released() for rows, child in new.items()}}
+        return children
 
     def violations(self, codes: Codes) -> Array:
         """How much complementarity is violated at every node that can be branched on; -inf at the others."""
@@ -293,7 +332,8 @@ class SpaceRelaxation:
         slip = self._dissipation()
         # an undecided node's slip counts double: deciding it now saves the slack that it leaves in the energy
         score = slip + np.where(array == UNDECIDED, slip - y[:p] * w[:p], 0.0)
-        wide = (array > SECTORS) & (array < SECTORS + (1 << _DEEP)) & (slip > _DISSIPATION)
+        levels = np.array([width_level(code - SECTORS) if code > SECTORS else _DEEP for code in codes])
+        wide = (levels < _DEEP) & (slip > _DISSIPATION)
         undecided = (array == CONTACT) | (array == UNDECIDED)
         return np.where(undecided, np.maximum(score, _DISSIPATION * _DISSIPATION), np.where(wide, score, -np.inf))
 
@@ -311,7 +351,10 @@ class SpaceRelaxation:
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> SpaceRelaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""
-        found = self._found.pop(tuple(rows), None)
-        if found is not None:
-            return found
-        return type(self)(self._engine, self._state if last else self._state.copy(), rows, modes)
+        key = tuple(rows)
+        found = self._excluded.get(key) or self._found.pop(key, None)
+        if found is None:
+            found = type(self)(self._engine, self._state if last else self._state.copy(), rows, modes)
+        if not found.pruned:
+            found._excluded, found._shaving = self._excluded, self._shaving.copy()
+        return found

@@ -191,7 +191,7 @@ class Replay:
                 self._below(item)
             return True
         try:
-            split = records.Branching.covering(record, item.codes, search.splitting.coverings)
+            split = records.Branching.covering(record, item.codes, search.splitting.covers)
         except records.RecordError:
             stack.append(item)
             return False

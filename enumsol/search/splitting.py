@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIDING, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.imposed_rows import status_rows
-from enumsol.trusted.status_rows import coverings_of, refines
+from enumsol.trusted.status_rows import is_covering, refines
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -27,8 +27,8 @@ class Splitting(Protocol):
     def children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
         """Codes that together cover the node's partial status, in the order in which they are examined."""
 
-    def coverings(self, node: int, code: int) -> Sequence[Sequence[int]]:
-        """All ways to cover a partial status of a node by codes, in any order; none for a final one."""
+    def covers(self, node: int, code: int, children: Sequence[int]) -> bool:
+        """Whether codes, in any order, cover a partial status of a node."""
 
     def above(self, code: int, deeper: Iterable[int]) -> int:
         """A code of which this one may be a child, and of which the others are parts."""
@@ -127,9 +127,9 @@ class PlaneSplitting:
         self._contact = [tuple(c for c in _CONTACT if c in some) for some in self._allowed]
         self._parts = [self._touching_or_not(i) for i in range(len(F))]
 
-    def coverings(self, node: int, code: int) -> Sequence[Sequence[int]]:
-        """All ways to cover a partial status of a node by codes, in any order; none for a final one."""
-        return coverings_of(code, friction=self.friction[node])
+    def covers(self, node: int, code: int, children: Sequence[int]) -> bool:
+        """Whether codes, in any order, cover a partial status of a node."""
+        return is_covering(code, children, friction=self.friction[node])
 
     def above(self, code: int, deeper: Iterable[int]) -> int:
         """A code of which this one may be a child, and of which the others are parts."""

@@ -103,6 +103,11 @@ def coverings_of(code: int, *, friction: bool) -> tuple[tuple[int, ...], ...]:
     return ((children,) if children else ()) + (_SLIDING if code == UNDECIDED and friction else ())
 
 
+def is_covering(code: int, children: Sequence[int], *, friction: bool) -> bool:
+    """Whether statuses, in any order, are a way to split a partial one."""
+    return sorted(children) in map(sorted, coverings_of(code, friction=friction))
+
+
 def final_codes(friction: bool) -> tuple[int, ...]:
     """The final codes of a node."""
     return (OPEN, STICK, SLIP_PLUS, SLIP_MINUS) if friction else (OPEN, FRICTIONLESS)

@@ -8,6 +8,7 @@ column ``leaves`` counts the leaves that were tested by Krawczyk's operator, ``c
 
 ``wedges`` are held by weak springs, which all their contact nodes together hardly feel: they have several solutions,
 and S has eigenvalues far apart.
+This table was measured before slices were cut off sectors (``slices`` in search_in_3d_choices).
 
 ``degenerate`` are problems with three nodes whose search is long all the same: with small integers conditions hold with
 equality, and one region (``largest region``) may take hundreds of leaves; with much friction many selections come near

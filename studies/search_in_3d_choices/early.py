@@ -11,7 +11,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from enumsol.model.sectors import DEEPEST, SECTORS, contains, direction, end_number, level_of, nearest
+from enumsol.model.sectors import DEEPEST, SECTORS, around, contains, direction, end_number, nearest, width_level
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.outcome import SearchLimits
@@ -90,7 +90,7 @@ class Engine(SpaceEngine):
             if known:
                 self.closed[codes] = known[0]
             return bool(known)
-        widest = min((level_of(code - SECTORS) for code in codes if code > SECTORS), default=DEEPEST)
+        widest = min((width_level(code - SECTORS) for code in codes if code > SECTORS), default=DEEPEST)
         if self.level is None or widest < self.level:
             return False
         if nodes:
@@ -153,7 +153,7 @@ def parents(codes):
     """Assignments with one sector twice as wide."""
     for node, code in enumerate(codes):
         if code - SECTORS >= 8:
-            yield (*codes[:node], SECTORS + (code - SECTORS) // 2, *codes[node + 1 :])
+            yield (*codes[:node], SECTORS + around([code - SECTORS]), *codes[node + 1 :])
 
 
 def inside(codes, other, root):

@@ -8,11 +8,19 @@ product is replaced by another:
 - most violated: statuses and sectors alike, where complementarity is violated most, without solving children;
 - one dual step: as in 2D, children are bounded by one step of the dual method without carrying it out;
 - 4 candidates: children are solved at the four most violated nodes only;
-- no contraction: leaves are tested without halving sectors that are wider than others and have an excluded half;
 - tangents: rounds of tangents where the minimiser leaves the disc; in the product up to 4.
 
 Read ``nodes`` and ``leaves``, the leaves tested by Krawczyk's operator; they are the same on every machine. A search is
 cut at a number of nodes (column "complete" is False then).
+
+``slices`` has wedges, with other slices cut off the ends of sectors than in the product (halves and quarters, once all
+statuses are final, below level 8 only where maximum dissipation is violated), or with leaves tested at other times than
+there (from level 8, and when nothing else is left to do): no slices at all, halves only, eighths, too; leaves last, or
+from level 6; slices at every node of the tree.
+
+The results of ``slices`` are those of the three smallest wedges. All other tables are of the version before it, which
+cut no slices. They have one choice that is gone, "no contraction": leaves tested without halving sectors that are wider
+than others and have an excluded half.
 
 ``bounds`` tells how many of the children that the programs exclude are excluded by less: by the disc around the
 minimiser's slip or force in which the energy bound holds all solutions, without regard to other rows, and by one dual
@@ -56,11 +64,13 @@ from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import distinct_roots
 from enumsol.trusted.space.sector_rows import LEFT, RIGHT, SLIP, sector_row_terms
 from search_in_3d_choices.early import early
+from search_in_3d_choices.slices import slices
 
 if TYPE_CHECKING:
     from shared.results import Run
 
 MAX_NODES, RANDOM = 10_000, 100
+MOST_SLICES, SMOKE_SLICES = 30_000, 200
 CANDIDATES = 16  # of one dual step
 BODIES = {
     **{
@@ -149,16 +159,6 @@ class FourCandidates(SpaceRelaxation):
         score = super().violations(codes)
         score[np.argsort(-score, kind="stable")[4:]] = -np.inf
         return score
-
-
-class NoContraction(SpaceRelaxation):
-    """No sector is halved where maximum dissipation holds."""
-
-    __slots__ = ()
-
-    def contracted(self, codes):
-        """None."""
-        return -1
 
 
 class Counted(DualStep):
@@ -272,7 +272,6 @@ CHOICES = {
     "most violated": (MostViolated, {}),
     "one dual step": (DualStep, {}),
     "4 candidates": (FourCandidates, {}),
-    "no contraction": (NoContraction, {}),
     "tangents: 0 rounds": (SpaceRelaxation, {"ROUNDS": 0}),
     "tangents: 1 round": (SpaceRelaxation, {"ROUNDS": 1}),
 }
@@ -322,6 +321,7 @@ def main(run: Run) -> None:
             results = [searched(*problem, kind, constants)[0] for problem in problems]
             rows.append({"choice": choice, **summed(name, results)})
     report(run, rows)
+    slices(run, Solvers, SMOKE_SLICES if run.smoke else MOST_SLICES)
     others = bodies if run.smoke else bodies | MORE
     bounds(run, others)
     turns(run, others)

@@ -63,6 +63,7 @@ SHARED = {
     "trusted.status_rows": None,
     "trusted.space.sector_rows": None,
     "trusted.space.leaves": None,
+    "trusted.space.turning": {"turned_by"},
     "trusted.space.boxed_solution": {
         *("BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "solution_in_box")
     },

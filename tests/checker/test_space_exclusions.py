@@ -3,6 +3,7 @@
 import hashlib
 import struct
 from fractions import Fraction
+from math import ceil, floor
 
 import numpy as np
 import pytest
@@ -91,10 +92,10 @@ class Space:
                 kind, "."
             )
         if kind > 6:
-            inner = code - 8
-            while code > 8 and inner > number:
-                inner //= 2
-            return "+" if code > 8 and inner == number else "."
+            if code < 9:
+                return "."
+            (a, b), (c, d) = arc(number), arc(code - 8)
+            return "+" if a <= c and d <= b else "."
         return (table[code] if code < 8 else "E+....+")[kind]
 
     def bound(self, codes, rows, values, force, length):
@@ -119,18 +120,55 @@ class Space:
 
 def direction(number):
     """Where a sector begins."""
-    first = 1 << (number.bit_length() - 1)
-    t = Fraction(4 * (number - first), first)
-    q, s = divmod(t, 1)
+    q, s = divmod(arc(number)[0] % 1 * 4, 1)
     x, y = (1 - s * s) / (1 + s * s), 2 * s / (1 + s * s)
     for _ in range(q):
         x, y = -y, x
     return (63 * x - 16 * y) / 65, (16 * x + 63 * y) / 65
 
 
+def arc(number):
+    """Where a sector begins and ends, as a share of all sectors of its level."""
+    length, first = divmod(number, 2**31)
+    count = 2 ** (len(f"{first:b}") - 1)
+    return Fraction(first - count, count), Fraction(first - count + length + 1, count)
+
+
 def following(number):
-    first = 1 << (number.bit_length() - 1)
-    return number + 1 if number + 1 < 2 * first else first
+    """The sector of the same level that begins where this one ends."""
+    length, first = divmod(number, 2**31)
+    count = 2 ** (len(f"{first:b}") - 1)
+    return count + (first - count + length + 1) % count
+
+
+def split(code, tangents):
+    """The codes into which the document splits one that is not that of a sector."""
+    if code == 6:
+        return [0, 5] if tangents else [0, 4]
+    return {1: [1, 2, 3], 2: [1, 12, 13, 14, 15]}[tangents]
+
+
+def covers(problem, records):
+    """Whether every split is one of the document's; gives the number of those that do not halve a sector."""
+    tangents, unequal = (np.transpose(problem.friction) > 0).sum(axis=1), 0
+    stack = [[6] * problem.p]
+    for record in records[1:-1]:
+        codes = stack.pop()
+        if record[0] != "b":
+            continue
+        _, node, children = record
+        if codes[node] <= 8:
+            assert sorted(children) == sorted(split(codes[node], tangents[node]))
+        else:
+            parts = sorted(arc(code - 8) for code in children)
+            begin, end = arc(codes[node] - 8)
+            assert len(parts) > 1
+            assert [begin, *(b for _, b in parts)] == [*(a for a, _ in parts), end]
+            assert all(floor(4 * a) == ceil(4 * b) - 1 for a, b in parts)
+            unequal += {b - a for a, b in parts} != {(end - begin) / 2}
+        stack += [[*codes[:node], code, *codes[node + 1 :]] for code in reversed(children)]
+    assert not stack
+    return unequal
 
 
 def excluded(problem, records, alpha=0):
@@ -149,6 +187,11 @@ def test_exclusions_hold_in_rationals(name):
     problem, _, records, _ = case(name)
     assert of_kind(records, "x")
     assert excluded(problem, records)
+    covers(problem, records)
+
+
+def test_sectors_are_cut_otherwise_than_in_halves():
+    assert sum(covers(case(name)[0], case(name)[2]) for name in ((2, 0), (2, 5), (2, 20))) > 5
 
 
 def test_what_is_accepted_of_changed_multipliers_holds_in_rationals():
@@ -165,8 +208,11 @@ def test_what_is_accepted_of_changed_multipliers_holds_in_rationals():
                 rows, values = copied(records[k][1]), values_of(records[k])
                 j = int(rng.integers(len(rows)))
                 values[j] *= float(rng.choice((0.0, 0.5, 1.01, 1.2, 2.0, -1.0)))
-                if rng.random() < 0.3:
-                    rows[j][2] = int(rng.integers(4, 40)) if rows[j][0] > 5 else rows[j][2]
+                if rng.random() < 0.3 and rows[j][0] > 5:
+                    run = int(rng.integers(3)) << 31 if rows[j][0] > 6 else 0
+                    number = int(rng.integers(4, 40)) + run
+                    a, b = arc(number)
+                    rows[j][2] = number if floor(4 * a) == ceil(4 * b) - 1 else rows[j][2]
                 accepted = checker._leaf(codes[k], with_values(["x", rows, ""], values)) is None
                 bound = space.bound(codes[k], rows, values, header["force"], header["length"])
                 assert accepted == (bound is not None and bound > 0)

@@ -94,7 +94,9 @@ def _row(rng, records):
     if places:
         row = _pick(rng, records[_pick(rng, places)][1])
         j = int(rng.integers(3))
-        row[j] = int(_pick(rng, (row[j] + 1, row[j] - 1, 2 * row[j], row[j] // 2, 0, 1, 2**24, 2**40, -1)))
+        row[j] = int(
+            _pick(rng, (row[j] + 1, row[j] - 1, 2 * row[j], row[j] // 2, 0, 1, 2**24, 2**31, row[j] + 2**31, 2**40, -1))
+        )
 
 
 def _value(rng, records):
@@ -111,9 +113,12 @@ def _sector(rng, records):
     k = _pick(rng, of_kind(records, "b"))
     codes = records[k][2]
     j = int(rng.integers(len(codes)))
-    how = int(rng.integers(4))
+    how = int(rng.integers(5))
     if how == 0:
         del codes[j]
+    elif how == 4:
+        # a sector longer, shorter, or cut elsewhere
+        codes[j] = int(codes[j] + _pick(rng, (1, -1)) * 2**31 + _pick(rng, (0, 0, 1, -1)))
     elif how == 1:
         codes[j] = int(codes[j] + _pick(rng, (-1, 1, 4, codes[j])))
     elif how == 2:

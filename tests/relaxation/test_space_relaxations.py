@@ -1,10 +1,11 @@
 """Relaxations in 3D: which node is branched on, and children that were solved for that."""
 
+from fractions import Fraction
+
 import numpy as np
 from problems3d import random_coupled
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
-from enumsol.model.sectors import SECTORS, level_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.trusted.space.sector_rows import sector_margin
@@ -65,9 +66,9 @@ def test_branching_takes_a_node_of_which_all_children_but_one_are_excluded():
     assert given > 20
 
 
-def test_sectors_wider_than_others_are_halved_where_one_half_is_excluded():
-    contracted = leaves = 0
-    for seed in range(10):
+def leaves_of_trees(seeds):
+    """Engine, codes, relaxation and node to branch on of all nodes of some trees in which every status is final."""
+    for seed in seeds:
         S, g, F = random_coupled(np.random.default_rng(seed), 3)
         engine = SpaceEngine(SpaceSystem.scaled(S, g, F))
         stack = [(UNDECIDED,) * 3]
@@ -75,19 +76,35 @@ def test_sectors_wider_than_others_are_halved_where_one_half_is_excluded():
             codes = stack.pop()
             relaxation = fresh(engine, codes)
             node = relaxation.choose(codes)
+            if not {CONTACT, UNDECIDED} & set(codes):
+                yield engine, codes, relaxation, node
+            if relaxation.cut is not None:
+                stack.append(with_code(codes, node, relaxation.cut[1][-1]))
+            elif node >= 0:
+                stack += children_left(engine, codes, node)
+
+
+def test_slices_that_are_cut_off_sectors_are_excluded_and_leave_the_rest():
+    ends, runs, leaves = set(), 0, 0
+    for engine, codes, relaxation, node in leaves_of_trees(range(10)):
+        if relaxation.cut is None:
             leaves += node < 0
-            if node < 0:
-                continue
-            left = children_left(engine, codes, node)
-            stack += left
-            if {CONTACT, UNDECIDED} & set(codes):
-                continue
-            tau, v = (engine.system.tangential(x) for x in (relaxation.forces, relaxation.displacements))
-            if relaxation.forces[node] * np.linalg.norm(v[node]) - tau[node] @ v[node] < 1e-8:
-                # dissipation is the largest there: halved only as far as that excludes something
-                levels = [level_of(code - SECTORS) for code in codes if code > SECTORS]
-                assert level_of(codes[node] - SECTORS) < max(levels)
-                assert len(left) <= 1
-                contracted += 1
-    assert contracted > 3
+            continue
+        at, (*slices, rest) = relaxation.cut
+        assert at == node
+        assert all(fresh(engine, with_code(codes, node, part)).pruned for part in slices)
+        whole, *parts = (as_arc(code) for code in (codes[node], *slices, rest))
+        parts.sort()
+        assert [a for a, _ in parts] + [whole[1]] == [whole[0]] + [b for _, b in parts]
+        ends |= {parts.index(as_arc(part)) == 0 for part in slices}
+        runs += rest > 2**31
+    assert ends == {True, False}
+    assert runs > 3
     assert leaves > 2
+
+
+def as_arc(code):
+    """Where a sector begins and ends, as shares of the circle (docs/proof_format.md, section 7.2)."""
+    length, first = divmod(code - 8, 2**31)
+    level = 2 ** (len(f"{first:b}") - 1)
+    return Fraction(first - level, level), Fraction(first - level + length + 1, level)

@@ -7,18 +7,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.model.sectors import DEEPEST, SECTORS, direction, end_number, level_of
+from enumsol.model.sectors import DEEPEST, RUN, SECTORS, around, direction, end_number, is_sector, level_of, nearest
 from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, RegularRoot, UndecidedRecord
 from enumsol.proof.space_records import LEAVES, BoxedRoot, ExcludedInSpace, OnlyRoot
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.relaxation.space_relaxation import SpaceEngine
+from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import WIDEN, Certified, RecordingCertifier, Refine, UndecidedPart
 from enumsol.search.resume import RecordedBound
 from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.trusted.space.leaves import Cause, Open, SpaceRoot, settle
-from enumsol.trusted.space.sector_rows import sector_margin, sector_row_terms
+from enumsol.trusted.space.sector_rows import is_sector_covering, sector_margin, sector_row_terms
 from enumsol.trusted.space.space_uniqueness import OnlySolution, only_root, only_solution_in_space
+from enumsol.trusted.space.turning import turned_by
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -42,11 +43,13 @@ _PLACED = 1e-3
 _SMALL_FORCE = 1e-6
 #: Enclosures of solutions in boxes are made in steps of four.
 _WIDER = 4.0 * WIDEN
+#: Roots are enclosed from two sectors of this level around their directions.
+_LEVEL = 17
 _PERTURB, _HOLD = "perturb the load, by 1e-4 of its largest entry, say", "hold the body by stiffer springs"
 
 
 class SpaceSplitting:
-    """Open or in contact; then stick, or slip in one of four sectors; a sector is halved."""
+    """Open or in contact; then stick, or slip in one of four sectors, from which slices are cut; or it is halved."""
 
     def __init__(self, engine: SpaceEngine) -> None:
         self._engine, self._system = engine, engine.system
@@ -61,6 +64,8 @@ class SpaceSplitting:
         children = list(self._engine.children(node, codes[node]))
         if relaxation is None:
             return children
+        if isinstance(relaxation, SpaceRelaxation) and relaxation.cut is not None and relaxation.cut[0] == node:
+            return list(relaxation.cut[1])
         if codes[node] == UNDECIDED:
             force, w = relaxation.at(node)
             return children[:: -1 if force > -w else 1]
@@ -70,16 +75,14 @@ class SpaceSplitting:
         towards = tau / (np.linalg.norm(tau) + 1e-300) + v / (np.linalg.norm(v) + 1e-300)
         return sorted(children, key=lambda code: -_towards(code, towards) if code > SECTORS else -10.0)
 
-    def coverings(self, node: int, code: int) -> Sequence[Sequence[int]]:
-        """All ways to cover a partial status of a node by codes, in any order; none for a final one."""
-        children = () if code > SECTORS and level_of(code - SECTORS) >= DEEPEST else self._engine.children(node, code)
-        return (children,) if children else ()
+    def covers(self, node: int, code: int, children: Sequence[int]) -> bool:
+        """Whether codes, in any order, cover a partial status of a node."""
+        return is_sector_covering(code, children, self._engine.tangents[node])
 
     def above(self, code: int, deeper: Iterable[int]) -> int:
         """The code of which this one is a child."""
-        del deeper
         if code > SECTORS and level_of(code - SECTORS) > 2:
-            return SECTORS + (code - SECTORS) // 2
+            return SECTORS + around([other - SECTORS for other in (code, *deeper)])
         return CONTACT if code > SECTORS or code in (STICK, SLIP_PLUS, SLIP_MINUS) else UNDECIDED
 
 
@@ -179,9 +182,22 @@ class SpaceCertifier(RecordingCertifier):
             hint = _HOLD if answer.cause is Cause.ROUNDING else _PERTURB
             return UndecidedPart(codes, answer.cause.value, hint, examined=True)
         else:
-            self._verified[codes] = answer
             self._leaf(RegularRoot(self._ball(answer)))
+            answer = self._verified[codes] = self._placed(codes, answer)
         return answer
+
+    def _placed(self, codes: Codes, root: SpaceRoot) -> SpaceRoot:
+        """The same root from sectors around it: its numbers then do not depend on how the search came to its leaf."""
+        there = list(codes)
+        turning = [i for i, code in enumerate(codes) if code > SECTORS]
+        for i, (x, y) in zip(turning, turned_by(root.centre, root.angle)[0].tolist(), strict=True):
+            number = nearest(x, y, _LEVEL) - 1
+            if not is_sector(number + RUN):  # next to the end of a quarter
+                return root
+            there[i] = SECTORS + number + RUN
+        # its directions lie in that box: the only root there is this one
+        again = settle(self.enclosed, there) if turning else None
+        return again if isinstance(again, SpaceRoot) else root
 
     def close(self, numbers: Array, codes: Codes | None, normal: Array) -> list[SpaceRoot | OnlySolution] | None:
         """The only solution of the whole problem, as a list, and its leaf written; None if that is not proven.

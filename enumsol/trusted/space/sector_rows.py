@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, gamma, upper_norm, upper_sum
-from enumsol.model.sectors import SECTORS, contains, direction, end_number
+from enumsol.model.sectors import (
+    DEEPEST,
+    RUN,
+    SECTORS,
+    chord_of,
+    contains,
+    cut,
+    direction,
+    end_number,
+    is_sector,
+    level_of,
+    span,
+)
 from enumsol.trusted.energy_bounds import energy_bounds
 
 if TYPE_CHECKING:
@@ -35,8 +48,21 @@ def sector_children(code: int, tangents: int) -> tuple[int, ...]:
             return STICK, SLIP_PLUS, SLIP_MINUS
         return STICK, *(SECTORS + i for i in range(4, 8))
     if code > SECTORS:
-        return SECTORS + 2 * (code - SECTORS), SECTORS + 2 * (code - SECTORS) + 1
+        one, other = cut(code - SECTORS, 0, 1)
+        return SECTORS + one, SECTORS + other
     return ()
+
+
+def is_sector_covering(code: int, children: Sequence[int], tangents: int) -> bool:
+    """Whether statuses, in any order, cover a partial one: those of ``sector_children``, or any parts of a sector."""
+    if code <= SECTORS:
+        return bool(children) and sorted(children) == sorted(sector_children(code, tangents))
+    numbers = [child - SECTORS for child in children]
+    if len(numbers) < 2 or not all(is_sector(number) and level_of(number) <= DEEPEST + 1 for number in numbers):
+        return False
+    spans = sorted(map(span, numbers))
+    begin, end = span(code - SECTORS)
+    return [a for a, _ in spans] + [end] == [begin] + [b for _, b in spans]
 
 
 def row_sign(code: int, row: Row) -> int:
@@ -60,7 +86,7 @@ def row_sign(code: int, row: Row) -> int:
 
 
 def sector_row_terms(row: Row, tau: NDArray[np.intp], size: int) -> tuple[list[int], list[float]]:
-    """A row as a sum over y and, from ``size`` on, over w: indices and coefficients, off by 16 units at most.
+    """A row as a sum over y and, from ``size`` on, over w: indices and coefficients, off by half a unit at most.
 
     Raises
     ------
@@ -72,7 +98,7 @@ def sector_row_terms(row: Row, tau: NDArray[np.intp], size: int) -> tuple[list[i
         return [size + node], [-1.0]
     if kind == FORCE:
         return [node], [1.0]
-    t1, t2 = (int(t) for t in tau[node])
+    t1, t2 = tau[node].tolist()
     if kind in (TAU, SLIP):
         t = (t1, t2)[number] if number in (0, 1) else -1
         _exists(t >= 0)
@@ -84,10 +110,13 @@ def sector_row_terms(row: Row, tau: NDArray[np.intp], size: int) -> tuple[list[i
     _exists(t1 >= 0 and t2 >= 0 and number >= 4)
     x, y = direction(number)
     if kind == TANGENT:
+        _exists(number < RUN)
         return [node, t1, t2], [1.0, -x, -y]
-    p, q = direction(end_number(number))
+    _exists(is_sector(number))
     if kind == CHORD:
-        return [t1, t2, node], [x + p, y + q, -(1.0 + (x * p + y * q))]
+        along, across, most = chord_of(number)
+        return [t1, t2, node], [along, across, -most]
+    p, q = direction(end_number(number))
     return ([size + t1, size + t2], [-y, x]) if kind == LEFT else ([size + t1, size + t2], [q, -p])
 
 
@@ -105,21 +134,23 @@ def sector_margin(
     ``errors`` as in ``energy_bounds``; -inf where a multiplier has the wrong sign.
     """
     size, units = len(system.g), system.row_unit.tolist()
-    y, y_size, c, c_size = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
+    sums = [[0.0] * size for _ in range(4)]  # numbers of Python: faster one by one than those of arrays
+    w_sum, w_sizes, y_sum, y_sizes = sums
     for row, value in zip(rows, values.tolist(), strict=True):
         sign = row_sign(codes[row[1]], row)
-        if sign == FORBIDDEN or (sign == NONNEGATIVE and value < 0) or not np.isfinite(value):
+        if sign == FORBIDDEN or (sign == NONNEGATIVE and value < 0) or not math.isfinite(value):
             return -np.inf
         for i, coefficient in zip(*sector_row_terms(row, system.tau, size), strict=True):
             # a power of two: nothing is rounded but what underflows, which is less than TINY
             term = value * (coefficient * units[i])
             if i < size:
-                c[i] += term
-                c_size[i] += abs(term)
+                y_sum[i] += term
+                y_sizes[i] += abs(term)
             else:
                 # w = g - S lambda: a row on w acts on S lambda - g with the opposite sign
-                y[i - size] -= term
-                y_size[i - size] += abs(term)
+                w_sum[i - size] -= term
+                w_sizes[i - size] += abs(term)
+    y, y_size, c, c_size = (np.array(each) for each in sums)
     k = gamma(len(rows) + 24)
     k *= 1.0 + 2.0 * k  # the sizes are sums as long
     with np.errstate(over="ignore", invalid="ignore"):

@@ -13,7 +13,7 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, upper_norm
-from enumsol.model.sectors import DEEPEST, SECTORS, level_of
+from enumsol.model.sectors import DEEPEST, SECTORS, is_sector, level_of
 from enumsol.trusted.space.leaves import SpaceRoot, settle
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
@@ -127,7 +127,7 @@ def is_complete(system: EnclosedSpace, codes: Sequence[int]) -> bool:
 
 def _is_final(code: int, tangents: int) -> bool:
     if tangents == 2 and code > SECTORS:
-        return 2 <= level_of(code - SECTORS) <= DEEPEST + 1
+        return is_sector(code - SECTORS) and level_of(code - SECTORS) <= DEEPEST + 1
     return code in ((OPEN, FRICTIONLESS), (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), (OPEN, STICK))[tangents]
 
 
