@@ -1,6 +1,6 @@
 """The one table of cells: every kind with its nodes in the order of VTK, its facets, and its names elsewhere.
 
-A new element is one entry of `KINDS` and one line of the test that goes through the table.
+A new element begins with an entry of `KINDS`; docs/architecture.md lists the other places that it touches.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ The certifiers write a record by making one. Checkers, and a search that goes on
 class that a table gives for its first entry. Reading says whether a record makes sense, never that it is true.
 
 A new kind of leaf begins here and in ``LEAVES``; docs/architecture.md lists the other places that it touches. Leaves of
-problems in 3D are in ``proof.space_records``, records of graphs in ``proof.graph_records``.
+problems in 3D are in ``proof.space_records``. Records of graphs have no classes (see ``branches.proof_records``).
 """
 
 from __future__ import annotations

@@ -41,6 +41,7 @@ def verbs(proof, folder):
         "follow": ["follow", SQUARE, "--from", "0", "--to", "10", "--start", "3.5"],
         "audit": ["audit", SQUARE, points, "--from", "0", "--to", "10"],
         "fixed-point": ["fixed-point", SQUARE, "--alpha", "1"],
+        "history": ["history", SQUARE, "--steps", "1,0.5"],
         "verify": ["verify", SQUARE, proof],
         "gallery write": ["gallery", "write", "two-node-6.4", str(folder / "square.npz")],
         "gallery list": ["gallery", "list"],

@@ -60,6 +60,7 @@ PRINTING = {
     "graph json": ("graph", GALLERY, "--from", 0, "--to", 5, "--json", "-"),
     "follow": ("follow", GALLERY, "--from", 0, "--to", 5, "--start", 1),
     "audit": ("audit", GALLERY, "points.csv", "--graph", "graph.json"),
+    "history": ("history", GALLERY, "--steps", "1,0.5"),
     "verify": ("verify", GALLERY, "graph.proof"),
     "gallery": ("gallery",),
     "gallery list": ("gallery", "list"),
@@ -271,7 +272,7 @@ def test_a_proof_that_has_no_room_leaves_the_roots():
 
 
 def test_statuses_are_documented(capsys):
-    for verb in ("roots", "table", "graph", "follow", "audit", "verify"):
+    for verb in ("roots", "table", "graph", "follow", "audit", "history", "verify"):
         text = " ".join(run(capsys, verb, "--help")[1].split())
         assert "74 if" in text, verb
         assert "141 if the program that read it has ended" in text, verb
