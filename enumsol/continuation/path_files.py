@@ -18,22 +18,22 @@ _FORMAT = 1
 _Path = TypeVar("_Path", bound=PathData)
 
 
-def save_path(path: PathData, file: str | os.PathLike[str]) -> None:
+def save_path(followed: PathData, path: str | os.PathLike[str]) -> None:
     """Write the path to a .npz file; the problem and the callables of a smooth path are not in it."""
     report = {
-        "kinds": path.kinds,
-        "transitions": [_pack(item) for item in path.transitions],
-        "status": path.status,
-        "message": path.message,
-        "orientation": path.orientation,
-        "interval": path.interval,
-        "options": path.options.to_dict(),
-        "next_step": path.next_step,
-        "stats": path.stats.__dict__,
-        "node_ids": path.node_ids,
-        "names": [[status.value for status in point.statuses] for point in path],
+        "kinds": followed.kinds,
+        "transitions": [_pack(item) for item in followed.transitions],
+        "status": followed.status,
+        "message": followed.message,
+        "orientation": followed.orientation,
+        "interval": followed.interval,
+        "options": followed.options.to_dict(),
+        "next_step": followed.next_step,
+        "stats": followed.stats.__dict__,
+        "node_ids": followed.node_ids,
+        "names": [[status.value for status in point.statuses] for point in followed],
     }
-    write_arrays(file_path(file, "path"), _FORMAT, report, {name: getattr(path, name) for name in ARRAYS})
+    write_arrays(file_path(path, "path"), _FORMAT, report, {name: getattr(followed, name) for name in ARRAYS})
 
 
 def load_path(kind: type[_Path], file: str | os.PathLike[str]) -> _Path:

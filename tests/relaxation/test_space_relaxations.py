@@ -104,7 +104,7 @@ def test_slices_that_are_cut_off_sectors_are_excluded_and_leave_the_rest():
 
 
 def as_arc(code):
-    """Where a sector begins and ends, as shares of the circle (docs/proof_format.md, section 7.2)."""
+    """Where a sector begins and ends, as shares of the circle (docs/proof_format.md, under space proofs)."""
     length, first = divmod(code - 8, 2**31)
     level = 2 ** (len(f"{first:b}") - 1)
     return Fraction(first - level, level), Fraction(first - level + length + 1, level)

@@ -108,7 +108,7 @@ def test_halves_of_sectors_are_those_that_they_hold():
 
 
 def positions(number):
-    """Where a sector begins and ends, as shares of the circle (docs/proof_format.md, section 7.2)."""
+    """Where a sector begins and ends, as shares of the circle (docs/proof_format.md, under space proofs)."""
     length, first = divmod(number, 2**31)
     level = 2 ** (len(f"{first:b}") - 1)
     return Fraction(first - level, level), Fraction(first - level + length + 1, level)

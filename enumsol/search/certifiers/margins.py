@@ -26,7 +26,7 @@ FORM_ERRORS = 4.0
 
 
 def energy_margin(within: EnclosedSystem | EnclosedPiece) -> Margin:
-    """Lower bounds on the energy, less twice the error bound (theory, section 6.2; over a piece section 7.9)."""
+    """Lower bounds on the energy, less twice the error bound (theory, sections 6.2 and 7.9)."""
     try:
         from enumsol.search.certifiers._margin import Margins
     except ImportError:
