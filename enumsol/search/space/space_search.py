@@ -196,7 +196,7 @@ class SpaceCertifier(RecordingCertifier):
                 return root
             there[i] = SECTORS + number + RUN
         # its directions lie in that box: the only root there is this one
-        again = settle(self.enclosed, there) if turning else None
+        again = settle(self.enclosed, tuple(there)) if turning else None
         return again if isinstance(again, SpaceRoot) else root
 
     def close(self, numbers: Array, codes: Codes | None, normal: Array) -> list[SpaceRoot | OnlySolution] | None:
