@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -13,11 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.construction import branch_graph
-from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.loading.map_rows import MapFold, MapRow
 from enumsol.model.problem import ContactProblem
-from enumsol.model.restart import SlipStart, restarted
 from enumsol.support.arguments import (
     alpha_interval,
     alpha_value,
@@ -396,13 +392,8 @@ class _Replaced:
     def __call__(self, value: float) -> ContactProblem:
         """The problem at this value."""
         if self.name == "load":
-            load = self.problem.f + value * self.direction
-            if self.problem.load_slope is not None:
-                return dataclasses.replace(self.problem, f=load)
-            with suppress(NotEnclosedError):
-                _ = self.problem.enclosure  # made once, as are the factors: the matrices are the same
-            return restarted(self.problem, SlipStart.of(self.problem), load)
-        return dataclasses.replace(self.problem, **{self.name: value})
+            return self.problem.replace(f=self.problem.f + value * self.direction)
+        return self.problem.replace(**{self.name: value})
 
 
 def _parameter(problem: Any, over: Any) -> tuple[str, Callable[[float], ContactProblem], list[float]]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import inspect
+from contextlib import suppress
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -37,8 +38,8 @@ ROW_RANK_TOLERANCE = 1e-12
 class ContactBody(Immutable):
     """A linear elastic body with p contact nodes: A, Bn and one or two tangents, f(alpha), gap and slip offset.
 
-    ``dataclasses.replace(problem, f=...)`` makes a problem of the same data but for those named: every argument of a
-    subclass is the name of an attribute that it takes back.
+    ``problem.replace(f=...)`` makes a problem of the same data but for those named. So does ``dataclasses.replace``,
+    which computes everything again: every argument of a subclass is the name of an attribute that it takes back.
 
     Parameters
     ----------
@@ -51,12 +52,14 @@ class ContactBody(Immutable):
     coordinates : (p, dimension) array_like or None
     """
 
-    _instead = "build a new problem, or one with other data by dataclasses.replace"
+    _instead = "build a new problem, or one with other data by dataclasses.replace or problem.replace"
     slip_offset: Floats
     #: How far the slip offset may be from ``slip_offset``, and its value where no floats hold it: a step of a history
     #: starts where the step before it ended (see enumsol.model.restart).
     offset_radius: Floats | None = None
     exact_offset: tuple[Fraction, ...] | None = None
+    #: The problem that this one was made from with the same matrices, which computes what rests on them for both.
+    _origin: ContactBody | None = None
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     def __init_subclass__(cls) -> None:
@@ -125,6 +128,8 @@ class ContactBody(Immutable):
     @cached_property
     def factorization(self) -> Factorization:
         """One sparse factorization of A, shared by everything that solves with it."""
+        if self._origin is not None:
+            return self._origin.factorization
         from enumsol.condensation.factorization import Factorization  # scipy's solvers come with the first use
 
         return Factorization(self.A)
@@ -132,6 +137,9 @@ class ContactBody(Immutable):
     @cached_property
     def products(self) -> Products:
         """What condensation and enclosure have in common."""
+        if (origin := self._origin) is not None:
+            mine, theirs = ((body.f, body.load_slope) for body in (self, origin))
+            return origin.products if all(map(_equal, mine, theirs)) else origin.products.with_loads_of(self)
         from enumsol.condensation.products import Products  # as above
 
         return Products.of(self)
@@ -145,8 +153,11 @@ class ContactBody(Immutable):
         NotEnclosedError
             A is positive definite only within rounding.
         """
-        from enumsol.condensation.enclosure import CondensedEnclosure  # as above
+        from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError  # as above
 
+        if self._origin is not None:
+            with suppress(NotEnclosedError):  # because of the other load, perhaps
+                return self._origin.enclosure.restarted(self, self.products)
         return CondensedEnclosure.from_problem(self, self.products)
 
     def is_unloaded(self, alpha: AlphaLike) -> bool:
@@ -162,6 +173,47 @@ class ContactBody(Immutable):
     def known_exactly(self) -> bool:
         """Whether rationals hold all data: a slip offset may be known as a ball only."""
         return self.offset_radius is None or self.exact_offset is not None
+
+    def replace(self, **changes: Any) -> Self:
+        """The same problem with other data; what depends on A, Bn and Bt alone is not computed again.
+
+        ``dataclasses.replace`` makes an equal problem that shares nothing with this one.
+
+        Parameters
+        ----------
+        **changes
+            Arguments of the class by their names, such as ``f``, ``friction``, ``gap`` or ``slip_offset``. A problem
+            with another A shares nothing, and one with other rows Bn or Bt only the factorization of A.
+
+        Raises
+        ------
+        InvalidProblemError
+            The new data cannot be used.
+        TypeError
+            There is no argument of that name.
+
+        Examples
+        --------
+        >>> import enumsol
+        >>> problem = enumsol.gallery.one_node_triangle()
+        >>> for factor in (1, 2, 3):  # factorized once
+        ...     root = enumsol.enumerate_roots(problem.replace(f=factor * problem.f), alpha=0)[0]
+        ...     print(root.lambda_n.round(6))
+        """
+        other = object.__new__(type(self))
+        given = {name: getattr(self, name) for name in self.__dataclass_fields__} | changes
+        matrices = {"A": self._A, **self._rows}
+        kept = [
+            name for name, own in matrices.items() if name not in changes or own.holds(real_matrix(changes[name], name))
+        ]
+        if len(kept) == len(matrices):
+            other.__dict__["_origin"] = self._origin or self
+        elif "A" in kept:
+            other.__dict__["factorization"] = self.factorization
+        type(self).__init__(other, **given)
+        if "slip_offset" not in changes:
+            other.__dict__.update(offset_radius=self.offset_radius, exact_offset=self.exact_offset)
+        return other
 
     @staticmethod
     def constant_friction(values: Floats) -> dict[str, Any]:
@@ -209,7 +261,12 @@ class ContactBody(Immutable):
 
     def __getstate__(self) -> dict[str, Any]:
         # the factorization (SuperLU) cannot be pickled; workers that need it compute it again
-        return {key: value for key, value in self.__dict__.items() if key != "factorization"}
+        return {key: value for key, value in self.__dict__.items() if key not in ("factorization", "_origin")}
+
+
+def _equal(one: Floats | None, other: Floats | None) -> bool:
+    """Of two loads or slopes of loads."""
+    return one is other or (one is not None and other is not None and np.array_equal(one, other))
 
 
 def friction_values(alpha: Fraction, first: Floats, slope: Floats) -> Floats:

@@ -35,7 +35,7 @@ class ContactProblem(ContactBody):
 
     with F(alpha) = F0 + alpha F1 and f(alpha) = f + alpha load_slope. The object is immutable: its arrays are
     read-only, and every access to A, Bn or Bt gives a new sparse matrix, made in O(1) on read-only parts.
-    ``dataclasses.replace(problem, f=2 * problem.f)`` makes another one, the same but for what is named.
+    ``problem.replace(f=2 * problem.f)`` makes another one, the same but for what is named.
 
     Data are taken exactly as given: what float64 cannot hold (an integer above 2^53, digits of a longdouble) is
     refused. Sparse matrices may have any format of scipy.sparse; arrays of bool count as 0 and 1.

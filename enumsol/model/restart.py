@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -12,7 +11,6 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT
-from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.contact_body import ContactBody
 from enumsol.support.immutable import Sealed, sealed
 
@@ -20,8 +18,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Floats
 
 _Body = TypeVar("_Body", bound=ContactBody)
-#: What a body has computed of its matrices alone; everything else that it has computed is its own.
-_SHARED = {"factorization"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,20 +104,14 @@ def restarted(
     """
     other = afresh(problem)
     given = other.__dict__
+    given["_origin"] = problem._origin or problem
     given["slip_offset"] = sealed(start.offset.reshape(problem.slip_offset.shape) + 0.0)
     given["offset_radius"] = None if start.radius is None else sealed(start.radius.reshape(start.offset.shape))
     given["exact_offset"] = start.exact
     if friction is not None:
         given.update(problem.constant_friction(friction))
-    products = problem.products
     if load is not None:
         given.update(f=sealed(load + 0.0), load_slope=None)
-        products = products.with_loads_of(other)
-    given["products"] = products
-    known = problem.__dict__.get("enclosure")
-    if known is not None:
-        with suppress(NotEnclosedError):  # whoever asks for it is told so
-            given["enclosure"] = known.restarted(other, products)
     return other
 
 
@@ -134,5 +124,6 @@ def afresh(problem: _Body) -> _Body:
 
 
 def _computed(problem: ContactBody, name: str) -> bool:
-    """Whether an attribute was computed of data that another step may change."""
-    return name not in _SHARED and isinstance(getattr(type(problem), name, None), cached_property)
+    """Whether an attribute was computed of data that another step may change, or is by whom it is computed."""
+    kept = name == "factorization" or not isinstance(getattr(type(problem), name, None), cached_property)
+    return name == "_origin" or not kept

@@ -114,6 +114,10 @@ class SealedMatrix(Sealed):
         again = type(matrix)((matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape, copy=False)
         return cls(again.format, again.data, again.indices, again.indptr, again.shape)
 
+    def holds(self, matrix: sp.sparray) -> bool:
+        """Whether a matrix has the same entries."""
+        return bool(matrix.shape == self.shape and (self.matrix() != matrix).nnz == 0)
+
     def matrix(self) -> Any:
         """A csc_array or csr_array of the immutable parts."""
         kind = sp.csc_array if self.layout == "csc" else sp.csr_array

@@ -1,14 +1,16 @@
-"""What does condensation cost for a body with 200,000 degrees of freedom and 40 contact nodes?
+"""What does condensation cost for a body with 200,000 degrees of freedom and 40 contact nodes, and each further load?
 
 Time and memory of the sparse factorization of A and of S = B A^-1 B'. tracemalloc sees numpy's arrays; the factors
 show in the peak resident size of the process.
 
 Read ``condense / solve``, which should be near the 81 right-hand sides, and the memory beside that of one dense n x n
-matrix.
+matrix. For loads, read ``ratio``: the processor time of searches under several loads, with a problem for each that
+dataclasses.replace builds, divided by that with problems that problem.replace makes.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import resource
 import time
 import tracemalloc
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
 CELLS, SMOKE_CELLS = ((40, 40), (80, 80), (160, 160), (320, 312)), ((40, 40),)
 CONTACT = 40
+LOAD_CELLS, SMOKE_LOAD_CELLS, LOADS = ((40, 40), (80, 80), (160, 160)), ((40, 40),), 10
 GIGA = 2.0**30
 
 
@@ -68,6 +71,30 @@ def row(nx, ny):
     }
 
 
+def sweep(problem, replace, loads):
+    """Processor time of a verified search for each of several loads, and the number of roots."""
+    start = time.process_time()
+    found = [len(enumsol.enumerate_roots(replace(problem, f=factor * problem.f), 1.0)) for factor in loads]
+    return time.process_time() - start, sum(found)
+
+
+def loads_row(nx, ny):
+    """One body under several loads."""
+    problem, loads = gallery.clamped_block(nx, ny, contact=CONTACT), np.linspace(0.5, 1.5, LOADS)
+    anew, roots = sweep(problem, dataclasses.replace, loads)
+    shared, same = sweep(problem, type(problem).replace, loads)
+    return {
+        "n": problem.n,
+        "p": problem.p,
+        "loads": LOADS,
+        "built anew s": anew,
+        "replaced s": shared,
+        "ratio": anew / shared,
+        "roots": roots,
+        "as many": roots == same,
+    }
+
+
 def main(run: Run) -> None:
     rows = [row(*cells) for cells in (SMOKE_CELLS if run.smoke else CELLS)]
     last = rows[-1]
@@ -78,4 +105,12 @@ def main(run: Run) -> None:
         f"{last['condense s']:.1f} s to condense ({last['condense / solve']:.0f} single solves for {2 * CONTACT + 1} "
         f"right-hand sides), arrays of {last['arrays GB']:.2f} GB, process {last['process GB']:.2f} GB, "
         f"where one dense n x n matrix has {last['dense n x n GB']:.0f} GB.",
+    )
+    rows = [loads_row(*cells) for cells in (SMOKE_LOAD_CELLS if run.smoke else LOAD_CELLS)]
+    last = rows[-1]
+    run.table(
+        "loads",
+        rows,
+        f"Conclusion: n = {last['n']}, p = {last['p']}: {LOADS} loads take {last['ratio']:.1f} times as much processor "
+        "time with a problem built anew for each as with problem.replace.",
     )
