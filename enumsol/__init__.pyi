@@ -74,7 +74,7 @@ from .model.problem3d import ContactProblem3D as ContactProblem3D
 from .model.slip_mean import SlipMean as SlipMean
 from .model.statuses import ContactStatus as ContactStatus, sign_array as sign_array
 from .proof.proof_file import Proof as Proof, ProofFormatError as ProofFormatError
-from .report import write_history_report as write_history_report, write_report as write_report
+from .report import write_report as write_report
 from .roots.enumerate import enumerate_roots as enumerate_roots, is_unique as is_unique
 from .roots.root import Enclosure as Enclosure, Polytope as Polytope, Root as Root, RootFamily as RootFamily
 from .roots.root_set import RootSet as RootSet, SearchStats as SearchStats, Undecided as Undecided

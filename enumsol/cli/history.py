@@ -105,9 +105,9 @@ def history(
     found, ended = so_far(lambda: _search(body, given, jobs, options))
 
     def write_page(path: str) -> None:
-        from enumsol.report.history_page import write_history_report  # numpy: not for --help
+        from enumsol.report import write_report  # numpy: not for --help
 
-        write_history_report(found, path, title=problem if title is None else title)
+        write_report(found, path, title=problem if title is None else title)
 
     deliver(
         (proof_file, lambda path: _write_proof(found, path)),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enumsol.report.history_page import write_history_report
 from enumsol.report.page import write_report
 
-__all__ = ["write_history_report", "write_report"]
+__all__ = ["write_report"]

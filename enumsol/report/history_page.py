@@ -4,98 +4,52 @@ from __future__ import annotations
 
 import base64
 from html import escape
-from importlib.resources import files
 from io import BytesIO
-from string import Template
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol._version import find_version
 from enumsol.errors import InvalidArgumentError
-from enumsol.loading.history import History
 from enumsol.loading.history_text import steps_table, tree_lines
-from enumsol.support.arguments import file_path, instance_of
-from enumsol.support.files import writing
+from enumsol.report.parts import fact_list, filled_page, proof_facts, warning_list
 from enumsol.support.messages import counted, html_table
 
 if TYPE_CHECKING:
-    import os
+    from collections.abc import Sequence
 
-#: Lines of the tree, reasons, and steps whose bodies are drawn, at most; of more steps the last ones.
-_TREE, _REASONS, _BODIES = 1000, 20, 24
+    from enumsol.loading.history import History
+
+#: Lines of the tree, and steps whose bodies are drawn, at most; of more steps the last ones.
+_TREE, _BODIES = 1000, 24
 _DPI = 96
 
 
-def write_history_report(
-    history: History, file: str | os.PathLike[str], *, title: str = "Histories of a contact problem"
-) -> None:
-    """Write a history as one HTML page that needs no network.
-
-    The page has a table of the steps, the tree of the roots, figures of load, displacement and work of friction, the
-    deformed bodies of all roots of a step that is chosen (with a mesh), and what is certified.
-
-    Parameters
-    ----------
-    history : History
-    file : str or path-like
-        An existing file is replaced.
-    title : str
-
-    Raises
-    ------
-    InvalidArgumentError
-        There can be no such file, or an argument is not of that form.
-    MissingDependencyError
-        matplotlib is not installed.
-    OutputError
-        There is no room for the file.
-
-    Examples
-    --------
-    >>> import enumsol, pathlib, tempfile
-    >>> from enumsol.report import write_history_report
-    >>> history = enumsol.histories(enumsol.gallery.one_node_triangle(), [5, 4])
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_history_report(history, f"{folder}/node.html", title="One node")
-    ...     "complete: yes (proven)" in pathlib.Path(folder, "node.html").read_text()
-    True
-    """
-    instance_of(history, History, "history")
-    place = file_path(file, "file")
-    page = _page(history, instance_of(title, str, "title"))
-    with writing(place, "file"):
-        place.write_text(page, encoding="utf-8")
-
-
-def _page(history: History, title: str) -> str:
-    parts = files("enumsol.report")
+def history_page(history: History, title: str, commands: Sequence[str]) -> str:
+    """The text of the page."""
     words = {
         "title": escape(title),
-        "style": (parts / "page.css").read_text(encoding="utf-8"),
+        "plotly": "",
         "badge": "yes" if history.complete else "no",
         "completeness": escape(history.completeness()),
         "reasons": _reasons(history),
+        "answers": "",
         "facts": _facts(history),
         "steps": f'<div class="scroll">{html_table(*steps_table(history.data))}</div>',
         "tree": escape("\n".join(tree_lines(history.data, _TREE))),
         "figures": _figures(history),
         "bodies": _bodies(history),
-        "certified": _certified(history),
-        "version": escape(find_version()),
+        "certified": _certified(history, commands),
     }
-    return Template((parts / "history_page.html").read_text(encoding="utf-8")).substitute(words)
+    return filled_page("history", ("page.history.js",), {}, words)
 
 
 def _reasons(history: History) -> str:
     if not history.reasons:
         return ""
-    items = "".join(f"<li>{escape(reason)}</li>" for reason in history.reasons[:_REASONS])
-    left = len(history.reasons) - _REASONS
-    more = f"<li>and {left} more</li>" if left > 0 else ""
-    return (
-        '<div class="warning"><p>This history is not complete. Every root shown is a solution of its step, but roots '
-        f"and histories may be missing. Why:</p><ul>{items}{more}</ul></div>"
+    return warning_list(
+        "This history is not complete. Every root shown is a solution of its step, but roots and histories may be "
+        "missing. Why:",
+        history.reasons,
     )
 
 
@@ -111,7 +65,7 @@ def _facts(history: History) -> str:
         ("arithmetic", history.arithmetic),
         ("increments", "not halved" if history.refinement is None else str(history.refinement)),
     )
-    return "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts)
+    return fact_list(facts)
 
 
 def _figures(history: History) -> str:
@@ -152,7 +106,7 @@ def _image(figure: Any) -> str:
     return f'<figure><img src="data:image/png;base64,{text}" alt=""></figure>'
 
 
-def _certified(history: History) -> str:
+def _certified(history: History, commands: Sequence[str]) -> str:
     lines = [f"<p>{escape(history.completeness())}.</p>"]
     if history.complete:
         lines.append(
@@ -168,8 +122,10 @@ def _certified(history: History) -> str:
     searches = counted(len(history.data.stages), "search", "searches")
     lines.append(
         f"<p>{searches}; where slip is counted from is known within {widest:.1e}, for offsets up to {size:.3g}.</p>"
-        f"<p>Fingerprint of the problem (SHA-256 of its data): <code>{escape(history.problem.fingerprint)}</code></p>"
-        "<p>To check it: <code>enumsol history PROBLEM --steps STEPS --proof FILE</code>, then "
-        "<code>enumsol verify PROBLEM FILE</code>.</p>"
     )
+    how = (
+        "<code>enumsol history PROBLEM --steps STEPS --proof FILE</code>, then "
+        "<code>enumsol verify PROBLEM FILE</code>."
+    )
+    lines.append(proof_facts(history.problem.fingerprint, commands, how))
     return "".join(lines)

@@ -10,8 +10,18 @@ import numpy as np
 from enumsol.branches import BranchGraph
 from enumsol.branches.figures.graph_plots import checked_units
 from enumsol.errors import InvalidArgumentError
+from enumsol.loading.history import History
 from enumsol.report.content import listed, report_content
-from enumsol.report.parts import fact_list, filled_page, packed_plotly, span_words, table_text, warning_list
+from enumsol.report.history_page import history_page
+from enumsol.report.parts import (
+    fact_list,
+    filled_page,
+    packed_plotly,
+    proof_facts,
+    span_words,
+    table_text,
+    warning_list,
+)
 from enumsol.report.roots_page import roots_page
 from enumsol.roots.root_set import RootSet
 from enumsol.support.arguments import file_path, instance_of
@@ -26,14 +36,16 @@ if TYPE_CHECKING:
 
 
 def write_report(
-    solutions: BranchGraph | RootSet,
+    solutions: BranchGraph | RootSet | History,
     file: str | os.PathLike[str],
     *,
     title: str = "Contact problem with Coulomb friction",
     units: tuple[str, str] | None = None,
     commands: Sequence[str] = (),
 ) -> None:
-    """Write all solutions over an interval of alpha, or at one alpha, as one HTML page that needs no network.
+    """Write all solutions over an interval of alpha, at one alpha, or after every load step, as one HTML page.
+
+    It needs no network.
 
     The page of a graph has the branches against alpha (pointing shows values and statuses, a click on a branch its
     arcs), the number of solutions, a slider over alpha with the deformed bodies of all solutions (without a mesh:
@@ -45,15 +57,18 @@ def write_report(
     undecided parts; and what is certified. Without a mesh there are in 3D the contact nodes at their coordinates, in 2D
     bars of forces and displacements, and otherwise the tables alone.
 
+    The page of a History has a table of the steps, the tree of the roots, figures of load, displacement and work of
+    friction, the deformed bodies of all roots of a step that is chosen (with a mesh), and what is certified.
+
     Parameters
     ----------
-    solutions : BranchGraph or RootSet
+    solutions : BranchGraph, RootSet or History
     file : str or path-like
         An existing file is replaced.
     title : str
         What the problem is.
     units : (str, str), optional
-        Of forces and of lengths.
+        Of forces and of lengths; the figures of a History have none.
     commands : sequence of str
         Lines of a shell by which a reader can check the proof.
 
@@ -62,7 +77,7 @@ def write_report(
     InvalidArgumentError
         There can be no such file, or an argument is not of that form.
     MissingDependencyError
-        plotly is not installed, whose script draws diagrams and bodies in 3D in the page.
+        plotly is not installed, whose script draws diagrams and bodies in 3D in the page; for a History matplotlib.
     OutputError
         There is no room for the file.
 
@@ -76,11 +91,18 @@ def write_report(
     True
     """
     given: object = solutions
-    if not isinstance(given, (BranchGraph, RootSet)):
-        raise InvalidArgumentError(f"solutions is a {type(given).__name__}; expected a BranchGraph or a RootSet")
+    if not isinstance(given, (BranchGraph, RootSet, History)):
+        raise InvalidArgumentError(
+            f"solutions is a {type(given).__name__}; expected a BranchGraph, a RootSet or a History"
+        )
     place = file_path(file, "file")
     words = (instance_of(title, str, "title"), checked_units(units), tuple(commands))
-    page = report_page(solutions, *words) if isinstance(solutions, BranchGraph) else roots_page(solutions, *words)
+    if isinstance(solutions, BranchGraph):
+        page = report_page(solutions, *words)
+    elif isinstance(solutions, RootSet):
+        page = roots_page(solutions, *words)
+    else:
+        page = history_page(solutions, words[0], words[2])
     with writing(place, "file"):
         place.write_text(page, encoding="utf-8")
 
@@ -100,7 +122,7 @@ def report_page(graph: BranchGraph, title: str, units: tuple[str, str] | None, c
         "vertices": _vertices(graph),
         "certified": _certified(graph, commands),
     }
-    return filled_page("page.html", ("page.common.js", "page.js", "page.solutions.js"), content, words)
+    return filled_page("graph", ("page.common.js", "page.js", "page.solutions.js"), content, words)
 
 
 def _reasons(reasons: Sequence[str]) -> str:
@@ -202,14 +224,13 @@ def _certified(graph: BranchGraph, commands: Sequence[str]) -> str:
     lines.append(
         "<p>This page is a picture of the result and no proof. Curves are drawn between points on the arcs; critical "
         "alphas are given to the last digit.</p>"
-        f"<p>Fingerprint of the problem (SHA-256 of its data): <code>{escape(graph.problem.fingerprint)}</code></p>"
     )
-    if commands:
-        shell = escape("\n".join(commands))
-        lines.append(f"<p>To check it, with the problem and the proof at hand:</p><pre>{shell}</pre>")
-    else:
-        lines.append(
-            "<p>To check it: <code>enumsol graph PROBLEM --from A --to B --proof FILE</code>, then "
-            "<code>enumsol verify PROBLEM FILE</code>; the proof's first record holds the same fingerprint.</p>"
+    lines.append(
+        proof_facts(
+            graph.problem.fingerprint,
+            commands,
+            "<code>enumsol graph PROBLEM --from A --to B --proof FILE</code>, then "
+            "<code>enumsol verify PROBLEM FILE</code>; the proof's first record holds the same fingerprint.",
         )
+    )
     return "".join(lines)

@@ -19,17 +19,19 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
 
-def filled_page(template: str, scripts: Sequence[str], content: Mapping[str, Any], words: Mapping[str, str]) -> str:
-    """The text of a page: a template with its words, scripts and the numbers that these draw."""
+def filled_page(kind: str, scripts: Sequence[str], content: Mapping[str, Any], words: Mapping[str, str]) -> str:
+    """The text of a page: the frame of all pages around what one kind has, with words, scripts and what these draw."""
     parts = files("enumsol.report")
+    main = Template((parts / f"page.{kind}.html").read_text(encoding="utf-8")).substitute(words)
     own = {
+        "main": main,
         "style": (parts / "page.css").read_text(encoding="utf-8"),
         "script": "\n".join((parts / name).read_text(encoding="utf-8") for name in scripts),
         # no "<" of a name may end the element
         "data": json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
         "version": escape(find_version()),
     }
-    return Template((parts / template).read_text(encoding="utf-8")).substitute({**own, **words})
+    return Template((parts / "page.frame.html").read_text(encoding="utf-8")).substitute({**own, **words})
 
 
 def packed_plotly() -> str:
@@ -56,6 +58,19 @@ def span_words(values: Any) -> str:
 def fact_list(facts: Iterable[tuple[str, str]]) -> str:
     """Names and values, which are escaped here."""
     return "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts)
+
+
+def proof_facts(fingerprint: str | None, commands: Sequence[str], otherwise: str) -> str:
+    """The problem's fingerprint, and how to check the proof: by the commands given, or by words in HTML, if any."""
+    lines = ""
+    if fingerprint is not None:
+        lines = f"<p>Fingerprint of the problem (SHA-256 of its data): <code>{escape(fingerprint)}</code></p>"
+    if commands:
+        shell = escape("\n".join(commands))
+        lines += f"<p>To check it, with the problem and the proof at hand:</p><pre>{shell}</pre>"
+    elif otherwise:
+        lines += f"<p>To check it: {otherwise}</p>"
+    return lines
 
 
 def warning_list(sentence: str, items: Sequence[str]) -> str:

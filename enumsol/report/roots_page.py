@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from collections import Counter
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.report.parts import fact_list, filled_page, packed_plotly, span_words, table_text, warning_list
+from enumsol.report.parts import (
+    fact_list,
+    filled_page,
+    packed_plotly,
+    proof_facts,
+    span_words,
+    table_text,
+    warning_list,
+)
 from enumsol.report.roots_content import roots_content
 from enumsol.roots.root import summary
 from enumsol.support.messages import counted
@@ -40,7 +48,7 @@ def roots_page(found: RootSet, title: str, units: tuple[str, str] | None, comman
         "undecided": _undecided_table(found),
         "certified": _what_is_certified(found, commands),
     }
-    return filled_page("page.roots.html", ("page.common.js", "page.roots.js"), content, words)
+    return filled_page("roots", ("page.common.js", "page.roots.js"), content, words)
 
 
 def _open_parts(found: RootSet) -> str:
@@ -162,7 +170,7 @@ def _what_is_certified(found: RootSet, commands: Sequence[str]) -> str:
         "problem": "the matrices A, the contact rows and f as they were given",
         "condensed": "the condensed problem, S and g as computed",
     }[found.certified_data]
-    lines: list[Any] = [f"<p>{escape(found.completeness())}.</p>"]
+    lines = [f"<p>{escape(found.completeness())}.</p>"]
     if found.complete:
         lines.append(
             f"<p>It is proven that the problem has the listed solutions at this alpha, and no others. This is about "
@@ -174,15 +182,14 @@ def _what_is_certified(found: RootSet, commands: Sequence[str]) -> str:
         known = "The listed roots are proven. " if len(found) else ""
         lines.append(f"<p>{known}Nothing is claimed about solutions that are not listed.</p>")
     lines.append("<p>This page is a picture of the result and no proof; numbers are rounded.</p>")
-    if len(found):
-        print_of = escape(found[0].problem.fingerprint)
-        lines.append(f"<p>Fingerprint of the problem (SHA-256 of its data): <code>{print_of}</code></p>")
-    if commands:
-        shell = escape("\n".join(commands))
-        lines.append(f"<p>To check it, with the problem and the proof at hand:</p><pre>{shell}</pre>")
-    elif found.arithmetic != "fast":
-        lines.append(
-            "<p>To check it: <code>enumsol roots PROBLEM --alpha A --proof FILE</code>, then "
-            "<code>enumsol verify PROBLEM FILE</code>; the proof's first record holds the same fingerprint.</p>"
+    lines.append(
+        proof_facts(
+            found[0].problem.fingerprint if len(found) else None,
+            commands,
+            ""
+            if found.arithmetic == "fast"
+            else "<code>enumsol roots PROBLEM --alpha A --proof FILE</code>, then "
+            "<code>enumsol verify PROBLEM FILE</code>; the proof's first record holds the same fingerprint.",
         )
+    )
     return "".join(lines)

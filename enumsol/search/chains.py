@@ -11,15 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.model.statuses import ACROSS, FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, UNDECIDED
 from enumsol.search.reduction import NEAR, Reduction
 from enumsol.support.deadlines import look
 from enumsol.trusted.selection import (
-    CONE_MINUS,
-    CONE_PLUS,
-    NORMAL_FORCE,
-    SLIP_BACKWARD,
-    SLIP_FORWARD,
     Selection,
 )
 
@@ -37,13 +32,6 @@ _BESIDE, _STEPS, _CLOSE = 1e-7, 40, 1e-12
 _MOST = 16
 #: A condition that vanishes at an event falls behind it by more than this, by its size, where the branch turns back.
 _TURNS = 1e-9
-_ACROSS = {
-    SLIP_FORWARD: STICK,
-    SLIP_BACKWARD: STICK,
-    CONE_PLUS: SLIP_PLUS,
-    CONE_MINUS: SLIP_MINUS,
-    NORMAL_FORCE: OPEN,
-}
 
 
 @dataclass(frozen=True)
@@ -192,9 +180,8 @@ class Chains:
     def _beyond(self, curve: SelectionCurve, alpha: float, condition: int) -> Codes | None:
         """The selection behind an event; None where the branch turns back."""
         node, kind = curve.rows.conditions[condition]
-        if kind in _ACROSS:
-            code = _ACROSS[kind]
-        else:
+        (code, _), *others = ACROSS[curve.rows.codes[node], kind]
+        if others:
             slip = float(curve.at(alpha)[1][self.system.p + node])
             rubs = self.system.F0[node] != 0 or self.system.F1[node] != 0
             code = (SLIP_PLUS if slip > 0 else SLIP_MINUS) if rubs else FRICTIONLESS

@@ -37,7 +37,7 @@ def proven(name):
     return problem, records
 
 
-class Judge:
+class LeafJudge:
     """What a leaf claims, by docs/proof_format.md alone, in floats: refuses what is wrong by more than rounding."""
 
     def __init__(self, name):
@@ -107,7 +107,7 @@ class Judge:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_judge_agrees_with_what_is_true(name):
-    judge, (problem, records) = Judge(name), proven(name)
+    judge, (problem, records) = LeafJudge(name), proven(name)
     judge.solves()
     assert judge.right(records[1])
     report = verify(problem, proof_of(records))
@@ -141,7 +141,7 @@ def put(entry, place, value):
 def test_signs_and_sizes_of_numbers(name):
     problem, records = proven(name)
     p, count = problem.p, len(records[1][_NUMBERS])
-    judge = Judge(name)
+    judge = LeafJudge(name)
     for place in range(2 * p):
         # kappa of a node without tau is not used
         used = place < p or len(judge.parts(place - p))
@@ -159,7 +159,7 @@ def test_signs_and_sizes_of_numbers(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_theta_that_does_not_serve(name):
     """At a loaded node theta is known: no other one is accepted."""
-    judge, (problem, records) = Judge(name), proven(name)
+    judge, (problem, records) = LeafJudge(name), proven(name)
     p, m = problem.p, judge.m
     tried = 0
     for i in range(p):
@@ -241,7 +241,7 @@ def test_a_root_among_several_is_never_the_only_one(name):
 @pytest.mark.few(1)
 @pytest.mark.parametrize("name", NAMES)
 def test_random_mutants_are_refused_or_true(name):
-    rng, (problem, records), judge = np.random.default_rng(9), proven(name), Judge(name)
+    rng, (problem, records), judge = np.random.default_rng(9), proven(name), LeafJudge(name)
     accepted = 0
     for _ in range(50):
         changed = copied(records)

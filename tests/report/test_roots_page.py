@@ -207,7 +207,7 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     assert "enumsol roots gallery:wedge3d-2-3 --alpha=1.0 --proof roots.proof" in again
     assert main(["roots", "gallery:two-node-5", "--alpha", "5", "--report", "-"]) == 2
     assert "--report is -; expected the name of a file" in capsys.readouterr().err
-    with pytest.raises(InvalidArgumentError, match="solutions is a int; expected a BranchGraph or a RootSet"):
+    with pytest.raises(InvalidArgumentError, match="solutions is a int; expected a BranchGraph, a RootSet or a"):
         write_report(3, page)
     monkeypatch.setitem(sys.modules, "plotly.offline", None)
     with pytest.raises(MissingDependencyError, match=r"enumsol\[report\]"):
