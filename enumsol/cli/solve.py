@@ -88,6 +88,17 @@ def _number_by_part(texts: list[str], option: str) -> dict[str, Any]:
     return _by_part(texts, option, _number)
 
 
+def _pairs(texts: list[str], option: str) -> list[list[Any]]:
+    """Pairs of texts UPPER:LOWER or UPPER:LOWER:GAP."""
+    pairs: list[list[Any]] = []
+    for text in texts:
+        names = text.split(":")
+        if len(names) not in (2, 3):
+            raise InvalidArgumentError(f"{option} is {text}; expected NAME:NAME, or NAME:NAME:GAP")
+        pairs.append([*names[:2], *(_entry(gap, option, text) for gap in names[2:])])
+    return pairs
+
+
 def _obstacle(text: str, option: str) -> dict[str, Any]:
     return _by_part([text], option)
 
@@ -97,6 +108,13 @@ _PULL = "NAME=fx,fy[,fz]"
 #: By their names in `fem.mesh_problem`.
 MESH_OPTIONS = {
     "contact": Given(_BODY, "NAME", "Part of the boundary in contact; may be repeated.", _as_given, True),
+    "pairs": Given(
+        _BODY,
+        "NAME:NAME[:GAP]",
+        "Parts of two bodies that may touch, first the one whose nodes are the contact nodes; may be repeated.",
+        _pairs,
+        True,
+    ),
     "young": Given(_BODY, "E", "Young's modulus [force / length^2].", _number),
     "poisson": Given(_BODY, "NU", "Poisson's ratio.", _number),
     "plane": Given(_BODY, "strain|stress", "In 2D, plane strain or plane stress; default: strain.", _plane),
@@ -136,9 +154,15 @@ MESH_OPTIONS = {
 }
 
 
+def _flags(name: str) -> tuple[str, ...]:
+    """How the command line spells an option of `fem.mesh_problem`, the usual way first."""
+    return (*(["--pair"] if name == "pairs" else []), "--" + name.replace("_", "-"))
+
+
 def _option(name: str, given: Given) -> Parameter:
-    flag = "--" + name.replace("_", "-")
-    how = typer.Option(flag, metavar=given.metavar, help=given.help, rich_help_panel=given.panel, show_default=False)
+    how = typer.Option(
+        *_flags(name), metavar=given.metavar, help=given.help, rich_help_panel=given.panel, show_default=False
+    )
     annotation = Annotated[list[str] | None, how] if given.repeated else Annotated[str | None, how]
     return Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
@@ -194,11 +218,7 @@ def solve(
     Exit status: as enumsol roots.
     """
     texts = {name: options.pop(name) for name in MESH_OPTIONS}
-    given = {
-        name: MESH_OPTIONS[name].read(text, "--" + name.replace("_", "-"))
-        for name, text in texts.items()
-        if text is not None
-    }
+    given = {name: MESH_OPTIONS[name].read(text, _flags(name)[0]) for name, text in texts.items() if text is not None}
     alpha = options.pop("alpha")
     search = Search(**options)
     search.check()
@@ -219,8 +239,8 @@ def solve(
 def _problem(mesh: str, options: dict[str, Any]) -> ContactProblem | ContactProblem3D:
     if mesh.endswith(TOML):
         if options:
-            name = next(iter(options)).replace("_", "-")
-            raise InvalidArgumentError(f"--{name} is given beside {mesh}, which has all options; expected it there")
+            flag = _flags(next(iter(options)))[0]
+            raise InvalidArgumentError(f"{flag} is given beside {mesh}, which has all options; expected it there")
         return load_any_problem(mesh)
     from enumsol import fem  # numpy: not for --help
     from enumsol.fem.mesh_problems import check_keys
@@ -234,7 +254,7 @@ def _problem(mesh: str, options: dict[str, Any]) -> ContactProblem | ContactProb
     refuse_misspelt(mesh, meshes=True)
     if (found := unreadable(place)) is not None:
         raise InvalidArgumentError(f"{mesh}: {found}; expected a mesh with named parts, or a {TOML} file")
-    check_keys(options, lambda name: "--" + name.replace("_", "-"))
+    check_keys(options, lambda name: _flags(name)[0])
     return fem.mesh_problem(mesh, **options)
 
 

@@ -12,14 +12,14 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.bases import nodal_basis
-from enumsol.fem.basis_problems import outward_normal, pressed
-from enumsol.fem.conditions import Held, Obstacle, by_part, check_held, names_of, part_forces, part_springs
+from enumsol.fem.conditions import Held, by_part, check_held, names_of, part_forces, part_springs
 from enumsol.fem.construction import axes_of, problem_of
+from enumsol.fem.contacts import contacts_of
 from enumsol.fem.mesh_checks import lame, unit_vectors
 from enumsol.fem.mesh_files import read_mesh
 from enumsol.fem.named_parts import PartedMesh
-from enumsol.fem.restrained import ContactNodes, movable, plain_dofs
-from enumsol.model.cells import contact_nodes
+from enumsol.fem.pairs import Pair
+from enumsol.fem.restrained import plain_dofs
 from enumsol.model.mesh import BodyMesh
 from enumsol.support.arguments import exact_number, file_path, finite_number, shown
 from enumsol.support.array_arguments import short_vector
@@ -31,16 +31,18 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from enumsol.fem.bases import NodalBasis
+    from enumsol.fem.restrained import ContactNodes
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.array_types import ArrayLike, Floats, Integers
+    from enumsol.support.array_types import ArrayLike, Floats
 
     Names = str | Sequence[str]
     Vectors = Mapping[str, ArrayLike] | None
 
 #: Largest TOML file that is read; one that describes a problem has a thousandth of that [bytes].
 LARGEST_FILE = 1_000_000
+#: What ``pairs`` may be called in TOML files.
+_PAIRS = "contact_pair"
 
 
 def mesh_problem(
@@ -48,7 +50,8 @@ def mesh_problem(
     *,
     young: float,
     poisson: float,
-    contact: Names,
+    contact: Names = (),
+    pairs: Sequence[Sequence[Any]] = (),
     plane: Literal["strain", "stress"] = "strain",
     friction: float | Sequence[float] = (0.0, 1.0),
     friction2: float | Sequence[float] | None = None,
@@ -84,7 +87,11 @@ def mesh_problem(
     young, poisson : float
         Young's modulus [force / length^2] and Poisson's ratio [-].
     contact : name or names
-        The contact boundary.
+        The contact boundary, in contact with a rigid foundation.
+    pairs : sequence of (slave, master) or (slave, master, gap)
+        Parts of two bodies that may touch each other. The nodes of the first part are the contact nodes; each is in
+        contact with the point of a facet of the second part on the line along its normal (theory, section 11.8). Nodes
+        that face no facet have no contact. The gap is the distance along the normal, or the one that is given [length].
     plane : {"strain", "stress"}
         In 2D; all forces and stiffnesses are per unit thickness.
     friction : float or (F0, F1)
@@ -108,11 +115,12 @@ def mesh_problem(
     body_force : vector, optional
         Force per volume, such as the weight [force / length^3].
     gap : float
-        Initial gap along the normals, in addition to the distance to the obstacle; negative is a press fit [length].
+        Initial gap along the normals, in addition to the distance to the obstacle or within a pair; negative is a press
+        fit [length].
     obstacle : mapping of one kind to numbers, optional
-        The rigid foundation, where it does not have the shape of the body: ``{"plane": (x, y, nx, ny)}`` by a point and
-        the direction from it to the body, ``{"circle": (x, y, r)}``, or ``{"hole": (x, y, r)}``, a circle that the body
-        is inside of; in 3D ``plane`` with six numbers, ``sphere`` and ``hole`` with four.
+        The rigid foundation of the contact parts, where it does not have the shape of the body: ``{"plane": (x, y, nx,
+        ny)}`` by a point and the direction from it to the body, ``{"circle": (x, y, r)}``, or ``{"hole": (x, y, r)}``,
+        a circle that the body is inside of; in 3D ``plane`` with six numbers, ``sphere`` and ``hole`` with four.
     groups : str, optional
         As in `read_mesh`.
 
@@ -145,31 +153,31 @@ def mesh_problem(
         raise InvalidArgumentError(f"plane is {shown(plane)} of a body in 3D; expected it for plane meshes only")
     body = nodal_basis(parted.points, parted.cells)
     held = _held(parted, clamp, symmetry, displacement)
-    facets = _facets(body, parted, names_of(contact, "contact"))
-    nodes, gaps = _contact(body, parted, facets, held, obstacle)
+    contacts = contacts_of(body, parted, names_of(contact, "contact"), Pair.all_of(pairs), held, obstacle)
+    nodes = contacts.rows
     forces = part_forces(body, parted, load, pressure)
     if body_force is not None:
         density = short_vector(body_force, "body_force", dimension)
         forces = forces + body.volume_forces(np.tile(density, (len(parted.cells), 1)))
     slope = part_forces(body, parted, load_slope, pressure_slope, "_slope")
     more: dict[str, Any] = {
-        "gap": gaps + finite_number(gap, "gap"),
+        "gap": contacts.gaps + finite_number(gap, "gap"),
         "node_ids": nodes.nodes.tolist(),
         "coordinates": parted.points[nodes.nodes],
         **_coefficients(dimension, friction, friction2),
     }
-    surface = None
+    surface = contacts.facets if pairs else None
     if dimension == 3:
         from enumsol.fem.solid_geometry import outward  # not for plane bodies
 
-        surface = outward(facets, parted.cells)
-        more["areas"] = body.on_part(facets, "contact", lambda v, _: v[0], lumped=True)[nodes.nodes, 0]
+        surface, more["areas"] = outward(contacts.facets, parted.cells), contacts.areas
     offset = held.supports.values
     springs = part_springs(body, parted, spring)
     check_held(parted, held.supports, springs)
     coefficients = lame(young, poisson, plane)
     A = sp.csc_array(body.stiffness(*coefficients) + springs)
     axes = _axes(nodes, axis, dimension)
+    more |= _moved(nodes, axes, offset, more["gap"])
     slopes = slope.ravel() if np.any(slope) else None
     return problem_of(
         *(A, forces.ravel(), slopes, plain_dofs(parted.points.shape), nodes, axes, held.supports),
@@ -180,6 +188,8 @@ def mesh_problem(
 
 def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProblem3D:
     r"""Contact problem that a TOML file describes: the options of `mesh_problem`, with ``mesh`` a path from its folder.
+
+    ``pairs`` are called ``contact_pair`` there, too.
 
     The file may also have the ``steps`` of a history, which the command ``enumsol history`` reads.
 
@@ -225,12 +235,15 @@ def _toml(place: Path) -> dict[str, Any]:
     if len(content) > LARGEST_FILE:
         raise InvalidArgumentError(f"it has more than {LARGEST_FILE} bytes; expected a TOML file of options")
     try:
-        return tomllib.loads(content.decode("utf-8"))
+        options = tomllib.loads(content.decode("utf-8"))
     except (ValueError, RecursionError) as error:  # UnicodeDecodeError and TOMLDecodeError, too
         reason = shortened(str(error))
         raise InvalidArgumentError(
             f"it is no TOML file ({reason}); expected lines such as contact = 'floor'"
         ) from error
+    if {_PAIRS, "pairs"} <= options.keys():
+        raise InvalidArgumentError(f"{_PAIRS} and pairs are given; expected one of both")
+    return {"pairs" if name == _PAIRS else name: value for name, value in options.items()}
 
 
 def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str) -> None:
@@ -250,6 +263,8 @@ def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str) 
             hint = f"did you mean {close[0]}?" if close else f"expected some of mesh, {', '.join(known)}"
             raise InvalidArgumentError(f"there is no option {shown(name)}; {hint}")
     missing = [name for name, default in known.items() if default is inspect.Parameter.empty and name not in options]
+    if not {"contact", "pairs"} & options.keys():
+        missing.append("contact")
     if missing:
         names = ", ".join(map(spelled, missing))
         raise InvalidArgumentError(f"{names} {'is' if len(missing) == 1 else 'are'} missing")
@@ -266,52 +281,13 @@ def _held(mesh: PartedMesh, clamp: Any, symmetry: Any, displacement: Any) -> Hel
     return held
 
 
-def _facets(body: NodalBasis, mesh: PartedMesh, parts: list[str]) -> Integers:
-    """Facets of the contact parts, each once."""
-    if not parts:
-        raise InvalidArgumentError("contact names no part; expected the contact boundary")
-    for part in parts:
-        body.facet_numbers(mesh.part(part), part)  # on the boundary?
-    facets = np.concatenate([mesh.part(part) for part in parts])
-    _, first = np.unique(np.sort(facets, axis=1), axis=0, return_index=True)
-    return np.asarray(facets[np.sort(first)])
-
-
-def _contact(
-    body: NodalBasis, mesh: PartedMesh, facets: Integers, held: Held, obstacle: Any
-) -> tuple[ContactNodes, Floats]:
-    """Contact nodes with their normals, and the distances to the obstacle."""
-    dimension = mesh.points.shape[1]
-    touching = along(facets) if dimension == 2 else np.unique(contact_nodes(dimension, facets))
-    if np.all(held.supports.fixed[touching]):
-        raise InvalidArgumentError("contact has no node that clamp or displacement leave free; expected some")
-    if obstacle is None:
-        integrals = body.on_part(facets, "contact", outward_normal, lumped=True)
-        normals, gaps = pressed(integrals[touching], touching), np.zeros(len(touching))
-    else:
-        normals, gaps = Obstacle.of(obstacle, dimension).normals_and_gaps(mesh.points[touching])
-    normals = unit_vectors(normals, "normals of the boundary")
-    if obstacle is None:  # what averages with the other half of the body would be
-        normals = unit_vectors(np.where(held.mirrored[touching], 0.0, normals), "normals at the plane of symmetry")
-    nodes = movable(touching, normals, held.supports)
-    return nodes, gaps[nodes.kept]
-
-
-def along(edges: Integers) -> Integers:
-    """Nodes of edges (k, 2) or (k, 3), each line of edges from one end to the other; closed lines from any node."""
-    pairs = edges if edges.shape[1] == 2 else np.concatenate([edges[:, [0, 2]], edges[:, [2, 1]]])
-    beside: dict[int, list[int]] = {}
-    for one, two in pairs.tolist():
-        beside.setdefault(one, []).append(two)
-        beside.setdefault(two, []).append(one)
-    ordered: dict[int, None] = {}
-    # ends first, then what is left: closed lines
-    for start in sorted(beside, key=lambda node: (len(beside[node]) != 1, node)):
-        node: int | None = start
-        while node is not None and node not in ordered:
-            ordered[node] = None
-            node = next((after for after in beside[node] if after not in ordered), None)
-    return np.array(list(ordered), dtype=np.int64)
+def _moved(nodes: ContactNodes, axes: tuple[Floats, ...], values: Floats, gaps: Floats) -> dict[str, Any]:
+    """Gaps and slip offsets less what given displacements of the nodes of pairs make of them."""
+    relative = np.asarray(nodes.means @ values)
+    if not np.any(relative):
+        return {}
+    normal, *slips = (-np.sum(relative * axis, axis=1) for axis in (nodes.normals, *axes))
+    return {"gap": gaps + normal, "slip_offset": slips[0] if len(slips) == 1 else np.stack(slips, axis=1)}
 
 
 def _coefficients(dimension: int, friction: Any, second: Any) -> dict[str, Any]:

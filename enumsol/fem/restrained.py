@@ -49,7 +49,7 @@ class ContactRows:
     Attributes
     ----------
     means : (p, N) csr_array
-        The displacement of each row as a weighted mean of nodal ones.
+        The displacement of each row as a weighted mean of nodal ones; in pairs less that of what it faces.
     normals : (p, dimension) array
         Of length one.
     apart : (N, dimension) bool array
@@ -76,20 +76,25 @@ class ContactNodes(ContactRows):
     kept: Integers
 
 
-def movable(nodes: Integers, normals: Floats, supports: Supports) -> ContactNodes:
+def movable(nodes: Integers, normals: Floats, supports: Supports, means: sp.csr_array | None = None) -> ContactNodes:
     """Contact nodes without those that are held entirely.
+
+    ``means`` (p, N) are the displacements of the rows, relative to what each faces, by nodes; without them those of the
+    nodes. A component of a row is held if it is at all of its nodes.
 
     Raises
     ------
     InvalidArgumentError
         All are held, or one is held in a component that is not perpendicular to its normal, or displaced in one.
     """
-    fixed = supports.fixed[nodes]
+    means = means_of_nodes(nodes, len(supports.fixed)) if means is None else means
+    fixed = np.asarray(abs(means) @ (~supports.fixed).astype(np.float64)) == 0
     kept = np.flatnonzero(~np.all(fixed, axis=1))
     if not len(kept):
         raise InvalidArgumentError("contact has held nodes only; expected free ones")
-    nodes, fixed, normals = nodes[kept], fixed[kept], normals[kept]
-    wrong = np.any(fixed & ((np.abs(normals) > RIGHT_ANGLE) | (supports.values[nodes] != 0)), axis=1)
+    nodes, fixed, normals, means = nodes[kept], fixed[kept], normals[kept], sp.csr_array(means[kept])
+    moved = np.asarray(means @ supports.values) != 0
+    wrong = np.any(fixed & ((np.abs(normals) > RIGHT_ANGLE) | moved), axis=1)
     if np.any(wrong):
         raise InvalidArgumentError(
             f"contact node {nodes[np.argmax(wrong)]} is held or displaced in some components only, which makes its "
@@ -101,7 +106,7 @@ def movable(nodes: Integers, normals: Floats, supports: Supports) -> ContactNode
     normals[touched] /= np.linalg.norm(normals[touched], axis=1)[:, None]
     apart = np.zeros_like(supports.fixed)
     apart[nodes] = fixed
-    return ContactNodes(means_of_nodes(nodes, len(apart)), normals, apart, nodes, kept)
+    return ContactNodes(means, normals, apart, nodes, kept)
 
 
 def means_of_nodes(nodes: Integers, count: int) -> sp.csr_array:

@@ -35,8 +35,8 @@ class BodyMesh(Immutable):
     offset : (N, d) array_like or None
         Prescribed displacements [length]; None: no node is moved.
     facets : (k, m) array_like of int or None
-        In 3D, the contact surface: corners counterclockwise as seen from outside, then the nodes between them and
-        inside.
+        In 3D, and of pairs of bodies, the contact surface: corners, in 3D counterclockwise as seen from outside, then
+        the nodes between them and inside.
     rows : (k,) array_like of int or None
         Where contact rows stand for patches, the row of each facet (-1: held); None where they stand for nodes.
     lame : (2,) or (M, 2) array_like or None
@@ -140,9 +140,16 @@ class BodyMesh(Immutable):
         return np.asarray(columns.indices, dtype=np.int64)
 
     def directions(self, rows: sp.csr_array) -> Floats:
-        """Directions (p, d) in global axes of rows (p, n) that stand for the displacement of one point each."""
+        """Directions (p, d) in global axes of rows (p, n) that stand for the displacement of one point each.
+
+        Where the contact surface is known, what rows have beside it does not count: the other body of a pair.
+        """
         d = self.points.shape[1]
-        axes = np.tile(np.eye(d), (len(self.points), 1))
+        own = np.ones(len(self.points))
+        if self.facets is not None:
+            own[:] = 0.0
+            own[self.facets] = 1.0
+        axes = np.kron(own[:, None], np.eye(d))
         return np.asarray(rows @ (self.motion.T @ axes))
 
     def displacements(self, u: ArrayLike) -> Floats:

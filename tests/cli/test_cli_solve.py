@@ -5,11 +5,12 @@ import os
 from inspect import signature
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import assert_refused, run
 from typer.testing import CliRunner
 
-from enumsol import enumerate_roots, fem, read_problem
+from enumsol import InvalidProblemError, enumerate_roots, fem, read_problem
 from enumsol.cli.app import app
 from enumsol.cli.solve import MESH_OPTIONS
 
@@ -175,6 +176,57 @@ def test_bad_calls_get_one_sentence(here, capsys, arguments, part):
         os.mkfifo(here / name)
     (here / "dangling.msh").symlink_to(here / "nothing")
     assert_refused(*run(capsys, *arguments), part)
+
+
+PAIR = ("--young", "2.5", "--poisson", "0.25", "--friction", "0.3", "--clamp", "roof", "--clamp", "floor")
+
+
+@pytest.fixture
+def two_bodies(here):
+    """A square on another one, in one file."""
+    meshio = pytest.importorskip("meshio")
+    points = [[x, y] for y in (0, 1, 1, 2) for x in (0, 1)]
+    cells = [("quad", [[0, 1, 3, 2], [4, 5, 7, 6]]), ("line", [[0, 1], [2, 3], [4, 5], [6, 7]])]
+    tags = {"gmsh:physical": [[9, 9], [1, 2, 3, 4]], "gmsh:geometrical": [[1, 1], [1, 2, 3, 4]]}
+    names = {name: np.array([k + 1, 1]) for k, name in enumerate(("floor", "lower", "upper", "roof"))}
+    meshio.write("two.msh", meshio.Mesh(points, cells, cell_data=tags, field_data=names), "gmsh22", binary=False)
+    return here
+
+
+def test_a_pair_is_the_same_by_option_file_and_call(two_bodies, capsys):
+    text = (
+        "mesh = 'two.msh'\nyoung = 2.5\npoisson = 0.25\nfriction = 0.3\nclamp = ['roof', 'floor']\n"
+        "contact_pair = [['upper', 'lower', -0.01]]\n"
+    )
+    (two_bodies / "two.toml").write_text(text)
+    status, out, _ = run(capsys, "solve", "two.msh", *PAIR, "--pair", "upper:lower:-0.01", "-o", "two.npz")
+    assert status == 0
+    assert "complete: yes (proven" in out
+    direct = fem.mesh_problem(
+        "two.msh", young=2.5, poisson=0.25, friction=0.3, clamp=["roof", "floor"], pairs=[("upper", "lower", -0.01)]
+    )
+    assert read_problem("two.npz").fingerprint == direct.fingerprint == fem.read_mesh_problem("two.toml").fingerprint
+    status, out, _ = run(capsys, "solve", "two.msh", *PAIR, "--pair", "upper:lower", "--pressure", "right=0")
+    assert status == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("upper", "--pair is upper; expected NAME:NAME, or NAME:NAME:GAP"),
+        ("upper:lower:x", "--pair is upper:lower:x; expected numbers such as 0.5"),
+        ("upper:low", "the mesh has no facets named 'low'; expected one of"),
+        ("roof:floor", "roof of the pair roof:floor has no node that faces a facet of floor along its normal"),
+    ],
+)
+def test_bad_pairs_on_the_command_line(two_bodies, capsys, text, part):
+    assert_refused(*run(capsys, "solve", "two.msh", *PAIR, "--pair", text), part)
+
+
+def test_a_pair_is_called_by_one_name_in_a_file(two_bodies):
+    (two_bodies / "two.toml").write_text("mesh = 'two.msh'\ncontact_pair = []\npairs = []\n")
+    with pytest.raises(InvalidProblemError, match="contact_pair and pairs are given; expected one of both"):
+        fem.read_mesh_problem("two.toml")
 
 
 def test_help_names_every_option_of_mesh_problem():
