@@ -188,6 +188,18 @@ def test_weights_between_nodes_are_the_shape_functions(nodes, weights):
     assert np.allclose(seen.gaps, 0.2)
 
 
+@pytest.mark.parametrize(("heights", "gap"), [((0.5, 0.2), 0.2), ((0.2, 0.5), 0.2), ((-0.1, 0.3), -0.1)])
+def test_of_several_facets_the_nearest_counts(heights, gap):
+    """A node at height 0 above two shelves of one part, one behind the other."""
+    points = np.array([[0.5, 0.0], *([x, -height] for height in heights for x in (0, 1))])
+    facets, outward = np.array([[1, 2], [3, 4]]), np.tile([0.0, 1.0], (5, 1))
+    seen = faced(points, np.array([0]), np.array([[0.0, -1.0]]), facets, outward, facets[:0])
+    assert np.allclose(seen.gaps, gap)
+    outward[1 + 2 * int(np.argmin(np.abs(heights))) :][:2] *= -1  # the nearest one turns its back to the node
+    seen = faced(points, np.array([0]), np.array([[0.0, -1.0]]), facets, outward, facets[:0])
+    assert np.allclose(seen.gaps, max(heights))
+
+
 @pytest.mark.parametrize("kind", SOLID_KINDS)
 def test_linear_fields_are_interpolated_exactly_in_3d(kind):
     """On boxes turned in space: weights times positions are where the line along the normal meets the plane."""
