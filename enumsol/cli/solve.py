@@ -28,7 +28,7 @@ class Given(NamedTuple):
     ----------
     panel, metavar, help : in the help
     read : function of the text, or of the texts, and the option's name
-    repeated : whether it may be given several times
+    repeated : whether it may be given several times; then ``read`` takes a list
     """
 
     panel: str
@@ -99,6 +99,19 @@ def _pairs(texts: list[str], option: str) -> list[list[Any]]:
     return pairs
 
 
+def _each(read: Callable[[str, str], Any]) -> Callable[[list[str], str], Any]:
+    """Reads one value, or values by the names of parts, of texts NAME=VALUE."""
+
+    def of_texts(texts: list[str], option: str) -> Any:
+        if any("=" in text for text in texts):
+            return _by_part(texts, option, read)
+        if len(texts) > 1:
+            raise InvalidArgumentError(f"{option} is given {len(texts)} times; expected one value, or NAME=VALUE each")
+        return read(texts[0], option)
+
+    return of_texts
+
+
 def _obstacle(text: str, option: str) -> dict[str, Any]:
     return _by_part([text], option)
 
@@ -115,15 +128,30 @@ MESH_OPTIONS = {
         _pairs,
         True,
     ),
-    "young": Given(_BODY, "E", "Young's modulus [force / length^2].", _number),
-    "poisson": Given(_BODY, "NU", "Poisson's ratio.", _number),
-    "plane": Given(_BODY, "strain|stress", "In 2D, plane strain or plane stress; default: strain.", _plane),
-    "friction": Given(
-        _BODY, "F0[,F1]", "Coefficient of friction F0 + alpha F1; default: 0,1, which is alpha itself.", _one_or_two
+    "young": Given(
+        _BODY, "[NAME=]E", "Young's modulus [force / length^2], by parts of the body.", _each(_number), True
     ),
-    "friction2": Given(_BODY, "F0[,F1]", "In 3D, coefficient of friction along the second axis.", _one_or_two),
+    "poisson": Given(_BODY, "[NAME=]NU", "Poisson's ratio, by parts of the body.", _each(_number), True),
+    "plane": Given(
+        _BODY, "[NAME=]strain|stress", "In 2D, plane strain or plane stress; default: strain.", _each(_plane), True
+    ),
+    "thickness": Given(
+        _BODY, "[NAME=]LENGTH", "In 2D, thickness; by default all forces are per unit thickness.", _each(_number), True
+    ),
+    "friction": Given(
+        _BODY,
+        "[NAME=]F0[,F1]",
+        "Coefficient of friction F0 + alpha F1, by contact parts; default: 0,1, which is alpha itself.",
+        _each(_one_or_two),
+        True,
+    ),
+    "friction2": Given(
+        _BODY, "[NAME=]F0[,F1]", "In 3D, coefficient of friction along the second axis.", _each(_one_or_two), True
+    ),
     "axis": Given(_BODY, "x,y,z", "In 3D, direction of the first axis of friction.", _numbers),
-    "gap": Given(_BODY, "LENGTH", "Initial gap; negative is a press fit.", _number),
+    "gap": Given(
+        _BODY, "[NAME=]LENGTH", "Initial gap, by contact parts; negative is a press fit.", _each(_number), True
+    ),
     "obstacle": Given(
         _BODY,
         "KIND=NUMBERS",
@@ -150,7 +178,9 @@ MESH_OPTIONS = {
     "load_slope": Given(_LOAD, _PULL, "The same, times alpha.", _by_part, True),
     "pressure": Given(_LOAD, "NAME=P", "Force per area into the body.", _number_by_part, True),
     "pressure_slope": Given(_LOAD, "NAME=P", "The same, times alpha.", _number_by_part, True),
-    "body_force": Given(_LOAD, "fx,fy[,fz]", "Force per volume, such as the weight.", _numbers),
+    "body_force": Given(
+        _LOAD, "[NAME=]fx,fy[,fz]", "Force per volume, such as the weight, by parts of the body.", _each(_numbers), True
+    ),
 }
 
 

@@ -91,10 +91,14 @@ class NodalBasis:
     ----------
     blocks : tuple of Block
     shape : (N, dimension)
+    thickness : (M,) array or None
+        Of a plane body by cells, with which stiffness, tractions and forces per volume are multiplied; None: of one
+        [length].
     """
 
     blocks: tuple[Block, ...]
     shape: tuple[int, int]
+    thickness: Floats | None = None
 
     def matrix(self, form: Any) -> sp.csc_array:
         """The matrix of a bilinear form of scikit-fem, made exactly symmetric."""
@@ -128,7 +132,13 @@ class NodalBasis:
         total = np.zeros(self.shape)
         for block, numbers in zip(self.blocks, self.facet_numbers(facets, name), strict=True):
             if len(numbers):
-                integrals = LinearForm(form).assemble(block.on_facets(numbers, lumped=lumped))
+                basis = block.on_facets(numbers, lumped=lumped)
+                if self.thickness is None:
+                    integrals = LinearForm(form).assemble(basis)
+                else:
+                    of_facets = self.thickness[block.rows][block.basis.mesh.f2t[0, numbers]]
+                    scaled = LinearForm(lambda v, w: w.thickness * form(v, w))
+                    integrals = scaled.assemble(basis, thickness=of_facets[:, None])
                 total[block.nodes] += np.asarray(integrals)[block.dofs]
         return total
 
@@ -168,23 +178,35 @@ class NodalBasis:
                     known[key] = (k, number)
         return known
 
-    def stiffness(self, lam: float, mu: float) -> sp.csc_array:
-        """Stiffness of a linear elastic body with these Lame coefficients, in 2D in plane strain."""
+    def stiffness(self, lam: float | Floats, mu: float | Floats) -> sp.csc_array:
+        """Stiffness of a linear elastic body with these Lame coefficients, of all cells or of each, in plane strain."""
         from skfem import BilinearForm  # as below
         from skfem.helpers import ddot, div, sym_grad
         from skfem.models.elasticity import linear_elasticity
 
-        def energy(u: Any, v: Any, _: Any) -> Any:
+        def energy(u: Any, v: Any, w: Any) -> Any:
             # as linear_elasticity has it, which makes an identity of every quadrature point and is slow in 3D
-            return lam * div(u) * div(v) + 2.0 * mu * ddot(sym_grad(u), sym_grad(v))
+            return w.lam * div(u) * div(v) + 2.0 * w.mu * ddot(sym_grad(u), sym_grad(v))
 
-        form = linear_elasticity(lam, mu) if self.shape[1] == 2 else BilinearForm(energy)
+        uniform = np.ndim(lam) == 0 and self.thickness is None
+        factor = np.ones(()) if self.thickness is None else self.thickness
+        first, second = (np.broadcast_to(factor * value, self.count) for value in (lam, mu))
+
+        def of_block(block: Block) -> Any:
+            own = first[block.rows], second[block.rows]
+            if block.basis.Nbfun > _FEW:
+                return _solid_stiffness(block.basis, *own)
+            if uniform and self.shape[1] == 2:
+                return linear_elasticity(float(first[0]), float(second[0])).assemble(block.basis)
+            return BilinearForm(energy).assemble(block.basis, lam=own[0][:, None], mu=own[1][:, None])
+
         with np.errstate(over="ignore", invalid="ignore"):  # problems refuse what is not finite
-            return self._gathered(
-                lambda block: (
-                    _solid_stiffness(block.basis, lam, mu) if block.basis.Nbfun > _FEW else form.assemble(block.basis)
-                )
-            )
+            return self._gathered(of_block)
+
+    @property
+    def count(self) -> int:
+        """Number of cells."""
+        return sum(len(block.rows) for block in self.blocks)
 
     def volume_forces(self, density: Floats) -> Floats:
         """Nodal forces (N, dimension) of a force per volume that is constant on each cell, (M, dimension)."""
@@ -192,8 +214,9 @@ class NodalBasis:
         from skfem.helpers import dot
 
         form, total = LinearForm(lambda v, w: dot(w.density, v)), np.zeros(self.shape)
+        each = np.asarray(density) if self.thickness is None else self.thickness[:, None] * density
         for block in self.blocks:
-            of_block = np.asarray(density)[block.rows].T[:, :, None]
+            of_block = each[block.rows].T[:, :, None]
             total[block.nodes] += np.asarray(form.assemble(block.basis, density=of_block))[block.dofs]
         return total
 
@@ -254,13 +277,14 @@ def between_corners(element: Any) -> bool:
     return isinstance(getattr(element, "elem", element), ElementTetP2)
 
 
-def _solid_stiffness(basis: Any, lam: float, mu: float) -> sp.coo_array:
+def _solid_stiffness(basis: Any, lam: Floats, mu: Floats) -> sp.coo_array:
     """The same as of the form of the energy in 3D, for all pairs of functions of a cell at once."""
     # degrees of freedom of a cell are node by node, and a gradient is that of one component
     slopes = np.stack([basis.basis[j][0].grad[0] for j in range(0, basis.Nbfun, 3)])
     nodes, _, cells, points = slopes.shape
     G = slopes.transpose(2, 0, 1, 3).reshape(cells, 3 * nodes, points)
     T = ((G * basis.dx[:, None]) @ G.transpose(0, 2, 1)).reshape(cells, nodes, 3, nodes, 3)
+    lam, mu = lam[:, None, None, None, None], mu[:, None, None, None, None]
     K = lam * T + mu * T.transpose(0, 1, 4, 3, 2)
     K += mu * np.einsum("maibi,jk->majbk", T, np.eye(3))
     dofs = basis.element_dofs.T

@@ -22,6 +22,7 @@ from enumsol.support.messages import shortened
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     from enumsol.support.array_types import Floats, Integers, NDArray
 
@@ -58,7 +59,8 @@ def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -
     numbers for the new nodes. The third coordinate of a plane mesh is left out; it must be the same everywhere.
 
     Parts are the lines (in 3D triangles or quadrilaterals) that the file holds, by the names of their cell sets or
-    groups (a group without a name gets its number); without any groups all of them are named "boundary".
+    groups (a group without a name gets its number); without any groups all of them are named "boundary". Cells of the
+    body that belong to cell sets or groups are bodies of these names, for their materials.
     Named points and point sets are parts given by nodes; where all nodes of a facet on the boundary belong to a point
     set, the facet is a part of this name, too. Nodes that belong to no cell are left out, and the others numbered from
     0 in the order of the file.
@@ -68,7 +70,7 @@ def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -
     source : str, path-like or meshio.Mesh
         A gmsh (.msh) or .vtu file, or any other that meshio knows by its suffix.
     groups : str or None
-        Name of cell data (integers) by which facets are grouped instead, for formats without named groups.
+        Name of cell data (integers) by which facets and cells are grouped instead, for formats without named groups.
 
     Raises
     ------
@@ -197,7 +199,8 @@ def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
         )
     sets = {name: rows[rows >= 0] for name, rows in sets.items() if np.any(rows >= 0)}
     made = PartedMesh if dimension == 2 else SolidMesh
-    return made(nodes, inside, MappingProxyType(facets), MappingProxyType(sets))
+    named = _grouped(mesh, bodies, groups, dimension)
+    return made(nodes, inside, MappingProxyType(facets), MappingProxyType(sets), MappingProxyType(named))
 
 
 def _plane(points: NDArray[Any]) -> Floats:
@@ -229,7 +232,8 @@ def _node_sets(mesh: Any) -> dict[str, Integers]:
     for tag, names in _families(mesh, _FAMILIES[1]).items():
         of_family = np.flatnonzero(np.asarray(mesh.point_data[_FAMILIES[1]]) == tag)
         sets |= {name: np.union1d(sets.get(name, of_family), of_family) for name in names}
-    points = {name: rows.ravel() for name, rows in _grouped(mesh, "vertex", None, 0).items()}
+    vertices = _rows(mesh, "vertex")
+    points = {name: vertices[rows].ravel() for name, rows in _grouped(mesh, ["vertex"], None, 0).items()}
     return sets | points
 
 
@@ -238,16 +242,18 @@ def _named(mesh: Any, facet: str, groups: str | None, dimension: int) -> dict[st
     if groups is not None and groups not in mesh.cell_data:
         known = ", ".join(mesh.cell_data) or "none"
         raise InvalidArgumentError(f"groups is {shown(groups)}; expected the name of cell data (found {known})")
-    rows = [np.asarray(block.data).astype(np.int64) for block in mesh.cells if block.type == facet]
-    named = _grouped(mesh, facet, groups, dimension - 1)
-    if named or not rows or _node_sets(mesh):
-        return named
-    return {ALL: np.concatenate(rows)}
+    every = _rows(mesh, facet)
+    named = {name: every[rows] for name, rows in _grouped(mesh, [facet], groups, dimension - 1).items()}
+    return named if named or not len(every) or _node_sets(mesh) else {ALL: every}
 
 
-def _grouped(mesh: Any, kind: str, groups: str | None, dimension: int) -> dict[str, Integers]:
-    """Cells of a kind by the name of their cell set or group."""
-    rows = {k: np.asarray(block.data).astype(np.int64) for k, block in enumerate(mesh.cells) if block.type == kind}
+def _grouped(mesh: Any, kinds: Sequence[str], groups: str | None, dimension: int) -> dict[str, Integers]:
+    """Rows of the cells of some kinds, counted through all their blocks, by the name of their cell set or group."""
+    rows: dict[int, Integers] = {}
+    count = 0
+    for k, block in enumerate(mesh.cells):
+        if block.type in kinds:
+            rows[k] = np.arange(count, count := count + len(block.data))
     named: dict[str, list[Integers]] = {}
     if groups is None:
         for name, sets in mesh.cell_sets.items():
@@ -256,12 +262,18 @@ def _grouped(mesh: Any, kind: str, groups: str | None, dimension: int) -> dict[s
                     named.setdefault(name, []).append(rows[k][np.asarray(sets[k], dtype=np.int64)])
     data, names, numbered = _tags(mesh, list(rows), groups, dimension)
     if not named and data is not None:
-        for k, cells in rows.items():
-            tags = np.asarray(mesh.cell_data[data][k]).reshape(len(cells))
+        for k, own in rows.items():
+            tags = np.asarray(mesh.cell_data[data][k]).reshape(len(own))
             for tag in np.unique(tags):
                 for name in names.get(int(tag), [f"{tag:g}"] if numbered else []):
-                    named.setdefault(name, []).append(cells[tags == tag])
+                    named.setdefault(name, []).append(own[tags == tag])
     return {name: np.concatenate(parts) for name, parts in named.items()}
+
+
+def _rows(mesh: Any, kind: str) -> Integers:
+    """Nodes of all cells of a kind, in the numbers of the file."""
+    parts = [np.asarray(block.data).astype(np.int64) for block in mesh.cells if block.type == kind]
+    return np.concatenate(parts) if parts else np.zeros((0, 1), dtype=np.int64)
 
 
 def _tags(

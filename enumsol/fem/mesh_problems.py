@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import inspect
 import tomllib
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -15,7 +16,8 @@ from enumsol.fem.bases import nodal_basis
 from enumsol.fem.conditions import Held, by_part, check_held, names_of, part_forces, part_springs
 from enumsol.fem.construction import axes_of, problem_of
 from enumsol.fem.contacts import contacts_of
-from enumsol.fem.mesh_checks import lame, unit_vectors
+from enumsol.fem.materials import body_force_of, lame_of, of_rows, thickness_of
+from enumsol.fem.mesh_checks import unit_vectors
 from enumsol.fem.mesh_files import read_mesh
 from enumsol.fem.named_parts import PartedMesh
 from enumsol.fem.pairs import Pair
@@ -38,6 +40,8 @@ if TYPE_CHECKING:
 
     Names = str | Sequence[str]
     Vectors = Mapping[str, ArrayLike] | None
+    Plane = Literal["strain", "stress"]
+    Coefficient = float | Sequence[float]
 
 #: Largest TOML file that is read; one that describes a problem has a thousandth of that [bytes].
 LARGEST_FILE = 1_000_000
@@ -48,13 +52,14 @@ _PAIRS = "contact_pair"
 def mesh_problem(
     mesh: PartedMesh | str | os.PathLike[str] | Any,
     *,
-    young: float,
-    poisson: float,
+    young: float | Mapping[str, float],
+    poisson: float | Mapping[str, float],
     contact: Names = (),
     pairs: Sequence[Sequence[Any]] = (),
-    plane: Literal["strain", "stress"] = "strain",
-    friction: float | Sequence[float] = (0.0, 1.0),
-    friction2: float | Sequence[float] | None = None,
+    plane: Plane | Mapping[str, Plane] = "strain",
+    thickness: float | Mapping[str, float] = 1.0,
+    friction: Coefficient | Mapping[str, Coefficient] = (0.0, 1.0),
+    friction2: Coefficient | Mapping[str, Coefficient] | None = None,
     axis: ArrayLike | None = None,
     clamp: Names = (),
     symmetry: Names = (),
@@ -64,8 +69,8 @@ def mesh_problem(
     load_slope: Vectors = None,
     pressure: Mapping[str, float] | None = None,
     pressure_slope: Mapping[str, float] | None = None,
-    body_force: ArrayLike | None = None,
-    gap: float = 0.0,
+    body_force: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    gap: float | Mapping[str, float] = 0.0,
     obstacle: Mapping[str, Sequence[float]] | None = None,
     groups: str | None = None,
 ) -> ContactProblem | ContactProblem3D:
@@ -84,19 +89,24 @@ def mesh_problem(
     ----------
     mesh : PartedMesh, path, or meshio.Mesh
         What `read_mesh` returns or takes. Parts are called by their names.
-    young, poisson : float
-        Young's modulus [force / length^2] and Poisson's ratio [-].
+    young, poisson : float, or mapping of names to float
+        Young's modulus [force / length^2] and Poisson's ratio [-], of the whole body or of every part of it
+        (``mesh.bodies``).
     contact : name or names
         The contact boundary, in contact with a rigid foundation.
     pairs : sequence of (slave, master) or (slave, master, gap)
         Parts of two bodies that may touch each other. The nodes of the first part are the contact nodes; each is in
         contact with the point of a facet of the second part on the line along its normal (theory, section 11.8). Nodes
         that face no facet have no contact. The gap is the distance along the normal, or the one that is given [length].
-    plane : {"strain", "stress"}
-        In 2D; all forces and stiffnesses are per unit thickness.
-    friction : float or (F0, F1)
-        Coefficient F0 + alpha F1 [-].
-    friction2 : float or (F0, F1), optional
+    plane : {"strain", "stress"}, or mapping of names to them
+        In 2D, of the whole body or of every part of it.
+    thickness : float, or mapping of names to float
+        In 2D, of the whole body or of every part of it; all forces and stiffnesses are multiplied by it. By default
+        they are per unit thickness [length].
+    friction : float or (F0, F1), or mapping of names to them
+        Coefficient F0 + alpha F1 [-], of all contact nodes or of every contact part and of the first part of every
+        pair. A node of two parts has the coefficient of the one that `contact` names first.
+    friction2 : as friction, optional
         In 3D, coefficient along the second axis; default as the first.
     axis : (3,) array_like, optional
         In 3D, direction whose projection on the tangent plane is the first axis; default as `solid_contact_problem`.
@@ -112,11 +122,11 @@ def mesh_problem(
         Force per area (in 2D per length) in x, y (and z), and its derivative with respect to alpha [force / length^2].
     pressure, pressure_slope : mapping of names to float
         Force per area along the inward normal, and its derivative with respect to alpha [force / length^2].
-    body_force : vector, optional
-        Force per volume, such as the weight [force / length^3].
-    gap : float
-        Initial gap along the normals, in addition to the distance to the obstacle or within a pair; negative is a press
-        fit [length].
+    body_force : vector, or mapping of names to vectors, optional
+        Force per volume, such as the weight, on the whole body or on parts of it [force / length^3].
+    gap : float, or mapping of names to float
+        Of all contact nodes or, as friction, by parts, 0 for those that are not named. Initial gap along the normals,
+        in addition to the distance to the obstacle or within a pair; negative is a press fit [length].
     obstacle : mapping of one kind to numbers, optional
         The rigid foundation of the contact parts, where it does not have the shape of the body: ``{"plane": (x, y, nx,
         ny)}`` by a point and the direction from it to the body, ``{"circle": (x, y, r)}``, or ``{"hole": (x, y, r)}``,
@@ -149,22 +159,20 @@ def mesh_problem(
     """
     parted = mesh if isinstance(mesh, PartedMesh) else read_mesh(mesh, groups)
     dimension = parted.points.shape[1]
-    if dimension == 3 and plane != "strain":
-        raise InvalidArgumentError(f"plane is {shown(plane)} of a body in 3D; expected it for plane meshes only")
-    body = nodal_basis(parted.points, parted.cells)
+    coefficients = lame_of(parted, young, poisson, plane)
+    body = replace(nodal_basis(parted.points, parted.cells), thickness=thickness_of(parted, thickness))
     held = _held(parted, clamp, symmetry, displacement)
     contacts = contacts_of(body, parted, names_of(contact, "contact"), Pair.all_of(pairs), held, obstacle)
     nodes = contacts.rows
     forces = part_forces(body, parted, load, pressure)
     if body_force is not None:
-        density = short_vector(body_force, "body_force", dimension)
-        forces = forces + body.volume_forces(np.tile(density, (len(parted.cells), 1)))
+        forces = forces + body.volume_forces(body_force_of(parted, body_force))
     slope = part_forces(body, parted, load_slope, pressure_slope, "_slope")
     more: dict[str, Any] = {
-        "gap": contacts.gaps + finite_number(gap, "gap"),
+        "gap": contacts.gaps + of_rows(gap, "gap", contacts.parts, finite_number, 0.0),
         "node_ids": nodes.nodes.tolist(),
         "coordinates": parted.points[nodes.nodes],
-        **_coefficients(dimension, friction, friction2),
+        **_coefficients(dimension, contacts.parts, friction, friction2),
     }
     surface = contacts.facets if pairs else None
     if dimension == 3:
@@ -174,8 +182,7 @@ def mesh_problem(
     offset = held.supports.values
     springs = part_springs(body, parted, spring)
     check_held(parted, held.supports, springs)
-    coefficients = lame(young, poisson, plane)
-    A = sp.csc_array(body.stiffness(*coefficients) + springs)
+    A = sp.csc_array(body.stiffness(*coefficients.T) + springs)
     axes = _axes(nodes, axis, dimension)
     more |= _moved(nodes, axes, offset, more["gap"])
     slopes = slope.ravel() if np.any(slope) else None
@@ -290,14 +297,14 @@ def _moved(nodes: ContactNodes, axes: tuple[Floats, ...], values: Floats, gaps: 
     return {"gap": gaps + normal, "slip_offset": slips[0] if len(slips) == 1 else np.stack(slips, axis=1)}
 
 
-def _coefficients(dimension: int, friction: Any, second: Any) -> dict[str, Any]:
+def _coefficients(dimension: int, parts: Sequence[str], friction: Any, second: Any) -> dict[str, Any]:
     """F0 + alpha F1 as the arguments of the problem."""
-    F0, F1 = _line(friction, "friction")
+    F0, F1 = of_rows(friction, "friction", parts, _line).T
     if dimension == 2:
         if second is not None:
             raise InvalidArgumentError("friction2 is given for a plane body, which has one tangent; expected it in 3D")
         return {"friction": (F0, F1)}
-    G0, G1 = (F0, F1) if second is None else _line(second, "friction2")
+    G0, G1 = (F0, F1) if second is None else of_rows(second, "friction2", parts, _line).T
     return {"friction": (F0, G0), "friction_slope": (F1, G1)}
 
 

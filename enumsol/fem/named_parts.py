@@ -41,12 +41,27 @@ class PartedMesh:
         inside.
     node_sets : mapping of names to (k,) int arrays
         Nodes of parts that are given by nodes.
+    bodies : mapping of names to (k,) int arrays
+        Rows of the cells of named parts of the body: materials, or several bodies.
     """
 
     points: Floats
     cells: Integers
     facets: Mapping[str, Integers]
     node_sets: Mapping[str, Integers] = field(default_factory=lambda: MappingProxyType({}))
+    bodies: Mapping[str, Integers] = field(default_factory=lambda: MappingProxyType({}))
+
+    def body(self, name: str) -> Integers:
+        """Rows of the cells of this name.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There are none.
+        """
+        if name not in self.bodies:
+            raise self._unknown(name, "cells", self.bodies)
+        return self.bodies[name]
 
     def part(self, name: str) -> Integers:
         """Facets of this name.
@@ -84,6 +99,8 @@ class PartedMesh:
             hint = f" (give {' and '.join(several)} one by one)"
         elif [*known] == [ALL]:
             hint = " (the file names no parts of its boundary; in gmsh physical groups do)"
+        elif what == "cells":
+            hint = hint or " (in gmsh, physical groups of surfaces, in 3D of volumes, name parts of the body)"
         return InvalidArgumentError(
             f"the mesh has no {what} named {shown(name)}; expected one of {', '.join(known) or 'none'}{hint}"
         )
@@ -99,6 +116,8 @@ class PartedMesh:
             f"  cells   {', '.join(kinds)}",
             f"  facets  {parts}",
         ]
+        if self.bodies:
+            lines.insert(2, "  bodies  " + ", ".join(f"{name} ({len(rows)})" for name, rows in self.bodies.items()))
         if self.node_sets:
             lines.append("  nodes   " + ", ".join(f"{name} ({len(part)})" for name, part in self.node_sets.items()))
         return "\n".join(lines)
@@ -115,6 +134,6 @@ class SolidMesh(PartedMesh):
         Nodes of each tetrahedron (k = 4 or 10) or hexahedron (k = 8 or 27), in the order of VTK.
     facets : mapping of names to (k, m) int arrays
         Nodes of the triangles (m = 3 or 6) or quadrilaterals (m = 4 or 9) of parts of the boundary.
-    node_sets : mapping of names to (k,) int arrays
-        Nodes of parts that are given by nodes.
+    node_sets, bodies : mappings of names to (k,) int arrays
+        As in `PartedMesh`.
     """

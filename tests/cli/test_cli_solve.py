@@ -186,9 +186,10 @@ def two_bodies(here):
     """A square on another one, in one file."""
     meshio = pytest.importorskip("meshio")
     points = [[x, y] for y in (0, 1, 1, 2) for x in (0, 1)]
-    cells = [("quad", [[0, 1, 3, 2], [4, 5, 7, 6]]), ("line", [[0, 1], [2, 3], [4, 5], [6, 7]])]
-    tags = {"gmsh:physical": [[9, 9], [1, 2, 3, 4]], "gmsh:geometrical": [[1, 1], [1, 2, 3, 4]]}
+    cells = [("quad", [[0, 1, 3, 2]]), ("quad", [[4, 5, 7, 6]]), ("line", [[0, 1], [2, 3], [4, 5], [6, 7]])]
+    tags = {"gmsh:physical": [[1], [2], [1, 2, 3, 4]], "gmsh:geometrical": [[1], [2], [1, 2, 3, 4]]}
     names = {name: np.array([k + 1, 1]) for k, name in enumerate(("floor", "lower", "upper", "roof"))}
+    names |= {"pad": np.array([1, 2]), "disc": np.array([2, 2])}
     meshio.write("two.msh", meshio.Mesh(points, cells, cell_data=tags, field_data=names), "gmsh22", binary=False)
     return here
 
@@ -208,6 +209,46 @@ def test_a_pair_is_the_same_by_option_file_and_call(two_bodies, capsys):
     assert read_problem("two.npz").fingerprint == direct.fingerprint == fem.read_mesh_problem("two.toml").fingerprint
     status, out, _ = run(capsys, "solve", "two.msh", *PAIR, "--pair", "upper:lower", "--pressure", "right=0")
     assert status == 2
+
+
+def test_materials_and_friction_by_part_in_a_file_on_the_command_line_and_in_a_call(two_bodies, capsys):
+    text = (
+        "mesh = 'two.msh'\nyoung.pad = 5e3\nyoung.disc = 2e5\npoisson.pad = 0.45\npoisson.disc = 0.3\n"
+        "thickness.pad = 2.0\nthickness.disc = 1.0\nplane = 'stress'\n"
+        "friction.upper = 0.2\nfriction.floor = [0.1, 0.5]\n"
+        "gap.floor = 0.5\nbody_force.disc = [0, -1]\ncontact = 'floor'\ncontact_pair = [['upper', 'lower']]\n"
+        "clamp = 'roof'\nspring.lower = [1, 1]\n"
+    )
+    (two_bodies / "two.toml").write_text(text)
+    status, _, _ = run(
+        capsys, "solve", "two.msh", "--young", "pad=5e3", "--young", "disc=2e5", "--poisson", "pad=0.45", "--poisson",
+        "disc=0.3", "--thickness", "pad=2", "--thickness", "disc=1", "--plane", "stress", "--friction", "upper=0.2",
+        "--friction", "floor=0.1,0.5", "--gap", "floor=0.5", "--body-force", "disc=0,-1", "--contact", "floor",
+        "--pair", "upper:lower", "--clamp", "roof", "--spring", "lower=1,1", "-o", "two.npz",
+    )  # fmt: skip
+    assert status == 0
+    direct = fem.mesh_problem(
+        "two.msh", young={"pad": 5e3, "disc": 2e5}, poisson={"pad": 0.45, "disc": 0.3},
+        thickness={"pad": 2, "disc": 1}, plane="stress", friction={"upper": 0.2, "floor": (0.1, 0.5)},
+        gap={"floor": 0.5}, body_force={"disc": (0, -1)}, contact="floor", pairs=[("upper", "lower")], clamp="roof",
+        spring={"lower": (1, 1)},
+    )  # fmt: skip
+    assert direct.friction[0].tolist() == [0.1, 0.1, 0.2, 0.2]
+    assert read_problem("two.npz").fingerprint == direct.fingerprint == fem.read_mesh_problem("two.toml").fingerprint
+
+
+@pytest.mark.parametrize(
+    ("options", "part"),
+    [
+        (("--young", "1", "--young", "2"), "--young is given 2 times; expected one value, or NAME=VALUE each"),
+        (("--young", "pad=1", "--young", "2"), "--young is 2; expected NAME=NUMBERS"),
+        (("--young", "pad=1", "--young", "pad=2"), "--young is given twice for pad"),
+        (("--young", "1", "--thickness", "pad=x"), "--thickness is x; expected numbers"),
+    ],
+)
+def test_bad_materials_on_the_command_line(two_bodies, capsys, options, part):
+    command = ("solve", "two.msh", "--poisson", "0", "--pair", "upper:lower", "--clamp", "floor", "--clamp", "roof")
+    assert_refused(*run(capsys, *command, *options, "--friction", "0"), part)
 
 
 @pytest.mark.parametrize(
