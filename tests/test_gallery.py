@@ -60,6 +60,7 @@ def test_one_node_roots(alpha, count):
         assert normal == {OPEN: 0.0, STICK: pytest.approx(1.5), SLIP_MINUS: pytest.approx(1 / (alpha - 2))}
 
 
+@pytest.mark.slow
 def test_one_node_criterion():
     rng = np.random.default_rng(0)
     seen = set()

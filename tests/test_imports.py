@@ -77,6 +77,7 @@ def test_a_search_does_not_load_the_checker():
     assert not modules & {"enumsol.checker.verify", "enumsol.io", "enumsol.branches", "enumsol.continuation"}
 
 
+@pytest.mark.slow
 def test_a_problem_in_2d_loads_nothing_of_3d(tmp_path):
     code = "from concurrent.futures import ThreadPoolExecutor\nimport enumsol\nfrom enumsol import fem\n"
     code += "problem = enumsol.gallery.two_node_square()\nwith ThreadPoolExecutor(2) as executor:\n"
@@ -94,6 +95,7 @@ def test_a_problem_in_2d_loads_nothing_of_3d(tmp_path):
     assert not [name for name in modules if "space" in name or "3d" in name or name.startswith(("fem.so", "fem.su"))]
 
 
+@pytest.mark.slow
 def test_a_branch_graph_loads_algebra_and_graphs_only():
     code = "import enumsol; graph = enumsol.branch_graph(enumsol.gallery.two_node_square(), (0.0, 10.0)); "
     modules = modules_after(code + "assert graph.complete")
@@ -144,6 +146,7 @@ def test_the_factorization_keeps_no_copy_of_its_factors():
     assert np.array_equal(x, Factorization(problem.A).solve(problem.f))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the peak is read from /proc")
 def test_nothing_of_size_n_by_n_is_dense():
     code = (

@@ -40,6 +40,7 @@ def test_blocks_that_are_run_are_found():
         assert kinds.count("command") == len(re.findall(r"^    .*\benumsol [a-z]", text, re.MULTILINE)), path
 
 
+@pytest.mark.slow
 def test_tutorial(tutorial):
     printed = [text for kind, text in blocks(DOCS / "tutorial.md") if kind == "text"]
     outputs = [text for _, text in tutorial["outputs"]]
@@ -85,6 +86,7 @@ def test_branches_and_continuation(branches):
     assert {path.name for path in branches["folder"].iterdir()} >= {"branches.png", "graph.json", "POINTS.csv"}
 
 
+@pytest.mark.slow
 def test_three_dimensions(three_dimensions):
     assert three_dimensions["limit"].converged
     assert three_dimensions["weakening"].converged
@@ -102,6 +104,7 @@ def test_results(results):
     assert "complete: yes" in results["outputs"][-1][1]
 
 
+@pytest.mark.slow
 def test_reports(command_line):
     assert {path.name for path in command_line["folder"].iterdir()} == {
         "FILE",
@@ -112,6 +115,7 @@ def test_reports(command_line):
     }
 
 
+@pytest.mark.slow
 def test_histories(histories):
     assert {path.name for path in histories["folder"].iterdir()} >= {"loop.png", "node.html", "wedge.html", "map.png"}
     assert histories["history"].complete

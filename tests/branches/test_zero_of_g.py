@@ -50,7 +50,7 @@ def test_g_vanishes_by_load_and_offsets_together(p, zero, friction):
         assert (zero in ends_of_pieces(graph)) == (0 <= zero <= 10)
 
 
-@pytest.mark.few(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("zero", ZEROS, ids=str)
 def test_g_that_almost_vanishes(zero):
     rng = np.random.default_rng([5, zero.numerator + 3, zero.denominator])

@@ -332,7 +332,7 @@ def test_the_oracle_agrees_with_the_originals(name):
             assert not oracle.is_true(codes, side, ["h", part[1], 1], low)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "open" else []) for name in ORIGINALS]
 )
@@ -362,6 +362,7 @@ def test_an_arc_removed_with_its_events_is_refused(name):
             assert judge(name, changed) == (removed == 0)
 
 
+@pytest.mark.slow
 def test_proofs_of_degenerate_graphs_are_accepted():
     for push in (0.0, 1e-12):
         problem = pair(push)

@@ -57,7 +57,7 @@ def shifted(step):
     return lambda values: [value + step for value in values]
 
 
-@pytest.mark.few(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_changed_leaves_are_refused(seed):
     assert proven(seed)[2]
@@ -122,7 +122,7 @@ def test_leaves_that_are_left_out(seed):
     assert not report.complete
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("part", range(4))
 def test_random_changes(part):
     """Accepted, at most, where the box is one of the same root."""

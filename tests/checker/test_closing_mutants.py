@@ -15,7 +15,7 @@ from enumsol import enumerate_roots, verify
 from enumsol.checker.stability import stability_radius
 from enumsol.search import fathoming as closing, solvers
 
-MUTANTS = 150
+MUTANTS = 75
 
 
 @functools.cache
@@ -124,7 +124,7 @@ def accepted(problem, records):
 KINDS = ["a", "m", "M", "slides", "sides", "any theta"]
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_both_checkers_accept(kind):
     for problem, records in cases(kind):
@@ -230,6 +230,7 @@ def test_a_lone_root_is_no_other_and_no_wider():
                 assert not accepted(problem, whole) or check_records(problem, whole)
 
 
+@pytest.mark.slow
 def test_forged_counts_are_refused():
     for problem, records in cases("M"):
         for k in leaves(records, "M"):
@@ -239,6 +240,7 @@ def test_forged_counts_are_refused():
             assert not accepted(problem, [*records[:k], forged, *records[k + 1 : -1], footer])
 
 
+@pytest.mark.slow
 def test_a_root_counted_twice_is_refused():
     for problem, records in cases("m"):
         footer = {**records[-1], "roots": records[-1]["roots"] + 1}

@@ -77,7 +77,7 @@ def recount(records):
 def test_accepted_mutants_name_every_selection_that_holds(name):
     problem, original, holding = case(name)
     rng, accepted = np.random.default_rng([3, len(name)]), 0
-    for _ in range(120):
+    for _ in range(60):
         records = copied(original)
         for _ in range(int(rng.integers(1, 4))):
             with suppress(ValueError, TypeError, struct.error):  # it does not apply to what is left

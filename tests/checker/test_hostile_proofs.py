@@ -210,7 +210,7 @@ def test_what_the_writer_writes_is_far_from_these_bounds():
         assert longest < 0.1 * (proof_module.RECORD_SHARE * data.size + proof_module.SMALL)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["stopped", "graph in several pieces"])
 def test_the_header_comes_first(name, monkeypatch):
     other = gallery.clamped_block(8, 4)

@@ -90,6 +90,7 @@ def test_the_checker_imports_nothing_of_the_package():
     assert names == standard | {"flint", "numpy", *(module.__name__ for module in modules[1:])}
 
 
+@pytest.mark.slow
 def test_the_document_names_what_the_proofs_hold():
     text = DOCUMENT.read_text(encoding="utf-8")
     seen = [record for name in POINTS for record in point(name)[1]] + [r for name in GRAPHS for r in graph(name)[1]]
@@ -346,7 +347,7 @@ def test_another_alpha_makes_other_roots():
     assert refused(problem, [{**records[0], "alpha": "9/2"}, *records[1:]])
 
 
-@pytest.mark.few(3)
+@pytest.mark.slow
 @pytest.mark.parametrize("arcs", [True, False])
 @pytest.mark.parametrize("name", ["friction", "load", "both", "unloaded", "everything"])
 def test_forged_graph_proofs(name, arcs):

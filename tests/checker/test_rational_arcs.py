@@ -65,7 +65,7 @@ def test_forged_parts_that_hold_nothing(name):
             assert refused(problem, with_part(records, k, i, other)), other
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVENTFUL)
 def test_forged_events(name):
     problem, records, _ = graph(name)

@@ -181,6 +181,7 @@ def test_theta_that_does_not_serve(name):
     assert tried > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_balls_and_indices(name):
     _, records = proven(name)

@@ -86,6 +86,7 @@ def test_large_results_have_no_table_over_nodes(capsys):
     assert "... 61 more" in out
 
 
+@pytest.mark.slow
 def test_methods_and_jobs_agree(capsys):
     counts = []
     for options in ((), ("--arithmetic", "fast", "--method", "exhaustive"), ("--jobs", 2), ("--arithmetic", "exact")):
@@ -199,6 +200,7 @@ def test_all_solutions_in_3d(capsys, tmp_path):
     assert "open, stick, slip: how many" in out
 
 
+@pytest.mark.slow
 def test_jobs_in_3d(capsys, tmp_path):
     proof = tmp_path / "block.proof"
     status, out, _ = run(capsys, "roots", "gallery:block3d-9", "--alpha", 0.5, "--jobs", 2, "--proof", proof)

@@ -47,6 +47,7 @@ def test_long_tables_are_printed_as_runs(capsys):
     assert out.endswith("complete: not proven (0 undecided)\n")
 
 
+@pytest.mark.slow
 def test_table_as_json_and_with_jobs(capsys, tmp_path):
     file = tmp_path / "table.json"
     arguments = ("table", "gallery:two-node-6.5", "--from", 0, "--to", 9, "--samples", 7, "--json")
@@ -153,6 +154,7 @@ def test_a_graph_has_a_proof(capsys, tmp_path):
     assert not file.exists()
 
 
+@pytest.mark.slow
 def test_graph_plots_chosen_nodes_and_quantities(capsys, tmp_path):
     for ending, options in (("svg", ("--quantity", "u_t", "--nodes", "1")), ("pdf", ("--nodes", "0,1"))):
         file = tmp_path / f"graph.{ending}"
@@ -167,6 +169,7 @@ def test_graph_cut_short_is_status_3(capsys):
     assert out.splitlines()[-1].startswith("complete: no (")
 
 
+@pytest.mark.slow
 def test_graph_with_jobs(capsys, tmp_path):
     outputs = []
     for jobs in (1, 2):

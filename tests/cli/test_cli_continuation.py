@@ -44,6 +44,7 @@ def test_all_roots_and_none_twice(capsys):
     assert out.endswith("4 paths, 4 of them left the interval or closed\n")
 
 
+@pytest.mark.slow
 def test_follow_csv_names_columns_by_label(capsys, tmp_path):
     body = gallery.two_node_square()
     labels = ("toe", "heel")
@@ -151,6 +152,7 @@ def test_degenerate_starts(capsys):
     assert status == 0
 
 
+@pytest.mark.slow
 def test_follow_plots(capsys, tmp_path, graph):
     for options in ((), ("--graph", graph, "--quantity", "u_t", "--node", "0")):
         file = tmp_path / "path.png"

@@ -139,6 +139,7 @@ def test_stdout_that_nobody_reads(outcomes, name):
     assert status == 141
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["help", "roots csv"])
 def test_stdout_on_a_full_disk_from_a_shell(place, name):
     with open(FULL, "w") as full:
@@ -230,6 +231,7 @@ def test_an_fclib_file_on_a_full_disk(place):
         enumsol.write_problem(constant, place / "full.h5")
 
 
+@pytest.mark.slow
 def test_one_output_that_fails_keeps_no_other_back(place, tmp_path):
     good = {name: tmp_path / f"graph.{name}" for name in ("csv", "graphml", "proof", "png")}
     with open(FULL, "w") as full:

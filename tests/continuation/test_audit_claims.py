@@ -184,7 +184,7 @@ def test_what_is_said_against_a_cut_graph_is_true_of_the_complete_one(name):
     whole = branch_graph(problem, (0.0, 8.0))
     paths = follow_all(problem, (0.0, 8.0), graph=whole).paths
     on = cut_short = 0
-    for limit in range(1, 40):
+    for limit in (1, 2, 3, 5, 8, 13, 21, 39):
         graph = branch_graph(problem, (0.0, 8.0), max_nodes=limit)
         report = audit(paths, graph)
         assert report.complete == graph.complete

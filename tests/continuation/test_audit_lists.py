@@ -181,6 +181,7 @@ def test_points_with_few_digits_pass_with_the_tolerance_that_the_help_advises(gr
 # -- errors ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_errors_name_the_file_and_the_columns_found(capsys, tmp_path, frame, graph):
     file = tmp_path / "forces.csv"
     frame.rename(columns={"lambda_t_0": "lambda_T"})[["alpha", "lambda_n_0", "lambda_T"]].to_csv(file, index=False)

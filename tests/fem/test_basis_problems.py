@@ -109,6 +109,7 @@ def test_three_dimensions():
     assert np.allclose(found[0].lambda_t, found[1].lambda_t[places], rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_what_is_refused():
     basis, K = basis_of(skfem.ElementTriP1())
     good = {"basis": basis, "stiffness": K, "contact": "bottom", "held": basis.get_dofs("top")}

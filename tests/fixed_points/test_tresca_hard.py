@@ -68,7 +68,7 @@ def test_hard_problems_are_solved(rng, solver):
 @pytest.mark.slow
 def test_extreme_coefficients_are_solved_or_refused(rng):
     unsolved = 0
-    for _ in range(150):
+    for _ in range(60):
         problem, bound, F = hard(rng, [0, 1e-6, 0.5, 1e6])
         try:
             found = enumsol.solve_tresca(problem, bound, 0)
@@ -77,7 +77,7 @@ def test_extreme_coefficients_are_solved_or_refused(rng):
             continue
         S, g = problem.condensed.S, problem.condensed.free_displacements(0)
         assert violation(S, g, bound, F, found) < 1e-3
-    assert unsolved <= 7
+    assert unsolved <= 3
 
 
 def test_no_load_gives_no_forces_wherever_the_start_is(rng):

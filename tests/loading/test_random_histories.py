@@ -96,6 +96,7 @@ def compare(problem, alphas, arithmetic):
     return history
 
 
+@pytest.mark.few(20)
 @pytest.mark.parametrize("seed", range(60))
 def test_all_paths_of_small_problems(seed):
     problem, alphas = case(seed)
@@ -111,6 +112,7 @@ def test_all_paths_with_up_to_three_nodes(seed):
     compare(problem, alphas, "verified")
 
 
+@pytest.mark.slow
 def test_the_cases_branch_and_are_degenerate():
     found = [histories(*case(seed), arithmetic="exact") for seed in range(0, 60, 4)]
     assert sum(len(history.branchings) > 0 for history in found) > 4

@@ -93,7 +93,7 @@ def descend(rng, system, engine):
 def test_values_agree_with_an_interior_point_solver(seed):
     rng = np.random.default_rng(seed)
     seen = {"pruned": 0, "solved": 0}
-    for _ in range(25):
+    for _ in range(12):
         system = random_system(rng, int(rng.integers(1, 6)))
         for codes, node in descend(rng, system, ActiveSetEngine(system)):
             value = reference(system, codes)
@@ -104,7 +104,7 @@ def test_values_agree_with_an_interior_point_solver(seed):
             else:
                 assert node.bound == pytest.approx(value, abs=1e-6)
                 seen["solved"] += 1
-    assert min(seen.values()) > 15
+    assert min(seen.values()) > 7
 
 
 @pytest.mark.few(3)

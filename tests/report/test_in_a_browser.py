@@ -179,6 +179,7 @@ def test_more_solutions_than_fit_are_on_further_pages(browser, pages):
     assert browser.complaints() == []
 
 
+@pytest.mark.slow
 def test_a_graph_cut_short_never_counts_as_complete(browser, pages):
     browser.size(1280, 900)
     browser.open(pages["cut"])

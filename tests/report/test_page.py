@@ -33,6 +33,7 @@ def wedge_page(wedge, tmp_path_factory):
     return page_of(wedge, tmp_path_factory.mktemp("wedge"), title="Wedge in a notch", units=("N", "mm"))
 
 
+@pytest.mark.slow
 def test_the_numbers_are_those_of_the_graph(wedge, wedge_page):
     data = data_of(wedge_page)
     p = wedge.problem.p

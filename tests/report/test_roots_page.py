@@ -52,6 +52,7 @@ def pages(found, tmp_path_factory):
 # -- the text of the page ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["wedge", "plane"])
 def test_bodies_and_forces_are_those_of_the_roots(found, pages, name):
     data, roots = data_of(pages[name].read_text()), found[name]

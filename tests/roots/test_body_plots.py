@@ -143,6 +143,7 @@ def test_bodies_with_cells_of_two_kinds(kind, tmp_path):
     assert enumsol.read_problem(tmp_path / "p.npz").fingerprint == problem.fingerprint
 
 
+@pytest.mark.slow
 def test_bodies_in_space_are_compared_in_one_view():
     problem = enumsol.gallery.get("wedge3d-4-9").build()
     roots = enumsol.enumerate_roots(problem, 3.0)

@@ -33,7 +33,7 @@ def check(problem, rng, methods=METHODS):
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize(("seed", "sizes", "count"), [(0, (1, 2), 70), (10, (1, 2), 130), (1, (3,), 30)])
+@pytest.mark.parametrize(("seed", "sizes", "count"), [(0, (1, 2), 50), (10, (1, 2), 60), (1, (3,), 15)])
 def test_integer_data(seed, sizes, count):
     rng = np.random.default_rng(seed)
     merged = 0
@@ -44,9 +44,10 @@ def test_integer_data(seed, sizes, count):
     assert merged >= count / 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "sizes", "count"),
-    [(2, (1, 2), 20), *(pytest.param(*more, marks=pytest.mark.slow) for more in ((12, (1, 2), 100), (3, (3,), 15)))],
+    [(2, (1, 2), 20), *(pytest.param(*more, marks=pytest.mark.slow) for more in ((12, (1, 2), 50), (3, (3,), 8)))],
 )
 def test_singular_selections(seed, sizes, count):
     rng = np.random.default_rng(seed)
@@ -80,7 +81,7 @@ def test_near_coincidences_in_exact_arithmetic():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [5, 6, 7])
+@pytest.mark.parametrize("seed", [5, 6])
 def test_tree_equals_exhaustive_next_to_coincidences_in_fast_arithmetic(seed):
     # around the tolerance neither is right, but a root that one method accepts must not be pruned by the other
     rng = np.random.default_rng(seed)

@@ -67,7 +67,7 @@ def check(problem, alpha, roots, S, g, F, wanted):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 3])
+@pytest.mark.parametrize("seed", [0])
 def test_one_node_against_the_closed_form(seed):
     rng = np.random.default_rng(seed)
     counts, kinds = set(), set()

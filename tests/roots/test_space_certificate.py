@@ -121,8 +121,8 @@ def compared(seed):
     return True
 
 
-@pytest.mark.few(1)
-@pytest.mark.parametrize("part", range(5))
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(3))
 def test_the_same_as_the_tree(part):
     did = [compared(seed) for seed in range(40 * part, 40 * part + 40)]
     assert sum(did) > 15
@@ -241,7 +241,7 @@ def served(root, F):
     return np.where(length > 1 - 1e-9, theta / np.maximum(length, 0.1), theta)
 
 
-@pytest.mark.few(3)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, roots in RANDOM.items() if roots > 1], ids=str)
 def test_no_numbers_close_a_problem_with_several_roots(name):
     """Whatever is proposed for any of its roots, the right theta among it."""

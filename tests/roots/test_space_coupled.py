@@ -9,7 +9,7 @@ import enumsol
 from enumsol import enumerate_roots
 
 
-@pytest.mark.few(2)
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "p"), [(4, 2), (6, 2), (3, 3), (6, 3)])
 def test_newton_from_many_starts_finds_no_other(seed, p):
     rng = np.random.default_rng(seed)

@@ -129,6 +129,7 @@ def test_axes_turned_at_every_node(case):
         check(start, Q @ S @ Q.T, Q @ g, isotropic, lambda lam, Q=Q: Q @ lam)
 
 
+@pytest.mark.slow
 def test_a_quarter_turn_with_the_coefficients_exchanged(case):
     S, g, F, before = case
     turn = [0, 1, 4, 5, 2, 3]

@@ -261,6 +261,7 @@ def integers(seed):
     return enumsol.ContactProblem3D(A, rows[:3], rows[3:6], rows[6:], f, friction=(F, F))
 
 
+@pytest.mark.slow
 def test_the_reason_is_what_stands_in_the_way_and_the_hint_helps():
     perturb = "perturb the load, by 1e-4 of its largest entry, say"
     wedging = from_compliance(*(np.array(part, dtype=float) for part in RAY), (np.ones(1), np.ones(1)))

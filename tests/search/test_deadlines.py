@@ -299,7 +299,7 @@ def test_wherever_the_time_is_over_nothing_false_is_claimed(name, monkeypatch):
     }[name]()
     whole, ticks, ended = branch_graph(problem, interval), count(), set()
     assert whole.complete
-    for limit in np.unique(np.geomspace(1, 2000, 14).astype(int)).tolist():
+    for limit in np.unique(np.geomspace(1, 2000, 8).astype(int)).tolist():
         with monkeypatch.context() as patch:
             patch.setattr("time.perf_counter", lambda: float(next(ticks)))
             graph = branch_graph(problem, interval, time_limit=limit)

@@ -127,6 +127,7 @@ def test_interruption_keeps_what_was_found(method):
     assert isinstance(caught.value, KeyboardInterrupt)
 
 
+@pytest.mark.slow
 def test_processes():
     # spawn: nothing is inherited, everything travels by pickle
     context = multiprocessing.get_context("spawn")

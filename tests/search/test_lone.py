@@ -55,7 +55,7 @@ def problems(seed):
     return from_condensed(S, random_load(rng, p) if g is None else g, F)
 
 
-@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 5))])
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 3))])
 def test_all_selections_find_the_same(part):
     lone = several = 0
     for seed in range(40 * part, 40 * part + 40):
@@ -78,10 +78,9 @@ def test_all_selections_find_the_same(part):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", [0, pytest.param(1, marks=pytest.mark.slow)])
-def test_the_tree_without_them_finds_the_same(part):
+def test_the_tree_without_them_finds_the_same():
     fewer = 0
-    for seed in range(60 * part, 60 * part + 60):
+    for seed in range(50):
         rng = np.random.default_rng([25, seed])
         p = int(rng.integers(4, 9))
         problem = random_problem(rng, p) if seed % 2 else touching_problem(rng, p)

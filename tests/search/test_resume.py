@@ -161,6 +161,7 @@ def test_a_whole_proof_leaves_nothing_to_search(name, tmp_path):
         assert "from the file, nothing was left to search" in repr(found)
 
 
+@pytest.mark.slow
 @settings(QUICK, max_examples=25)
 @given(data=st.data())
 def test_a_file_cut_anywhere(data, tmp_path_factory):
@@ -185,6 +186,7 @@ def test_as_much_is_taken_as_the_file_holds(name, tmp_path):
     assert taken[-1] == len(records)
 
 
+@pytest.mark.slow
 @settings(QUICK, max_examples=60)
 @given(seed=st.integers(0, 2**32), name=st.sampled_from(list(PROBLEMS)))
 def test_a_forged_file_never_gives_a_wrong_answer(seed, name, tmp_path_factory):

@@ -124,6 +124,7 @@ def check_cut_short(partial, many):
     assert report.undecided == sum(record[0] == "u" for record in records_of(partial.proof)[1:-1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limits", [{"stop_after": 2}, {"max_nodes": 3}, {"time_limit": 1e-9}])
 def test_limits(limits, executors, many):
     roots = enumerate_roots(many[0], 0, executor=executors[0], **limits)

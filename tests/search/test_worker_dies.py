@@ -282,6 +282,7 @@ def test_workers_end_with_a_command_that_is_killed(tmp_path):
         time.sleep(0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the worker is found in /proc")
 def test_a_worker_killed_from_outside(tmp_path):
     # 3^6 roots; the worker is killed as soon as it is there

@@ -31,7 +31,7 @@ def studies(monkeypatch):
     monkeypatch.syspath_prepend(Path(__file__).parents[2] / "studies")
 
 
-@pytest.mark.few(3)
+@pytest.mark.slow
 @pytest.mark.parametrize("group", SOME)
 def test_cases_of_the_study_are_right(group):
     from extremes.run import CASES

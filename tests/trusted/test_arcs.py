@@ -89,8 +89,8 @@ def check_claims(count, start=0):
 
 @pytest.mark.slow
 def test_claims_over_parts_are_true():
-    made = check_claims(300)
-    assert min(made.values()) > 20, made
+    made = check_claims(150)
+    assert min(made.values()) > 10, made
 
 
 def check_errors(count, start=0):
@@ -191,6 +191,7 @@ def test_single_alphas():
     assert regular > 150
 
 
+@pytest.mark.slow
 def test_an_interval_of_two_neighbouring_floats_and_one_of_any_length():
     for _, selection, truth in selections(60):
         for low, high in ((1.0, float(np.nextafter(1.0, 2.0))), (-1e6, 1e9), (0.0, 5e-324), (1e300, 1.7e308)):

@@ -39,7 +39,7 @@ def boxed(seed):
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("part", range(6))
+@pytest.mark.parametrize("part", range(3))
 def test_known_solutions_lie_in_their_boxes(part):
     found = 0
     for seed in range(40 * part, 40 * part + 40):
@@ -76,7 +76,7 @@ def natural(problem, y):
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize("part", range(2))
 def test_steps_stay_within_their_bounds(part):
     """y - Y N(y) - c is what (12.13) says, and contracts, at random points of sets of all sizes."""
     rng, tried = np.random.default_rng(part), 0

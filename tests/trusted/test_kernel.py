@@ -238,6 +238,7 @@ def _check_selection(system, S, g, F, codes):
     return ball.is_root or ball.is_excluded
 
 
+@pytest.mark.slow
 def test_selections_hold_the_exact_solution():
     rng = np.random.default_rng(8)
     for p, count in ((1, 20), (2, 15), (3, 3)):

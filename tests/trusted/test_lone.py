@@ -98,7 +98,7 @@ def cases(seeds):
                     yield rng, case, codes, root[0], given
 
 
-@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 4))])
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 2))])
 def test_what_is_proven_is_so(part):
     proven = squares = several = 0
     for _, case, codes, selection, given in cases(range(45 * part, 45 * part + 45)):
@@ -136,7 +136,7 @@ def changed(rng, case, codes, given):
     return tuple(codes), [weights, strengths, rows, values]
 
 
-@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 4))])
+@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 2))])
 def test_what_is_changed_is_refused_or_true(part):
     refused = accepted = 0
     for rng, case, codes, selection, given in cases(range(45 * part, 45 * part + 45)):
@@ -160,7 +160,7 @@ def test_a_wrong_test_is_seen(wrong, monkeypatch):
     else:
         monkeypatch.setattr(lone, "_allowed", lambda *_: True)
     false = 0
-    for _, case, codes, selection, given in cases(range(120)):
+    for _, case, codes, selection, given in cases(range(60)):
         strengths = given[1].copy()
         free = [i for i in range(case.p) if codes[i] > 5 and selection[i] != 0]
         strengths[0, free] = 1e3 if wrong != "narrow gaps" else 50.0 * strengths[0, free]
@@ -168,12 +168,12 @@ def test_a_wrong_test_is_seen(wrong, monkeypatch):
         if lone_root(case.system, codes, selection, *given) is not None:
             reason = case.judged(codes, selection, *given)
             false += reason is not None
-    assert false > 5
+    assert false > 2
 
 
 @pytest.mark.slow
 def test_gaps_hold_at_all_roots():
-    for _, case, codes, _selection, (_, _, rows, values) in cases(range(120)):
+    for _, case, codes, _selection, (_, _, rows, values) in cases(range(60)):
         bounds = gaps(case.system, codes, rows, values)
         for other, root in case.roots:
             if KnownRoot(other, root.force.mid, root.w.mid).below(codes):

@@ -65,7 +65,7 @@ def a_member(enclosed, rng):
 @pytest.mark.parametrize("degenerate", [False, True])
 def test_solutions_for_all_data_lie_in_the_balls(degenerate):
     rng, concluded, nearest = np.random.default_rng(4), {SpaceRoot: 0, OnlySolution: 0}, 0.0
-    for _ in range(120):
+    for _ in range(60):
         solvers = random_solvers(rng, degenerate)
         width = 10.0 ** rng.uniform(-9, -3.5)
         S, g = solvers.enclosed.S, solvers.enclosed.g
@@ -91,8 +91,8 @@ def test_solutions_for_all_data_lie_in_the_balls(degenerate):
                 assert np.all(np.abs(slips - found.w.mid) <= found.w.rad + 1e-8)
                 if isinstance(found, OnlySolution):
                     statuses(found, y, w, taus)
-    assert concluded[OnlySolution] > 40
-    assert degenerate or concluded[SpaceRoot] > 40
+    assert concluded[OnlySolution] > 20
+    assert degenerate or concluded[SpaceRoot] > 20
     # balls are not so wide that this would not tell
     assert nearest > 0.02
 
