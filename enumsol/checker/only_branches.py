@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.proof.reading import numbers_from
-from enumsol.trusted.arcs.only_branch import PieceNumbers, only_roots
+from enumsol.trusted.arcs.only_branch import only_roots
 from enumsol.trusted.arcs.selection_balls import ArcSelection
+from enumsol.trusted.piece_form import PieceNumbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

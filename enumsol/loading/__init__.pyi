@@ -7,3 +7,4 @@ from .map_rows import MapFold as MapFold, MapRow as MapRow
 from .maps import MultiplicityMap as MultiplicityMap, multiplicity_map as multiplicity_map
 from .stages import Stage as Stage
 from .steps import LoadStep as LoadStep
+from .strips import MapStrip as MapStrip

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fractions import Fraction
 
+    from enumsol.support.arguments import Alpha
+
 
 @dataclass(frozen=True)
 class MapFold:
@@ -58,3 +60,12 @@ class MapRow:
     limit: float | None
     unique: bool | None
     seconds: float
+
+    def count_at(self, alpha: Alpha) -> int:
+        """Number of solutions at an alpha of the interval; a lower bound where the row is not exact."""
+        for k, critical in enumerate(self.alphas):
+            if alpha == critical:
+                return self.at_alphas[k]
+            if alpha < critical:
+                return self.between[k - 1]
+        return self.between[-1]

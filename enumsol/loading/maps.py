@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from enumsol.branches.construction import branch_graph
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.loading.map_rows import MapFold, MapRow
+from enumsol.loading.strips import map_strip, ranges_of_one
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import (
     alpha_interval,
@@ -21,6 +23,7 @@ from enumsol.support.arguments import (
     file_path,
     finite_number,
     instance_of,
+    nonnegative_integer,
     optional_callable,
     optional_executor,
     optional_seconds,
@@ -33,14 +36,18 @@ from enumsol.support.messages import counted
 from enumsol.support.workers import Crew
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from concurrent.futures import Executor
     from pathlib import Path
 
     import pandas as pd
 
+    from enumsol.loading.strips import MapStrip
     from enumsol.support.arguments import Alpha, AlphaLike
     from enumsol.support.workers import Job
+
+    #: A function, what makes its arguments once it is called, and what takes its result.
+    _Call = tuple[Callable[..., Any], Callable[[], tuple[Any, ...]], Callable[[Any], None]]
 
 _EXPECTED = (
     'expected {"friction": values}, {"gap": values}, {"load": (direction, values)}, or a pair of a function of a value '
@@ -56,9 +63,13 @@ def multiplicity_map(
     executor: Executor | None = None,
     progress: Callable[[int, int], object] | None = None,
     time_limit: float | None = None,
+    max_boxes: int = 200,
     **options: Any,
 ) -> MultiplicityMap:
     """The number of solutions over alpha and a second parameter: a branch graph at every value of the latter.
+
+    Between two neighbouring values, where both have one solution, it is proven as far as one certificate goes that
+    every problem between them has exactly one, too (theory, section 13.5). Nothing else is known there.
 
     Parameters
     ----------
@@ -77,6 +88,9 @@ def multiplicity_map(
         Called with the numbers of values done and of all.
     time_limit : float, optional
         Stop after this many seconds; what was done by then is kept.
+    max_boxes : int
+        Rectangles of alpha and the second parameter that are tried between two neighbouring values; 0: none, and
+        nothing is proven there. Nor is it with ``make``, or in arithmetic "fast".
     **options
         Of `branch_graph`: ``arithmetic``, ``max_nodes``.
 
@@ -98,10 +112,10 @@ def multiplicity_map(
     >>> found = enumsol.multiplicity_map(square, (0, 5), {"gap": [0, 0.1]})
     >>> print(found)
     MultiplicityMap over gap, 2 values, alpha in [0, 5]
-         gap  solutions  unique until
-           0  1 5 3                 3
+         gap  solutions  unique until  to the next value
+           0  1 5 3                 3               36 %
          0.1  1 3 5            3.6087
-    complete: yes (proven at these values; says nothing about those between)
+    complete: yes (proven at these values; says nothing about those between, but for one solution over 36 % of alpha)
     """
     interval = alpha_interval(alphas, "alphas")
     name, make, values = _parameter(problem, over)
@@ -109,12 +123,12 @@ def multiplicity_map(
     optional_callable(progress, "progress")
     if "interval" in options or "progress" in options:
         raise InvalidArgumentError("interval and progress are no options here; expected those of branch_graph")
-    work = _Rows(name, interval, values, make, options, optional_seconds(time_limit))
+    most = nonnegative_integer(max_boxes, "max_boxes")
+    if not isinstance(make, _Replaced) or options.get("arithmetic") == "fast":
+        most = 0
+    work = _Rows(name, interval, values, make, options, optional_seconds(time_limit), most)
     try:
-        if executor is None:
-            work.one_by_one(progress)
-        else:
-            work.spread(executor, progress)
+        work.run(executor, progress)
     except (KeyboardInterrupt, Interrupted) as interruption:
         done = f"{len(work.done)} of {counted(len(values), 'value')}"
         raise Interrupted(
@@ -133,44 +147,63 @@ class _Rows:
     make: Callable[[float], ContactProblem]
     options: dict[str, Any]
     seconds: float | None
+    max_boxes: int
     started: float = field(default_factory=time.perf_counter)
     done: dict[int, MapRow] = field(default_factory=dict)
+    strips: list[MapStrip] = field(default_factory=list)
 
-    def one_by_one(self, progress: Callable[[int, int], object] | None) -> None:
-        """In this process."""
-        for k, value in enumerate(self.values):
-            if self._over():
-                return
-            self._add(k, map_row(self.make, value, self.interval, self._limited()), progress)
+    def run(self, executor: Executor | None, progress: Callable[[int, int], object] | None) -> None:
+        """All rows, then the strips between them."""
 
-    def spread(self, executor: Executor, progress: Callable[[int, int], object] | None) -> None:
-        """By an executor, a limited number ahead of those awaited."""
-        crew, waiting = Crew(executor), list(enumerate(self.values))[::-1]
-        running: dict[Job, int] = {}
+        def add(place: int, row: MapRow) -> None:
+            self.done[place] = row
+            if progress is not None:
+                progress(len(self.done), len(self.values))
+
+        calls = [(map_row, partial(self._row_arguments, k), partial(add, k)) for k in range(len(self.values))]
+        self._spread(executor, calls)
+        rows = sorted(self.done.values(), key=lambda row: row.value)
+        pairs = list(pairwise(rows)) if self.max_boxes and len(rows) == len(self.values) else []
+        self._spread(
+            executor, [(map_strip, partial(self._strip_arguments, pair), self.strips.append) for pair in pairs]
+        )
+
+    def _row_arguments(self, place: int) -> tuple[Any, ...]:
+        """Of map_row; the options have the time that is left."""
+        left = {} if self.seconds is None else {"time_limit": self._left()}
+        return self.make, self.values[place], self.interval, {**self.options, **left}
+
+    def _strip_arguments(self, rows: tuple[MapRow, MapRow]) -> tuple[Any, ...]:
+        """Of map_strip."""
+        return self.make, (rows[0].value, rows[1].value), ranges_of_one(rows), self.max_boxes, self._left()
+
+    def _spread(self, executor: Executor | None, calls: Sequence[_Call]) -> None:
+        """Make calls while there is time: here, or by an executor, a limited number ahead of those awaited."""
+        if executor is None:
+            for function, arguments, add in calls:
+                if self._over():
+                    return
+                add(function(*arguments()))
+            return
+        crew, waiting = Crew(executor), list(calls)[::-1]
+        running: dict[Job, Callable[[Any], None]] = {}
         try:
             while (waiting and not self._over()) or running:
                 while waiting and crew.room > 0 and not self._over():
-                    k, value = waiting.pop()
-                    running[crew.submit(map_row, self.make, value, self.interval, self._limited())] = k
+                    function, arguments, add = waiting.pop()
+                    running[crew.submit(function, *arguments())] = add
                 job = crew.next()
                 if job is not None:
-                    self._add(running.pop(job), job.result, progress)
+                    running.pop(job)(job.result)
         finally:
             crew.cancel()
 
     def _over(self) -> bool:
         return self.seconds is not None and time.perf_counter() - self.started > self.seconds
 
-    def _limited(self) -> dict[str, Any]:
-        """The options with the time that is left."""
-        if self.seconds is None:
-            return self.options
-        return {**self.options, "time_limit": max(self.seconds - (time.perf_counter() - self.started), 1e-3)}
-
-    def _add(self, place: int, row: MapRow, progress: Callable[[int, int], object] | None) -> None:
-        self.done[place] = row
-        if progress is not None:
-            progress(len(self.done), len(self.values))
+    def _left(self) -> float | None:
+        """Seconds."""
+        return None if self.seconds is None else max(self.seconds - (time.perf_counter() - self.started), 1e-3)
 
     def result(self, reason: str | None = None) -> MultiplicityMap:
         """The map of what was done."""
@@ -179,7 +212,8 @@ class _Rows:
         missing = f"{why}, {counted(len(left), 'value')} not done" if why is not None else None
         rows = tuple(self.done[k] for k in sorted(self.done))
         ends = float(self.interval[0]), float(self.interval[1])
-        return MultiplicityMap(self.name, ends, rows, missing)
+        strips = tuple(sorted(self.strips, key=lambda strip: strip.low))
+        return MultiplicityMap(self.name, ends, rows, strips, missing)
 
 
 def map_row(
@@ -212,7 +246,8 @@ def map_row(
 class MultiplicityMap(Immutable):
     """The number of solutions over alpha and a second parameter (made by ``multiplicity_map``).
 
-    Everything said is proven at the values of the second parameter only: nothing is known between them.
+    What is said of the rows is proven at the values of the second parameter. Between them nothing is known, except that
+    the solution is unique where ``strips`` says so.
 
     Attributes
     ----------
@@ -222,6 +257,8 @@ class MultiplicityMap(Immutable):
         Of alpha.
     rows : tuple of MapRow
         One for every value, in the order given.
+    strips : tuple of MapStrip
+        Between neighbouring values, ascending: where the solution is proven to be unique there.
     complete : bool
         Every row is proven to be complete, and none is missing.
 
@@ -233,8 +270,15 @@ class MultiplicityMap(Immutable):
     (5, 1, 3)
     """
 
-    def __init__(self, name: str, interval: tuple[float, float], rows: tuple[MapRow, ...], missing: str | None) -> None:
-        self.name, self.interval, self.rows, self.missing = name, interval, rows, missing
+    def __init__(
+        self,
+        name: str,
+        interval: tuple[float, float],
+        rows: tuple[MapRow, ...],
+        strips: tuple[MapStrip, ...],
+        missing: str | None,
+    ) -> None:
+        self.name, self.interval, self.rows, self.strips, self.missing = name, interval, rows, strips, missing
         self._freeze()
 
     @property
@@ -261,12 +305,7 @@ class MultiplicityMap(Immutable):
         exact = alpha_value(alpha)
         if not self.interval[0] <= exact <= self.interval[1]:
             raise InvalidArgumentError(f"alpha is {float(exact):g}; expected it in the interval {list(self.interval)}")
-        for k, critical in enumerate(row.alphas):
-            if exact == critical:
-                return row.at_alphas[k]
-            if exact < critical:
-                return row.between[k - 1]
-        return row.between[-1]
+        return row.count_at(exact)
 
     @cached_property
     def curves(self) -> tuple[tuple[tuple[int, float], ...], ...]:
@@ -296,10 +335,13 @@ class MultiplicityMap(Immutable):
     def to_frame(self) -> pd.DataFrame:
         """One row per value and range of alpha with one number of solutions.
 
-        Columns: value; first and last of the range; solutions, exact (or a lower bound); complete (the value's graph).
+        Columns: value; first and last of the range; solutions, exact (or a lower bound); complete (the value's graph);
+        to_next, the share of the range over which the solution is proven to be unique for all values up to the next
+        larger one.
         """
         import pandas as pd
 
+        strips = {strip.low: strip for strip in self.strips}
         return pd.DataFrame(
             [
                 {
@@ -309,18 +351,20 @@ class MultiplicityMap(Immutable):
                     "solutions": count,
                     "exact": row.exact,
                     "complete": row.complete,
+                    "to_next": _share(strips.get(row.value), float(row.alphas[k]), float(row.alphas[k + 1])),
                 }
                 for row in self.rows
                 for k, count in enumerate(row.between)
             ],
-            columns=["value", "first", "last", "solutions", "exact", "complete"],
+            columns=["value", "first", "last", "solutions", "exact", "complete", "to_next"],
         )
 
     def plot(self, *, ax: Any = None, file: str | Path | None = None) -> Any:
         """A figure: alpha across, the second parameter upwards, numbers of solutions by colour, folds as curves.
 
-        What is proven is drawn as lines in full colour at the values; the pale colour around them only fills the
-        space between, and dashed curves link folds. The region in which the solution is unique is white.
+        What is proven is drawn in full colour: lines at the values, and between them green rectangles, in which the
+        solution is unique. The pale colour elsewhere only fills the space, and dashed curves link folds: that is not
+        proven.
 
         Parameters
         ----------
@@ -340,19 +384,28 @@ class MultiplicityMap(Immutable):
         """
         from enumsol.loading.map_plots import draw_map  # matplotlib comes with the first picture
 
-        figure = draw_map(self.name, self.rows, self.curves, self.completeness(), ax)
+        figure = draw_map(self.name, self.rows, self.strips, self.curves, self.completeness(), ax)
         if file is not None:
             place = file_path(file, "file")
             with writing(place, "file"):
                 figure.savefig(place, dpi=150)
         return figure
 
+    @property
+    def unique_between(self) -> float:
+        """The share of alpha over which the solution is proven to be unique between values, mean of all strips."""
+        shares = [strip.share(*self.interval) for strip in self.strips]
+        return sum(shares) / len(shares) if shares else 0.0
+
     def completeness(self) -> str:
         """The closing line of the printed map."""
         if self.missing is not None:
             return f"complete: no ({self.missing})"
         if self.complete:
-            return "complete: yes (proven at these values; says nothing about those between)"
+            between = "says nothing about those between"
+            if any(strip.unique for strip in self.strips):
+                between += f", but for one solution over {_percent(self.unique_between)} of alpha"
+            return f"complete: yes (proven at these values; {between})"
         return f"complete: no (not proven at {sum(not row.complete for row in self.rows)} of {len(self.rows)} values)"
 
     def __repr__(self) -> str:
@@ -360,10 +413,23 @@ class MultiplicityMap(Immutable):
         lines = [
             f"MultiplicityMap over {self.name}, {counted(len(self.rows), 'value')}, alpha in [{low:g}, {high:g}]",
         ]
-        width = max((len(_counts(row)) for row in self.rows), default=9)
-        lines.append(f"{self.name:>8}  {'solutions':<{max(width, 9)}}  {'unique until':>12}")
-        lines += [f"{row.value:>8.5g}  {_counts(row):<{max(width, 9)}}  {_limit(row):>12}" for row in self.rows]
+        width = max([9, *(len(_counts(row)) for row in self.rows)])
+        shares = {strip.low: _percent(strip.share(low, high)) for strip in self.strips}
+        last = "  to the next value" if shares else ""
+        lines.append(f"{self.name:>8}  {'solutions':<{width}}  {'unique until':>12}{last}")
+        for row in self.rows:
+            text = f"{row.value:>8.5g}  {_counts(row):<{width}}  {_limit(row):>12}"
+            lines.append(text + (f"{shares[row.value]:>19}" if row.value in shares else ""))
         return "\n".join([*lines, self.completeness()])
+
+
+def _share(strip: MapStrip | None, first: float, last: float) -> float:
+    return 0.0 if strip is None else strip.share(first, last)
+
+
+def _percent(share: float) -> str:
+    """Rounded downwards: 100 % is all."""
+    return f"{int(100 * share)} %"
 
 
 def _counts(row: MapRow) -> str:

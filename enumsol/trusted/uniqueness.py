@@ -17,20 +17,16 @@ from enumsol.arithmetic.balls import SAFE
 from enumsol.trusted.at_alpha import EnclosedSolution, solve_selection
 from enumsol.trusted.selection import Selection, Unknowns, row_values
 from enumsol.trusted.status_rows import (
-    BACKWARD,
     CONDITIONS,
     FORWARD,
     FRICTIONLESS,
     OPEN,
-    SLIP_MINUS,
-    SLIP_PLUS,
-    STICK,
     UNDECIDED,
     final_codes,
     refines,
     slip_directions,
 )
-from enumsol.trusted.uniqueness_weights import Components, Weights
+from enumsol.trusted.uniqueness_weights import SLIDES, Components, Weights
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -141,9 +137,6 @@ def same_solution(
     return None
 
 
-_SLIDING = (FORWARD, BACKWARD)
-
-
 @dataclass(frozen=True)
 class Reduced(Components):
     """w = h - R x on the nodes that are free or slide, by elimination of the fixed ones.
@@ -168,10 +161,10 @@ class Reduced(Components):
         """None where the fixed nodes' equations are not proven regular, or a node cannot have its code."""
         chosen = set(free)
         for i, (code, F) in enumerate(zip(selection, system.F, strict=True)):
-            if code not in final_codes(F > 0) and not (code in _SLIDING and F > 0 and i not in chosen):
+            if code not in final_codes(F > 0) and not (code in SLIDES and F > 0 and i not in chosen):
                 return None
         status = np.array(core_of(selection, free), dtype=np.intp)
-        slides = np.isin(status, _SLIDING)
+        slides = np.isin(status, SLIDES)
         nodes = np.concatenate([np.array(free, dtype=np.intp), np.flatnonzero(slides)])
         own = (system.F[nodes] > 0) & ~slides[nodes]
         at = Unknowns(system.p, nodes, own, slip_directions(status[nodes]))
@@ -192,7 +185,7 @@ class Reduced(Components):
 
     def enclosed(self, numbers: Weights, force: Array) -> ClosedSolution | None:
         """The solution as a ball, None where it is not proven to exist and to be the only one."""
-        if len(self.at.nodes) == self.system.p and not any(code in _SLIDING for code in self.selection):
+        if len(self.at.nodes) == self.system.p and not any(code in SLIDES for code in self.selection):
             # all nodes are free: where its selection holds strictly, that is closer than (6.10) if Q is hardly definite
             root = solve_selection(self.system, self.selection)
             if root is not None and root.is_root:
@@ -204,8 +197,8 @@ class Reduced(Components):
         least = self.least(numbers)
         if not least > 0:
             return None
-        x = self._point(force, numbers)
-        reach = self._distance(x.mid, self._displacements(x), numbers) / least * SAFE
+        x = self.point(force, numbers)
+        reach = self.distance(x.mid, self._displacements(x), numbers) / least * SAFE
         if not np.isfinite(reach):
             return None
         x = Ball(x.mid, (x.rad + reach) * SAFE)
@@ -224,37 +217,14 @@ class Reduced(Components):
         """w of the free components."""
         return self.h - self.R @ x
 
-    def _point(self, force: Array, numbers: Weights) -> Ball:
-        """Forces in the cones, with the statuses of the selection, near the given ones."""
-        mid = np.array([0.0 if self.selection[i] == OPEN else max(float(force[i]), 0.0) for i in self.at.nodes])
-        turned = Ball.exact(mid[self.at.tangential >= 0]) * numbers.slope
-        radii = np.where(mid[self.at.tangential >= 0] > 0, turned.rad, 0.0)
-        return Ball(np.concatenate([mid, turned.mid]), np.concatenate([np.zeros(len(mid)), radii]))
-
-    def _distance(self, point: Array, w: Ball, numbers: Weights) -> float:
-        """Bound of the numerator of theory, (6.10), for a point that is a solution with another h."""
-        size, change = w.size, np.zeros(len(self.at.places))
-        up, down = np.maximum(w.high, 0.0) * SAFE, np.maximum(w.rad - w.mid, 0.0) * SAFE
-        gap = np.maximum(-w.high, 0.0) / SAFE
-        if not np.all(np.isfinite(size)):
-            return np.inf
-        for i, node in enumerate(self.at.nodes):
-            code, t = self.selection[node], self.at.tangential[i]
-            apart = code == OPEN or (code in _SLIDING and point[i] == 0)
-            change[i] = up[i] if apart else size[i]
-            if t >= 0:
-                slips = {STICK: size[t], SLIP_PLUS: down[t], SLIP_MINUS: up[t]}
-                change[t] = numbers.beyond(t - len(self.at.nodes), gap[i], up[t], down[t]) if apart else slips[code]
-        return numbers.moved(change)
-
     def _solution(self, x: Ball, w_free: Ball) -> ClosedSolution:
         system, p = self.system, self.system.p
         (S, g, F), at = system.balls, self.at
         force = self.E @ (self.Z[:, 0] - self.Z[:, 1:] @ x)
-        free = [int(node) for node in at.nodes if self.selection[node] not in _SLIDING]
+        free = [int(node) for node in at.nodes if self.selection[node] not in SLIDES]
         core = core_of(self.selection, free)
         status = np.array(core)
-        fixed = (status != UNDECIDED) & ~np.isin(status, _SLIDING)
+        fixed = (status != UNDECIDED) & ~np.isin(status, SLIDES)
         idle = np.concatenate([~fixed | (status == OPEN), ~fixed | (status == OPEN) | (status == FRICTIONLESS)])
         force[idle] = 0.0
         at.put(x, F, force)

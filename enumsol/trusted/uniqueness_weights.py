@@ -9,7 +9,7 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, upper_norm
-from enumsol.trusted.status_rows import slip_directions
+from enumsol.trusted.status_rows import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, slip_directions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.trusted.selection import Unknowns
+
+#: Codes of nodes that are open or slip in one direction.
+SLIDES = (FORWARD, BACKWARD)
 
 
 @dataclass(frozen=True)
@@ -196,3 +199,26 @@ class Components:
         off = np.array([numbers.off(k, x[a], x[b], w[a], w[b]) for k, (a, b) in enumerate(zip(n, t, strict=True))])
         # at each of them Q is not smaller than this
         return bool(least > upper_norm(numbers.kappa * off * upper_norm(self.R[t].size, axis=1)) * SAFE)
+
+    def point(self, force: Array, numbers: Weights) -> Ball:
+        """Forces in the cones, with the statuses of the selection, near the given ones."""
+        mid = np.array([0.0 if self.selection[i] == OPEN else max(float(force[i]), 0.0) for i in self.at.nodes])
+        turned = Ball.exact(mid[self.at.tangential >= 0]) * numbers.slope
+        radii = np.where(mid[self.at.tangential >= 0] > 0, turned.rad, 0.0)
+        return Ball(np.concatenate([mid, turned.mid]), np.concatenate([np.zeros(len(mid)), radii]))
+
+    def distance(self, point: Array, w: Ball, numbers: Weights) -> float:
+        """Bound of the numerator of theory, (6.10), for a point that is a solution with another h."""
+        size, change = w.size, np.zeros(len(self.at.places))
+        up, down = np.maximum(w.high, 0.0) * SAFE, np.maximum(w.rad - w.mid, 0.0) * SAFE
+        gap = np.maximum(-w.high, 0.0) / SAFE
+        if not np.all(np.isfinite(size)):
+            return np.inf
+        for i, node in enumerate(self.at.nodes):
+            code, t = self.selection[node], self.at.tangential[i]
+            apart = code == OPEN or (code in SLIDES and point[i] == 0)
+            change[i] = up[i] if apart else size[i]
+            if t >= 0:
+                slips = {STICK: size[t], SLIP_PLUS: down[t], SLIP_MINUS: up[t]}
+                change[t] = numbers.beyond(t - len(self.at.nodes), gap[i], up[t], down[t]) if apart else slips[code]
+        return numbers.moved(change)

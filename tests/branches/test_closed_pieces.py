@@ -16,7 +16,8 @@ from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.branches.enclosed.traced import TracedProblem
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import Interrupted
-from enumsol.trusted.arcs.only_branch import PieceNumbers, only_roots
+from enumsol.trusted.arcs.only_branch import only_roots
+from enumsol.trusted.piece_form import PieceNumbers
 
 
 @pytest.fixture(autouse=True, scope="module")

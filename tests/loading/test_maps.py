@@ -33,6 +33,89 @@ def test_every_value_is_what_enumerate_roots_counts(over_gap):
     assert "says nothing about those between" in repr(over_gap)
 
 
+def test_uniqueness_between_values_is_proven_or_said_not_to_be(over_gap):
+    """Where strips claim it, enumerate_roots finds one root at random values between; folds are not claimed."""
+    import dataclasses
+
+    square, rng = enumsol.gallery.two_node_square(), np.random.default_rng(0)
+    assert [(strip.low, strip.high) for strip in over_gap.strips] == [(0.0, 0.05), (0.05, 0.1)]
+    for strip, row in zip(over_gap.strips, over_gap.rows, strict=False):
+        assert strip.unique
+        assert strip.tried >= len(strip.boxes) > 0
+        assert strip.unique[-1][1] < row.limit
+        for first, last in strip.unique:
+            for alpha, share in ((first, 0.0), (last, 1.0), *rng.uniform(0, 1, size=(3, 2))):
+                problem = dataclasses.replace(square, gap=strip.low + share * (strip.high - strip.low))
+                roots = enumerate_roots(problem, min(max(alpha, first), last))
+                assert roots.complete
+                assert len(roots) == 1
+    frame = over_gap.to_frame()
+    assert np.all(frame["to_next"][frame["solutions"] > 1] == 0)
+    assert np.all(frame["to_next"][frame["value"] == 0.1] == 0)
+    assert 0.3 < frame["to_next"].iloc[0] < 1
+    assert "for one solution over 35 % of alpha" in repr(over_gap)
+
+
+def test_a_block_is_unique_between_all_values():
+    block = enumsol.gallery.get("clamped-block-8").build()
+    shear = np.where(np.arange(block.n) % 2 == 0, block.f, 0.0)
+    for over in ({"load": (shear, [0.1, 0.0, 0.2])}, {"gap": [0.0, 1e-4]}):
+        found = multiplicity_map(block, (0.5, 3), over)
+        assert [strip.unique for strip in found.strips] == [((0.5, 3.0),)] * len(found.strips)
+        assert found.unique_between == 1
+        assert "100 %" in repr(found)
+    constant = enumsol.ContactProblem(block.A, block.Bn, block.Bt, block.f, friction=0.5, load_slope=shear)
+    by_friction = multiplicity_map(constant, (0.0, 0.25), {"friction": [0.5, 0.55]})
+    assert by_friction.strips[0].unique == ((0.0, 0.25),)
+    assert by_friction.to_frame()["to_next"].tolist() == [1.0, 0.0]
+
+
+def test_strips_are_left_out_on_request_and_where_nothing_can_be_proven(over_gap):
+    square = enumsol.gallery.two_node_square()
+    none = multiplicity_map(square, (0, 2), {"gap": [0.0, 0.05]}, max_boxes=0)
+    assert none.strips == ()
+    assert repr(none).endswith("(proven at these values; says nothing about those between)")
+    assert multiplicity_map(square, (0, 2), {"gap": [0.0, 0.05]}, arithmetic="fast").strips == ()
+    assert multiplicity_map(None, (0, 2), (_with_gap, [0.0, 0.05])).strips == ()
+    few = multiplicity_map(square, (0, 5), {"gap": [0.0, 0.05]}, max_boxes=1)
+    assert few.strips[0].tried == 1
+    assert few.strips[0].unique == ()
+    with pytest.raises(InvalidArgumentError, match="max_boxes is -1; expected an integer that is not negative"):
+        multiplicity_map(square, (0, 5), {"gap": [0.0, 0.05]}, max_boxes=-1)
+    with ThreadPoolExecutor(2) as pool:
+        spread = multiplicity_map(square, (0, 5), {"gap": [0.0, 0.05, 0.1]}, executor=pool)
+    assert [strip.boxes for strip in spread.strips] == [strip.boxes for strip in over_gap.strips]
+
+
+def _with_gap(value):
+    return enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 0], value)
+
+
+def test_problems_of_a_map_share_their_factors_and_their_data_are_those_replaced():
+    from enumsol.loading.maps import _Replaced
+
+    block = enumsol.gallery.get("clamped-block-8").build()
+    block = enumsol.ContactProblem(block.A, block.Bn, block.Bt, block.f, friction=(0.1, 1.0), load_slope=-block.f)
+    for name, value in (("friction", 0.5), ("gap", 1e-3), ("load", 0.25)):
+        made = _Replaced(block, name, np.arange(block.n, dtype=float))(value)
+        data = {"f": block.f + value * np.arange(block.n)} if name == "load" else {name: value}
+        again = enumsol.ContactProblem(
+            block.A,
+            block.Bn,
+            block.Bt,
+            **{"f": block.f, "friction": (0.1, 1.0), "load_slope": -block.f, **data},
+        )
+        assert made.fingerprint == again.fingerprint
+        assert made.factorization is block.factorization
+        balls = [problem.enclosure.at(0.5, *_ones(problem)).balls for problem in (made, again)]
+        for mine, other in zip(*balls, strict=True):
+            assert np.all(np.abs(mine.mid - other.mid) <= mine.rad + other.rad)
+
+
+def _ones(problem):
+    return np.ones(2 * problem.p), np.ones(2 * problem.p)
+
+
 def test_folds_are_linked_between_neighbours(over_gap):
     assert over_gap.curves
     for curve in over_gap.curves:
@@ -83,6 +166,11 @@ def test_the_picture_has_a_line_for_every_range(over_gap, tmp_path):
     (ax,) = figure.axes
     flat = [line for line in ax.lines if line.get_linestyle() == "-"]
     assert len(flat) == len(over_gap.to_frame())
+    boxes = [patch for patch in ax.patches if patch.get_zorder() == 2]
+    assert len(boxes) == sum(len(strip.boxes) for strip in over_gap.strips)
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert "one solution, proven for all values between" in labels
+    assert "elsewhere between the values: not proven" in labels
     assert {float(line.get_ydata()[0]) for line in flat} == set(over_gap.values)
     assert len([line for line in ax.lines if line.get_linestyle() == "--"]) == len(over_gap.curves)
 

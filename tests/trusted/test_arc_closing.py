@@ -19,7 +19,8 @@ from rational_pieces import _Along
 from enumsol import ContactProblem
 from enumsol.branches.enclosed.traced import TracedProblem
 from enumsol.condensation.unloaded import vanishing_alpha
-from enumsol.trusted.arcs.only_branch import PieceNumbers, only_roots
+from enumsol.trusted.arcs.only_branch import only_roots
+from enumsol.trusted.piece_form import PieceNumbers
 
 FAMILIES = (generic_problem, integer_problem, generic_problem, without_friction_somewhere)
 

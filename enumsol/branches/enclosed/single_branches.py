@@ -17,7 +17,8 @@ from enumsol.search.chains import Chains, LoadedSystem, SelectionCurve
 from enumsol.search.interval.subintervals import Piece, whole_pieces
 from enumsol.search.reduction import WeightSource
 from enumsol.support.deadlines import look
-from enumsol.trusted.arcs.only_branch import PieceNumbers, only_roots
+from enumsol.trusted.arcs.only_branch import only_roots
+from enumsol.trusted.piece_form import PieceNumbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.selections.solution import Codes
-    from enumsol.trusted.arcs.only_branch import PieceNumbers
+    from enumsol.trusted.piece_form import PieceNumbers
 
 #: Pieces are not cut below this part of the interval.
 SMALLEST_PIECE = 2.0**-40

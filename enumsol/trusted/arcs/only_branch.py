@@ -6,15 +6,15 @@ theta follows the solution, which is known as polynomials in tau with bounds of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, factor_above, gamma, upper_norm, upper_sum
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_sum
 from enumsol.trusted.arcs.over_parts import expansions
 from enumsol.trusted.arcs.series import bernstein_values
+from enumsol.trusted.piece_form import definite
 from enumsol.trusted.selection import signed
 from enumsol.trusted.status_rows import OPEN
 
@@ -25,33 +25,13 @@ if TYPE_CHECKING:
 
     from enumsol.trusted.arcs.over_parts import Expansion
     from enumsol.trusted.arcs.selection_balls import ArcSelection
+    from enumsol.trusted.piece_form import PieceNumbers
 
     Array = NDArray[np.float64]
     Span = tuple[ArcSelection, float, float]
 
 #: How often an interval of alpha is halved, and how many parts are expanded together.
 _HALVINGS, _TOGETHER = 8, 8
-
-
-@dataclass(frozen=True, eq=False)
-class PieceNumbers:
-    """The numbers of the form of theory, (6.9), for all alpha of a piece.
-
-    Attributes
-    ----------
-    mu, kappa, nu : (p,) arrays
-        mu and kappa positive; kappa and nu are read at nodes with friction only.
-    """
-
-    mu: Array
-    kappa: Array
-    nu: Array
-
-    @property
-    def usable(self) -> bool:
-        """Whether they are numbers, and positive where they must be."""
-        finite = all(np.all(np.isfinite(part)) for part in (self.mu, self.kappa, self.nu))
-        return bool(finite and np.all(self.mu > 0) and np.all(self.kappa > 0))
 
 
 def only_roots(asked: Sequence[Span], numbers: PieceNumbers, errors: float = 1.0, margin: float = 0.0) -> list[bool]:
@@ -120,15 +100,16 @@ class _Along:
             return False
         friction = [self._affine(self._system.F0, self._system.F1, tau) for tau in self._ends]
         size = np.maximum(friction[0].size, friction[1].size)
-        if np.any(np.abs(numbers.nu) * size * SAFE + TINY > numbers.mu):
+        if not numbers.serve(size):
             return False
         slopes = self._slopes(friction, size)
         if slopes is None:
             return False
         kept = np.concatenate([np.arange(p), p + np.flatnonzero(self._rubbing)])
-        forms, taken = [self._form(theta)[np.ix_(kept, kept)] for theta in slopes[:2]], self._taken(slopes[2])
-        self.hopeless = not all(_definite(form, margin) for form in forms)
-        return not self.hopeless and all(_definite(form - taken[np.ix_(kept, kept)], margin) for form in forms)
+        S, here = self._system.S, np.ix_(kept, kept)
+        forms, taken = [numbers.form(S, theta)[here] for theta in slopes[:2]], numbers.taken(S, slopes[2])[here]
+        self.hopeless = not all(definite(form, margin) for form in forms)
+        return not self.hopeless and all(definite(form - taken, margin) for form in forms)
 
     def _affine(self, constant: Array, slope: Array, tau: float) -> Ball:
         """constant + alpha slope at the alpha of a tau."""
@@ -205,42 +186,6 @@ class _Along:
         """constant + alpha slope by powers of tau."""
         middle, radius = (Ball.exact(np.full(1, value)) for value in (self._series.middle, self._series.radius))
         return Ball.exact(constant) + Ball.exact(slope) * middle, Ball.exact(slope) * radius
-
-    def _form(self, theta: Ball) -> Ball:
-        """D'S, of which (6.9) is the symmetric part."""
-        S, p, numbers = self._system.S, self._system.p, self._numbers
-        along = S[:p] * Ball.exact(numbers.mu[:, None])
-        turned = (theta * Ball.exact(numbers.kappa))[:, None]
-        across = S[:p] * Ball.exact(numbers.nu[:, None]) + S[p:] * Ball.exact(numbers.kappa[:, None])
-        along = along - S[p:] * turned
-        return Ball.joined(along, across)
-
-    def _taken(self, off: Array) -> Ball:
-        """What a theta that is off by so much takes from the form at most."""
-        S, p = self._system.S, self._system.p
-        nodes = np.flatnonzero(off > 0)
-        length = upper_norm(S[p + nodes].size, axis=1)
-        weight = self._numbers.kappa[nodes] * off[nodes] * SAFE
-        # weights at least kappa rho / |r|, for any rounding
-        T = S[p + nodes] * Ball.exact((np.sqrt(weight / length) * SAFE + TINY)[:, None])
-        square = T.T @ T
-        taken = Ball(0.5 * square.mid, 0.5 * square.rad)
-        taken.mid[nodes, nodes] += 0.5 * weight * length * SAFE
-        taken.rad[nodes, nodes] += 4 * UNIT * taken.mid[nodes, nodes]
-        return taken
-
-
-def _definite(form: Ball, margin: float) -> bool:
-    """Whether the symmetric parts of all matrices in a ball are positive definite."""
-    form = form.symmetric
-    if not form.finite:
-        return False
-    mid = form.mid
-    k, largest = gamma(len(mid) + 2), float(np.max(np.abs(np.diagonal(mid)), initial=0.0))
-    # a Cholesky factorization that runs to its end proves M >= -gamma trace (Rump 2006)
-    slack = k / (1 - k) * float(np.trace(np.abs(mid))) + float(upper_norm(form.rad)) + margin * largest
-    shift = (slack + 8 * UNIT * largest) * (1.0 + 8 * UNIT) * SAFE + TINY
-    return factor_above(mid, shift) is not None
 
 
 def _between(polynomials: Ball, ends: tuple[float, float]) -> tuple[Array, Array]:

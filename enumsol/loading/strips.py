@@ -1,0 +1,101 @@
+"""What is proven between two neighbouring values of a map: where the solution is unique (theory, section 13.5)."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.search.data_boxes import BoxSearch, throughout
+from enumsol.support.deadlines import Deadline, TimeOverError, within
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from enumsol.loading.map_rows import MapRow
+    from enumsol.model.problem import ContactProblem
+
+
+@dataclass(frozen=True)
+class MapStrip:
+    """The part of a map between two neighbouring values of the second parameter.
+
+    Attributes
+    ----------
+    low, high : float
+        The two values.
+    boxes : tuple of ((alpha, alpha), (value, value))
+        Rectangles, borders included, in which every problem is proven to have exactly one solution.
+    unique : tuple of (alpha, alpha)
+        Ranges over which this is proven for every value from ``low`` to ``high``.
+    tried : int
+        Boxes that were tried.
+    seconds : float
+    """
+
+    low: float
+    high: float
+    boxes: tuple[tuple[tuple[float, float], tuple[float, float]], ...]
+    unique: tuple[tuple[float, float], ...]
+    tried: int
+    seconds: float
+
+    def share(self, first: float, last: float) -> float:
+        """Of a range of alpha the part over which the solution is proven to be unique for every value between."""
+        covered = sum(max(0.0, min(b, last) - max(a, first)) for a, b in self.unique)
+        return covered / (last - first) if last > first else float(any(a <= first <= b for a, b in self.unique))
+
+
+def ranges_of_one(rows: tuple[MapRow, MapRow]) -> list[tuple[float, float]]:
+    """The ranges of alpha in which both rows have one solution, as far as they say."""
+    ends = sorted({alpha for row in rows for alpha in row.alphas})
+    found: list[tuple[float, float]] = []
+    for low, high in pairwise(ends):
+        if any(row.count_at((low + high) / 2) != 1 for row in rows):
+            continue
+        if found and found[-1][1] == float(low) and all(row.count_at(low) == 1 for row in rows):
+            found[-1] = (found[-1][0], float(high))
+        else:
+            found.append((float(low), float(high)))
+    return found
+
+
+def map_strip(
+    make: Callable[[float], ContactProblem],
+    values: tuple[float, float],
+    ranges: Sequence[tuple[float, float]],
+    most: int,
+    seconds: float | None,
+) -> MapStrip:
+    """One strip of a map (a module-level function, so that other processes can import it).
+
+    Parameters
+    ----------
+    make : of a value, a problem whose load, gap and friction are affine in it
+    values : two neighbours
+    ranges : of alpha, in which boxes are tried
+    most : number of boxes that are tried at most
+    seconds : or until this time is over, or None
+    """
+    started = time.perf_counter()
+    search = None
+    low, high = values
+    with suppress(NotEnclosedError, TimeOverError), within(Deadline.after(started, seconds)):
+        search = BoxSearch((make(low), make(high)))
+        search.run(ranges, most)
+    boxes = [] if search is None else sorted(search.found)
+
+    def value(share: float) -> float:
+        return low if share == 0 else high if share == 1 else low + share * (high - low)
+
+    return MapStrip(
+        low=low,
+        high=high,
+        boxes=tuple((box.alphas, (value(box.shares[0]), value(box.shares[1]))) for box in boxes),
+        unique=tuple(throughout(boxes)),
+        tried=0 if search is None else search.tried,
+        seconds=time.perf_counter() - started,
+    )
