@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from enumsol.cli.common import GALLERY, TOML, load_any_problem, note, parse_alpha, refuse_misspelt
-from enumsol.cli.options import LIMITS, OUTPUT, Quiet, with_options
+from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt
+from enumsol.cli.options import LIMITS, OUTPUT, Quiet, file, with_options
+from enumsol.cli.output import check_plot, deliver, write_figure
 from enumsol.cli.roots import Search
-from enumsol.errors import InvalidArgumentError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from enumsol.fem.scenes import Scene
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
 
@@ -219,6 +221,19 @@ Output = Annotated[
 ]
 
 
+DryRun = Annotated[
+    bool,
+    typer.Option(
+        "--dry-run",
+        help="Print what was understood: bodies, parts, loads, contact nodes, rigid modes. Nothing is solved.",
+        rich_help_panel=OUTPUT,
+    ),
+]
+Picture = Annotated[
+    str | None, file("--plot", "Draw the bodies with their parts, loads and contact nodes: .png, .pdf, .svg.")
+]
+
+
 _OPTIONS = (
     *(_option(name, given) for name, given in MESH_OPTIONS.items()),
     Parameter("alpha", Parameter.KEYWORD_ONLY, default=None, annotation=AtAlpha),
@@ -236,6 +251,8 @@ def solve(
     ],
     *,
     output: Output = None,
+    dry_run: DryRun = False,
+    plot: Picture = None,
     quiet: Quiet = False,
     **options: Any,
 ) -> None:
@@ -243,7 +260,7 @@ def solve(
 
     A .toml file holds the same options under the same names (`load_slope`, not `--load-slope`), and `mesh`. All other
     commands accept such files as PROBLEM, and also the files that --output writes. Without --alpha, a problem that
-    depends on alpha is written but not solved.
+    depends on alpha is written but not solved. With --dry-run, what was understood is printed.
 
     Exit status: as enumsol roots.
     """
@@ -253,11 +270,24 @@ def solve(
     search = Search(**options)
     search.check()
     value = None if alpha is None else parse_alpha(alpha)
-    problem = _problem(mesh, given)
-    if _at_rest(problem):
-        note("nothing acts on the body: it has no load, press fit or given displacement, and rests")
+    check_plot(plot)
+    scene = _scene(mesh, given)
+    if dry_run:
+        deliver(
+            (plot, lambda path: write_figure(path, scene.plot())),
+            json_file=search.json_file,
+            text=lambda: str(scene),
+            content=lambda: {"scene": str(scene).splitlines(), "notes": scene.notes},
+        )
+    elif plot is not None:
+        write_figure(plot, scene.plot())
+    problem = _problem(mesh, scene)
     if output is not None:
         _write(problem, output)
+    if dry_run:
+        return
+    for text in scene.notes:
+        note(text)
     if value is None and problem.depends_on_alpha:
         if output is not None:
             return
@@ -266,18 +296,20 @@ def solve(
     search.answer(mesh, problem, value or 0.0, source)
 
 
-def _problem(mesh: str, options: dict[str, Any]) -> ContactProblem | ContactProblem3D:
-    if mesh.endswith(TOML):
-        if options:
-            flag = _flags(next(iter(options)))[0]
-            raise InvalidArgumentError(f"{flag} is given beside {mesh}, which has all options; expected it there")
-        return load_any_problem(mesh)
+def _scene(mesh: str, options: dict[str, Any]) -> Scene:
+    """What the mesh and the options, or a TOML file, describe."""
     from enumsol import fem  # numpy: not for --help
     from enumsol.fem.mesh_problems import check_keys
     from enumsol.io import SUFFIXES
     from enumsol.support.arguments import file_path
     from enumsol.support.files import unreadable
 
+    if mesh.endswith(TOML):
+        if options:
+            flag = _flags(next(iter(options)))[0]
+            raise InvalidArgumentError(f"{flag} is given beside {mesh}, which has all options; expected it there")
+        refuse_misspelt(mesh)
+        return fem.read_mesh_scene(mesh)
     place = file_path(mesh, "MESH", "the name of a mesh file")
     if place.suffix in SUFFIXES or mesh.startswith(GALLERY):
         raise InvalidArgumentError(f"{mesh} is a problem; expected a mesh (enumsol roots {mesh} solves a problem)")
@@ -285,13 +317,16 @@ def _problem(mesh: str, options: dict[str, Any]) -> ContactProblem | ContactProb
     if (found := unreadable(place)) is not None:
         raise InvalidArgumentError(f"{mesh}: {found}; expected a mesh with named parts, or a {TOML} file")
     check_keys(options, lambda name: _flags(name)[0])
-    return fem.mesh_problem(mesh, **options)
+    return fem.mesh_scene(mesh, **options)
 
 
-def _at_rest(problem: ContactProblem | ContactProblem3D) -> bool:
-    """Whether u = 0 solves the problem because it has no data that are not zero, for every alpha."""
-    acting = [problem.f, problem.load_slope, problem.slip_offset]
-    return not any(part is not None and part.any() for part in acting) and not (problem.gap < 0).any()
+def _problem(mesh: str, scene: Scene) -> ContactProblem | ContactProblem3D:
+    try:
+        return scene.problem()
+    except (InvalidArgumentError, InvalidProblemError) as error:
+        if mesh.endswith(TOML):
+            raise InvalidProblemError(f"{mesh}: {error}") from error
+        raise
 
 
 def _write(problem: ContactProblem | ContactProblem3D, place: str) -> None:

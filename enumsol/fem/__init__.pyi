@@ -10,10 +10,16 @@ from .assembly import (
 from .basis_problems import basis_contact_problem as basis_contact_problem
 from .mesh_checks import lame as lame
 from .mesh_files import read_mesh as read_mesh, read_solid as read_solid
-from .mesh_problems import mesh_problem as mesh_problem, read_mesh_problem as read_mesh_problem
+from .mesh_problems import (
+    mesh_problem as mesh_problem,
+    mesh_scene as mesh_scene,
+    read_mesh_problem as read_mesh_problem,
+    read_mesh_scene as read_mesh_scene,
+)
 from .meshes import Mesh as Mesh, edges_along as edges_along, rectangle as rectangle, trapezoid as trapezoid
 from .named_parts import PartedMesh as PartedMesh, SolidMesh as SolidMesh
 from .norms import MeshNorms as MeshNorms, h1_norms as h1_norms
+from .scenes import Scene as Scene
 from .solid_meshes import blocks as blocks, box as box
 from .solid_problems import solid_contact_problem as solid_contact_problem
 from .solids import (

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 _SAME = 1e-9
 #: Of the energies of rigid motions in the supports, the least as a share of the largest that holds a body.
 _HELD = 1e-10
+#: How many parts of a boundary are named to say which body it is.
+_NAMED = 3
 #: What stands for a component that is not given.
 FREE = "free"
 #: Numbers that an obstacle takes in 2D and 3D: a point and a normal, or a centre and a radius.
@@ -132,33 +134,70 @@ class Held:
         self._values[nodes, component] = value
 
 
+@dataclass(frozen=True)
+class Piece:
+    """A body that hangs together, and with no other.
+
+    Attributes
+    ----------
+    nodes : (N,) bool array
+        Which nodes are its own.
+    name : str
+        What messages call it: the names of parts of the body, or of the boundary, that it consists of.
+    """
+
+    nodes: Mask
+    name: str
+
+    def free_motions(self, points: Floats, hold: sp.csc_array) -> int:
+        """How many of its rigid motions nothing holds; ``hold`` is a stiffness of supports and springs."""
+        motions = _rigid_motions(points, self.nodes)
+        values = np.linalg.eigvalsh(motions.T @ (hold @ motions))
+        return int(np.sum(values <= _HELD * max(values[-1], np.finfo(np.float64).tiny)))
+
+
+def pieces_of(mesh: PartedMesh) -> list[Piece]:
+    """All bodies of a mesh that hang together."""
+    points, cells = mesh.points, mesh.cells
+    first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
+    links = (np.ones(first.size), (first.ravel(), cells[:, 1:].ravel()))
+    count, piece_of = connected_components(sp.coo_array(links, shape=(len(points),) * 2), directed=False)
+    masks = [piece_of == piece for piece in range(count)]
+    return [Piece(mask, "the body" if count == 1 else _name_of(mesh, mask)) for mask in masks]
+
+
+def _name_of(mesh: PartedMesh, inside: Mask) -> str:
+    """What one of several bodies is called."""
+    names = [name for name, rows in mesh.bodies.items() if np.all(inside[mesh.cells[rows]])]
+    if not names:
+        sides = [name for name, rows in mesh.facets.items() if np.all(inside[rows])]
+        more = ", ..." if len(sides) > _NAMED else ""
+        names = [f"the body with the boundary {', '.join(sides[:_NAMED])}{more}"] if sides else []
+    around = f"the part of the body around {mesh.points[np.argmax(inside)].tolist()}"
+    return ", ".join(names) if names else around
+
+
+def holding(supports: Supports, springs: sp.csc_array) -> sp.csc_array:
+    """A stiffness of supports and springs, the stiffest of each being one."""
+    largest = np.max(springs.diagonal(), initial=0.0)
+    hold = sp.csc_array(sp.diags_array(supports.fixed.ravel().astype(np.float64)))
+    return sp.csc_array(hold + springs / largest) if largest > 0 else hold
+
+
 def check_held(mesh: PartedMesh, supports: Supports, springs: sp.csc_array) -> None:
     """Refuse a body, or a part of it that hangs together with no other, that can move as a rigid body.
 
     Raises
     ------
     InvalidProblemError
-        It says where.
+        It says which.
     """
-    points, cells = mesh.points, mesh.cells
-    first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
-    links = (np.ones(first.size), (first.ravel(), cells[:, 1:].ravel()))
-    _, piece_of = connected_components(sp.coo_array(links, shape=(len(points),) * 2), directed=False)
-    largest = np.max(springs.diagonal(), initial=0.0)
-    hold = sp.csc_array(sp.diags_array(supports.fixed.ravel().astype(np.float64)))
-    if largest > 0:
-        hold = sp.csc_array(hold + springs / largest)
-    for piece in range(piece_of.max() + 1):
-        inside = piece_of == piece
-        motions = _rigid_motions(points, inside)
-        values = np.linalg.eigvalsh(motions.T @ (hold @ motions))
-        if values[0] <= _HELD * max(values[-1], np.finfo(np.float64).tiny):
-            whole = (
-                "the body" if np.all(inside) else f"the part of the body around {points[np.argmax(inside)].tolist()}"
-            )
+    hold = holding(supports, springs)
+    for piece in pieces_of(mesh):
+        if piece.free_motions(mesh.points, hold):
             raise InvalidProblemError(
-                f"{whole} is free to move as a rigid body; expected clamp, symmetry, displacement or spring to hold "
-                "it (contact alone does not)"
+                f"{piece.name} is free to move as a rigid body; expected clamp, symmetry, displacement or spring to "
+                "hold it (contact alone does not)"
             )
 
 
@@ -276,6 +315,14 @@ class Obstacle:
         if not entries[-1] > 0:
             raise InvalidArgumentError(f"obstacle {kind} has the radius {entries[-1]:g}; expected a length > 0")
         return cls(kind, entries[:dimension], None, float(entries[-1]))
+
+    @property
+    def expected(self) -> str:
+        """What a user may have meant by an obstacle behind the boundary."""
+        if self.kind == "plane":
+            return "the direction from the plane to the body after its point"
+        others = "circle or sphere" if self.kind == "hole" else "hole"
+        return f"the boundary on the side of the obstacle, or {others} for a body on its other side"
 
     def normals_and_gaps(self, points: Floats) -> tuple[Floats, Floats]:
         """Directions (p, d) from points to the obstacle, and the distances (p,) to it, negative inside it.

@@ -24,6 +24,34 @@ if TYPE_CHECKING:
     from enumsol.fem.named_parts import PartedMesh
     from enumsol.support.array_types import Floats, Integers
 
+#: Cosine of the angle from which on a normal of the boundary points away from an obstacle, but for rounding.
+_BEHIND = -1e-6
+
+
+@dataclass(frozen=True)
+class Group:
+    """Contact nodes that face one thing.
+
+    Attributes
+    ----------
+    parts : list of str
+        Contact parts, or the first part of a pair.
+    pair : Pair or None
+    normals : (k, d) array
+        Of the boundary, out of the body, also where an obstacle gives the normals of the rows.
+    count, missed : int
+        How many there are, and how many nodes of a pair face nothing.
+    """
+
+    parts: list[str]
+    pair: Pair | None
+    normals: Floats
+    count: int
+    missed: int = 0
+
+    def __str__(self) -> str:
+        return ", ".join(self.parts) if self.pair is None else f"the pair {self.pair}"
+
 
 @dataclass(frozen=True)
 class Contacts:
@@ -41,6 +69,8 @@ class Contacts:
         Of all these parts.
     areas : (p,) array
         Of the contact surface around each, in 2D its length [length^2, in 2D length].
+    groups : list of Group
+        One for all contact parts, then one for each pair; the nodes come in this order.
     """
 
     rows: ContactNodes
@@ -48,6 +78,7 @@ class Contacts:
     parts: list[str]
     facets: Integers
     areas: Floats
+    groups: list[Group]
 
 
 def contacts_of(
@@ -65,27 +96,28 @@ def contacts_of(
     """
     if not parts and not pairs:
         raise InvalidArgumentError("contact names no part; expected the contact boundary, or pairs")
-    found: list[tuple[ContactNodes, Floats]] = []
+    found: list[tuple[ContactNodes, Floats, Group]] = []
     groups: list[tuple[list[str], Pair | None]] = [(list(parts), None)] if parts else []
     groups += [([pair.slave], pair) for pair in pairs]
     on, areas, taken = [], [], np.zeros(0, dtype=np.int64)
     for names, pair in groups:
         facets = _facets(body, mesh, names)
-        rows, gaps = _group(body, mesh, facets, held, obstacle if pair is None else None, pair, taken)
-        found.append((rows, gaps))
+        rows, gaps, group = _group(body, mesh, names, facets, held, obstacle if pair is None else None, pair, taken)
+        found.append((rows, gaps, group))
         on.append(facets)
         areas.append(body.on_part(facets, names[0], lambda v, _: v[0], lumped=True)[rows.nodes, 0])
         taken = np.concatenate([taken, rows.nodes])
     rows = ContactNodes(
-        sp.csr_array(sp.vstack([rows.means for rows, _ in found])),
-        np.concatenate([rows.normals for rows, _ in found]),
-        np.any([rows.apart for rows, _ in found], axis=0),
+        sp.csr_array(sp.vstack([rows.means for rows, _, _ in found])),
+        np.concatenate([rows.normals for rows, _, _ in found]),
+        np.any([rows.apart for rows, _, _ in found], axis=0),
         taken,
         np.arange(len(taken)),
     )
     names = list(dict.fromkeys([*parts, *(pair.slave for pair in pairs)]))
-    gaps, facets = np.concatenate([gaps for _, gaps in found]), _distinct(np.concatenate(on))
-    return Contacts(rows, gaps, _parts(mesh, names, taken), facets, np.concatenate(areas))
+    gaps, facets = np.concatenate([gaps for _, gaps, _ in found]), _distinct(np.concatenate(on))
+    of_groups = [group for _, _, group in found]
+    return Contacts(rows, gaps, _parts(mesh, names, taken), facets, np.concatenate(areas), of_groups)
 
 
 def _parts(mesh: PartedMesh, names: list[str], nodes: Integers) -> list[str]:
@@ -112,53 +144,66 @@ def _distinct(facets: Integers) -> Integers:
 def _group(
     body: NodalBasis,
     mesh: PartedMesh,
+    parts: list[str],
     facets: Integers,
     held: Held,
     obstacle: Any,
     pair: Pair | None,
     taken: Integers,
-) -> tuple[ContactNodes, Floats]:
+) -> tuple[ContactNodes, Floats, Group]:
     """Contact nodes with their normals on some facets, and the distances to what they face."""
     dimension = mesh.points.shape[1]
     touching = along(facets) if dimension == 2 else np.unique(contact_nodes(dimension, facets))
     touching = touching[~np.isin(touching, taken)]
     if pair is None and np.all(held.supports.fixed[touching]):
         raise InvalidArgumentError("contact has no node that clamp or displacement leave free; expected some")
+    if not len(touching):
+        raise InvalidArgumentError(
+            f"all nodes of {parts[0]} belong to another contact already; expected a boundary of its own for the pair "
+            f"{pair}"
+        )
+    integrals = body.on_part(facets, "contact", outward_normal, lumped=True)
     if obstacle is None:
-        integrals = body.on_part(facets, "contact", outward_normal, lumped=True)
-        normals, gaps = pressed(integrals[touching], touching), np.zeros(len(touching))
-    else:
-        normals, gaps = Obstacle.of(obstacle, dimension).normals_and_gaps(mesh.points[touching])
-    normals = unit_vectors(normals, "normals of the boundary")
-    if obstacle is None:  # what averages with the other half of the body would be
+        normals = unit_vectors(pressed(integrals[touching], touching), "normals of the boundary")
+        # what averages with the other half of the body would be
         normals = unit_vectors(np.where(held.mirrored[touching], 0.0, normals), "normals at the plane of symmetry")
+        own, gaps = normals, np.zeros(len(touching))
+    else:
+        given = Obstacle.of(obstacle, dimension)
+        normals, gaps = given.normals_and_gaps(mesh.points[touching])
+        own = np.nan_to_num(integrals[touching] / np.linalg.norm(integrals[touching], axis=1, keepdims=True))
+        if np.all(np.sum(own * normals, axis=1) < _BEHIND):
+            raise InvalidArgumentError(
+                f"obstacle {given.kind} is behind the contact boundary, whose outward normals point away from it; "
+                f"expected {given.expected}"
+            )
     if pair is None:
         nodes = movable(touching, normals, held.supports)
-        return nodes, gaps[nodes.kept]
+        return nodes, gaps[nodes.kept], Group(parts, None, own[nodes.kept], len(nodes.nodes))
     return _paired(body, mesh, touching, normals, held, pair)
 
 
 def _paired(
     body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Held, pair: Pair
-) -> tuple[ContactNodes, Floats]:
+) -> tuple[ContactNodes, Floats, Group]:
     """Nodes that face the other part of a pair, relative to it."""
     facets = _facets(body, mesh, [pair.master])
     apart = ~np.isin(touching, facets)  # a node of both, as at the tip of a crack, is in contact with itself
     touching, normals = touching[apart], normals[apart]
-    outward = body.on_part(facets, pair.master, outward_normal)
     boundary = boundary_facets(mesh.points.shape[1], mesh.cells)
     others = boundary[np.isin(facet_rows(boundary, facets, facets.shape[1]), -1)]
-    seen = faced(mesh.points, touching, normals, facets, outward, others)
+    seen = faced(mesh.points, touching, normals, facets, body.on_part(facets, pair.master, outward_normal), others)
     if not len(seen.gaps):
         raise InvalidArgumentError(
             f"{pair.slave} of the pair {pair} has no node that faces a facet of {pair.master} along its normal; "
-            "expected parts of two bodies, which share no nodes, that face each other"
+            "expected parts of two bodies, which share no nodes, that face each other with opposite normals"
         )
+    missed = int(np.sum(~seen.found))
     touching, normals = touching[seen.found], normals[seen.found]
     means = sp.csr_array(means_of_nodes(touching, len(mesh.points)) - seen.weights)
     nodes = movable(touching, normals, held.supports, means)
     gaps = seen.gaps if pair.gap is None else np.full(len(touching), pair.gap)
-    return nodes, gaps[nodes.kept]
+    return nodes, gaps[nodes.kept], Group([pair.slave], pair, normals[nodes.kept], len(nodes.nodes), missed)
 
 
 def along(edges: Integers) -> Integers:

@@ -5,26 +5,11 @@ from __future__ import annotations
 import difflib
 import inspect
 import tomllib
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
-import scipy.sparse as sp
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.fem.bases import nodal_basis
-from enumsol.fem.conditions import Held, by_part, check_held, names_of, part_forces, part_springs
-from enumsol.fem.construction import axes_of, problem_of
-from enumsol.fem.contacts import contacts_of
-from enumsol.fem.materials import body_force_of, lame_of, of_rows, thickness_of
-from enumsol.fem.mesh_checks import unit_vectors
-from enumsol.fem.mesh_files import read_mesh
-from enumsol.fem.named_parts import PartedMesh
-from enumsol.fem.pairs import Pair
-from enumsol.fem.restrained import plain_dofs
-from enumsol.model.mesh import BodyMesh
-from enumsol.support.arguments import exact_number, file_path, finite_number, shown
-from enumsol.support.array_arguments import short_vector
+from enumsol.fem.scenes import Scene
+from enumsol.support.arguments import file_path, shown
 from enumsol.support.files import unreadable
 from enumsol.support.messages import shortened
 
@@ -33,16 +18,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from enumsol.fem.restrained import ContactNodes
+    from enumsol.fem.named_parts import PartedMesh
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.array_types import ArrayLike, Floats
+    from enumsol.support.array_types import ArrayLike
 
     Names = str | Sequence[str]
     Vectors = Mapping[str, ArrayLike] | None
     Plane = Literal["strain", "stress"]
     Coefficient = float | Sequence[float]
 
+T = TypeVar("T")
 #: Largest TOML file that is read; one that describes a problem has a thousandth of that [bytes].
 LARGEST_FILE = 1_000_000
 #: What ``pairs`` may be called in TOML files.
@@ -75,6 +61,8 @@ def mesh_problem(
     groups: str | None = None,
 ) -> ContactProblem | ContactProblem3D:
     """Contact problem of a body whose mesh has named parts.
+
+    `mesh_scene` tells in words and by a picture what the arguments describe.
 
     Contact is by nodes: every node of the contact parts that is not held has a row, in second order the nodes between
     corners as well; of triangles with six nodes, which in 3D tetrahedra of second order have, these only, since a
@@ -157,40 +145,41 @@ def mesh_problem(
     >>> problem.n, problem.p
     (24, 4)
     """
-    parted = mesh if isinstance(mesh, PartedMesh) else read_mesh(mesh, groups)
-    dimension = parted.points.shape[1]
-    coefficients = lame_of(parted, young, poisson, plane)
-    body = replace(nodal_basis(parted.points, parted.cells), thickness=thickness_of(parted, thickness))
-    held = _held(parted, clamp, symmetry, displacement)
-    contacts = contacts_of(body, parted, names_of(contact, "contact"), Pair.all_of(pairs), held, obstacle)
-    nodes = contacts.rows
-    forces = part_forces(body, parted, load, pressure)
-    if body_force is not None:
-        forces = forces + body.volume_forces(body_force_of(parted, body_force))
-    slope = part_forces(body, parted, load_slope, pressure_slope, "_slope")
-    more: dict[str, Any] = {
-        "gap": contacts.gaps + of_rows(gap, "gap", contacts.parts, finite_number, 0.0),
-        "node_ids": nodes.nodes.tolist(),
-        "coordinates": parted.points[nodes.nodes],
-        **_coefficients(dimension, contacts.parts, friction, friction2),
-    }
-    surface = contacts.facets if pairs else None
-    if dimension == 3:
-        from enumsol.fem.solid_geometry import outward  # not for plane bodies
+    given = locals()  # all arguments by their names
+    return Scene.of(given.pop("mesh"), given).problem()
 
-        surface, more["areas"] = outward(contacts.facets, parted.cells), contacts.areas
-    offset = held.supports.values
-    springs = part_springs(body, parted, spring)
-    check_held(parted, held.supports, springs)
-    A = sp.csc_array(body.stiffness(*coefficients.T) + springs)
-    axes = _axes(nodes, axis, dimension)
-    more |= _moved(nodes, axes, offset, more["gap"])
-    slopes = slope.ravel() if np.any(slope) else None
-    return problem_of(
-        *(A, forces.ravel(), slopes, plain_dofs(parted.points.shape), nodes, axes, held.supports),
-        mesh=lambda left: BodyMesh.of_dofs(parted.points, parted.cells, left, offset, surface, lame=coefficients),
-        **more,
-    )
+
+def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) -> Scene:
+    """What a mesh and the options of `mesh_problem` describe: ``print(scene)``, ``scene.plot()``, ``scene.notes``.
+
+    The scene tells bodies, parts with their areas, the resultant of the loads, contact nodes with their gaps, which
+    bodies are free to move, and what may be meant otherwise. ``scene.problem()`` is what `mesh_problem` returns.
+
+    Parameters
+    ----------
+    mesh, **options
+        As in `mesh_problem`.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InvalidArgumentError
+        As `mesh_problem`, and an option that it does not have.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> scene = fem.mesh_scene(
+    ...     fem.rectangle(4, 2).parted(), young=2.5, poisson=0.25, contact="bottom", clamp="left", friction=0.5
+    ... )
+    >>> print(scene)
+    """
+    check_keys(options)
+    known = inspect.signature(mesh_problem).parameters.items()
+    return Scene.of(mesh, {name: options.get(name, of.default) for name, of in known if name != "mesh"})
 
 
 def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProblem3D:
@@ -223,13 +212,32 @@ def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactP
     >>> fem.read_mesh_problem("square.toml").p
     2
     """
+    return _of_file(path, lambda scene: scene.problem())
+
+
+def read_mesh_scene(path: str | os.PathLike[str]) -> Scene:
+    """What a TOML file describes, see `mesh_scene`.
+
+    Parameters
+    ----------
+    path : str or path-like
+
+    Raises
+    ------
+    InvalidProblemError, MissingDependencyError
+        As `read_mesh_problem`, except that what does not make a problem may still be a scene.
+    """
+    return _of_file(path, lambda scene: scene)
+
+
+def _of_file(path: Any, made: Callable[[Scene], T]) -> T:
     place = file_path(path, "path")
     try:
         options = _toml(place)
         name = file_path(options.pop("mesh", None), "mesh", "the name of a mesh file in quotes")
         options.pop("steps", None)  # of enumsol history
         check_keys(options)
-        return mesh_problem(place.parent / name, **options)
+        return made(mesh_scene(place.parent / name, **options))
     except (InvalidArgumentError, InvalidProblemError) as error:
         raise InvalidProblemError(f"{place}: {error}") from error
 
@@ -275,59 +283,3 @@ def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str) 
     if missing:
         names = ", ".join(map(spelled, missing))
         raise InvalidArgumentError(f"{names} {'is' if len(missing) == 1 else 'are'} missing")
-
-
-def _held(mesh: PartedMesh, clamp: Any, symmetry: Any, displacement: Any) -> Held:
-    held = Held(mesh)
-    for part in names_of(clamp, "clamp"):
-        held.clamp(part)
-    for part in names_of(symmetry, "symmetry"):
-        held.mirror(part)
-    for part, value in by_part(displacement, "displacement").items():
-        held.displace(part, value)
-    return held
-
-
-def _moved(nodes: ContactNodes, axes: tuple[Floats, ...], values: Floats, gaps: Floats) -> dict[str, Any]:
-    """Gaps and slip offsets less what given displacements of the nodes of pairs make of them."""
-    relative = np.asarray(nodes.means @ values)
-    if not np.any(relative):
-        return {}
-    normal, *slips = (-np.sum(relative * axis, axis=1) for axis in (nodes.normals, *axes))
-    return {"gap": gaps + normal, "slip_offset": slips[0] if len(slips) == 1 else np.stack(slips, axis=1)}
-
-
-def _coefficients(dimension: int, parts: Sequence[str], friction: Any, second: Any) -> dict[str, Any]:
-    """F0 + alpha F1 as the arguments of the problem."""
-    F0, F1 = of_rows(friction, "friction", parts, _line).T
-    if dimension == 2:
-        if second is not None:
-            raise InvalidArgumentError("friction2 is given for a plane body, which has one tangent; expected it in 3D")
-        return {"friction": (F0, F1)}
-    G0, G1 = (F0, F1) if second is None else of_rows(second, "friction2", parts, _line).T
-    return {"friction": (F0, G0), "friction_slope": (F1, G1)}
-
-
-def _line(value: Any, name: str) -> tuple[float, float]:
-    if exact_number(value) is not None:
-        return finite_number(value, name), 0.0
-    try:
-        F0, F1 = short_vector(value, name, 2)
-    except InvalidArgumentError:
-        raise InvalidArgumentError(
-            f"{name} is {shown(value)}; expected a number, or two: F0 and F1 of F0 + alpha F1"
-        ) from None
-    return float(F0), float(F1)
-
-
-def _axes(nodes: ContactNodes, axis: Any, dimension: int) -> tuple[Floats, ...]:
-    if axis is None:
-        return axes_of(None, nodes.normals)
-    if dimension == 2:
-        raise InvalidArgumentError("axis is given for a plane body, which has one tangent; expected it in 3D")
-    direction = short_vector(axis, "axis", 3)
-    first = direction - (nodes.normals @ direction)[:, None] * nodes.normals
-    if np.min(np.linalg.norm(first, axis=1)) <= 1e-6 * np.linalg.norm(direction):
-        raise InvalidArgumentError(f"axis is {shown(axis)}, a normal of the contact boundary; expected a tangent")
-    first = unit_vectors(first, "axis")
-    return first, np.cross(nodes.normals, first)

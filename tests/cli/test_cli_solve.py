@@ -237,6 +237,41 @@ def test_materials_and_friction_by_part_in_a_file_on_the_command_line_and_in_a_c
     assert read_problem("two.npz").fingerprint == direct.fingerprint == fem.read_mesh_problem("two.toml").fingerprint
 
 
+@pytest.mark.parametrize("toml", [False, True])
+def test_what_was_understood(here, capsys, toml):
+    command = ("body.toml",) if toml else ("body.msh", *OPTIONS)
+    status, out, err = run(capsys, "solve", *command, "--dry-run", "--plot", "scene.png", "--json", "scene.json")
+    assert (status, err) == (0, "")
+    for line in ("contact   3 contact nodes of floor, gap 0", "lid: 2 facets, length 2; spring, load", "held"):
+        assert line in out
+    assert (here / "scene.png").read_bytes().startswith(b"\x89PNG")
+    assert json.loads((here / "scene.json").read_text()) == {"scene": out.splitlines(), "notes": []}
+    assert "RootSet" not in out
+
+
+def test_a_scene_that_is_no_problem_is_printed_before_it_is_refused(here, capsys):
+    status, out, err = run(capsys, "solve", "body.msh", *OPTIONS[:6], "--friction", "0", "--dry-run", "-o", "p.npz")
+    assert status == 2
+    assert "3 rigid modes that nothing but contact holds" in out
+    assert "note      nothing acts on the body" in out
+    assert err.startswith("enumsol: error: the body is free to move as a rigid body")
+    (here / "body.toml").write_text(TOML.replace("spring", "pressure_slope").replace("[1, 0.5]", "1"))
+    status, out, err = run(capsys, "roots", "body.toml", "--alpha", "1")
+    assert status == 2
+    assert err.startswith("enumsol: error: body.toml: the body is free to move")
+    status, out, again = run(capsys, "solve", "body.toml", "--alpha", "1")
+    assert (status, out, again) == (2, "", err)
+
+
+def test_notes_and_a_picture_beside_the_roots(here, capsys):
+    status, out, err = run(capsys, "solve", "body.msh", *OPTIONS, "--friction", "9", "--plot", "scene.svg")
+    assert status in (0, 3)
+    assert "RootSet at alpha = 0" in out
+    assert err == "enumsol: note: friction is 9; coefficients of friction above 1 are rare\n"
+    assert b"<svg" in (here / "scene.svg").read_bytes()
+    assert_refused(*run(capsys, "solve", "body.msh", *OPTIONS, "--plot", "scene.txt"), "scene.txt")
+
+
 @pytest.mark.parametrize(
     ("options", "part"),
     [

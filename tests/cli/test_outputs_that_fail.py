@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -15,6 +16,7 @@ from enumsol.cli.output import deliver
 
 FULL = "/dev/full"
 GALLERY = "gallery:one-node-6.1"
+MESH = Path(__file__).parents[1] / "fem" / "meshes" / "block.22.msh"
 pytestmark = pytest.mark.skipif(not os.path.exists(FULL), reason="this system has no device that is always full")
 
 
@@ -55,6 +57,7 @@ PRINTING = {
     "roots": ("roots", GALLERY, "--alpha", 5),
     "roots json": ("roots", GALLERY, "--alpha", 5, "--json", "-"),
     "roots csv": ("roots", GALLERY, "--alpha", 5, "--csv", "-"),
+    "solve dry run": ("solve", MESH, "--contact", "floor", "--young", 1, "--poisson", 0, "--clamp", "lid", "--dry-run"),
     "table": ("table", GALLERY, "--alphas", "1,2"),
     "graph": ("graph", GALLERY, "--from", 0, "--to", 5),
     "graph json": ("graph", GALLERY, "--from", 0, "--to", 5, "--json", "-"),

@@ -1,0 +1,180 @@
+"""What catches a wrong scene: refusals and notes, each in one sentence."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem.basis_problems import outward_normal
+from enumsol.fem.pairs import faced
+from enumsol.model.cells import boundary_facets
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+#: Share of the contact nodes of a part that may touch another body before that is refused as a wall between both.
+_WALL = 0.5
+#: Press fits and given displacements above this part of the extent of the largest body are not small.
+_SMALL = 0.25
+#: Strains by loads above this come from wrong units: ten times the length of the body.
+_ABSURD = 10.0
+#: Loads that strain the body by less than this are below what its own rounding does.
+_NOTHING = 1e-13
+#: Coefficients of friction above this are rare.
+_STEEP = 5.0
+#: A ratio of moduli above this is often a wrong unit.
+_UNLIKE = 1e8
+
+
+def refuse_walls(scene: Any) -> None:
+    """Refuse contact parts where another body touches them: the foundation would be a wall between the two.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It suggests a pair.
+    """
+    mesh, dimension = scene.mesh, scene.dimension
+    group = scene.contacts.groups[0]
+    if len(scene.pieces) < 2 or group.pair is not None or scene.options["obstacle"] is not None:
+        return
+    nodes = scene.contacts.rows.nodes[: group.count]
+    boundary = boundary_facets(dimension, mesh.cells)
+    for piece in scene.pieces:
+        own = piece.nodes[nodes]
+        others = boundary[~piece.nodes[boundary[:, 0]]]
+        if not np.any(own):
+            continue
+        outward = scene.body.on_part(others, "boundary", outward_normal)
+        seen = faced(mesh.points, nodes[own], group.normals[own], others, outward, others[:0])
+        touching = nodes[own][seen.found][seen.gaps == 0.0]
+        for part in group.parts:
+            here = np.intersect1d(touching, mesh.nodes(part))
+            if len(here) > _WALL * np.sum(np.isin(nodes[own], mesh.nodes(part))):
+                beside = np.flatnonzero(np.any(seen.weights.toarray()[seen.gaps == 0.0] != 0, axis=0))
+                names = [name for name, rows in mesh.facets.items() if np.all(np.isin(beside, rows))]
+                other = names[0] if names else "OTHER"
+                touched = f"those of {other}" if names else "the boundary of another body"
+                raise InvalidArgumentError(
+                    f"contact names {part}, whose facets coincide with {touched}, and would put a rigid wall between "
+                    f"both bodies; expected the pair {part}:{other}"
+                )
+
+
+def scene_notes(scene: Any) -> list[str]:
+    """What may be meant otherwise."""
+    checks = (_unfaced, _alone, _rest, _loaded_contact, _reach, _units, _friction)
+    return [note for check in checks for note in check(scene)]
+
+
+def _unfaced(scene: Any) -> list[str]:
+    """Nodes of pairs without contact."""
+    return [
+        f"{group.missed} of {group.missed + group.count} nodes of {group.pair.slave} face nothing of "
+        f"{group.pair.master} and have no contact"
+        for group in scene.contacts.groups
+        if group.missed
+    ]
+
+
+def _alone(scene: Any) -> list[str]:
+    """Bodies that nothing connects with the others."""
+    if len(scene.pieces) < 2:
+        return []
+    touched = np.zeros(len(scene.mesh.points), dtype=bool)
+    touched[np.unique(scene.contacts.rows.means.indices)] = True
+    return [
+        f"{piece.name} touches nothing: it has no contact part and is in no pair"
+        for piece in scene.pieces
+        if not np.any(touched & piece.nodes)
+    ]
+
+
+def _rest(scene: Any) -> list[str]:
+    """Nothing that acts on the bodies."""
+    acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.supports.values)
+    if acting or np.any(scene.gaps < 0):
+        return []
+    return ["nothing acts on the body: it has no load, press fit or given displacement, and rests"]
+
+
+def _loaded_contact(scene: Any) -> list[str]:
+    """Loads on contact parts."""
+    corners = {tuple(sorted(row)) for row in scene.contacts.facets.tolist()}
+    notes = []
+    for option in ("load", "load_slope", "pressure", "pressure_slope", "spring"):
+        for part in scene.options[option] or ():
+            if any(tuple(sorted(row)) in corners for row in scene.mesh.part(part).tolist()):
+                what = "stiffens" if option == "spring" else "acts on"
+                notes.append(f"{option} of {part} {what} contact nodes, as {part} is in contact")
+    return notes
+
+
+def _reach(scene: Any) -> list[str]:
+    """Gaps and press fits as large as a body."""
+    extent, notes, start = _extent(scene), [], 0
+    for group in scene.contacts.groups:
+        gaps = scene.gaps[start : start + group.count]
+        start += group.count
+        if gaps.min() > extent:
+            notes.append(
+                f"the smallest gap of {group} is {gaps.min():.3g}, more than the extent {extent:.3g} of the body: it "
+                "will not be in contact"
+            )
+        elif gaps.min() < -_SMALL * extent:
+            notes.append(
+                f"the press fit of {group} is {-gaps.min():.3g}, which is not small beside the extent {extent:.3g} of "
+                "the body, as displacements have to be"
+            )
+    return notes
+
+
+def _units(scene: Any) -> list[str]:
+    """Loads, displacements and moduli of absurd size."""
+    notes, dimension = [], scene.dimension
+    extent = _extent(scene)
+    stiffness = np.atleast_2d(scene.lame) @ (1.0, 2.0)
+    thickness = 1.0 if scene.body.thickness is None else float(np.min(scene.body.thickness))
+    area = extent ** (dimension - 1) * thickness
+    for forces, name in ((scene.forces, "loads"), (scene.slope, "load slopes")):
+        strain = float(np.sum(np.abs(forces))) / (float(np.min(stiffness)) * area)
+        if strain > _ABSURD:
+            notes.append(
+                f"the {name} would strain the body by about {strain:.2g}, which is absurd; are young and the "
+                f"{name} in the same units?"
+            )
+        elif 0 < strain < _NOTHING:
+            notes.append(
+                f"the {name} would strain the body by about {strain:.2g}, which is next to nothing; are young and the "
+                f"{name} in the same units?"
+            )
+    moved = float(np.max(np.abs(scene.held.supports.values)))
+    if moved > _SMALL * extent:
+        notes.append(
+            f"a displacement of {moved:.3g} is given, which is not small beside the extent {extent:.3g} of the body"
+        )
+    if np.max(stiffness) > _UNLIKE * np.min(stiffness):
+        notes.append(
+            f"the moduli of parts differ by a factor of {np.max(stiffness) / np.min(stiffness):.2g}; are all in the "
+            "same unit?"
+        )
+    return notes
+
+
+def _extent(scene: Any) -> float:
+    """That of the largest body [length]."""
+    return max(float(np.max(np.ptp(scene.mesh.points[piece.nodes], axis=0))) for piece in scene.pieces)
+
+
+def _friction(scene: Any) -> list[str]:
+    """Coefficients that no pair of materials has."""
+    given: Mapping[str, Any] = {"friction": scene.options["friction"], "friction2": scene.options["friction2"]}
+    notes = []
+    for name, value in given.items():
+        each = value.values() if hasattr(value, "values") else [value]
+        steep = max((float(np.ravel(own)[0]) for own in each if own is not None), default=0.0)
+        if steep > _STEEP:
+            notes.append(f"{name} is {steep:g}; coefficients of friction above 1 are rare")
+    return notes

@@ -1,0 +1,131 @@
+"""A scene in words: what was understood of a mesh and its options."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem.conditions import holding
+from enumsol.model.cells import KINDS, by_kind
+from enumsol.support.messages import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from enumsol.support.array_types import Floats, Integers
+
+#: Width of the column of titles.
+_TITLES = 10
+#: Components of a resultant below this part of all nodal forces are rounding.
+_ROUNDING = 1e-12
+
+
+def described(scene: Any) -> str:
+    """The lines of a `Scene`."""
+    sections = {
+        "mesh": _mesh(scene),
+        "bodies": _bodies(scene),
+        "material": _material(scene),
+        "parts": _parts(scene),
+        "loads": _loads(scene),
+        "contact": _contact(scene),
+        "note": scene.notes,
+    }
+    return "\n".join(_titled(sections))
+
+
+def _titled(sections: Mapping[str, Sequence[str]]) -> Iterable[str]:
+    for title, lines in sections.items():
+        for k, line in enumerate(lines):
+            yield f"{title if k == 0 or title == 'note' else '':{_TITLES}}{line}"
+
+
+def _mesh(scene: Any) -> list[str]:
+    mesh, d = scene.mesh, scene.dimension
+    cells = [f"{len(rows)} {KINDS[d, nodes.shape[1]].name}" for rows, nodes in by_kind(d, mesh.cells)]
+    extent = f"from {_vector(mesh.points.min(axis=0))} to {_vector(mesh.points.max(axis=0))}"
+    return [f"{len(mesh.points)} nodes, {', '.join(cells)}, {extent}"]
+
+
+def _bodies(scene: Any) -> list[str]:
+    mesh, hold = scene.mesh, holding(scene.held.supports, scene.springs)
+    sizes = np.empty(len(mesh.cells))
+    for block in scene.body.blocks:
+        sizes[block.rows] = np.sum(block.basis.dx, axis=1)
+
+    def size(rows: Integers) -> str:
+        what = "area" if scene.dimension == 2 else "volume"
+        return f"{counted(len(rows), 'cell')}, {what} {np.sum(sizes[rows]):.6g}"
+
+    lines, said = [], set()
+    for piece in scene.pieces:
+        free = piece.free_motions(mesh.points, hold)
+        modes = f"{counted(free, 'rigid mode')} that nothing but contact holds" if free else "held"
+        lines.append(f"{piece.name}: {size(np.flatnonzero(np.all(piece.nodes[mesh.cells], axis=1)))}, {modes}")
+        said.add(piece.name)
+    return [*lines, *(f"part {name}: {size(rows)}" for name, rows in mesh.bodies.items() if name not in said)]
+
+
+def _material(scene: Any) -> list[str]:
+    names = ("young", "poisson", *(("plane", "thickness") if scene.dimension == 2 else ()))
+    return [f"{name} {_said(scene.options[name])}" for name in names]
+
+
+def _parts(scene: Any) -> list[str]:
+    plain, what = replace(scene.body, thickness=None), "length" if scene.dimension == 2 else "area"
+    lines = []
+    for name, facets in scene.mesh.facets.items():
+        try:
+            size = f"{what} {np.sum(plain.on_part(facets, name, lambda v, _: v[0], lumped=True)):.6g}"
+        except InvalidArgumentError:
+            size = "not on the boundary"
+        lines.append(f"{name}: {counted(len(facets), 'facet')}, {size}; {', '.join(scene.uses(name)) or 'not used'}")
+    lines += [
+        f"{name}: {counted(len(nodes), 'node')}; {', '.join(scene.uses(name)) or 'not used'}"
+        for name, nodes in scene.mesh.node_sets.items()
+        if name not in scene.mesh.facets
+    ]
+    return lines
+
+
+def _loads(scene: Any) -> list[str]:
+    lines = [f"resultant {_resultant(scene.forces)}"]
+    if np.any(scene.slope):
+        lines.append(f"times alpha: resultant {_resultant(scene.slope)}")
+    return lines
+
+
+def _resultant(forces: Floats) -> str:
+    """The sum of nodal forces, without what rounding leaves of those that cancel."""
+    total = forces.sum(axis=0)
+    return _vector(np.where(np.abs(total) <= _ROUNDING * np.sum(np.abs(forces)), 0.0, total))
+
+
+def _contact(scene: Any) -> list[str]:
+    lines, start = [], 0
+    for group in scene.contacts.groups:
+        gaps = scene.gaps[start : start + group.count]
+        start += group.count
+        gap = f"gap {gaps[0]:.6g}" if np.ptp(gaps) == 0 else f"gaps from {gaps.min():.6g} to {gaps.max():.6g}"
+        lines.append(f"{counted(group.count, 'contact node')} of {group}, {gap}")
+    return [*lines, f"friction {_said(scene.options['friction'])}"]
+
+
+def _said(value: Any) -> str:
+    """A number, two, a word, or one of these for each of several parts."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{_said(own)} ({part})" for part, own in value.items())
+    if isinstance(value, str):
+        return value
+    if np.ndim(value) == 0:
+        return f"{float(value):.6g}"
+    first, second = value
+    return f"{float(first):.6g} + alpha {float(second):.6g}"
+
+
+def _vector(values: Floats) -> str:
+    return f"({', '.join(f'{float(value) + 0.0:.6g}' for value in values)})"

@@ -1,0 +1,236 @@
+"""What a mesh and its options describe: bodies, supports, loads and contacts; its problem, its text and its picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem.bases import nodal_basis
+from enumsol.fem.conditions import (
+    Held,
+    by_part,
+    check_held,
+    names_of,
+    part_forces,
+    part_springs,
+    pieces_of,
+)
+from enumsol.fem.construction import axes_of, problem_of
+from enumsol.fem.contacts import contacts_of
+from enumsol.fem.materials import body_force_of, lame_of, of_rows, thickness_of
+from enumsol.fem.mesh_checks import unit_vectors
+from enumsol.fem.mesh_files import read_mesh
+from enumsol.fem.named_parts import PartedMesh
+from enumsol.fem.pairs import Pair
+from enumsol.fem.restrained import plain_dofs
+from enumsol.fem.scene_checks import refuse_walls, scene_notes
+from enumsol.fem.scene_text import described
+from enumsol.model.mesh import BodyMesh
+from enumsol.support.arguments import exact_number, finite_number, shown
+from enumsol.support.array_arguments import short_vector
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from enumsol.fem.bases import NodalBasis
+    from enumsol.fem.conditions import Piece
+    from enumsol.fem.contacts import Contacts
+    from enumsol.fem.restrained import ContactNodes
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.support.array_types import Floats
+
+#: Options that say what a part of the boundary is for.
+_USES = ("contact", "clamp", "symmetry", "displacement", "spring", "load", "load_slope", "pressure", "pressure_slope")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a mesh and the options of `mesh_problem` describe; ``print(scene)`` says it in words.
+
+    Attributes
+    ----------
+    mesh : PartedMesh
+    options : mapping
+        Of `mesh_problem`, by their names.
+    body : NodalBasis
+    held : Held
+    contacts : Contacts
+    forces, slope : (N, d) arrays
+        On all nodes, and their derivatives with respect to alpha [force].
+    springs : (d N, d N) csc_array
+    lame : (2,) or (M, 2) array
+    pieces : list of Piece
+        The bodies that hang together.
+    """
+
+    mesh: PartedMesh
+    options: Mapping[str, Any]
+    body: NodalBasis
+    held: Held
+    contacts: Contacts
+    forces: Floats
+    slope: Floats
+    springs: sp.csc_array
+    lame: Floats
+    pieces: list[Piece]
+
+    @classmethod
+    def of(cls, source: Any, options: Mapping[str, Any]) -> Scene:
+        """That of a mesh, or of what `read_mesh` takes, with all options of `mesh_problem`.
+
+        Raises
+        ------
+        InvalidArgumentError
+            As `mesh_problem`.
+        """
+        mesh = source if isinstance(source, PartedMesh) else read_mesh(source, options["groups"])
+        coefficients = lame_of(mesh, options["young"], options["poisson"], options["plane"])
+        thickness = thickness_of(mesh, options["thickness"])
+        body = replace(nodal_basis(mesh.points, mesh.cells), thickness=thickness)
+        held = _held(mesh, options["clamp"], options["symmetry"], options["displacement"])
+        parts, pairs = names_of(options["contact"], "contact"), Pair.all_of(options["pairs"])
+        contacts = contacts_of(body, mesh, parts, pairs, held, options["obstacle"])
+        forces = part_forces(body, mesh, options["load"], options["pressure"])
+        if options["body_force"] is not None:
+            forces = forces + body.volume_forces(body_force_of(mesh, options["body_force"]))
+        slope = part_forces(body, mesh, options["load_slope"], options["pressure_slope"], "_slope")
+        springs, pieces = part_springs(body, mesh, options["spring"]), pieces_of(mesh)
+        scene = cls(mesh, options, body, held, contacts, forces, slope, springs, coefficients, pieces)
+        refuse_walls(scene)
+        return scene
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return int(self.mesh.points.shape[1])
+
+    @cached_property
+    def gaps(self) -> Floats:
+        """Gaps of the contact nodes, (p,) [length]."""
+        return self.contacts.gaps + of_rows(self.options["gap"], "gap", self.contacts.parts, finite_number, 0.0)
+
+    @cached_property
+    def notes(self) -> list[str]:
+        """What may be meant otherwise, each in a sentence."""
+        return scene_notes(self)
+
+    def problem(self) -> ContactProblem | ContactProblem3D:
+        """The contact problem; see `mesh_problem`.
+
+        Raises
+        ------
+        InvalidArgumentError, InvalidProblemError
+            As `mesh_problem`.
+        """
+        mesh, contacts, supports, options = self.mesh, self.contacts, self.held.supports, self.options
+        nodes, offset = contacts.rows, supports.values
+        more: dict[str, Any] = {
+            "gap": self.gaps,
+            "node_ids": nodes.nodes.tolist(),
+            "coordinates": mesh.points[nodes.nodes],
+            **_coefficients(self.dimension, contacts.parts, options["friction"], options["friction2"]),
+        }
+        surface = contacts.facets if any(group.pair is not None for group in contacts.groups) else None
+        if self.dimension == 3:
+            from enumsol.fem.solid_geometry import outward  # not for plane bodies
+
+            surface, more["areas"] = outward(contacts.facets, mesh.cells), contacts.areas
+        check_held(mesh, supports, self.springs)
+        A = sp.csc_array(self.body.stiffness(*self.lame.T) + self.springs)
+        axes = _axes(nodes, options["axis"], self.dimension)
+        more |= _moved(nodes, axes, offset, more["gap"])
+        slopes = self.slope.ravel() if np.any(self.slope) else None
+        return problem_of(
+            *(A, self.forces.ravel(), slopes, plain_dofs(mesh.points.shape), nodes, axes, supports),
+            mesh=lambda left: BodyMesh.of_dofs(mesh.points, mesh.cells, left, offset, surface, lame=self.lame),
+            **more,
+        )
+
+    def plot(self) -> Any:
+        """A figure of the bodies, the parts of their boundaries, forces and contact nodes with their normals.
+
+        Raises
+        ------
+        MissingDependencyError
+            matplotlib is not installed.
+        """
+        from enumsol.fem.scene_plots import draw_scene  # matplotlib takes a while
+
+        return draw_scene(self)
+
+    def uses(self, part: str) -> list[str]:
+        """What the options say of a part of the boundary."""
+        found = [name for name in _USES if part in _names(self.options[name])]
+        pairs = [group.pair for group in self.contacts.groups if group.pair is not None]
+        found += [f"contact nodes of the pair {pair}" for pair in pairs if part == pair.slave]
+        return found + [f"facets of the pair {pair}" for pair in pairs if part == pair.master]
+
+    def __str__(self) -> str:
+        return described(self)
+
+
+def _names(value: Any) -> Sequence[str]:
+    """The parts that an option names."""
+    return [value] if isinstance(value, str) else () if value is None else list(value)
+
+
+def _held(mesh: PartedMesh, clamp: Any, symmetry: Any, displacement: Any) -> Held:
+    held = Held(mesh)
+    for part in names_of(clamp, "clamp"):
+        held.clamp(part)
+    for part in names_of(symmetry, "symmetry"):
+        held.mirror(part)
+    for part, value in by_part(displacement, "displacement").items():
+        held.displace(part, value)
+    return held
+
+
+def _moved(nodes: ContactNodes, axes: tuple[Floats, ...], values: Floats, gaps: Floats) -> dict[str, Any]:
+    """Gaps and slip offsets less what given displacements of the nodes of pairs make of them."""
+    relative = np.asarray(nodes.means @ values)
+    if not np.any(relative):
+        return {}
+    normal, *slips = (-np.sum(relative * axis, axis=1) for axis in (nodes.normals, *axes))
+    return {"gap": gaps + normal, "slip_offset": slips[0] if len(slips) == 1 else np.stack(slips, axis=1)}
+
+
+def _coefficients(dimension: int, parts: Sequence[str], friction: Any, second: Any) -> dict[str, Any]:
+    """F0 + alpha F1 as the arguments of the problem."""
+    F0, F1 = of_rows(friction, "friction", parts, _line).T
+    if dimension == 2:
+        if second is not None:
+            raise InvalidArgumentError("friction2 is given for a plane body, which has one tangent; expected it in 3D")
+        return {"friction": (F0, F1)}
+    G0, G1 = (F0, F1) if second is None else of_rows(second, "friction2", parts, _line).T
+    return {"friction": (F0, G0), "friction_slope": (F1, G1)}
+
+
+def _line(value: Any, name: str) -> tuple[float, float]:
+    if exact_number(value) is not None:
+        return finite_number(value, name), 0.0
+    try:
+        F0, F1 = short_vector(value, name, 2)
+    except InvalidArgumentError:
+        raise InvalidArgumentError(
+            f"{name} is {shown(value)}; expected a number, or two: F0 and F1 of F0 + alpha F1"
+        ) from None
+    return float(F0), float(F1)
+
+
+def _axes(nodes: ContactNodes, axis: Any, dimension: int) -> tuple[Floats, ...]:
+    if axis is None:
+        return axes_of(None, nodes.normals)
+    if dimension == 2:
+        raise InvalidArgumentError("axis is given for a plane body, which has one tangent; expected it in 3D")
+    direction = short_vector(axis, "axis", 3)
+    first = direction - (nodes.normals @ direction)[:, None] * nodes.normals
+    if np.min(np.linalg.norm(first, axis=1)) <= 1e-6 * np.linalg.norm(direction):
+        raise InvalidArgumentError(f"axis is {shown(axis)}, a normal of the contact boundary; expected a tangent")
+    first = unit_vectors(first, "axis")
+    return first, np.cross(nodes.normals, first)

@@ -1,0 +1,210 @@
+"""Wrong scenes, each refused or noted in one sentence; what a scene says and draws."""
+
+import re
+
+import numpy as np
+import pytest
+from parted_meshes import grid
+from two_bodies import blocks, boxes, shifted, together
+
+from enumsol import EnumsolError, InvalidProblemError, fem
+
+GOOD = {"young": 2.0, "poisson": 0.3, "contact": "bottom", "clamp": "top", "load": {"left": (0.01, 0.0)}}
+PAIR = {**GOOD, "contact": (), "pairs": [("upper.bottom", "lower.top")], "clamp": ["upper.top", "lower.bottom"]}
+PAIR["load"] = {"upper.right": (0.01, 0.0)}
+
+
+def one():
+    return grid(2, 2, 4)
+
+
+def two():
+    flat = blocks(4, 3, 2)
+    return fem.PartedMesh(flat.points, flat.cells, flat.facets, {}, {"pad": np.arange(6), "disc": np.arange(6, 10)})
+
+
+def three():
+    """A third block beside two others."""
+    return together(
+        ("upper", shifted(grid(2, 1, 4), (0, 1))), ("lower", grid(2, 1, 4)), ("loose", shifted(one(), (5, 0)))
+    )
+
+
+def apart(gap):
+    return lambda: blocks(4, gap=gap)
+
+
+def wide():
+    return together(("upper", shifted(grid(6, 1, 4, 3.0), (0, 1))), ("lower", grid(2, 1, 4)))
+
+
+def scene_of(mesh, given):
+    scene = fem.mesh_scene(mesh(), **given)
+    scene.problem()
+    return scene
+
+
+REFUSED = [
+    (one, {"obstacle": {"plane": (0, -0.1, 0, -1)}}, "obstacle plane is behind the contact boundary, .* point away"),
+    (one, {"obstacle": {"plane": (0, 2.0, 0, -1)}}, "obstacle plane is behind .*expected the direction from the plane"),
+    (
+        one,
+        {"obstacle": {"circle": (0.5, 3, 1)}},
+        "obstacle circle is behind the contact boundary, .*or hole for a body",
+    ),
+    (one, {"obstacle": {"hole": (0.5, -3, 1)}}, "obstacle hole is behind .* or circle or sphere"),
+    (two, PAIR | {"pairs": [("upper.bottom", "lower.bottom")]}, "upper.bottom of the pair .* face each other with opp"),
+    (two, PAIR | {"pairs": [("upper.top", "lower.bottom")]}, "upper.top of the pair .* has no node that faces a facet"),
+    (two, PAIR | {"pairs": [("upper.left", "lower.left")]}, "upper.left of the pair .* has no node that faces a facet"),
+    (
+        two,
+        PAIR | {"contact": ["upper.bottom"], "pairs": ()},
+        "contact names upper.bottom, whose facets coincide with those of lower.top, .*expected the pair upper.bottom:",
+    ),
+    (
+        two,
+        PAIR | {"contact": ["lower.left", "lower.top", "upper.bottom"], "pairs": ()},
+        "contact names (lower.top|upper.bottom), whose facets coincide .* put a rigid wall between both bodies",
+    ),
+    (two, PAIR | {"contact": ["upper.bottom"]}, "all nodes of upper.bottom belong to another contact already"),
+    (two, PAIR | {"clamp": "upper.top"}, "^disc is free to move as a rigid body; expected clamp"),
+    (two, PAIR | {"clamp": "lower.bottom"}, "^pad is free to move as a rigid body; expected clamp"),
+    (
+        three,
+        PAIR,
+        r"^the body with the boundary loose.bottom, loose.top, loose.left, ... is free to move as a rigid body",
+    ),
+    (two, PAIR | {"young": {"pad": 1.0}}, "young is not given for 4 of 10 cells, those of disc"),
+    (two, PAIR | {"friction": {"lower.top": 0.1}}, "friction is given for lower.top, which has no contact nodes"),
+    (two, PAIR | {"pairs": [("upper.bottom", "lower.top", None)]}, "gap of the pair .* is None; expected a finite"),
+    (two, PAIR | {"symmetry": ["upper.bottom"]}, "normals at the plane of symmetry row 0 is zero"),
+    (one, {"contact": "top"}, "contact has no node that clamp or displacement leave free"),
+    (one, {"contact": "floor"}, "no facets named 'floor'; expected one of bottom, top, left, right"),
+    (one, {"clamp": ()}, "^the body is free to move as a rigid body"),
+    (one, {"displacement": {"bottom": (0.1, "free")}}, "contact node 0 is held or displaced in some components only"),
+    (one, {"displacement": {"top": (0.1, 0.0)}}, "top moves node 6 by 0.1 in x, and another part .* by 0"),
+    (one, {"thickness": -1}, "thickness is -1; expected a finite number > 0"),
+]
+
+NOTED = [
+    (
+        apart(3.5),
+        PAIR,
+        "the smallest gap of the pair upper.bottom:lower.top is 3.5, .* will not be in contact",
+    ),
+    (
+        one,
+        {"gap": 5.0},
+        "the smallest gap of bottom is 5, more than the extent 1 of the body: it will not be in contact",
+    ),
+    (one, {"gap": -0.5}, "the press fit of bottom is 0.5, which is not small beside the extent 1"),
+    (one, {"load": {"bottom": (0.1, 0.0)}}, "load of bottom acts on contact nodes, as bottom is in contact"),
+    (one, {"pressure": {"bottom": 0.1}}, "pressure of bottom acts on contact nodes"),
+    (one, {"load": None}, "nothing acts on the body: it has no load, press fit or given displacement, and rests"),
+    (
+        one,
+        {"load": {"left": (3e6, 0.0)}},
+        "the loads would strain the body by about .*, which is absurd; are young and",
+    ),
+    (one, {"young": 2e13, "load": {"left": (1e-3, 0)}}, "the loads would strain the body by .* next to nothing; are"),
+    (one, {"clamp": (), "displacement": {"top": (0.0, -3.0)}}, "a displacement of 3 is given, which is not small"),
+    (one, {"friction": 30}, "friction is 30; coefficients of friction above 1 are rare"),
+    (two, PAIR | {"young": {"pad": 1.0, "disc": 1e10}}, r"the moduli of parts differ by a factor of 1e\+10"),
+    (
+        two,
+        PAIR | {"contact": "upper.left", "pairs": ()},
+        "disc touches nothing: it has no contact part and is in no pair",
+    ),
+    (wide, PAIR, "4 of 7 nodes of upper.bottom face nothing of lower.top and have no contact"),
+]
+
+
+@pytest.mark.parametrize(("mesh", "changes", "message"), REFUSED)
+def test_wrong_scenes_that_are_refused(mesh, changes, message):
+    with pytest.raises(EnumsolError, match=message) as caught:
+        scene_of(mesh, GOOD | changes)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("mesh", "changes", "message"), NOTED)
+def test_wrong_scenes_that_are_noted(mesh, changes, message):
+    (note,) = scene_of(mesh, GOOD | changes).notes
+    assert re.search(message, note)
+    assert "\n" not in note
+    assert not note.endswith(".")
+
+
+def test_there_are_thirty_of_them():
+    assert len(REFUSED) + len(NOTED) >= 30
+
+
+@pytest.mark.parametrize(
+    ("mesh", "given"),
+    [
+        (one, GOOD),
+        (two, PAIR),
+        (one, GOOD | {"obstacle": {"plane": (0, -0.1, 0, 1)}, "friction": (0, 1)}),
+        (one, GOOD | {"obstacle": {"circle": (0.5, -3, 2.9)}}),
+        (one, GOOD | {"obstacle": {"hole": (0.5, 1.0, 1.5)}}),
+        (one, GOOD | {"contact": ["bottom", "right"], "gap": -1e-3}),
+        (apart(0.1), PAIR),
+        (lambda: boxes(4, 2, 1), PAIR),
+    ],
+)
+def test_right_scenes_are_neither(mesh, given):
+    three_d = mesh().points.shape[1] == 3
+    more = {"load": {"upper.right": (0.01, 0, 0)}} if three_d else {}
+    assert scene_of(mesh, given | more).notes == []
+
+
+def test_a_scene_in_words():
+    mesh = two()
+    scene = fem.mesh_scene(mesh, **PAIR, friction={"upper.bottom": (0.1, 0.5)}, load_slope={"upper.left": (0.0, -2.0)})
+    said = str(scene)
+    for line in (
+        "mesh      21 nodes, 10 quadrilaterals, from (0, 0) to (2, 2)",
+        "bodies    pad: 6 cells, area 2, held",
+        "          disc: 4 cells, area 2, held",
+        "material  young 2",
+        "upper.bottom: 3 facets, length 2; contact nodes of the pair upper.bottom:lower.top",
+        "lower.bottom: 2 facets, length 2; clamp",
+        "lower.left: 2 facets, length 1; not used",
+        "loads     resultant (0.01, 0)",
+        "times alpha: resultant (0, -2)",
+        "contact   4 contact nodes of the pair upper.bottom:lower.top, gap 0",
+        "friction 0.1 + alpha 0.5 (upper.bottom)",
+    ):
+        assert line in said
+    assert "note" not in said
+    assert fem.mesh_problem(mesh, **PAIR).fingerprint == fem.mesh_scene(mesh, **PAIR).problem().fingerprint
+
+
+def test_what_is_free_is_counted():
+    loose = fem.mesh_scene(blocks(4), **(PAIR | {"clamp": "lower.bottom"}))
+    assert "cells, area 2, 3 rigid modes that nothing but contact holds" in str(loose)
+    rollers = fem.mesh_scene(blocks(4), **(PAIR | {"clamp": "lower.bottom", "symmetry": "upper.left"}))
+    assert "1 rigid mode that nothing but contact holds" in str(rollers)
+    with pytest.raises(InvalidProblemError, match="free to move"):
+        rollers.problem()
+    solid = fem.mesh_scene(
+        boxes(8),
+        **(PAIR | {"clamp": "lower.bottom", "load": {"upper.right": (0.01, 0, 0)}, "gap": 0.5, "friction": 0.5}),
+    )
+    assert "volume 0.5, 6 rigid modes that nothing but contact holds" in str(solid)
+
+
+@pytest.mark.parametrize("mesh", [two, lambda: boxes(4, 2, 1), lambda: boxes(10, 1, 1)])
+def test_a_scene_as_a_picture(mesh, tmp_path):
+    three_d = mesh().points.shape[1] == 3
+    more = {"load": {"upper.right": (0.01, 0, 0)}} if three_d else {"load_slope": {"upper.left": (0.0, 1.0)}}
+    figure = fem.mesh_scene(mesh(), **(PAIR | more)).plot()
+    labels = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    assert "upper.bottom: contact nodes of the pair upper.bottom:lower.top" in labels
+    assert "lower.bottom: clamp" in labels
+    figure.savefig(tmp_path / "scene.png")
+    assert (tmp_path / "scene.png").stat().st_size > 5000
+
+
+def test_options_that_do_not_exist():
+    with pytest.raises(EnumsolError, match="there is no option 'contacts'; did you mean contact"):
+        fem.mesh_scene(one(), **GOOD, contacts="bottom")
