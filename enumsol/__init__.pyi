@@ -48,6 +48,7 @@ from .errors import (
     InvalidArgumentError as InvalidArgumentError,
     InvalidProblemError as InvalidProblemError,
     MissingDependencyError as MissingDependencyError,
+    NotHeldError as NotHeldError,
     OutputError as OutputError,
     TooLargeError as TooLargeError,
 )
@@ -77,5 +78,10 @@ from .proof.proof_file import Proof as Proof, ProofFormatError as ProofFormatErr
 from .report import write_report as write_report
 from .roots.enumerate import enumerate_roots as enumerate_roots, is_unique as is_unique
 from .roots.root import Enclosure as Enclosure, Polytope as Polytope, Root as Root, RootFamily as RootFamily
-from .roots.root_set import RootSet as RootSet, SearchStats as SearchStats, Undecided as Undecided
+from .roots.root_set import (
+    RigidBound as RigidBound,
+    RootSet as RootSet,
+    SearchStats as SearchStats,
+    Undecided as Undecided,
+)
 from .search.outcome import SearchProgress as SearchProgress

@@ -31,6 +31,22 @@ class TooLargeError(EnumsolError, ValueError):
     """The work asked for is beyond a stated limit; the message gives an estimate of its cost."""
 
 
+class NotHeldError(EnumsolError, ValueError):
+    """What was asked is not available for a body that nothing holds (one with ``rigid_modes``).
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> block = enumsol.gallery.block_on_table()
+    >>> try:
+    ...     enumsol.branch_graph(block, (0, 1))
+    ... except enumsol.NotHeldError as error:
+    ...     print(error)
+    branch_graph cannot take a body that nothing holds (rigid_modes is given); expected a body held by supports or \
+springs
+    """
+
+
 class IncompleteGraphError(EnumsolError, ValueError):
     """A branch graph with gaps was asked a question that only a graph without gaps can answer.
 

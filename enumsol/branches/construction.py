@@ -139,6 +139,7 @@ def branch_graph(
     complete: yes (proven)
     """
     instance_of(problem, ContactProblem, "problem")
+    problem.check_held("branch_graph")
     a, b = (Fraction(end) for end in alpha_interval(interval))
     one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     optional_callable(progress, "progress")

@@ -160,6 +160,7 @@ def link_samples(
     SampledGraph of 3 samples: 9 roots, 6 links (heuristic), 0 ambiguous pairs left open
     """
     instance_of(problem, ContactProblem, "problem")
+    problem.check_held("link_samples")
     optional_callable(progress, "progress")
     samples = sorted(set(alpha_list(alphas)))
     if not samples:

@@ -26,6 +26,9 @@ What checker and search share
     - ``trusted.exclusion``: the exclusion inequality, of which the search has a compiled copy, at one alpha and over
       a piece of an interval (``trusted.over_interval``); ``trusted.energy_bounds``, what multipliers prove;
       ``trusted.quadratic_forms``, other forms than the energy;
+    - of bodies that nothing holds: ``model.rigid_modes``, the springs and the bounds; ``condensation.floating``, balls
+      for G and h; ``trusted.floating_bounds``, what multipliers prove, and ``trusted.confinement``, beyond which bounds
+      there are no solutions;
     - ``trusted.at_alpha``: the verified solve of a selection and the contradiction of its equations;
     - ``trusted.uniqueness``, the test by which a subtree is closed by its only possible solution, and which of these
       solutions are the same; ``trusted.uniqueness_in_contact``, the test that a root is alone below an assignment;
@@ -93,7 +96,8 @@ Cross-checks
       bring the sum to +1; a sum of +1 so far proves nothing, since roots may be missing in pairs.
     - None otherwise: the index of a degenerate root or family could not be found within the limits of the local
       analysis (very many selections hold there). The count of roots does not depend on it.
-    - Complete, and another sum or an even number of regular roots: a contradiction. Either the program or the machine
+    - Complete, and another sum or an even number of regular roots: a contradiction, unless nothing holds the body
+      (theory, section 14.2). Either the program or the machine
       is wrong; please report it with the problem and the proof.
 
 How far the data may change before the list of roots does: ``checker.stability.stability_radius``.

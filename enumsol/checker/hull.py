@@ -43,7 +43,8 @@ class Hull:
 def hull_of_selections(system: RationalSystem, *selections: Sequence[int]) -> Hull:
     """The root set that the given selections have in common, a polytope.
 
-    It is bounded, and therefore the hull of its vertices, because S is positive definite (theory, section 5.1). Every
+    It is bounded, and therefore the hull of its vertices, because S is positive definite (theory, section 5.1), and
+    where nothing holds the body its rigid displacement is (theory, section 14.2). Every
     vertex is the only common zero of some of the conditions on the affine solution set.
 
     Raises
@@ -72,7 +73,7 @@ def hull_of_selections(system: RationalSystem, *selections: Sequence[int]) -> Hu
 
 def _solution_set(system: RationalSystem, selections: Sequence[Sequence[int]]) -> tuple[list[Any], list[Any]] | None:
     """A point that solves all equations and a basis of their kernel, or None if they contradict each other."""
-    size = 2 * system.p
+    size = system.size
     table = []
     for codes in selections:
         M, b = system.equations(codes)

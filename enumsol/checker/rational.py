@@ -52,6 +52,11 @@ class RationalSystem:
         self._inverse: Any = None
         self.zero = fmpq(0)
 
+    @property
+    def size(self) -> int:
+        """Numbers of a point."""
+        return 2 * self.p
+
     def row(self, kind: int, node: int) -> tuple[Vector, Any]:
         """A row of ``trusted.status_rows`` as an affine function of lambda: 2p coefficients, and what is added."""
         p, form = self.p, [fmpq(0)] * (2 * self.p)

@@ -34,6 +34,8 @@ class VerificationReport:
         "problem": the theorem holds for the problem's own matrices; "condensed": for S, g and F as computed.
     alpha : Fraction or None
         The parameter that the proof is about; None when its header cannot be read.
+    within : float or None
+        Of a body that nothing holds: the bound of its rigid displacement [length], if a leaf rests on it.
 
     Examples
     --------
@@ -52,6 +54,7 @@ class VerificationReport:
     leaves: int
     data: str
     alpha: Fraction | None
+    within: float | None = None
 
     @property
     def complete(self) -> bool:
@@ -72,9 +75,12 @@ class VerificationReport:
                 "undecided",
                 f"  {counted(self.roots, 'isolated root')}, {counted(self.families, 'family', 'families')}",
                 f"  certified data: {_DATA[self.data]}",
-                f"  complete: {'yes' if self.complete else 'no'}",
+                f"  complete: {'yes' if self.complete else 'no'}{self._bound()}",
             )
         )
+
+    def _bound(self) -> str:
+        return "" if self.within is None or not self.complete else f", within rigid displacements of {self.within:g}"
 
 
 @dataclass(frozen=True)

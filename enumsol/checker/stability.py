@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
-from enumsol.checker.verify import Checker, FormLeaves, verify
+from enumsol.checker.plane_checker import Checker, FormLeaves
+from enumsol.checker.verify import verify
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.model.problem import ContactProblem
 from enumsol.proof import records
@@ -74,7 +75,7 @@ def stability_radius(problem: ContactProblem, proof: Proof) -> float:
     InvalidArgumentError
         The problem is no ContactProblem.
     """
-    instance_of(problem, ContactProblem, "problem")
+    instance_of(problem, ContactProblem, "problem").check_held("stability_radius")
     if not verify(problem, proof).complete:
         return 0.0
     search = _WidenedChecker(problem, None, radius=LARGEST, adjust=True)

@@ -1,56 +1,24 @@
-"""The checker of root sets: whether a proof shows that its list of roots is complete.
+"""verify: whether a proof, of a root set, of a branch graph or of a history, holds for a problem.
 
-It imports nothing of the search; ``enumsol.checker`` lists what both rest on. It recomputes S, g and F (or
-their enclosures) from the problem, proves S positive definite, walks the tree from its root, so that the leaves cover
-all selections by construction, and checks every leaf.
+Which checker reads it depends on the problem and on the header; ``enumsol.checker`` lists what they rest on.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from fractions import Fraction
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
-import numpy as np
-
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT
 from enumsol.checker.graph_checker import GraphChecker
-from enumsol.checker.reports import GraphVerificationReport, HistoryVerificationReport, VerificationReport
-from enumsol.checker.walk import TreeChecker
-from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
+from enumsol.checker.plane_checker import Checker
 from enumsol.model.problem import ContactProblem
-from enumsol.proof import records
-from enumsol.proof.proof_file import Proof, fraction_text
-from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
+from enumsol.proof.proof_file import Proof
 from enumsol.support.arguments import instance_of, optional_callable
-from enumsol.trusted.at_alpha import holds_no_root, solve_selection
-from enumsol.trusted.exclusion import Leaves, exclusion_margins
-from enumsol.trusted.quadratic_forms import EnclosedForm
-from enumsol.trusted.status_rows import ROW_KINDS, UNDECIDED, is_covering, row_signs
-from enumsol.trusted.uniqueness_in_contact import lone_root
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    from enumsol.checker.rational import RationalSystem
-    from enumsol.checker.walk import Codes, Test
+    from enumsol.checker.reports import GraphVerificationReport, HistoryVerificationReport, VerificationReport
+    from enumsol.checker.walk import TreeChecker
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.proof.records import EnclosureRecord, Record
-    from enumsol.trusted.at_alpha import VerifiedSelection
-    from enumsol.trusted.exclusion import Terms
-    from enumsol.trusted.uniqueness import ClosedSolution
-
-    #: codes of a selection, the vertices of its root set, and its dimension
-    Polytope = tuple[tuple[int, ...], list[Any], int]
-
-#: Exclusion leaves checked together.
-_BATCH = 256
-#: Covers underflow of one product.
-_SUBNORMAL = 2.0**-1070
 
 
 def verify(
@@ -96,6 +64,10 @@ def verify(
     optional_callable(progress, "progress")
     proof.check_integrity()
     checker: type[TreeChecker] = Checker
+    if problem.modes is not None:
+        from enumsol.checker.floating import FloatingChecker  # for bodies that nothing holds only
+
+        checker = FloatingChecker
     if in_space:
         from enumsol.checker.space_checker import SpaceChecker  # with its trusted core, for problems in 3D only
 
@@ -105,8 +77,10 @@ def verify(
     if isinstance(header, dict) and header.get("kind") == "history":
         from enumsol.checker.history_checker import HistoryChecker  # not for other proofs
 
+        problem.check_held("a history")
         return HistoryChecker(problem, header, checker, progress).run(lines)
     if isinstance(header, dict) and header.get("kind") == "graph" and not in_space:
+        problem.check_held("a graph")
         return GraphChecker(cast("ContactProblem", problem), header, progress).run(lines)
     return checker(problem, progress).run(proof)
 
@@ -117,303 +91,3 @@ def _is_in_space(problem: object) -> bool:
     from enumsol.model.problem3d import ContactProblem3D
 
     return isinstance(problem, ContactProblem3D)
-
-
-class FormLeaves:
-    """Forms as they are declared, and leaves that wait to be checked."""
-
-    def __init__(self) -> None:
-        self.declared: list[records.DeclaredForm] = []
-        self._waiting: dict[int, list[tuple[int, tuple[int, ...], Terms]]] = {}
-
-    def __len__(self) -> int:
-        return sum(map(len, self._waiting.values()))
-
-    def add(self, number: int, codes: tuple[int, ...], said: records.ExcludedByForm) -> None:
-        """Take a leaf, to be checked with others."""
-        place = len(self.declared) - said.back
-        self._waiting.setdefault(place, []).append((number, codes, said.terms))
-
-    def clear(self) -> None:
-        """Let go of the leaves that wait."""
-        self._waiting.clear()
-
-    def failing(self, system: EnclosedSystem) -> list[int]:
-        """Check the leaves that wait, form by form; the numbers of those that are not excluded."""
-        failed: list[int] = []
-        for place, leaves in self._waiting.items():
-            declared = self.declared[place]
-            numbers, codes, terms = zip(*leaves, strict=True)
-            with np.errstate(over="ignore", invalid="ignore"):
-                form = EnclosedForm.of(system, declared.codes, declared.multipliers, declared.weight)
-                margins = exclusion_margins(form, Leaves.of(codes, terms))
-            failed += np.array(numbers)[~(margins > 0)].tolist()
-        return sorted(failed)
-
-
-@dataclass
-class Checker(TreeChecker):
-    """Checks one proof of a problem in 2D."""
-
-    kinds = records.LEAVES
-
-    polytopes: list[Polytope] = field(default_factory=list)
-    closed: dict[tuple[int, ...], ClosedSolution] = field(default_factory=dict)
-    #: Codes of the strict roots of complete selections.
-    strict: list[tuple[int, ...]] = field(default_factory=list)
-    _waiting: list[tuple[int, tuple[int, ...], Terms]] = field(default_factory=list)
-    _by_forms: FormLeaves = field(default_factory=FormLeaves)
-
-    # -- header and tree -------------------------------------------------------------------------------------------
-
-    def _read_header(self, header: Any) -> None:
-        self.data = data_of(header, self.problem, None)
-        try:
-            self.force, self.length = units_from(header, self.problem.p)
-            self.alpha = rational_from(header.get("alpha"))
-            self.friction = [F > 0 for F in friction_at(self.problem, self.alpha)]
-        except ValueError as error:
-            raise RefusedError(f"the header cannot be read: {error}") from None
-
-    @cached_property
-    def system(self) -> EnclosedSystem:
-        """Balls for S, g and F in the proof's units."""
-        if self.data == "condensed":
-            if not self.problem.known_exactly:
-                raise RefusedError("a proof about S and g as computed, of a problem whose slip offset is a ball")
-            scaled = self.problem.condensed.at(self.alpha)
-            with np.errstate(over="ignore", invalid="ignore"):
-                pair = self.force[:, None] / self.length[None, :]
-                S, g = scaled.S * pair, scaled.g / self.length
-            finite = np.all(np.isfinite(S)) and np.all(np.isfinite(g))
-            if not finite or np.any(np.array(self.friction) & (scaled.F == 0)):
-                raise RefusedError("S, g or F over- or underflow in the proof's units")
-            enclosed = EnclosedSystem.as_computed(S, g, scaled.F)
-        else:
-            enclosed = self.enclosed().at(self.alpha, self.force, self.length)
-        if not enclosed.smallest_eigenvalue > 0:
-            raise RefusedError("S is not proven positive definite")
-        return enclosed
-
-    @cached_property
-    def rational(self) -> RationalSystem:
-        """The condensed problem in rationals; computed only if a leaf needs it."""
-        if self.data == "condensed":
-            raise RefusedError("a rational leaf in a proof about S and g as computed")
-        if not self.problem.known_exactly:
-            raise RefusedError("a rational leaf in a proof about a problem whose slip offset is a ball")
-        from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
-
-        try:
-            definite = self.system.smallest_eigenvalue > 0
-        except (NotEnclosedError, RefusedError):
-            definite = False
-        return RationalSystem(self.problem, self.alpha, definite=definite)
-
-    def _flush(self, *, last: bool) -> None:
-        """Check the dual inequalities of the waiting leaves together."""
-        if len(self._by_forms) >= (1 if last else _BATCH):
-            self._check_forms(self._by_forms)
-            self._by_forms.clear()
-        if not self._waiting or (not last and len(self._waiting) < _BATCH):
-            return
-        numbers, codes, terms = zip(*self._waiting, strict=True)
-        self._waiting.clear()
-        self._check_exclusions(np.array(numbers), Leaves.of(codes, terms))
-
-    def _check_exclusions(self, numbers: NDArray[np.intp], leaves: Leaves) -> None:
-        margins = exclusion_margins(self.system, leaves)
-        for number in numbers[~(margins > 0)]:
-            self.fail(f"leaf {number}: its multipliers do not exclude it")
-
-    def _check_forms(self, leaves: FormLeaves) -> None:
-        for number in leaves.failing(self.system):
-            self.fail(f"leaf {number}: its form and multipliers do not exclude it")
-
-    def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:
-        if not issubclass(kind, records.ClosingRecord):
-            return records.Limits(codes, self.friction, self._by_forms.declared)
-        # as the kernel has it
-        friction = (self.system.F > 0).tolist()
-        if kind is records.ClosedInRationals:
-            _ = self.rational  # refused before the record is read
-        return records.Limits(codes, friction)
-
-    def _declare(self, record: list[Any]) -> None:
-        try:
-            form = records.DeclaredForm.read(record, records.Limits((UNDECIDED,) * self.problem.p))
-        except ValueError as error:
-            raise RefusedError(str(error)) from None
-        self._by_forms.declared.append(form)
-
-    def _covers(self, node: int, code: int, children: list[int]) -> bool:
-        return is_covering(code, children, friction=self.friction[node])
-
-    def _claim(self, isolated: int, families: int) -> dict[str, int]:
-        roots = self.regular + isolated
-        return {"roots": roots, "families": families, "undecided": self.undecided, "leaves": self.leaves}
-
-    # -- leaves ----------------------------------------------------------------------------------------------------
-
-    def _tests(self) -> dict[type[Record], Test]:
-        return {
-            records.Excluded: self._excluded,
-            records.ExcludedByForm: self._excluded_by_form,
-            records.ExcludedInRationals: self._rational_exclusion,
-            records.NoRoot: self._no_root,
-            records.RegularRoot: self._regular_root,
-            records.NoRootInRationals: self._no_rational_root,
-            records.RootSetRecord: self._root_set,
-            records.Closed: self._closed,
-            records.ClosedInRationals: self._closed_in_rationals,
-            records.Alone: self._alone,
-        }
-
-    def _at_rest(self) -> None:
-        self.polytopes.append(((0,) * self.problem.p, [tuple([Fraction(0)] * (2 * self.problem.p))], 0))
-
-    def _excluded(self, codes: Codes, said: records.Excluded) -> str | None:
-        self._waiting.append((self.leaves, codes, said.terms))
-        return None
-
-    def _excluded_by_form(self, codes: Codes, said: records.ExcludedByForm) -> str | None:
-        self._by_forms.add(self.leaves, codes, said)
-        return None
-
-    def _no_root(self, codes: Codes, said: records.NoRoot) -> str | None:
-        if holds_no_root(self.system, codes, solve_selection(self.system, codes)):
-            return None
-        return "its candidate does not break a condition strictly, nor do its equations contradict each other"
-
-    def _regular_root(self, codes: Codes, said: records.RegularRoot) -> str | None:
-        ball = solve_selection(self.system, codes)
-        if ball is None:
-            return "its selection is not proven regular"
-        if not ball.is_root:
-            return "its candidate is not proven to be a root"
-        return self._regular(codes, ball, said.enclosure)
-
-    def _regular(self, codes: Codes, ball: VerifiedSelection, said: EnclosureRecord) -> str | None:
-        """Count a regular root, and look at what is said of it."""
-        self.regular += 1
-        self.strict.append(codes)
-        self._locate(ball)
-        centre, radius = said.numbers(2 * self.problem.p)
-        with np.errstate(over="ignore", invalid="ignore"):
-            reach = np.abs(centre - ball.force.mid * self.force) + ball.force.rad * self.force
-            inside = reach * SAFE + np.where(ball.force.rad > 0, _SUBNORMAL, 0.0) <= radius
-        return said.refusal(ball.det_sign, inside=bool(np.all(inside)))
-
-    def _closed(self, codes: Codes, said: records.Closed) -> str | None:
-        from enumsol.checker.fathomed_subtrees import closed_by_balls
-
-        reason, ball = closed_by_balls(self.system, said, self.force)
-        if ball is not None:
-            self._locate(ball)
-            self.closed[ball.core] = ball
-        return reason
-
-    def _locate(self, ball: VerifiedSelection | ClosedSolution) -> None:
-        if self.located is not None:
-            p = self.problem.p
-            forces = Ball(ball.force.mid * self.force, ball.force.rad * self.force + TINY)
-            self.locate(forces, (ball.w.mid[p:] == 0) & (ball.w.rad[p:] == 0))
-
-    def locate_rational_roots(self) -> None:
-        """Add the isolated roots that rationals have found to ``located``."""
-        p = self.problem.p
-        for _, points, dimension in self.polytopes:
-            if dimension:
-                continue
-            exact = [Fraction(x) for x in points[0]]
-            forces = np.array([float(x) for x in exact])
-            w = [Fraction(0)] * p if not any(exact) and self.problem.is_unloaded(self.alpha) else self._slips(exact)
-            self.locate(Ball(forces, np.abs(forces) * 2 * UNIT + TINY), np.array([x == 0 for x in w]))
-
-    def _slips(self, point: list[Fraction]) -> list[Any]:
-        """w_t at a point, exactly."""
-        from enumsol.arithmetic.rationals import rational  # python-flint, as above
-
-        column = [rational(x) for x in point]
-        rows = self.rational.S.tolist()
-        pairs = zip(rows, self.rational.g, strict=True)
-        return [g - sum((a * x for a, x in zip(row, column, strict=True)), g * 0) for row, g in pairs][
-            len(point) // 2 :
-        ]
-
-    def _alone(self, codes: Codes, said: records.Alone) -> str | None:
-        root = lone_root(self.system, codes, *said.arguments)
-        return (
-            "its root is not proven to be alone"
-            if root is None
-            else self._regular(said.selection, root, said.enclosure)
-        )
-
-    def _closed_in_rationals(self, codes: Codes, said: records.ClosedInRationals) -> str | None:
-        from enumsol.checker.fathomed_subtrees import closed_in_rationals
-
-        reason, points = closed_in_rationals(self.system, self.rational, codes, said)
-        self.polytopes += [(said.selection, points, 0)] if points else []
-        return reason
-
-    def _rational_exclusion(self, codes: Codes, said: records.ExcludedInRationals) -> str | None:
-        p = self.problem.p
-        signs = row_signs(np.array(codes), np.array(self.friction, dtype=float))
-        units = [Fraction(self.length[r % p] if r // p < 4 else self.force[r % p]) for r in range(ROW_KINDS * p)]
-        rows, values = (part.tolist() for part in said.terms)
-        positive = self.rational.energy_bound_positive(signs, rows, values, units)
-        return None if positive else "its multipliers do not exclude it in rational arithmetic"
-
-    def _no_rational_root(self, codes: Codes, said: records.NoRootInRationals) -> str | None:
-        from enumsol.checker.hull import hull_of_selections
-
-        return "it holds a root" if hull_of_selections(self.rational, codes).points else None
-
-    def _root_set(self, codes: Codes, said: records.RootSetRecord) -> str | None:
-        from enumsol.checker.hull import hull_of_selections
-
-        hull = hull_of_selections(self.rational, codes)
-        # in lowest terms a number has one text: the texts in a file need no conversion
-        found = [[fraction_text(x.numerator, x.denominator) for x in point] for point in hull.points]
-        if not found or sorted(said.points) != sorted(found) or not same(said.dimension, hull.dimension):
-            return "its roots are not those that are claimed"
-        self.polytopes.append((codes, hull.points, hull.dimension))
-        return None
-
-    # -- counting --------------------------------------------------------------------------------------------------
-
-    def _count(self) -> tuple[int, int]:
-        """Isolated degenerate roots and families: rational solutions joined where they have a point in common.
-
-        A strict root solves no second selection: it is not among these, and strict roots of two leaves are different.
-        """
-        groups = list(range(len(self.polytopes)))
-
-        def group_of(k: int) -> int:
-            while groups[k] != k:
-                groups[k] = k = groups[groups[k]]
-            return k
-
-        owner: dict[Any, int] = {}
-        for k, (_, points, _) in enumerate(self.polytopes):
-            for point in points:
-                groups[group_of(k)] = group_of(owner.setdefault(point, k))
-        # points are equal or disjoint; larger polytopes may meet away from their vertices
-        for k in [k for k, polytope in enumerate(self.polytopes) if polytope[2] > 0]:
-            for m in range(len(self.polytopes)):
-                if group_of(k) != group_of(m) and self._meet(k, m):
-                    groups[group_of(k)] = group_of(m)
-        found = {group_of(k) for k in range(len(groups))}
-        families = {group_of(k) for k, polytope in enumerate(self.polytopes) if polytope[2] > 0}
-        apart = 0
-        if self.closed:
-            from enumsol.checker.fathomed_subtrees import count_apart
-
-            apart, self.doubtful = count_apart(self.closed, self.strict + [codes for codes, _, _ in self.polytopes])
-        return len(found) - len(families) + apart, len(families)
-
-    def _meet(self, k: int, m: int) -> bool:
-        """Whether two root sets have a point in common."""
-        from enumsol.checker.hull import hull_of_selections
-
-        return bool(hull_of_selections(self.rational, self.polytopes[k][0], self.polytopes[m][0]).points)

@@ -92,7 +92,13 @@ class TreeChecker:
             self.leaves,
             self.data,
             getattr(self, "alpha", None),
+            self._within,
         )
+
+    @property
+    def _within(self) -> float | None:
+        """The bound of rigid displacements that the leaves rest on."""
+        return None
 
     def enclosed(self) -> CondensedEnclosure:
         """Balls for S and g of the problem's own data."""

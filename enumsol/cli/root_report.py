@@ -56,7 +56,11 @@ def uniqueness(found: RootSet) -> str:
         why = "fast arithmetic proves nothing" if found.arithmetic == "fast" else found.completeness()
         return f"unique: not known ({why})"
     if found.unique:
-        return f"unique: yes ({'proven by one certificate' if found.by_one_certificate else 'proven by a search'})"
+        bound = found.rigid_bound
+        within = f", {bound.words()}" if bound is not None and bound.needed else ""
+        return (
+            f"unique: yes ({'proven by one certificate' if found.by_one_certificate else 'proven by a search'}{within})"
+        )
     what = "a continuum of solutions" if found.families else "two solutions"
     return f"unique: no ({what}, proven; --unique looks for no more)"
 
@@ -77,6 +81,7 @@ def roots_as_json(found: RootSet, problem: str) -> str:
         "by_one_certificate": found.by_one_certificate,
         "stopped": found.stopped,
         "index_sum": found.index_sum,
+        **_rigid_bound(found),
         "node_ids": list(found.node_ids),
         **_mirror(found),
         "roots": [_root(root) | _image(found, k) for k, root in enumerate(found)],
@@ -107,6 +112,12 @@ def _root(root: Root) -> dict[str, Any]:
     }
 
 
+def _rigid_bound(found: RootSet) -> dict[str, Any]:
+    """Of a body that nothing holds, within which rigid displacements solutions were sought."""
+    bound = found.rigid_bound
+    return {} if bound is None else {"max_rigid_displacement": bound.largest, "bound_needed": bound.needed}
+
+
 def _mirror(found: RootSet) -> dict[str, Any]:
     """What is known of the symmetry of the problem, after --mirror."""
     images = found.mirror_images
@@ -122,6 +133,8 @@ def _image(found: RootSet, k: int) -> dict[str, Any]:
 
 
 def _in_plane(root: Root) -> dict[str, Any]:
+    if root.rigid_coordinates is not None:
+        return {"rigid_coordinates": root.rigid_coordinates, "rigid_displacement": root.rigid_displacement}
     return {"condition": root.condition, "dlambda_dalpha": root.dlambda_dalpha}
 
 
@@ -155,6 +168,7 @@ def _family(family: RootFamily) -> dict[str, Any]:
                 "statuses": [status.value for status in part.statuses],
                 "dimension": part.dimension,
                 "vertices": part.vertices,
+                **({} if part.rigid_coordinates is None else {"rigid_coordinates": part.rigid_coordinates}),
             }
             for part in family.polytopes
         ],

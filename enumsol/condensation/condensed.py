@@ -16,7 +16,7 @@ from enumsol.support.immutable import Sealed, sealed
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.condensation.data import CondensableData, ProblemData
+    from enumsol.condensation.data import CondensableData, FloatingData, ProblemData
     from enumsol.condensation.products import WithProducts
     from enumsol.support.arguments import AlphaLike
 
@@ -273,3 +273,20 @@ class CondensedProblem(Condensation):
         """
         F = self.problem.friction_at(alpha)
         return CondensedSystem(self.S, self.free_displacements(alpha), F)
+
+
+@dataclass(frozen=True)
+class FloatingCondensation(Condensation):
+    """What roots ask of a body that nothing holds: displacements, and the problem itself."""
+
+    problem: FloatingData = field(repr=False)
+
+    @classmethod
+    def of(cls, problem: FloatingData) -> FloatingCondensation:
+        """That of a problem."""
+        held = problem.on_springs.condensed
+        return cls(held.S, held.g0, held.g1, problem)
+
+    def displacement(self, alpha: AlphaLike, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+        """u less the rigid displacement: A_k^-1 (f(alpha) - B' lambda), shape (n,)."""
+        return np.asarray(self.problem.on_springs.condensed.displacement(alpha, forces))

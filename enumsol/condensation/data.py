@@ -82,3 +82,11 @@ class ProblemData(CondensableData, Protocol):
 
     def friction_at(self, alpha: AlphaLike) -> Vector:
         """F(alpha), shape (p,)."""
+
+
+class FloatingData(ProblemData, Protocol):
+    """A 2D problem of a body that nothing holds."""
+
+    @property
+    def on_springs(self) -> Any:
+        """The problem of the body on springs."""

@@ -102,7 +102,7 @@ class CondensedEnclosure(Sealed):
         """B A^-1 f(alpha), where the contact nodes would be without contact, shape (2p,) [length]."""
         if self.free is None:
             raise AssertionError("these balls are not those of a whole problem")
-        value, slack = _float_at(alpha)
+        value, slack = float_at(alpha)
         with np.errstate(over="ignore", invalid="ignore"):
             moved = Ball(np.array(value), np.array(slack)) * Ball(self.g1, self.g1_rad) + Ball(*self.free)
         if not np.all(np.isfinite(moved.mid)) or not np.all(np.isfinite(moved.rad)):
@@ -161,7 +161,7 @@ class CondensedEnclosure(Sealed):
         """
         if np.any(np.frexp(np.concatenate([force, length]))[0] != 0.5):
             raise AssertionError("units of force and length must be powers of two")
-        value, slack = _float_at(alpha)
+        value, slack = float_at(alpha)
         with np.errstate(over="ignore", invalid="ignore"):
             g = self.g0 + value * self.g1
             size = np.abs(value * self.g1)
@@ -198,7 +198,7 @@ def nearest_floats(exact: Sequence[Fraction]) -> tuple[Array, NDArray[np.bool_]]
     return F, inexact
 
 
-def _float_at(alpha: Fraction) -> tuple[float, float]:
+def float_at(alpha: Fraction) -> tuple[float, float]:
     """The float next to alpha, and how far it may be away.
 
     Raises
@@ -286,6 +286,16 @@ class EnclosedSystem:
         if not bound > 0:
             raise NotEnclosedError("the condensed compliance S is positive definite only within rounding")
         return bound
+
+    @property
+    def reach(self) -> Array:
+        """Bounds of the coordinates of a rigid displacement; none of a body that is held."""
+        return np.zeros(0)
+
+    @cached_property
+    def largest_unknowns(self) -> float:
+        """A bound of the norm of lambda at a root: ||g|| / mu, by theory, (5.2)."""
+        return float(upper_norm(np.abs(self.g) + self.g_rad) / self.smallest_eigenvalue * SAFE)
 
     @cached_property
     def inverse(self) -> Array:

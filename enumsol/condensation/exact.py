@@ -60,6 +60,15 @@ class ExactSystem:
         """Number of contact nodes."""
         return len(self.F)
 
+    @property
+    def reach(self) -> tuple[Any, ...]:
+        """Bounds of the coordinates of a rigid displacement; none of a body that is held."""
+        return ()
+
+    def along(self, direction: tuple[Any, ...]) -> ExactSystem:
+        """The system whose g is a direction."""
+        return ExactSystem(self.S, direction, self.F)
+
     @classmethod
     def from_problem(cls, problem: ProblemData, alpha: Alpha) -> ExactSystem:
         """Condense at one alpha without any rounding.
@@ -73,6 +82,57 @@ class ExactSystem:
         """
         problem.friction_at(alpha)
         return ExactCondensed(*_condensed(problem), condensed_exactly=True, zero=None).system(rational(alpha))
+
+
+@dataclass(frozen=True)
+class FloatingExactSystem(ExactSystem):
+    """That of a body that nothing holds: S and g are bordered by G and h (theory, section 14.2).
+
+    Attributes
+    ----------
+    reach : tuple of r fmpq
+        Bounds of the coordinates q of a rigid displacement.
+    """
+
+    reach: tuple[Any, ...] = ()
+
+    @classmethod
+    def of(cls, problem: Any, alpha: Alpha) -> FloatingExactSystem:
+        """Condense the body on springs, and find G and h, without any rounding.
+
+        Raises
+        ------
+        InvalidArgumentError
+            Friction is negative there.
+        TooLargeError
+            The problem has more than EXACT_DOF_LIMIT degrees of freedom.
+        """
+        held = ExactSystem.from_problem(problem.on_springs, alpha)
+        N = rational_matrix(problem.modes.N)
+        G = (rational_matrix(problem.contact_rows.toarray()) * N).transpose().tolist()
+        slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
+        loads = (N.transpose() * rational_matrix(np.column_stack([problem.f, slope]))).tolist()
+        h = [load + rational(alpha) * change for load, change in loads]
+        S = [[*row, *(mode[k] for mode in G)] for k, row in enumerate(held.S.tolist())]
+        S += [[*mode, *([fmpq(0)] * len(G))] for mode in G]
+        reach = tuple(rational(float(x)) for x in problem.modes.reach(problem.rigid_reach))
+        return cls(fmpq_mat(S), (*held.g, *h), held.F, reach)
+
+    @property
+    def contact_compliance(self) -> Any:
+        """S of the body on springs, fmpq_mat (2p, 2p)."""
+        size = 2 * self.p
+        return fmpq_mat([row[:size] for row in self.S.tolist()[:size]])
+
+    def along(self, direction: tuple[Any, ...]) -> FloatingExactSystem:
+        """What changes with g along a direction: neither h nor the bounds."""
+        zeros = (fmpq(0),) * len(self.reach)
+        return FloatingExactSystem(self.S, (*direction, *zeros), self.F, zeros)
+
+
+def exact_system(problem: Any, alpha: Alpha) -> ExactSystem:
+    """The condensed problem in rationals, of a body that is held or not."""
+    return ExactSystem.from_problem(problem, alpha) if problem.modes is None else FloatingExactSystem.of(problem, alpha)
 
 
 @dataclass(frozen=True)

@@ -116,6 +116,7 @@ def follow_all(
     True
     """
     instance_of(problem, ContactProblem, "problem")
+    problem.check_held("follow_all")
     ends = alpha_interval(interval)
     optional_callable(progress, "progress")
     if graph is None:
@@ -220,6 +221,7 @@ def follow_arc(
         The arc does not end at the vertex, or is a sheet.
     """
     instance_of(problem, ContactProblem, "problem")
+    problem.check_held("follow_arc")
     checked_graph(graph)
     vertex, arc = positive_integer(vertex, "vertex", 0), positive_integer(arc, "arc", 0)
     chosen = next((item for item in graph.arcs if item.number == arc), None)

@@ -80,6 +80,7 @@ def newton(
     [(ContactStatus.OPEN,), (ContactStatus.STICK,)]
     """
     instance_of(problem, ContactProblem, "problem")
+    problem.check_held("newton")
     exact = alpha_value(alpha)
     value = float(exact)
     r = None if r is None else positive_number(r, "r")

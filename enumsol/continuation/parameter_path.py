@@ -74,6 +74,7 @@ class SmoothPath:
     def problem_at(self, problem: ContactProblem, alpha: AlphaLike) -> ContactProblem:
         """The problem with friction and load frozen at alpha, to enumerate roots on the path."""
         instance_of(problem, ContactProblem, "problem")
+        problem.check_held("a SmoothPath")
         exact = alpha_value(alpha)
         value = float(exact)
         F = problem.friction_at(exact) if self.F is None else _evaluate(self.F, value, "F", problem.p, broadcast=True)

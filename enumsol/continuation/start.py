@@ -42,6 +42,7 @@ class Start:
         smooth_path: SmoothPath | None,
     ) -> None:
         instance_of(problem, ContactProblem, "problem")
+        problem.check_held("follow")
         if smooth_path is not None:
             instance_of(smooth_path, SmoothPath, "smooth_path")
         chosen = ContinuationOptions() if options is None else options

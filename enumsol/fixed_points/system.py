@@ -36,8 +36,11 @@ def checked_problem(value: Any) -> Problem:
     ------
     InvalidArgumentError
         It is neither.
+    NotHeldError
+        Nothing holds the body.
     """
     if isinstance(value, (ContactProblem, ContactProblem3D)):
+        value.check_held("a fixed point")
         return value
     raise InvalidArgumentError(f"problem is a {type(value).__name__}; expected a ContactProblem or a ContactProblem3D")
 

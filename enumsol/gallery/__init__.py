@@ -6,13 +6,14 @@ there; `get` finds one by name.
 """
 
 from enumsol.gallery.catalogue import GALLERY, GalleryEntry, close_names, get
-from enumsol.gallery.problems import chain, clamped_block, one_node_triangle, two_node_square, wedge
+from enumsol.gallery.problems import block_on_table, chain, clamped_block, one_node_triangle, two_node_square, wedge
 from enumsol.gallery.solid_gallery import block3d, one_node_3d, wedge3d
 
 __all__ = [
     "GALLERY",
     "GalleryEntry",
     "block3d",
+    "block_on_table",
     "chain",
     "clamped_block",
     "close_names",

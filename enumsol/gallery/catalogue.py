@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.gallery.problems import chain, clamped_block, one_node_triangle, two_node_square, wedge
+from enumsol.gallery.problems import block_on_table, chain, clamped_block, one_node_triangle, two_node_square, wedge
 from enumsol.gallery.solid_gallery import block3d, one_node_3d, wedge3d
 from enumsol.support.arguments import shown
 
@@ -117,6 +117,7 @@ def _large() -> Iterator[GalleryEntry]:
     for p in (8, 16, 32, 64, 100):
         build = partial(clamped_block, p, p // 2)
         yield GalleryEntry(f"clamped-block-{p}", f"block on {p} contact nodes: one root", 3.0, 1, build)
+    yield GalleryEntry("block-on-table-5", "block that nothing but contact holds: one root", 0.0, 1, block_on_table)
     for p in (8, 14, 20, 32):
         build = partial(wedge, 4, p // 2)
         yield GalleryEntry(f"wedge-{p}-3", "wedge pulled straight: jammed, free or sliding out", 1.0, 3, build)

@@ -202,6 +202,73 @@ def clamped_block(
     )
 
 
+def block_on_table(
+    nx: int = 4,
+    ny: int = 2,
+    lame: Pair = (1.0, 1.0),
+    *,
+    pressure: float = 1.0,
+    push: float = 0.5,
+    friction: float = 0.3,
+    max_rigid_displacement: float | None = None,
+) -> ContactProblem:
+    """A block that lies on a table, pressed down and pushed: nothing but contact holds it.
+
+    The rectangle (0, 2) x (0, 1) is meshed as that of `clamped_block`. All nodes along the bottom touch the table:
+    p = nx + 1. The top is pressed down; forces on the bottom push the block to the right. Below ``push`` = 1 it has one
+    solution, at 1 it slides as far as one likes, and above it has none.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Cells along x and y, at least 1.
+    lame : (float, float)
+        Lame coefficients l, m [force / length^2].
+    pressure : float
+        Force per length of the top [force / length].
+    push : float
+        Sum of the pushing forces, in parts of what friction can hold [-].
+    friction : float
+        Constant coefficient.
+    max_rigid_displacement : float or None
+        As in `ContactProblem`.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> [len(enumsol.enumerate_roots(enumsol.gallery.block_on_table(push=push), 0)) for push in (0, 0.5, 1.1)]
+    [1, 1, 0]
+    """
+    mesh = fem.rectangle(nx, ny, 2.0, 1.0)
+    load = positive_number(pressure, "pressure")
+    mu, share = nonnegative_number(friction, "friction"), finite_number(push, "push")
+    f = fem.edge_forces(mesh.points, fem.edges_along(mesh.top), (0.0, -load)).ravel()
+    nodes, n = mesh.bottom, 2 * len(mesh.points)
+    f[2 * nodes] += share * mu * -np.sum(f[1::2]) / len(nodes)
+    rows = np.arange(len(nodes))
+    Bn = sp.csr_array((-np.ones(len(nodes)), (rows, 2 * nodes + 1)), shape=(len(nodes), n))
+    Bt = sp.csr_array((np.ones(len(nodes)), (rows, 2 * nodes)), shape=(len(nodes), n))
+    x, y = mesh.points.T
+    N = np.zeros((n, 3))
+    N[::2, 0], N[1::2, 1], N[::2, 2], N[1::2, 2] = 1.0, 1.0, -y, x
+    return ContactProblem(
+        fem.stiffness(mesh.points, mesh.triangles, lame),
+        Bn,
+        Bt,
+        f,
+        friction=mu,
+        coordinates=mesh.points[nodes],
+        mesh=BodyMesh.of_dofs(mesh.points, mesh.triangles, np.arange(n)),
+        rigid_modes=N,
+        max_rigid_displacement=max_rigid_displacement,
+    )
+
+
 def wedge(
     nx: int,
     ny: int,

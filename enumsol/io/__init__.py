@@ -15,6 +15,7 @@ The first three hold the arrays of `ContactProblem` or of `ContactProblem3D` by 
     - ``friction``: one number, a constant coefficient; or ``friction0`` and ``friction1``: F = friction0 + alpha
       friction1, each a number or a (p,) array, 0 when left out. With none of them F = alpha, as in `ContactProblem`.
     - ``gap``, ``load_slope``, ``slip_offset``, ``coordinates``: as in `ContactProblem`.
+    - ``rigid_modes`` (n, r) and ``max_rigid_displacement``, one number: of a body that nothing holds.
     - ``node_ids``: (p,) integers, floats or strings.
     - ``mesh_points`` (N, d), ``mesh_cells`` (M, k) and either ``mesh_motion`` (d N, n; dense or in sparse parts) or
       ``mesh_dofs`` (n,): a `BodyMesh`, or the arguments of ``BodyMesh.of_dofs``, all or none; with it ``mesh_offset``

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidProblemError
-from enumsol.io.layouts import LAYOUT_2D, LAYOUT_3D, MEAN, MESH, SURFACE, TABLE, Layout
+from enumsol.io.layouts import LAYOUT_2D, LAYOUT_3D, MEAN, MESH, RIGID, SURFACE, TABLE, Layout
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import ContactProblem
 
@@ -27,6 +27,7 @@ def problem_from_arrays(arrays: Mapping[str, Any], layout: Layout) -> ContactPro
     if layout is LAYOUT_2D:
         options |= _plane_friction(arrays)
         options["mesh"] = _mesh(arrays)
+        options |= _rigid(arrays)
         return ContactProblem(*(arrays[name] for name in layout.required), **options)
     # not for problems in 2D
     from enumsol.model.problem3d import ContactProblem3D
@@ -50,6 +51,10 @@ def arrays_of(problem: ContactProblem | ContactProblem3D) -> dict[str, Any]:
         F0, F1 = problem.friction
         arrays: dict[str, Any] = {name: getattr(problem, name) for name in (*LAYOUT_2D.required, "gap")}
         arrays |= {"friction0": F0, "friction1": F1, "slip_offset": problem.slip_offset}
+        if problem.rigid_modes is not None:
+            arrays["rigid_modes"] = problem.rigid_modes
+        if problem.max_rigid_displacement is not None:
+            arrays["max_rigid_displacement"] = np.array([problem.max_rigid_displacement])
     else:
         arrays = {name: getattr(problem, name) for name in (*LAYOUT_3D.required, "gap", "slip_offset")}
         arrays |= _arrays_of_law(problem) | dict(zip(_FRICTION_SLOPE, problem.friction_slope, strict=True))
@@ -61,6 +66,17 @@ def arrays_of(problem: ContactProblem | ContactProblem3D) -> dict[str, Any]:
     if mean is not None:
         more |= dict(zip(MEAN, (mean.T1, mean.T2, mean.offset, mean.weights), strict=True))
     return arrays | {name: part for name, part in more.items() if part is not None}
+
+
+def _rigid(arrays: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments about the rigid modes of a body that nothing holds."""
+    found = {name: arrays[name] for name in RIGID if name in arrays}
+    if RIGID[1] in found:
+        bound = np.asarray(found[RIGID[1]])
+        if bound.size != 1:
+            raise InvalidProblemError(f"{RIGID[1]} has shape {bound.shape}; expected one number")
+        found[RIGID[1]] = bound.item()
+    return found
 
 
 # -- friction ----------------------------------------------------------------------------------------------------------

@@ -61,6 +61,11 @@ def read(path: Path) -> Problem:
 def write(problem: Problem, path: Path) -> None:
     """Write a global problem; node labels, coordinates, areas and meshes have no place in it."""
     h5py = _h5py()
+    if problem.modes is not None:
+        raise InvalidProblemError(
+            "the body is held by nothing, and fclib has no place for rigid_modes; "
+            "expected a body that is held, or another format (.npz, MatrixMarket directory)"
+        )
     if problem.depends_on_alpha:
         raise InvalidProblemError(
             "friction or load depends on alpha, which fclib cannot hold; "

@@ -78,12 +78,14 @@ _COMMON = ("gap", "friction", "load_slope", "slip_offset", "node_ids", "coordina
 MESH, SURFACE = ("mesh_points", "mesh_cells"), ("mesh_offset", "mesh_facets", "mesh_rows", "mesh_lame")
 _MESH = (*MESH, "mesh_motion", "mesh_dofs", *SURFACE)
 _MESH_TABLES = (*MESH, "mesh_offset", "mesh_facets", "mesh_lame")
+#: Of a body that nothing holds.
+RIGID = ("rigid_modes", "max_rigid_displacement")
 LAYOUT_2D = Layout(
     contact=("A", "Bn", "Bt"),
     matrices=("A", "Bn", "Bt", "mesh_motion"),
-    tables=("coordinates", *_MESH_TABLES),
-    broadcast=("gap", "friction", "friction0", "friction1", "slip_offset"),
-    optional=(*_COMMON, "friction0", "friction1", *_MESH),
+    tables=("coordinates", *_MESH_TABLES, RIGID[0]),
+    broadcast=("gap", "friction", "friction0", "friction1", "slip_offset", RIGID[1]),
+    optional=(*_COMMON, "friction0", "friction1", *_MESH, *RIGID),
     frictions=(("friction",), ("friction0", "friction1")),
     synonyms=_SYNONYMS
     | {"bt": "Bt", "t": "Bt", "tangential": "Bt"}

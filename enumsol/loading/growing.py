@@ -171,6 +171,7 @@ def histories(
     given: Any = problem
     if not isinstance(given, ContactBody):
         instance_of(given, ContactProblem, "problem")
+    problem.check_held("histories")
     one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     if not callable(follow):
         one_of(follow, "follow", ("all", "nearest"))

@@ -478,6 +478,7 @@ def _parameter(problem: Any, over: Any) -> tuple[str, Callable[[float], ContactP
     if name not in ("friction", "gap", "load"):
         raise InvalidArgumentError(f"over is {shown(over)}; {_EXPECTED}")
     body = instance_of(problem, ContactProblem, "problem")
+    body.check_held("multiplicity_map")
     if name != "load":
         return name, _Replaced(body, name), _numbers(given)
     if not isinstance(given, tuple) or len(given) != 2:

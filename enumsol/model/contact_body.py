@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.condensation.affine import exactly_at
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError, NotHeldError
 from enumsol.support.arguments import alpha_value, shown
 from enumsol.support.array_arguments import real_array, real_matrix
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.condensation.factorization import Factorization
     from enumsol.condensation.products import Products
+    from enumsol.model.rigid_modes import RigidModes
     from enumsol.support.arguments import AlphaLike
     from enumsol.support.array_types import ArrayLike, Floats, NDArray
 
@@ -60,6 +61,8 @@ class ContactBody(Immutable):
     exact_offset: tuple[Fraction, ...] | None = None
     #: The problem that this one was made from with the same matrices, which computes what rests on them for both.
     _origin: ContactBody | None = None
+    #: The rigid modes of a body that nothing holds.
+    modes: RigidModes | None = None
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     def __init_subclass__(cls) -> None:
@@ -125,9 +128,24 @@ class ContactBody(Immutable):
         """Number of contact nodes."""
         return self._rows["Bn"].shape[0]
 
+    def check_held(self, what: str) -> None:
+        """Nothing for a body that supports or springs hold; ``what`` was asked of it, for the message.
+
+        Raises
+        ------
+        NotHeldError
+            Nothing holds the body: A is singular, and what needs its inverse is not there.
+        """
+        if self.modes is not None:
+            raise NotHeldError(
+                f"{what} cannot take a body that nothing holds (rigid_modes is given); "
+                "expected a body held by supports or springs"
+            )
+
     @cached_property
     def factorization(self) -> Factorization:
         """One sparse factorization of A, shared by everything that solves with it."""
+        self.check_held("a factorization of A")
         if self._origin is not None:
             return self._origin.factorization
         from enumsol.condensation.factorization import Factorization  # scipy's solvers come with the first use
@@ -137,6 +155,7 @@ class ContactBody(Immutable):
     @cached_property
     def products(self) -> Products:
         """What condensation and enclosure have in common."""
+        self.check_held("condensation")
         if (origin := self._origin) is not None:
             mine, theirs = ((body.f, body.load_slope) for body in (self, origin))
             return origin.products if all(map(_equal, mine, theirs)) else origin.products.with_loads_of(self)
@@ -153,6 +172,7 @@ class ContactBody(Immutable):
         NotEnclosedError
             A is positive definite only within rounding.
         """
+        self.check_held("an enclosure of S")
         from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError  # as above
 
         if self._origin is not None:
@@ -206,9 +226,9 @@ class ContactBody(Immutable):
         kept = [
             name for name, own in matrices.items() if name not in changes or own.holds(real_matrix(changes[name], name))
         ]
-        if len(kept) == len(matrices):
+        if len(kept) == len(matrices) and "rigid_modes" not in changes:
             other.__dict__["_origin"] = self._origin or self
-        elif "A" in kept:
+        elif "A" in kept and self.modes is None:
             other.__dict__["factorization"] = self.factorization
         type(self).__init__(other, **given)
         if "slip_offset" not in changes:
@@ -237,6 +257,8 @@ class ContactBody(Immutable):
         vectors = [self.f, self.gap, *friction, slope, self.slip_offset.ravel()]
         if self.offset_radius is not None:
             kind, vectors = kind + b", from a ball", [*vectors, self.offset_radius.ravel()]
+        if self.modes is not None:
+            kind, vectors = kind + b", held by nothing", [*vectors, self.modes.N.ravel(), self._largest_rigid()]
         digest = hashlib.sha256(kind)
         parts: list[Any] = [np.array([self.n, self.p])]
         rows = (sp.csc_array(matrix.matrix()).sorted_indices() for matrix in self._rows.values())
@@ -247,6 +269,10 @@ class ContactBody(Immutable):
             digest.update(np.ascontiguousarray(part, dtype=numbers).tobytes())
             digest.update(b"|")
         return digest.hexdigest()
+
+    def _largest_rigid(self) -> Floats:
+        """How far the body may move as a whole, shape (1,)."""
+        raise NotImplementedError
 
     def _text(self, friction: str) -> str:
         """What ``repr`` gives; ``friction`` are the coefficients in words."""

@@ -8,16 +8,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.model.contact_body import ContactBody, friction_values, span, vector
 from enumsol.model.mesh import BodyMesh
-from enumsol.support.arguments import alpha_value, exact_number, instance_of, shown
+from enumsol.model.rigid_modes import RigidModes
+from enumsol.support.arguments import alpha_value, exact_number, instance_of, positive_number, shown
 from enumsol.support.immutable import sealed
 
 if TYPE_CHECKING:
-    import scipy.sparse as sp
-
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.support.arguments import AlphaLike
     from enumsol.support.array_types import ArrayLike, Floats
@@ -62,6 +62,15 @@ class ContactProblem(ContactBody):
         Positions of the contact nodes, for plots [length].
     mesh : BodyMesh or None
         The mesh the problem was made of, for pictures of deformed bodies; no part of the fingerprint.
+    rigid_modes : (n, r) array_like or None
+        Of a body that nothing holds: all displacements, one in a column, that A offers no resistance to. A is then
+        positive semidefinite and A N = 0 within 1e-9 |A| |N| (theory, section 14). `enumerate_roots`, `is_unique` and
+        `verify` take such a body, all else refuses it.
+    max_rigid_displacement : float or None
+        Solutions are sought whose rigid displacement N q, at the degrees of freedom where it equals u, has no component
+        above this [length]. Default: ten times the size of the mesh, or of the contact nodes' ``coordinates``; without
+        these a thousand times the largest displacement of a contact node if springs as stiff as the body held it,
+        rounded up to a power of two.
 
     Raises
     ------
@@ -93,13 +102,56 @@ class ContactProblem(ContactBody):
         node_ids: Any = None,
         coordinates: ArrayLike | None = None,
         mesh: BodyMesh | None = None,
+        rigid_modes: ArrayLike | None = None,
+        max_rigid_displacement: float | None = None,
     ) -> None:
         super().__init__(A, {"Bn": Bn, "Bt": Bt}, f, gap, load_slope, node_ids, coordinates)
         self.friction = _friction(friction, self.p)
         self.slip_offset = vector(slip_offset, "slip_offset", self.p, broadcast=True)
         self.mesh = None if mesh is None else instance_of(mesh, BodyMesh, "mesh").check(self.n, self.p, 2)
+        self.modes = None if rigid_modes is None else RigidModes.of(rigid_modes, self.A)
+        self.rigid_modes = None if self.modes is None else self.modes.N
+        self.max_rigid_displacement = _largest(max_rigid_displacement, self.modes)
         self._freeze()
-        self.factorization.check_positive_definite()
+        self.on_springs.factorization.check_positive_definite()
+
+    @cached_property
+    def on_springs(self) -> ContactProblem:
+        """The body held by springs at some degrees of freedom, if nothing holds it (theory, section 14.1); or itself.
+
+        Raises
+        ------
+        InvalidProblemError
+            Springs there do not hold it: A is singular not only on the rigid modes.
+        """
+        if self.modes is None:
+            return self
+        names = "f", "gap", "friction", "load_slope", "slip_offset", "node_ids"
+        data = {name: getattr(self, name) for name in names}
+        if isinstance(self._origin, ContactProblem):
+            return self._origin.on_springs.replace(**data)
+        try:
+            return ContactProblem(sp.csc_array(self.A + self.modes.springs()), self.Bn, self.Bt, **data)
+        except InvalidProblemError as error:
+            raise InvalidProblemError(
+                f"A is singular or indefinite on more than the {self.modes.r} rigid_modes, for springs that hold these "
+                f"leave it so ({error})"
+            ) from None
+
+    @cached_property
+    def rigid_reach(self) -> float:
+        """How far the body may move as a whole: ``max_rigid_displacement`` or its default; 0 if it is held [length]."""
+        if self.modes is None:
+            return 0.0
+        if self.max_rigid_displacement is not None:
+            return self.max_rigid_displacement
+        for points in (None if self.mesh is None else self.mesh.points, self.coordinates):
+            if points is not None and np.any(np.ptp(points, axis=0)):
+                return float(10.0 * np.max(np.ptp(points, axis=0)))
+        condensed = self.on_springs.condensed
+        largest = float(np.max(np.abs(condensed.g0)) + np.max(np.abs(condensed.g1)))
+        # a power of two: the same wherever the problem is read, although what is computed may differ in its last bits
+        return float(np.exp2(np.ceil(np.log2(1000.0 * largest)))) if largest > 0 else 1.0
 
     @property
     def Bt(self) -> sp.csr_array:  # noqa: N802 (the field's letter)
@@ -114,6 +166,7 @@ class ContactProblem(ContactBody):
     @cached_property
     def condensed(self) -> CondensedProblem:
         """The problem condensed to its 2p contact forces (theory, section 4.1)."""
+        self.check_held("condensation")
         from enumsol.condensation.condensed import CondensedProblem  # scipy's solvers come with the first use
 
         return CondensedProblem.from_problem(self)
@@ -144,9 +197,26 @@ class ContactProblem(ContactBody):
         """SHA-256 of all data, as 64 hexadecimal digits; proofs are bound to it."""
         return self._digest(b"enumsol problem 1", self.friction)
 
+    def _largest_rigid(self) -> Floats:
+        return np.array([self.rigid_reach])
+
     def __repr__(self) -> str:
         F0, F1 = self.friction
-        return self._text(f"F0 + alpha F1,  F0 in {span(F0)}, F1 in {span(F1)}")
+        text = self._text(f"F0 + alpha F1,  F0 in {span(F0)}, F1 in {span(F1)}")
+        if self.modes is None:
+            return text
+        return f"{text}\n  rigid modes         {self.modes.r}, of displacements up to {self.rigid_reach:g}"
+
+
+def _largest(value: float | None, modes: RigidModes | None) -> float | None:
+    if value is None:
+        return None
+    if modes is None:
+        raise InvalidProblemError("max_rigid_displacement is given without rigid_modes; expected both")
+    try:
+        return positive_number(value, "max_rigid_displacement")
+    except InvalidArgumentError as error:
+        raise InvalidProblemError(str(error)) from None
 
 
 def _friction(value: Any, p: int) -> tuple[Floats, Floats]:

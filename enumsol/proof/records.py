@@ -46,12 +46,14 @@ class Limits:
     friction : whether each contact node has any
     declared : forms that were declared before
     components : of all forces, in 3D
+    modes : rigid modes of a body that nothing holds
     """
 
     codes: Codes
     friction: Sequence[bool] = ()
     declared: Sequence[DeclaredForm] = ()
     components: int = 0
+    modes: int = 0
 
     @property
     def p(self) -> int:
@@ -310,6 +312,20 @@ class ExcludedByForm(Exclusion):
         return cls(back, multipliers_from(entries[1:], ROW_KINDS * limits.p))
 
 
+@dataclass(frozen=True, eq=False)
+class Unbalanced(Exclusion):
+    """Of a body that nothing holds: no forces below the assignment are in balance with its load."""
+
+    kind, sizes = "i", (2,)
+
+    direction: Array
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> Unbalanced:
+        """A number for each rigid mode."""
+        return cls(numbers_from(entries[0], limits.modes))
+
+
 class NoRootInRationals(NoRoot):
     """A selection holds no root, to be checked in rational arithmetic."""
 
@@ -327,8 +343,8 @@ class RootSetRecord(Solved):
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> RootSetRecord:
-        """The points, lists of texts, one text for each force, and the dimension as it stands."""
-        points, size = entries[0], 2 * limits.p
+        """The points, lists of texts, one for each force and rigid mode, and the dimension as it stands."""
+        points, size = entries[0], 2 * limits.p + limits.modes
         if not isinstance(points, list) or not all(isinstance(point, list) and len(point) == size for point in points):
             raise ValueError(f"expected points of {size} fractions")
         if not all(isinstance(x, str) for point in points for x in point):
@@ -440,6 +456,10 @@ class Alone(Record):
 LEAVES = table_of(
     *(Excluded, ExcludedInRationals, ExcludedByForm, NoRoot, NoRootInRationals, RegularRoot, RootSetRecord),
     *(Closed, ClosedInRationals, Alone, Unloaded, UndecidedRecord),
+)
+#: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
+FLOATING_LEAVES = table_of(
+    *(Excluded, Unbalanced, NoRoot, NoRootInRationals, RegularRoot, RootSetRecord, UndecidedRecord)
 )
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.condensation.condensed import FloatingCondensation
 from enumsol.model.statuses import (
     CONTACT,
     FRICTIONLESS,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from enumsol.condensation.condensed import CondensedProblem
     from enumsol.model.problem import ContactProblem
     from enumsol.roots.components import RootComponent
     from enumsol.search.certifiers.protocol import UndecidedPart
@@ -47,6 +49,8 @@ class RootBuilder:
     points : values of the points that the components hold
     floats : the float solver of the same system, for scaled margins and derivatives
     verified : balls of the verified regular roots by their codes
+    rigid_unit : (r,) array, or None
+        Of a body that nothing holds, the units of the coordinates of its rigid displacement in balls.
     """
 
     problem: ContactProblem
@@ -54,6 +58,7 @@ class RootBuilder:
     points: PointValues
     floats: FloatSelections
     verified: Mapping[Codes, VerifiedSelection]
+    rigid_unit: NDArray[np.float64] | None = None
 
     def root(self, component: RootComponent) -> Root:
         """The isolated root of a component."""
@@ -78,11 +83,31 @@ class RootBuilder:
             regular=regular,
             margin=max(float(np.min(slack)), 0.0) if regular else 0.0,
             enclosure=self._enclosure(solution),
-            _condensed=self.problem.condensed,
-            _tangent=SelectionTangent(self.floats, self.problem.condensed, canonical, force, w) if regular else None,
+            _condensed=self._condensed(),
+            _tangent=self._tangent(canonical, force, w) if regular else None,
+            _rigid=self._rigid(solution),
             _slips=slips,
             _exact_slips=self.points.exact_slips(solution.vertices[0]),
         )
+
+    def _condensed(self) -> CondensedProblem | FloatingCondensation:
+        """What the root computes its displacements with."""
+        return self.problem.condensed if self.problem.modes is None else FloatingCondensation.of(self.problem)
+
+    def _tangent(self, codes: Codes, force: NDArray[np.float64], w: NDArray[np.float64]) -> SelectionTangent | None:
+        if self.problem.modes is not None:
+            return None
+        return SelectionTangent(self.floats, self.problem.condensed, codes, force, w)
+
+    def _rigid(self, solution: SelectionSolution) -> NDArray[np.float64] | None:
+        """Coordinates of the rigid displacement of a body that nothing holds."""
+        if self.rigid_unit is None:
+            return None
+        ball = self.verified.get(solution.codes)
+        if ball is None or ball.rigid is None:
+            return rigid_of(self.points, solution.vertices[0])
+        # -0.0 prints badly
+        return np.asarray(ball.rigid.mid * self.rigid_unit + 0.0)
 
     def _slip_signs(self, codes: Codes, solution: SelectionSolution) -> SlipSigns:
         """Signs of u_t: from the ball where it does not hold zero, otherwise those of the solver's arithmetic."""
@@ -150,9 +175,21 @@ def polytope(solution: SelectionSolution, corners: Sequence[Any], solver: Select
     points = np.array([solver.forces(corner) for corner in corners])
     slips = [solver.slip_signs(vertex) for vertex in solution.vertices]
     statuses = tuple(contact_status(code, sign_over(s[i] for s in slips)) for i, code in enumerate(solution.codes))
-    points = points[np.lexsort(points.T[::-1])]
+    rigid = np.array([rigid_of(solver, corner) for corner in corners]) if modes_of(solver) else None
+    order = np.lexsort((points if rigid is None else np.hstack([points, rigid])).T[::-1])
+    points = points[order]
     vertices = np.stack([points[:, : solver.p], points[:, solver.p :]], axis=2)
-    return Polytope(statuses, vertices, solution.dimension)
+    return Polytope(statuses, vertices, solution.dimension, None if rigid is None else rigid[order])
+
+
+def modes_of(solver: PointValues) -> int:
+    """Rigid modes of the body whose points a solver has."""
+    return getattr(solver, "modes", 0)
+
+
+def rigid_of(solver: Any, point: Any) -> NDArray[np.float64]:
+    """Coordinates of the rigid displacement at a point."""
+    return np.asarray(solver.rigid(point) + 0.0)
 
 
 def in_order(roots: list[Root], families: list[RootFamily]) -> tuple[list[Root], list[RootFamily]]:

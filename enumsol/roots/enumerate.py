@@ -15,7 +15,7 @@ from enumsol.roots.builder import RootBuilder, in_order, named, root_family
 from enumsol.roots.components import RootComponent, apart, closed_component, connected_components
 from enumsol.roots.enumeration import Enumeration, not_begun
 from enumsol.roots.local_degree import local_degree
-from enumsol.roots.root_set import RootSet
+from enumsol.roots.root_set import RigidBound, RootSet
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
 from enumsol.search.outcome import SearchLimits, SearchProgress, Stop, StopReason
@@ -158,7 +158,8 @@ def enumerate_roots(
                 _ = in_space.enclosed  # before a file is begun
                 search = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
             else:
-                solvers = Solvers(problem, value, arithmetic, tolerance, engine)
+                kind = Solvers if problem.modes is None else _floating_solvers()
+                solvers = kind(problem, value, arithmetic, tolerance, engine)
                 _ = solvers.enclosed  # as above
                 search = _Enumeration(solvers, progress, proof_path, method=method, resumed=resume, started=started)
     except TimeOverError:
@@ -204,6 +205,12 @@ def is_unique(problem: ContactProblem | ContactProblem3D, alpha: AlphaLike, **op
 def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
     """Whether it is a problem in 3D, whose class is not loaded for others."""
     return isinstance(problem, ContactBody) and not isinstance(problem, ContactProblem)
+
+
+def _floating_solvers() -> type[Solvers]:
+    from enumsol.search.floating import FloatingSolvers  # for bodies that nothing holds only
+
+    return FloatingSolvers
 
 
 def _in_doubt(core: Codes) -> UndecidedPart:
@@ -290,7 +297,7 @@ class _Enumeration(Enumeration[Solvers]):
         """Components of the root set with the solver whose points they hold."""
         solutions, closed, self.doubtful = apart(self.outcome.solutions)
         exact, floats = [s for s in solutions if s.exact], [s for s in solutions if not s.exact]
-        degree = partial(local_degree, self.solvers.floats)
+        degree = None if self.solvers.problem.modes is not None else partial(local_degree, self.solvers.floats)
         parts: list[tuple[list[RootComponent], SelectionSolver]] = []
         if floats or closed:
             components = connected_components(floats, self.solvers.floats, degree)
@@ -301,7 +308,8 @@ class _Enumeration(Enumeration[Solvers]):
 
     def _root(self, component: RootComponent, values: PointValues) -> Root:
         solvers, verified = self.solvers, self.certifier.certified.verified
-        return RootBuilder(solvers.problem, solvers.alpha, values, solvers.floats, verified).root(component)
+        about = solvers.problem, solvers.alpha, values, solvers.floats, verified, solvers.rigid_unit
+        return RootBuilder(*about).root(component)
 
     def _result(self) -> RootSet:
         outcome, solvers = self.outcome, self.solvers
@@ -334,7 +342,14 @@ class _Enumeration(Enumeration[Solvers]):
             at_least=None if whole else self._at_least(separate + int(joinable)),
             certified_data=solvers.data,
             proof=self._proof(roots=len(roots), families=len(families)),
+            rigid_bound=self._rigid_bound(),
         )
+
+    def _rigid_bound(self) -> RigidBound | None:
+        problem = self.solvers.problem
+        if problem.modes is None:
+            return None
+        return RigidBound(problem.rigid_reach, self.certifier.certified.bounded or self.method == "exhaustive")
 
 
 def roots_of_selections(problem: ContactProblem, alpha: Alpha, selections: Sequence[Codes], *, whole: bool) -> RootSet:

@@ -103,7 +103,7 @@ class Enumeration(ABC, Generic[_Solvers]):
 
     def _at_least(self, known: int) -> int:
         """What a number of roots is at least: a body that is proven stable has a solution (theory, section 12.6)."""
-        return max(known, int(self.solvers.undecidable is None))
+        return max(known, int(self.solvers.has_solution and self.solvers.undecidable is None))
 
     def _search(self, limits: SearchLimits, executor: Executor | None) -> None:
         """Search the tree."""

@@ -122,6 +122,7 @@ def local_branch_test(problem: ContactProblem, root: SolutionPoint) -> LocalBran
     a local Lipschitz branch exists in the load (1 selection holds)
     """
     instance_of(problem, ContactProblem, "problem")
+    problem.check_held("local_branch_test")
     active = getattr(root, "active", None)
     if not isinstance(active, tuple) or len(active) != problem.p:
         raise InvalidArgumentError(f"root is {type(root).__name__}; expected a Root with {problem.p} contact nodes")

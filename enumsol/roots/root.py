@@ -136,6 +136,7 @@ class Root(ContactState):
     _tangent: SelectionTangent | None = field(repr=False, compare=False, default=None)
     _slips: SlipSigns | None = field(repr=False, compare=False, default=None)
     _exact_slips: tuple[Fraction, ...] | None = field(repr=False, compare=False, default=None)
+    _rigid: NDArray[np.float64] | None = field(repr=False, compare=False, default=None)
 
     @cached_property
     def condition(self) -> float:
@@ -147,6 +148,7 @@ class Root(ContactState):
             The problem is one in 3D.
         """
         self._in_2d("condition")
+        self.problem.check_held("condition")
         return np.inf if self._tangent is None else self._tangent.condition()
 
     @cached_property
@@ -159,6 +161,7 @@ class Root(ContactState):
             The problem is one in 3D.
         """
         self._in_2d("dlambda_dalpha")
+        self.problem.check_held("dlambda_dalpha")
         derivative = None if self._tangent is None else self._tangent.derivative()
         return None if derivative is None else sealed(derivative)
 
@@ -166,7 +169,22 @@ class Root(ContactState):
     def u(self) -> NDArray[np.float64]:
         """Displacement of all degrees of freedom, shape (n,) [length]; computed at every access."""
         forces = np.concatenate([self.lambda_n, self.lambda_t.ravel(order="F")])
-        return self._condensed.displacement(self.alpha, forces)
+        u, rigid = self._condensed.displacement(self.alpha, forces), self.rigid_displacement
+        return u if rigid is None else u + rigid
+
+    @property
+    def rigid_coordinates(self) -> NDArray[np.float64] | None:
+        """Of a body that nothing holds: q of the rigid displacement N q, shape (r,); None of others."""
+        return self._rigid
+
+    @property
+    def rigid_displacement(self) -> NDArray[np.float64] | None:
+        """Of a body that nothing holds: how it moves as a whole, N q, shape (n,) [length]; None of others.
+
+        It is the rigid displacement that equals u at r degrees of freedom, where theory, section 14.1, has the body on
+        springs.
+        """
+        return None if self._rigid is None else np.asarray(self.problem.rigid_modes @ self._rigid)
 
     def local_branch_test(self) -> LocalBranchTest:
         """Whether a local Lipschitz branch of solutions passes through the root (theory, section 3.2).
@@ -182,7 +200,9 @@ class Root(ContactState):
         InvalidArgumentError
             The problem is one in 3D.
         """
-        return branch_test(self._in_2d("local_branch_test"), self)
+        condensed = self._in_2d("local_branch_test")
+        self.problem.check_held("local_branch_test")
+        return branch_test(condensed, self)
 
     @property
     def exact_slips(self) -> tuple[Fraction, ...] | None:
@@ -299,6 +319,8 @@ class Polytope(Sealed):
     vertices : (k, p, 2) array
         (lambda_n, lambda_t) at every vertex [force].
     dimension : int
+    rigid_coordinates : (k, r) array or None
+        Of a body that nothing holds: q of the rigid displacement N q at every vertex.
 
     Examples
     --------
@@ -312,6 +334,7 @@ class Polytope(Sealed):
     statuses: tuple[ContactStatus, ...]
     vertices: NDArray[np.float64]
     dimension: int
+    rigid_coordinates: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -345,6 +368,14 @@ class RootFamily:
     def dimension(self) -> int:
         """Largest dimension of its polytopes."""
         return max(part.dimension for part in self.polytopes)
+
+    @cached_property
+    def free_modes(self) -> tuple[int, ...]:
+        """Rigid modes, by their columns in ``rigid_modes``, along which the body moves within the family."""
+        parts = [part.rigid_coordinates for part in self.polytopes if part.rigid_coordinates is not None]
+        if not parts:
+            return ()
+        return tuple(np.flatnonzero(np.ptp(np.concatenate(parts), axis=0) > 0).tolist())
 
     @cached_property
     def vertices(self) -> NDArray[np.float64]:

@@ -126,6 +126,28 @@ class SearchStats:
     redone: int = 0
 
 
+@dataclass(frozen=True)
+class RigidBound:
+    """Within which rigid displacements the solutions of a body that nothing holds are all of them.
+
+    Attributes
+    ----------
+    largest : float
+        Bound of the components of the rigid displacement [length].
+    needed : bool
+        Whether anything rests on it. Otherwise there are no other solutions at all.
+    """
+
+    largest: float
+    needed: bool
+
+    def words(self) -> str:
+        """The end of the line that says whether the list is complete."""
+        if self.needed:
+            return f"within rigid displacements of {self.largest:g}"
+        return "no bound of rigid displacements was needed"
+
+
 class RootSet(Sequence[Root], Immutable):
     """All solutions at one alpha, as a sequence of the isolated roots in a deterministic order.
 
@@ -150,6 +172,8 @@ class RootSet(Sequence[Root], Immutable):
         In verified arithmetic: the proof that ``enumsol.verify`` checks; None when the search was interrupted.
     mirror_images : MirrorImages or None
         Which roots are mirror images of one another; None unless `mirrored` made it.
+    rigid_bound : RigidBound or None
+        Of a body that nothing holds, within which rigid displacements the solutions are all of them.
 
     Examples
     --------
@@ -175,6 +199,7 @@ class RootSet(Sequence[Root], Immutable):
         certified_data: str = "problem",
         proof: Proof | None = None,
         mirror_images: MirrorImages | None = None,
+        rigid_bound: RigidBound | None = None,
     ) -> None:
         self.alpha = alpha
         self._roots = tuple(roots)
@@ -189,6 +214,7 @@ class RootSet(Sequence[Root], Immutable):
         self.certified_data = certified_data
         self.proof = proof
         self.mirror_images = mirror_images
+        self.rigid_bound = rigid_bound
         self._freeze()
 
     @property
@@ -291,6 +317,7 @@ class RootSet(Sequence[Root], Immutable):
             certified_data=self.certified_data,
             proof=self.proof,
             mirror_images=images,
+            rigid_bound=self.rigid_bound,
         )
 
     def to_frame(self) -> pd.DataFrame:
@@ -356,7 +383,8 @@ class RootSet(Sequence[Root], Immutable):
             return f"complete: not proven ({count} undecided)"
         about = "proven" if self.certified_data == "problem" else "proven for S and g as computed"
         how = ": one solution, by one certificate" if self.by_one_certificate else ""
-        return f"complete: yes ({about}{how})"
+        within = "" if self.rigid_bound is None else f", {self.rigid_bound.words()}"
+        return f"complete: yes ({about}{how}{within})"
 
     def _heading(self) -> str:
         heading = f"RootSet at alpha = {float(self.alpha):g}: {counted(len(self), 'root')}"
@@ -393,7 +421,7 @@ class RootSet(Sequence[Root], Immutable):
             index = "?" if family.index is None else f"{family.index:+d}"
             lines.append(
                 f"family {k}: dimension {family.dimension}, {counted(len(family.polytopes), 'polytope')}, "
-                f"{counted(len(family.vertices), 'vertex', 'vertices')}, index {index}"
+                f"{counted(len(family.vertices), 'vertex', 'vertices')}, index {index}{_moving(family)}"
             )
         # a search that was cut short leaves many alike
         alike = Counter((item.reason, item.hint) for item in self.undecided)
@@ -411,6 +439,9 @@ class RootSet(Sequence[Root], Immutable):
         if self.mirror_images is not None:
             lines += self.mirror_images.notes(complete=self.complete)
         total = self.index_sum
+        if self.rigid_bound is not None:
+            # nothing that holds the body makes the sum +1
+            return [*lines, f"index sum: {'unknown' if total is None else f'{total:+d}'}", self.completeness()]
         # a sum other than +1 proves that something is missing or wrong
         note = "unknown" if total is None else f"{total:+d}" if total == 1 else f"{total:+d} (not +1!)"
         return [*lines, f"index sum: {note}", self.completeness()]
@@ -424,6 +455,15 @@ class RootSet(Sequence[Root], Immutable):
     def _repr_html_(self) -> str:
         table = html_table(("root", *_HEADS[1:]), self._rows()) if len(self) else ""
         return html_lines([self._heading()]) + table + html_lines(self._notes())
+
+
+def _moving(family: RootFamily) -> str:
+    """Along which rigid modes the body moves within a family, and how far as listed."""
+    parts = []
+    for mode in family.free_modes:
+        values = np.concatenate([part.rigid_coordinates[:, mode] for part in family.polytopes])  # type: ignore[index]
+        parts.append(f"mode {mode} (from {np.min(values):.4g} to {np.max(values):.4g})")
+    return f"; the body is free to move along {' and '.join(parts)}" if parts else ""
 
 
 def _region(item: Undecided) -> str:

@@ -46,6 +46,10 @@ class Searchable(Protocol):
         """In which it is searched."""
 
     @property
+    def has_solution(self) -> bool:
+        """Whether there is a solution for certain, once something can be proven."""
+
+    @property
     def undecidable(self) -> str | None:
         """Why nothing can be proven about this problem, or None."""
 

@@ -25,6 +25,8 @@ from enumsol.selections.float_selections import FloatSelections
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from numpy.typing import NDArray
+
     from enumsol.model.problem import ContactProblem
     from enumsol.proof.compressed_parts import Recorder
     from enumsol.relaxation.engine import Engine
@@ -39,7 +41,7 @@ Arithmetic = Literal["fast", "verified", "exact"]
 
 
 class Solvers:
-    """Solvers and certifier for one problem at one alpha.
+    """Solvers and certifier for one problem at one alpha (of a body that is held; ``search.floating`` has others).
 
     Parameters
     ----------
@@ -59,6 +61,11 @@ class Solvers:
         S is not positive definite: exactly where rationals decide what balls leave open, otherwise beyond rounding.
     """
 
+    #: There is a solution for certain (theory, section 6.7).
+    has_solution = True
+    #: Units of the rigid displacement of a body that nothing holds.
+    rigid_unit: NDArray[np.float64] | None = None
+
     def __init__(
         self,
         problem: ContactProblem,
@@ -68,12 +75,13 @@ class Solvers:
         engine: str | None = None,
     ) -> None:
         self.problem, self.alpha, self.arithmetic, self.engine = problem, alpha, arithmetic, engine
-        system = problem.condensed.at(alpha)
+        body = problem.on_springs
+        system = body.condensed.at(alpha)
         self._in_rationals = problem.n <= EXACT_DOF_LIMIT and problem.known_exactly
         exactly = arithmetic != "fast" and self._in_rationals
         self.scaled = system.proposals if exactly else system.scaled
         self.floats = FloatSelections(self.scaled, tolerance)
-        if exactly and not problem.condensed.definite:
+        if exactly and not body.condensed.definite:
             _ = self.exact  # definite, or refused
         exact = exactly_at(Fraction(alpha), *problem.friction)
         lost = [not F and x != 0 for F, x in zip(self.scaled.F, exact, strict=True)]

@@ -41,6 +41,8 @@ def _holds(conditions: Conditions, rows: Sequence[Any]) -> bool:
 class ExactSelections:
     """Solver of selections in rationals (a SelectionSolver; points are tuples of 2p fmpq).
 
+    Of a body that nothing holds points have 2p + r of them: the last ones are -q (theory, section 14.2).
+
     Parameters
     ----------
     system : ExactSystem
@@ -51,7 +53,9 @@ class ExactSelections:
         self.p = p = system.p
         self.F_positive = tuple(bool(f > 0) for f in system.F)
         self._S, self._F = as_objects(system.S.tolist()), as_objects(system.F)
-        self._zero = [fmpq(0)] * (2 * p)
+        #: Rigid modes of a body that nothing holds: as many numbers of a point follow its contact forces.
+        self.modes = len(system.reach)
+        self._zero = [fmpq(0)] * (2 * p + self.modes)
 
     # -- linear forms ----------------------------------------------------------------------------------------------
 
@@ -73,6 +77,12 @@ class ExactSelections:
         equations, inequalities = (
             [self.form(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][part]] for part in (0, 1)
         )
+        for place, reach in enumerate(self.system.reach, start=2 * self.p):
+            equations.append(((-self._S[place]).tolist(), self.system.g[place]))
+            for side in (-1, 1):
+                bound = list(self._zero)
+                bound[place] = fmpq(side)
+                inequalities.append((bound, reach))
         return equations, inequalities
 
     # -- the field -------------------------------------------------------------------------------------------------
@@ -91,20 +101,21 @@ class ExactSelections:
 
     def pushed(self, direction: tuple[Any, ...]) -> ExactSelections:
         """The solver whose g is a direction."""
-        return ExactSelections(ExactSystem(self.system.S, direction, self.system.F))
+        return ExactSelections(self.system.along(direction))
 
     # -- solving ---------------------------------------------------------------------------------------------------
 
     def solve_equations(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
         """The selection's forces for the right-hand side ``target`` and sign det, or None when it is singular."""
-        selection = Selection(codes)
+        selection = Selection(codes, self.modes)
         if not len(selection.unknown):
             return tuple(self._zero), 1
         solved = self._solved(selection.matrix(self._S, self._F), [target[r] for r in selection.unknown])
         if solved is None:
             return None
         y, sign = solved
-        return tuple(selection.forces(as_objects(y), self._F, fmpq(0))), sign
+        # the columns of -q change the sign
+        return tuple(selection.forces(as_objects(y), self._F, fmpq(0))), -sign if self.modes % 2 else sign
 
     @staticmethod
     def _solved(M: NDArray[Any], b: Sequence[Any]) -> tuple[Sequence[Any], int] | None:
@@ -131,6 +142,21 @@ class ExactSelections:
         differences = [[a - b for a, b in zip(v, vertices[0], strict=True)] for v in vertices[1:]]
         dimension = len(self.row_reduced(differences)[1]) if differences else 0
         return SelectionSolution(codes, tuple(vertices), dimension, 0, strict=False, exact=True)
+
+    def rests_on_reach(self, codes: Codes, found: SelectionSolution | None) -> bool:
+        """Whether what was found in a selection may be other without the bounds of the rigid displacement."""
+        if not self.modes:
+            return False
+        if found is not None:
+            # of a convex set that lies within the bounds, nothing lies beyond them
+            reach, places = self.system.reach, range(2 * self.p, 2 * self.p + self.modes)
+            return any(abs(v[i]) == most for v in found.vertices for i, most in zip(places, reach, strict=True))
+        equations, inequalities = self.forms(codes)
+        regular = self.solve_equations(codes, self.system.g)
+        if regular is not None:
+            return all(value(form, regular[0]) >= 0 for form in inequalities[: -2 * self.modes])
+        _, pivots = self.row_reduced([[*form, -constant] for form, constant in equations])
+        return 2 * self.p + self.modes not in pivots
 
     # -- decisions -------------------------------------------------------------------------------------------------
 
@@ -176,7 +202,7 @@ class ExactSelections:
         if solution.det_sign == 0:
             return 0
         push = tuple(fmpq(int(v)) for v in direction)
-        moved = self.solve_equations(solution.codes, push)
+        moved = self.solve_equations(solution.codes, self.system.along(push).g)
         if moved is None:  # det_sign says otherwise
             raise AssertionError("a regular selection became singular")
         step, sign = moved
@@ -196,21 +222,26 @@ class ExactSelections:
 
     def forces(self, point: Point) -> NDArray[np.float64]:
         """lambda as floats."""
-        return np.array([self.as_float(v) for v in point])
+        return np.array([self.as_float(v) for v in point[: 2 * self.p]])
+
+    def rigid(self, point: Point) -> NDArray[np.float64]:
+        """Coordinates q of the rigid displacement as floats, shape (r,)."""
+        return np.array([-self.as_float(v) for v in point[2 * self.p :]])
 
     def displacements(self, point: Point) -> NDArray[np.float64]:
         """w = g - S lambda as floats, rounded once."""
-        return np.array([self.as_float(v) for v in self.moved(point)])
+        return np.array([self.as_float(v) for v in self.moved(point)[: 2 * self.p]])
 
     def slip_signs(self, point: Point) -> tuple[int, ...]:
         """Signs of w_t, exactly."""
-        return tuple((v > 0) - (v < 0) for v in self.moved(point)[self.p :])
+        return tuple((v > 0) - (v < 0) for v in self.moved(point)[self.p : 2 * self.p])
 
     def exact_slips(self, point: Point) -> tuple[Fraction, ...]:
         """w_t, exactly."""
-        return tuple(map(to_fraction, self.moved(point)[self.p :]))
+        return tuple(map(to_fraction, self.moved(point)[self.p : 2 * self.p]))
 
     def bounds(self, point: Point) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Floats below and above (lambda, w), two arrays of shape (4p,), equal where a value is a float."""
-        pairs = [_outward(v) for v in (*point, *self.moved(point))]
+        forces = 2 * self.p
+        pairs = [_outward(v) for v in (*point[:forces], *self.moved(point)[:forces])]
         return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])

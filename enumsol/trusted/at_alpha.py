@@ -60,10 +60,13 @@ class VerifiedSelection(EnclosedSolution):
     Attributes
     ----------
     det_sign : int
-        Of the matrix.
+        Of the matrix; of a body that nothing holds as on weak springs (theory, section 14.2).
+    rigid : Ball of shape (r,), or None
+        Of such a body, the coordinates q of its rigid displacement.
     """
 
     det_sign: int
+    rigid: Ball | None = None
 
 
 def solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSelection | None:
@@ -84,12 +87,13 @@ def contradicts(system: EnclosedSystem, codes: Sequence[int]) -> bool:
     """Whether the equations M z = b of a complete selection are proven to hold for no forces that a root can have.
 
     At a root lambda' S lambda <= g' lambda, so that ||z|| <= ||lambda|| <= ||g|| / mu with mu the smallest eigenvalue
-    of S. Any vector y with |y'b| > ||M'y|| ||g|| / mu excludes that; the one tried is close to the left null vectors of
-    a singular or nearly singular M. Where the equations miss a continuum of solutions by d, the margin is of order d,
-    that of the energy only of order d^2.
+    of S; of a body that nothing holds theory, (14.5), bounds the unknowns. Any vector y for which |y'b| is more than
+    ||M'y|| times this bound excludes that; the one tried is close to the left null vectors of a singular or nearly
+    singular M. Where the equations miss a continuum of solutions by d, the margin is of order d, that of the energy
+    only of order d^2.
     """
     with np.errstate(over="ignore", divide="ignore", invalid="ignore", under="ignore"):
-        selection, (S, g, F) = Selection(codes), system.balls
+        selection, (S, g, F) = Selection(codes, len(system.reach)), system.balls
         M, b = selection.matrix(S, F), g[selection.unknown]
         if not len(b.mid) or not np.all(np.isfinite(M.mid)):
             return False
@@ -104,15 +108,14 @@ def contradicts(system: EnclosedSystem, codes: Sequence[int]) -> bool:
         y_abs, k = np.abs(y), gamma(len(b.mid) + 2)
         least = abs(float(y @ b.mid)) - float(y_abs @ (b.rad + k * np.abs(b.mid))) * (1 + 2 * k) * SAFE - TINY
         product = np.abs(y @ M.mid) + y_abs @ (M.rad + k * np.abs(M.mid)) * (1 + 2 * k) * SAFE
-        reach = upper_norm(np.abs(system.g) + system.g_rad) / system.smallest_eigenvalue * SAFE
-        return bool(least > upper_norm(product) * reach * SAFE + ROOT_TINY)
+        return bool(least > upper_norm(product) * system.largest_unknowns * SAFE + ROOT_TINY)
 
 
 def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSelection | None:
-    selection, (S, g, F) = Selection(codes), system.balls
+    selection, (S, g, F) = Selection(codes, len(system.reach)), system.balls
     rows = selection.unknown
     if not len(rows):
-        return _conditions(codes, F, Ball.exact(np.zeros(2 * system.p)), g, 1)
+        return _conditions(system, codes, Ball.exact(np.zeros(2 * system.p)), g, 1)
     # scale the columns by powers of two, so that the unknowns are comparable in the contraction
     M = selection.matrix(S, F)
     scale = column_scale(M)
@@ -123,12 +126,12 @@ def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSe
     force = selection.forces(Ball(solved.y * scale, solved.radius * scale + TINY), F)
     w = g - S @ force
     w[rows] = 0.0
-    found = _conditions(codes, F, force, w, solved.sign)
+    found = _conditions(system, codes, force, w, solved.sign)
     if found.is_root or found.is_excluded:
         return found
     w = Ball(w.mid, np.fmin(w.rad, _closer(system, selection, solved, scale, force)))
     w.rad[rows] = 0.0
-    return _conditions(codes, F, force, w, solved.sign)
+    return _conditions(system, codes, force, w, solved.sign)
 
 
 def _closer(system: EnclosedSystem, selection: Selection, solved: VerifiedSolution, scale: Array, force: Ball) -> Array:
@@ -136,7 +139,8 @@ def _closer(system: EnclosedSystem, selection: Selection, solved: VerifiedSoluti
 
     With lambda = E (y + e), e = R rest + (I - R M) e: S E R is not large where S E and R are.
     """
-    S, size, slipping = system.S, gamma(2 * system.p + 2), selection.slip
+    (S_ball, g, _), size, slipping = system.balls, gamma(selection.size + 2), selection.slip
+    S = S_ball.mid
     moved = selection.columns(S, system.F) * scale
     product, reach = moved @ solved.inverse, np.abs(moved)
     k = gamma(moved.shape[1] + 8)
@@ -147,11 +151,19 @@ def _closer(system: EnclosedSystem, selection: Selection, solved: VerifiedSoluti
     most = np.abs(force.mid) + force.rad
     turned = np.zeros_like(most)
     turned[system.p + slipping] = (system.F_rad + 4 * UNIT * system.F)[slipping] * most[slipping]
-    error += system.g_rad + system.S_rad @ most + np.abs(S) @ (turned + size * most)
-    return np.asarray((error * (1 + size) + size * np.abs(system.g)) * SAFE * SAFE + TINY)
+    error += g.rad + S_ball.rad @ most + np.abs(S) @ (turned + size * most)
+    return np.asarray((error * (1 + size) + size * np.abs(g.mid)) * SAFE * SAFE + TINY)
 
 
-def _conditions(codes: Sequence[int], F: Ball, force: Ball, w: Ball, sign: int) -> VerifiedSelection:
+def _conditions(system: EnclosedSystem, codes: Sequence[int], force: Ball, w: Ball, sign: int) -> VerifiedSelection:
     kinds, nodes = np.array([(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][1]]).T
-    slack = row_values(force, w, F)[kinds, nodes]
-    return VerifiedSelection(force, w, slack, sign)
+    slack = row_values(force, w, system.balls[2])[kinds, nodes]
+    if not len(system.reach):
+        return VerifiedSelection(force, w, slack, sign)
+    # the unknowns beyond the contact forces are -q, by which the columns of the border change sign
+    contact, rigid = 2 * system.p, -force[2 * system.p :]
+    if np.all(np.isfinite(system.reach)):
+        reach = Ball.exact(system.reach)
+        slack = Ball.joined(slack, reach - rigid, reach + rigid)
+    sign = -sign if len(system.reach) % 2 else sign
+    return VerifiedSelection(force[:contact], w[:contact], slack, sign, rigid)

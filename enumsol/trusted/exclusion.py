@@ -20,7 +20,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, gamma
+from enumsol.condensation.floating import FloatingSystem
 from enumsol.trusted.energy_bounds import energy_bounds, form_bounds
+from enumsol.trusted.floating_bounds import floating_bounds
 from enumsol.trusted.over_interval import EnclosedPiece
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE, ROW_KINDS, row_signs
@@ -159,11 +161,14 @@ def _margins(
         # where friction is constant a cone row may be an equation, and its coefficient must be the exact one
         c_rad[:, :p] += np.max([end.F_rad for end in ends], axis=0) * (low == high) * cone_size
         c_rad *= SAFE
-        bounds = [
-            form_bounds(end, y, c, c_rad, errors)
-            if isinstance(end, EnclosedForm)
-            else energy_bounds(end, y, c, c_rad, errors)
-            for end in ends
-        ]
+        bounds = [_bounds(end, y, c, c_rad, errors) for end in ends]
         least = np.min(bounds, axis=0)
     return np.where(refused | ~np.isfinite(least), -np.inf, least)
+
+
+def _bounds(end: EnclosedSystem | EnclosedForm, y: Array, c: Array, c_rad: Array, errors: float) -> Array:
+    if isinstance(end, EnclosedForm):
+        return form_bounds(end, y, c, c_rad, errors)
+    if isinstance(end, FloatingSystem):
+        return floating_bounds(end, y, c, c_rad, errors)
+    return energy_bounds(end, y, c, c_rad, errors)

@@ -31,6 +31,9 @@ class Selection:
     ----------
     codes : p status codes
         Complete; of a partial assignment those of the nodes that are fixed, and OPEN at the others.
+    modes : int
+        Of a body that nothing holds, its rigid modes: as many rows of S, g and lambda follow those of the contact
+        nodes, and are always among the unknowns and the equations (theory, section 14.2).
 
     Attributes
     ----------
@@ -49,16 +52,17 @@ class Selection:
         What has to be nonnegative: rows of w, forces lambda_n, then both sides of the cones of sticking nodes.
     """
 
-    def __init__(self, codes: Sequence[int]) -> None:
+    def __init__(self, codes: Sequence[int], modes: int = 0) -> None:
         self.codes = tuple(codes)
         self.p = p = len(self.codes)
+        self.size = 2 * p + modes
         opened = [i for i, code in enumerate(self.codes) if code == OPEN]
         closed = [i for i, code in enumerate(self.codes) if code != OPEN]
         stick = [i for i in closed if self.codes[i] == STICK]
         slip = [i for i in closed if self.codes[i] in (SLIP_PLUS, SLIP_MINUS)]
         place = {i: j for j, i in enumerate(closed)}
         self.closed, self.stick, self.slip = (np.array(nodes, dtype=np.intp) for nodes in (closed, stick, slip))
-        self.unknown = np.array([*closed, *(p + i for i in stick)], dtype=np.intp)
+        self.unknown = np.array([*closed, *(p + i for i in stick), *range(2 * p, self.size)], dtype=np.intp)
         self.slip_columns = np.array([place[i] for i in slip], dtype=np.intp)
         self.stick_columns = np.array([place[i] for i in stick], dtype=np.intp)
         self.slip_signs = np.array([1 if self.codes[i] == SLIP_PLUS else -1 for i in slip], dtype=np.intp)
@@ -97,7 +101,7 @@ class Selection:
 
     def forces(self, y: Any, F: Any, zero: Any = 0.0, unit: Any = 1) -> Any:
         """lambda = E y, shape (2p,) or (2p, k), for unknowns in rows; ``zero`` is that of the arithmetic."""
-        force = _filled(y, (2 * self.p, *y.shape[1:]), zero)
+        force = _filled(y, (self.size, *y.shape[1:]), zero)
         force[self.unknown] = _times(y, unit)
         if len(self.slip):
             turn, slipping = signed(F[self.slip], self.slip_signs), y[self.slip_columns]
@@ -121,7 +125,8 @@ class Selection:
 
     def slacks(self, y: Any, w: Any, F: Any) -> Any:
         """Values of the conditions at y and w = g - S E y; also their slopes, but for the change of F."""
-        bound, stuck = F[self.stick] * y[self.stick_columns], y[len(self.closed) :]
+        closed = len(self.closed)
+        bound, stuck = F[self.stick] * y[self.stick_columns], y[closed : closed + len(self.stick)]
         moves = signed(w[self.moving], self.moving_signs)
         return _joined(moves, y[: len(self.closed)], bound - stuck, bound + stuck)
 
@@ -168,8 +173,8 @@ class Unknowns:
 def row_values(force: Any, w: Any, F: Any) -> Any:
     """Values of the seven rows of every node, shape (7, p), in the order of their kinds (see status_rows)."""
     p = F.shape[0]
-    bound, t = F * force[:p], force[p:]
-    rows = force[:p], t, bound - t, bound + t, -w[:p], w[p:], -w[p:]
+    bound, t, w_t = F * force[:p], force[p : 2 * p], w[p : 2 * p]
+    rows = force[:p], t, bound - t, bound + t, -w[:p], w_t, -w_t
     if isinstance(F, Ball):
         return Ball(np.stack([row.mid for row in rows]), np.stack([row.rad for row in rows]))
     return np.array(rows)

@@ -14,7 +14,13 @@ import enumsol
 from enumsol import branch_graph, checker, enumerate_roots, write_problem
 
 ROOT = Path(enumsol.__file__).parent
-CHECKERS = ("enumsol.checker.verify", "enumsol.checker.graph_checker", "enumsol.checker.history_checker")
+CHECKERS = (
+    "enumsol.checker.verify",
+    "enumsol.checker.plane_checker",
+    "enumsol.checker.floating",
+    "enumsol.checker.graph_checker",
+    "enumsol.checker.history_checker",
+)
 IN_SPACE = {
     "enumsol.checker.space_checker",
     "enumsol.trusted.space.sector_rows",
@@ -46,6 +52,7 @@ SHARED = {
     "arithmetic.rationals": {"as_objects", "is_positive_definite", "rational", "rational_matrix", "to_fraction"},
     "condensation.affine": {"exactly_at"},
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
+    "condensation.floating": {"FloatingSystem", "RigidRows"},
     "condensation.space_condensed": {"EnclosedSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"only_roots"},
@@ -54,6 +61,8 @@ SHARED = {
     "trusted.arcs.selection_balls": None,
     "trusted.arcs.over_parts": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
+    "trusted.floating_bounds": {"is_unbalanced"},
+    "trusted.confinement": {"motion_against", "without_bound"},
     "trusted.over_interval": {"EnclosedPiece", "as_computed"},
     "trusted.arcs.precise": None,
     "trusted.positions": {"tangential_positions"},
@@ -192,6 +201,8 @@ def test_no_module_of_the_search_is_loaded_by_a_verification(tmp_path):
     plain = enumsol.gallery.one_node_triangle()
     proofs = [(degenerate, enumerate_roots(degenerate, 0.0)), (plain, enumerate_roots(plain, 5.0))]
     proofs += [(moving, branch_graph(moving, interval)), (plain, enumsol.histories(plain, [5, 4]))]
+    sliding = enumsol.gallery.block_on_table(1, 1, push=1.0)
+    proofs.append((sliding, enumerate_roots(sliding, 0)))
     for k, (problem, found) in enumerate(proofs):
         write_problem(problem, tmp_path / f"{k}.npz")
         found.proof.save(tmp_path / f"{k}.proof")

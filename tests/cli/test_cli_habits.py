@@ -132,6 +132,7 @@ def test_files_and_problems_are_completed(tmp_path, monkeypatch):
         "block.dir",
         "block.npz",
         "blocks.h5",
+        "block-on-table-5",
         "block3d-4",
         "block3d-9",
         "block3d-16",

@@ -85,12 +85,15 @@ class Certified:
     leaves : int
         Leaves written to the proof.
     sliding : as of the certifier
+    bounded : bool
+        Of a body that nothing holds: some conclusion rests on the bound of its rigid displacement.
     """
 
     verified: Mapping[Codes, Any] = field(default_factory=dict)
     escalations: Escalations | None = None
     leaves: int = 0
     sliding: Mapping[int, int] = field(default_factory=dict)
+    bounded: bool = False
 
 
 class Bound(Protocol):

@@ -107,9 +107,9 @@ class VerifiedCertifier(RecordingCertifier):
         if relaxation.form is not None:
             return self._excluded_by(relaxation.form, codes, rows, values)
         if self._margin is not None:
-            if (proven := _proven(self._margin, codes, rows, values)) is not None:
+            if (kept := proven(self._margin, codes, rows, values)) is not None:
                 self._escalations.balls += 1
-                self._leaf(records.Excluded(Terms(rows, proven)))
+                self._leaf(records.Excluded(Terms(rows, kept)))
                 return True
         elif (certifier := self._exact()) is not None and certifier.excluded(codes, relaxation):
             # no balls for an S that is positive definite only within rounding
@@ -125,15 +125,15 @@ class VerifiedCertifier(RecordingCertifier):
         margin = self._form_margins.get(form)
         if margin is None:
             margin = self._form_margins[form] = margin_of_form(form, FORM_ERRORS)
-        proven = _proven(margin, codes, rows, values)
-        if proven is None:
+        kept = proven(margin, codes, rows, values)
+        if kept is None:
             self._escalations.refined += 1
             return False
         if form not in self._forms:
             self._forms[form] = len(self._forms)
             self.recorder.write(records.DeclaredForm(form.codes, form.multipliers, form.weight).write())
         self._escalations.balls += 1
-        self._leaf(records.ExcludedByForm(len(self._forms) - self._forms[form], Terms(rows, proven)))
+        self._leaf(records.ExcludedByForm(len(self._forms) - self._forms[form], Terms(rows, kept)))
         return True
 
     def _allowed(self, codes: Codes, rows: NDArray[np.intp], values: Array) -> Terms:
@@ -158,17 +158,28 @@ class VerifiedCertifier(RecordingCertifier):
         if certifier is None:
             if (found := self._closed_selection(codes, ball)) is not None:
                 return found[0] if found else None
-            return self._undecided(codes, *_reason(codes, ball, self._node_ids))
+            return self._open(codes, ball)
         solution = certifier.selection(codes)
+        if isinstance(solution, SelectionSolution):
+            self._known.append(codes)
+            if ball is not None:
+                self._take_note(ball.force.mid, ball.w.mid)
+        return self._in_rationals(codes, solution)
+
+    def _open(self, codes: Codes, ball: VerifiedSelection | None) -> UndecidedPart:
+        """Write a selection that balls do not decide, of a problem too large for rationals."""
+        return self._undecided(codes, *_reason(codes, ball, self._node_ids))
+
+    def _in_rationals(
+        self, codes: Codes, solution: SelectionSolution | UndecidedPart | None
+    ) -> SelectionSolution | UndecidedPart | None:
+        """Write what was found in rationals."""
         if isinstance(solution, UndecidedPart):
             return self._undecided(codes, solution.reason, solution.hint)
         self._escalations.rationals += 1
         if solution is None:
             self._leaf(records.NoRootInRationals())
         else:
-            self._known.append(codes)
-            if ball is not None:
-                self._take_note(ball.force.mid, ball.w.mid)
             points = [[_fraction(v) for v in vertex] for vertex in solution.vertices]
             self._leaf(records.RootSetRecord(points, solution.dimension))
         return solution
@@ -304,7 +315,7 @@ class VerifiedCertifier(RecordingCertifier):
         return records.EnclosureRecord(found.force.mid * force, found.force.rad * force * WIDEN, index)
 
 
-def _proven(margin: Margin, codes: Codes, rows: NDArray[np.intp], values: Array) -> Array | None:
+def proven(margin: Margin, codes: Codes, rows: NDArray[np.intp], values: Array) -> Array | None:
     """Multipliers that exclude a partial assignment, rounded if these do it as well; None if those given do not."""
     short = coarse(values)
     if margin(codes, rows, short) > _CLEAR:

@@ -42,6 +42,9 @@ class SpaceSolvers:
         Of ``problem.friction_at`` and of the condensation.
     """
 
+    #: There is a solution for certain (theory, section 12.6).
+    has_solution = True
+
     def __init__(self, problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> None:
         self.problem, self.alpha, self.arithmetic = problem, alpha, arithmetic
         friction = problem.friction_at(alpha)  # refuses what cannot be enumerated before anything is computed

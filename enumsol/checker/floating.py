@@ -1,0 +1,117 @@
+"""The checker of root sets of a body that nothing holds (theory, section 14), as `enumsol.verify` uses it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from enumsol.checker.plane_checker import Checker
+from enumsol.condensation.floating import FloatingSystem, RigidRows
+from enumsol.proof import records
+from enumsol.proof.reading import RefusedError, quoted, same
+from enumsol.trusted.at_alpha import holds_no_root, solve_selection
+from enumsol.trusted.confinement import without_bound
+from enumsol.trusted.exclusion import exclusion_margins
+from enumsol.trusted.floating_bounds import is_unbalanced
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from fractions import Fraction
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from enumsol.checker.rational import RationalSystem
+    from enumsol.checker.walk import Codes, Test
+    from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.proof.records import Record
+    from enumsol.trusted.exclusion import Leaves
+
+
+@dataclass
+class FloatingChecker(Checker):
+    """Checks one proof of a body that nothing holds."""
+
+    kinds = records.FLOATING_LEAVES
+
+    #: Some leaf rests on the bound of the rigid displacement.
+    bounded: bool = False
+
+    def _read_header(self, header: Any) -> None:
+        super()._read_header(header)
+        if self.data != "problem":
+            raise RefusedError("a proof about S and g as computed, of a body that nothing holds")
+        found, reach = header.get("max_rigid_displacement"), self.problem.rigid_reach
+        if not same(found, reach):
+            raise RefusedError(f"its bound of the rigid displacement is {quoted(found)}; the problem's is {reach:g}")
+
+    @property
+    def _within(self) -> float | None:
+        return self.problem.rigid_reach if self.bounded else None
+
+    def enclosed(self) -> CondensedEnclosure:
+        """Balls for S and g of the body on springs."""
+        enclosure: CondensedEnclosure = self.problem.on_springs.enclosure
+        return enclosure
+
+    @cached_property
+    def system(self) -> FloatingSystem:
+        """Balls for S, g, F, G and h in the proof's units."""
+        held = self.enclosed().at(self.alpha, self.force, self.length)
+        if not held.smallest_eigenvalue > 0:
+            raise RefusedError("S is not proven positive definite")
+        return FloatingSystem.on(held, RigidRows.of(self.problem, self.alpha, self.force, self.length))
+
+    @cached_property
+    def free(self) -> FloatingSystem:
+        """The same with bounds beyond which there are no solutions."""
+        return without_bound(self.system)
+
+    @cached_property
+    def rational(self) -> RationalSystem:
+        """The condensed problem in rationals; computed only if a leaf needs it."""
+        from enumsol.checker.floating_rational import FloatingRationalSystem  # python-flint, not always needed
+
+        return FloatingRationalSystem(self.problem, self.alpha)
+
+    def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:
+        return records.Limits(codes, self.friction, modes=self.problem.modes.r)
+
+    def _declare(self, record: list[Any]) -> None:
+        raise RefusedError(f"a record {quoted(record)} that no leaf of this proof can refer to")
+
+    def _tests(self) -> dict[type[Record], Test]:
+        return super()._tests() | {records.Unbalanced: self._unbalanced}
+
+    def _check_exclusions(self, numbers: NDArray[np.intp], leaves: Leaves) -> None:
+        free = exclusion_margins(self.free, leaves) > 0
+        margins = exclusion_margins(self.system, leaves)
+        self.bounded |= bool((~free).any())
+        for number in numbers[~(free | (margins > 0))]:
+            self.fail(f"leaf {number}: its multipliers do not exclude it")
+
+    def _unbalanced(self, codes: Codes, said: records.Unbalanced) -> str | None:
+        if is_unbalanced(self.system, codes, said.direction):
+            return None
+        return "forces below it may be in balance with the load"
+
+    def _no_root(self, codes: Codes, said: records.NoRoot) -> str | None:
+        if holds_no_root(self.free, codes, solve_selection(self.free, codes)):
+            return None
+        self.bounded = True
+        return super()._no_root(codes, said)
+
+    def _no_rational_root(self, codes: Codes, said: records.NoRootInRationals) -> str | None:
+        self.bounded |= self._rests_on_reach(codes, [])
+        return super()._no_rational_root(codes, said)
+
+    def _root_set(self, codes: Codes, said: records.RootSetRecord) -> str | None:
+        reason, found = super()._root_set(codes, said), self.polytopes
+        if reason is None:
+            self.bounded |= self._rests_on_reach(codes, found[-1][1])
+        return reason
+
+    def _rests_on_reach(self, codes: Codes, points: Sequence[Sequence[Fraction]]) -> bool:
+        """Whether what a selection holds may be other without the bounds of the rigid displacement."""
+        return self.rational.rests_on_reach(codes, points)  # type: ignore[attr-defined, no-any-return]

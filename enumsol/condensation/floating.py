@@ -1,0 +1,137 @@
+"""The condensed problem of a body that nothing holds (theory, section 14): that of the body held by springs, and more.
+
+With q the coordinates of the rigid displacement N q, G = (B N)' and h = N'f(alpha),
+
+    w = g - S lambda + G'q,    G lambda = h
+
+where S and g are those of the body held by springs. With mu = -q the two are one system, S and g bordered by G and h.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import SAFE, TINY, gamma
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, float_at
+
+if TYPE_CHECKING:
+    from enumsol.arithmetic.balls import Array
+
+
+@dataclass(frozen=True)
+class RigidRows:
+    """The rows of equilibrium of the body as a whole, G lambda = h, in units given by powers of two.
+
+    Attributes
+    ----------
+    G : Ball (r, 2p)
+    h : Ball (r,)
+    unit : (r,) array
+        Units of the coordinates q of the rigid displacement.
+    reach : (r,) array
+        How large these can be, in these units.
+    """
+
+    G: Ball
+    h: Ball
+    unit: Array
+    reach: Array
+
+    @classmethod
+    def of(cls, problem: Any, alpha: Fraction, force: Array, length: Array) -> RigidRows:
+        """Those of a problem at one alpha, enclosed.
+
+        Raises
+        ------
+        NotEnclosedError
+            Something overflows.
+        """
+        N, slope = problem.modes.N, problem.load_slope
+        with np.errstate(over="ignore", invalid="ignore"):
+            G = _product(problem.contact_rows, N).T
+            load = N.T
+            h = _product(load, problem.f[:, None])[:, 0]
+            if slope is not None:
+                value, slack = float_at(alpha)
+                h = h + Ball(np.array(value), np.array(slack)) * _product(load, slope[:, None])[:, 0]
+            # the rows of G near one
+            size = np.max(np.abs(G.mid) / length, axis=1)
+            unit = np.exp2(-np.round(np.log2(np.where(size > 0, size, 1.0))))
+            pair = unit[:, None] / length
+            rows = Ball(G.mid * pair, np.where(G.rad > 0, G.rad * pair + TINY, 0.0))
+            work = float(force[0] * length[0])
+            loads = Ball(h.mid * unit / work, np.where(h.rad > 0, h.rad * unit / work + TINY, 0.0))
+            most = problem.modes.reach(problem.rigid_reach)
+            reach = most / unit
+        if not (rows.finite and loads.finite and np.all(np.isfinite(reach)) and np.all(reach * unit == most)):
+            raise NotEnclosedError("the rows of the rigid modes overflow float64; expected data in other units")
+        return cls(rows, loads, unit, reach)
+
+
+def _product(left: Any, right: Array) -> Ball:
+    """The product of two matrices, the first of which may be sparse, with the error of its sums; zeros are exact."""
+    mid = np.asarray(left @ right)
+    size = np.asarray(abs(left) @ np.abs(right))
+    terms = int(np.max(np.diff(sp.csr_array(left).indptr))) if sp.issparse(left) else left.shape[1]
+    k = gamma(terms + 2)
+    return Ball(mid, np.where(size > 0, size * k * (1 + 2 * k) * SAFE + TINY, 0.0))
+
+
+@dataclass(frozen=True)
+class FloatingSystem(EnclosedSystem):
+    """The problem of a body that nothing holds at one alpha as balls: S and g are those of the body on springs.
+
+    Attributes
+    ----------
+    rows : RigidRows
+    """
+
+    rows: RigidRows = field(kw_only=True)
+
+    @classmethod
+    def on(cls, system: EnclosedSystem, rows: RigidRows) -> FloatingSystem:
+        """That of a body whose problem on springs is given."""
+        return cls(system.S, system.S_rad, system.g, system.g_rad, system.F, system.F_rad, rows=rows)
+
+    @property
+    def reach(self) -> Array:
+        """Bounds of the coordinates of a rigid displacement, (r,)."""
+        return self.rows.reach
+
+    @cached_property
+    def balls(self) -> tuple[Ball, Ball, Ball]:
+        """S and g, bordered by G and h, and F."""
+        G, h = self.rows.G, self.rows.h
+        none = Ball.exact(np.zeros((len(G.mid),) * 2))
+        mid, rad = (
+            np.block([[own, border.T], [border, corner]])
+            for own, border, corner in ((self.S, G.mid, none.mid), (self.S_rad, G.rad, none.rad))
+        )
+        return Ball(mid, rad), Ball.joined(Ball(self.g, self.g_rad), h), Ball(self.F, self.F_rad)
+
+    def reaching(self, reach: Array) -> FloatingSystem:
+        """The same with other bounds of the rigid displacement."""
+        return replace(self, rows=replace(self.rows, reach=reach))
+
+    @cached_property
+    def largest_unknowns(self) -> float:
+        """A bound of the norm of (lambda, q) at a solution (theory, (14.5))."""
+        G, h = self.rows.G, self.rows.h
+        del G
+        load = float(self.reach @ h.size) * (1 + gamma(len(self.reach) + 2)) * SAFE if np.any(h.size) else 0.0
+        mu, g = self.smallest_eigenvalue, float(np.linalg.norm(np.abs(self.g) + self.g_rad)) * SAFE * (1 + 1e-12)
+        forces = (g + np.sqrt(g * g + 4 * mu * load)) / (2 * mu)
+        return float(np.hypot(forces, np.linalg.norm(self.reach)) * (1 + 1e-12) * SAFE)
+
+    @cached_property
+    def mode_inverse(self) -> Array:
+        """Approximate inverse of G S^-1 G'; no claim rests on its accuracy."""
+        G = self.rows.G.mid
+        return np.asarray(np.linalg.pinv(G @ self.inverse @ G.T, hermitian=True))

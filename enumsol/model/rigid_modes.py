@@ -1,0 +1,135 @@
+"""Rigid modes of a body that nothing holds: what they are, how springs hold the body, and how far it may move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.errors import InvalidProblemError
+from enumsol.support.array_arguments import real_array
+from enumsol.support.immutable import Sealed, sealed
+
+if TYPE_CHECKING:
+    from enumsol.support.array_types import Floats
+
+#: A N is rounding of the user's assembly up to this fraction of |A| |N|; theory, section 14.1, says what is then meant.
+MODE_TOLERANCE = 1e-9
+#: Pivots of the modes below this fraction of the largest mean dependent modes.
+INDEPENDENCE_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class RigidModes(Sealed):
+    """The displacements that a body offers no resistance to (theory, section 14.1).
+
+    Attributes
+    ----------
+    N : (n, r) array
+        A mode in every column.
+    held : (r,) int array
+        Degrees of freedom of the springs: held there, the body can no longer move as a whole.
+    stiffness : (r,) array
+        Of the springs [force / length].
+    """
+
+    N: Floats
+    held: Any
+    stiffness: Floats
+
+    @classmethod
+    def of(cls, N: Any, A: sp.csc_array) -> RigidModes:
+        """Modes as they are given, with springs to hold the body.
+
+        Raises
+        ------
+        InvalidProblemError
+            They are no modes of A, or not independent.
+        """
+        n = A.shape[0]
+        array = real_array(N, "rigid_modes")
+        array = array[:, None] if array.ndim == 1 else array
+        if array.ndim != 2 or array.shape[0] != n or not 0 < array.shape[1] <= n:
+            raise InvalidProblemError(f"rigid_modes has shape {array.shape}; expected (n, r) = ({n}, r), r >= 1")
+        modes = sealed(array + 0.0)
+        held = _pivots(modes)
+        image, size = np.abs(A @ modes).max(axis=0), (abs(A) @ np.abs(modes)).max(axis=0)
+        if np.any(image > MODE_TOLERANCE * size):
+            mode = int(np.argmax(image > MODE_TOLERANCE * size))
+            raise InvalidProblemError(
+                f"rigid_modes: column {mode} is no rigid mode, for max|A N| = {image[mode]:.3g} where max|A| |N| = "
+                f"{size[mode]:.3g}; expected A N = 0 within {MODE_TOLERANCE:g} |A| |N|"
+            )
+        diagonal = A.diagonal()
+        largest = float(np.max(np.abs(diagonal)))
+        own = diagonal[held]
+        return cls(modes, held, np.where(own > 0, own, largest if largest > 0 else 1.0))
+
+    @property
+    def r(self) -> int:
+        """Number of modes."""
+        return int(self.N.shape[1])
+
+    def springs(self) -> sp.csc_array:
+        """What is added to A, (n, n): the springs that hold the body; the sum with A is exact."""
+        n = len(self.N)
+        return sp.csc_array((self.stiffness, (self.held, self.held)), shape=(n, n))
+
+    def reach(self, largest: float) -> Floats:
+        """How large the coordinates of a rigid displacement can be, (r,), if none of its components is above this.
+
+        Rounded upward from the exact inverse of the modes at the springs.
+        """
+        inverse = _inverse([[Fraction(x) for x in row] for row in self.N[self.held].tolist()])
+        most = [Fraction(largest) * sum(map(abs, row)) for row in inverse]
+        nearest = np.array([float(x) for x in most])
+        low = [Fraction(x) < exact for x, exact in zip(nearest.tolist(), most, strict=True)]
+        return np.where(low, np.nextafter(nearest, np.inf), nearest)
+
+
+def _pivots(N: Floats) -> Any:
+    """Degrees of freedom at which the modes are well told apart, by elimination with complete pivoting.
+
+    Raises
+    ------
+    InvalidProblemError
+        The modes are not independent.
+    """
+    size = np.max(np.abs(N), axis=0)
+    if np.any(size == 0):
+        raise InvalidProblemError(f"rigid_modes: column {int(np.argmin(size))} is zero; expected independent columns")
+    # elementwise throughout: the same on every machine
+    rest, held = N / size, list[int]()
+    columns = list(range(N.shape[1]))
+    while columns:
+        part = np.abs(rest[:, columns])
+        row, place = divmod(int(np.argmax(part)), len(columns))
+        if part[row, place] <= INDEPENDENCE_TOLERANCE:
+            raise InvalidProblemError(
+                f"rigid_modes has linearly dependent columns ({columns[place]} and others); expected independent ones"
+            )
+        pivot = columns.pop(place)
+        held.append(row)
+        for column in columns:
+            rest[:, column] -= rest[:, pivot] * (rest[row, column] / rest[row, pivot])
+            rest[row, column] = 0.0
+    return sealed(np.array(sorted(held), dtype=np.intp))
+
+
+def _inverse(table: list[list[Fraction]]) -> list[list[Fraction]]:
+    """The inverse of a small matrix, exactly; InvalidProblemError where there is none."""
+    size = len(table)
+    rows = [[*row, *(Fraction(int(i == j)) for j in range(size))] for i, row in enumerate(table)]
+    for k in range(size):
+        pivot = next((i for i in range(k, size) if rows[i][k]), None)
+        if pivot is None:
+            raise InvalidProblemError("rigid_modes has linearly dependent columns; expected independent ones")
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        rows[k] = [x / rows[k][k] for x in rows[k]]
+        for i in range(size):
+            if i != k and rows[i][k]:
+                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
+    return [row[size:] for row in rows]

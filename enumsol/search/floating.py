@@ -1,0 +1,347 @@
+"""The search for a body that nothing holds (theory, section 14): its solvers, and what its certifiers conclude.
+
+The tree, its relaxations and complete selections are those of other bodies; what rests on a positive definite A, such
+as one certificate for the whole problem, is not used.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.condensation.condensed import ScaledSystem
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.floating import FloatingSystem, RigidRows
+from enumsol.errors import InvalidArgumentError
+from enumsol.proof import records
+from enumsol.search.certifiers.protocol import Certified, UndecidedPart
+from enumsol.search.certifiers.rational_certifier import ExactCertifier
+from enumsol.search.certifiers.verified import VerifiedCertifier, proven
+from enumsol.search.resume import PlaneReader, RecordedBound
+from enumsol.search.solvers import Solvers
+from enumsol.search.splitting import PlaneSplitting
+from enumsol.search.tree import TreeSearch, make_engine
+from enumsol.trusted.at_alpha import holds_no_root, solve_selection
+from enumsol.trusted.confinement import motion_against, without_bound
+from enumsol.trusted.exclusion import Terms, exclusion_margin
+from enumsol.trusted.floating_bounds import is_unbalanced
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.proof.compressed_parts import Recorder
+    from enumsol.relaxation.engine import Engine
+    from enumsol.search.certifiers.margins import Margin
+    from enumsol.search.certifiers.protocol import Bound, Certifier
+    from enumsol.search.outcome import SearchLimits, SearchProgress
+    from enumsol.selections.rational_selections import ExactSelections
+    from enumsol.selections.solution import Codes, SelectionSolution
+    from enumsol.support.arguments import Alpha
+
+#: Stiffness of the springs of the relaxations, relative to that of the body (theory, section 14.5).
+WEAK = 2.0**-20
+
+
+class FloatingSolvers(Solvers):
+    """Solvers and certifier for a body that nothing holds, at one alpha; parameters as of Solvers.
+
+    Raises
+    ------
+    InvalidArgumentError
+        Arithmetic is "fast", which has no solver for such a body, or as Solvers.
+    """
+
+    has_solution = False
+
+    def __init__(
+        self, problem: Any, alpha: Alpha, arithmetic: Any, tolerance: float, engine: str | None = None
+    ) -> None:
+        if arithmetic == "fast":
+            raise InvalidArgumentError(
+                'arithmetic is "fast" for a body that nothing holds; expected "verified" or "exact"'
+            )
+        super().__init__(problem, alpha, arithmetic, tolerance, engine)
+
+    @cached_property
+    def rows(self) -> RigidRows:
+        """Equilibrium of the body as a whole."""
+        return RigidRows.of(self.problem, Fraction(self.alpha), self.scaled.force, self.scaled.length)
+
+    @property
+    def rigid_unit(self) -> NDArray[np.float64]:  # type: ignore[override]
+        """Units of the coordinates of the rigid displacement, (r,)."""
+        return self.rows.unit
+
+    @cached_property
+    def exact(self) -> ExactSelections | None:
+        """Selections in rationals; None when the problem is too large for them."""
+        from enumsol.condensation.exact import FloatingExactSystem, check_definite  # python-flint
+        from enumsol.selections.rational_selections import ExactSelections  # python-flint
+
+        if self.arithmetic != "exact" and not self._in_rationals:
+            return None
+        system = FloatingExactSystem.of(self.problem, self.alpha)
+        if self.enclosed is None:
+            check_definite(system.contact_compliance)
+        return ExactSelections(system)
+
+    @cached_property
+    def exact_certifier(self) -> FloatingExactCertifier | None:
+        """The certifier in rationals; None when the problem is too large."""
+        return None if self.exact is None else FloatingExactCertifier(self.exact, self.scaled, self._enclosed[0])
+
+    @cached_property
+    def _enclosed(self) -> tuple[FloatingSystem | None, str]:
+        try:
+            held = self.problem.on_springs.enclosure.at(self.alpha, self.scaled.force, self.scaled.length)
+            enclosed = FloatingSystem.on(held, self.rows)
+            definite = enclosed.smallest_eigenvalue > 0
+        except NotEnclosedError:
+            return None, "problem"
+        return (enclosed if definite else None), "problem"
+
+    def certifier(self, recorder: Recorder | None) -> Certifier:
+        """The certifier of this arithmetic."""
+        if self.arithmetic == "exact":
+            if self.exact_certifier is None:
+                raise AssertionError("exact arithmetic has a solver, or refuses the problem")
+            return self.exact_certifier
+        if recorder is None:
+            raise AssertionError("verified arithmetic writes a proof")
+        ids = self.problem.node_ids
+        return FloatingCertifier(self.scaled, self._enclosed[0], lambda: self.exact_certifier, recorder, ids)
+
+    def search(
+        self,
+        certifier: Certifier,
+        limits: SearchLimits | None = None,
+        progress: Callable[[SearchProgress], object] | None = None,
+    ) -> TreeSearch:
+        """A search of the tree with a certifier made here."""
+        return TreeSearch(
+            self.on_weak_springs,
+            certifier,
+            engine=self._relaxations,
+            splitting=PlaneSplitting(self.scaled.F),
+            limits=limits,
+            progress=progress,
+        )
+
+    @cached_property
+    def on_weak_springs(self) -> ScaledSystem:
+        """What the relaxations are about."""
+        return on_weak_springs(self.scaled, self.rows)
+
+    @cached_property
+    def _relaxations(self) -> Engine:
+        return make_engine(self.on_weak_springs, self.engine)
+
+    def remake(self) -> Callable[[], Solvers]:
+        """Makes the same again, also in another process."""
+        return partial(FloatingSolvers, self.problem, self.alpha, self.arithmetic, self.floats.tolerance, self.engine)
+
+    def reader(self) -> FloatingReader:
+        """Understands the records of an earlier proof."""
+        return FloatingReader((self.scaled.F > 0).tolist(), self.enclosed, len(self.rows.unit))
+
+    def unloaded(self) -> bool:
+        """Without load the body may be moved: there is no one solution."""
+        return False
+
+    def proof_header(self) -> dict[str, Any]:
+        """First record of a proof: with the bound of the rigid displacement."""
+        return super().proof_header() | {"max_rigid_displacement": self.problem.rigid_reach}
+
+
+class FloatingReader(PlaneReader):
+    """Of proofs about a body that nothing holds.
+
+    Parameters
+    ----------
+    friction, enclosed : as of PlaneReader
+    modes : number of rigid modes
+    """
+
+    kinds = records.FLOATING_LEAVES
+
+    def __init__(self, friction: Sequence[bool], enclosed: EnclosedSystem | None, modes: int) -> None:
+        super().__init__(friction, enclosed)
+        self._modes = modes
+
+    def declare(self, record: list[Any]) -> None:
+        """Refuse a form: it is that of a body that is held."""
+        raise ValueError("there are no forms")
+
+    def bound(self, codes: Codes, record: list[Any]) -> Bound:
+        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
+        if record[0] != records.Unbalanced.kind:
+            return super().bound(codes, record)
+        records.Unbalanced.read(record, records.Limits(codes, modes=self._modes))
+        # the certifier finds a direction of its own
+        return RecordedBound(np.zeros(0, dtype=np.intp), np.zeros(0))
+
+
+def on_weak_springs(scaled: ScaledSystem, rows: RigidRows) -> ScaledSystem:
+    """The body on weak springs, which the relaxations of the search are about (theory, section 14.5)."""
+    G, h = rows.G.mid, rows.h.mid
+    soft = G.T / WEAK
+    S = scaled.S + soft @ G
+    S = 0.5 * (S + S.T)
+    cholesky = np.asarray(np.linalg.cholesky(S), dtype=np.float64)
+    return ScaledSystem(S, scaled.g + soft @ h, scaled.F, scaled.force, scaled.length, cholesky)
+
+
+class Exclusions:
+    """What excludes assignments of a body that nothing holds, if possible without a bound of the rigid displacement.
+
+    Parameters
+    ----------
+    enclosed : FloatingSystem
+
+    Attributes
+    ----------
+    system, free : FloatingSystem
+        With its bound, and with one beyond which there are no solutions.
+    """
+
+    def __init__(self, enclosed: FloatingSystem) -> None:
+        self.system, self.free = enclosed, without_bound(enclosed)
+        self._margins: tuple[Margin, Margin] = (
+            partial(exclusion_margin, self.free, errors=2.0),
+            partial(exclusion_margin, enclosed, errors=2.0),
+        )
+
+    def record(self, codes: Codes, bound: Bound) -> tuple[records.Exclusion, bool] | None:
+        """A record that excludes a partial assignment, and whether it needs the bound; or None."""
+        rows, values = bound.multipliers()
+        usable = bound.form is None and len(rows)
+        if usable and (kept := proven(self._margins[0], codes, rows, values)) is not None:
+            return records.Excluded(Terms(rows, kept)), False
+        if (unbalanced := self.unbalanced(codes)) is not None:
+            return unbalanced, False
+        if usable and (kept := proven(self._margins[1], codes, rows, values)) is not None:
+            return records.Excluded(Terms(rows, kept)), True
+        return None
+
+    def unbalanced(self, codes: Codes) -> records.Unbalanced | None:
+        """A record that no forces below a partial assignment are in balance with the load; or None."""
+        z = motion_against(self.system, codes)
+        return records.Unbalanced(z) if is_unbalanced(self.system, codes, z) else None
+
+
+class FloatingCertifier(VerifiedCertifier):
+    """Proves prunings and complete selections of a body that nothing holds; parameters as of VerifiedCertifier."""
+
+    lone = False
+
+    def __init__(
+        self,
+        scaled: ScaledSystem,
+        enclosed: FloatingSystem | None,
+        exact: Callable[[], FloatingExactCertifier | None],
+        recorder: Recorder,
+        node_ids: Any,
+    ) -> None:
+        super().__init__(scaled, None, exact, recorder, node_ids)
+        self._floating, self._exactly = enclosed, exact
+        self._exclusions = None if enclosed is None else Exclusions(enclosed)
+        #: Some conclusion rests on the bound of the rigid displacement.
+        self.bounded = False
+
+    @property
+    def certified(self) -> Certified:
+        """What was proven so far."""
+        return Certified(self._verified, self._escalations, self._leaves, self.sliding, self.bounded)
+
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
+        """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
+        found = None if self._exclusions is None else self._exclusions.record(codes, relaxation)
+        if found is None:
+            self._escalations.refined += 1
+            return False
+        self._excluded_by_record(found[0], bounded=found[1])
+        return True
+
+    def _excluded_by_record(self, record: records.Exclusion | records.NoRoot, *, bounded: bool) -> None:
+        self.bounded |= bounded
+        self._escalations.balls += 1
+        self._leaf(record)
+
+    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
+        """All roots in a complete selection."""
+        system, ball = self._floating, None
+        if system is not None and self._exclusions is not None:
+            ball = solve_selection(system, codes)
+            if ball is not None and ball.is_root:
+                self._escalations.balls += 1
+                return self._regular(codes, ball)
+            found: records.Exclusion | records.NoRoot | None = self._exclusions.unbalanced(codes)
+            if found is None and _holds_none(self._exclusions.free, codes):
+                found = records.NoRoot()
+            if found is None and holds_no_root(system, codes, ball):
+                self._excluded_by_record(records.NoRoot(), bounded=True)
+                return None
+            if found is not None:
+                self._excluded_by_record(found, bounded=False)
+                return None
+        certifier = self._exactly()
+        if certifier is None:
+            return self._open(codes, ball)
+        solution = certifier.selection(codes)
+        self.bounded |= certifier.bounded
+        return self._in_rationals(codes, solution)
+
+    def add(self, part: Certified) -> None:
+        """Take over what the certifier of a subtree has proven."""
+        super().add(part)
+        self.bounded |= part.bounded
+
+    def forget(self) -> None:
+        """Forget what was proven."""
+        super().forget()
+        self.bounded = False
+
+
+def _holds_none(system: FloatingSystem, codes: Codes) -> bool:
+    return holds_no_root(system, codes, solve_selection(system, codes))
+
+
+class FloatingExactCertifier(ExactCertifier):
+    """Complete selections in rationals; prunings by balls, which prove them as well (theory, section 14.3)."""
+
+    def __init__(
+        self, selections: ExactSelections, scaled: ScaledSystem, enclosed: FloatingSystem | None = None
+    ) -> None:
+        super().__init__(selections, scaled)
+        self._exclusions = None if enclosed is None else Exclusions(enclosed)
+        #: As of FloatingCertifier.
+        self.bounded = False
+
+    @property
+    def certified(self) -> Certified:
+        """Whether something rests on the bound of the rigid displacement."""
+        return Certified(bounded=self.bounded)
+
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
+        """Whether the multipliers prove that the partial assignment holds no solution."""
+        found = None if self._exclusions is None else self._exclusions.record(codes, relaxation)
+        self.bounded |= found is not None and found[1]
+        return found is not None
+
+    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
+        """All roots in the selection."""
+        found = super().selection(codes)
+        if not isinstance(found, UndecidedPart):
+            self.bounded |= self._selections.rests_on_reach(codes, found)
+        return found
+
+    def add(self, part: Certified) -> None:
+        """Take over what the certifier of a subtree has met."""
+        super().add(part)
+        self.bounded |= part.bounded

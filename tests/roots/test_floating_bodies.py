@@ -1,0 +1,258 @@
+"""Bodies that nothing holds, in 2D: all solutions against an oracle in rationals, which condenses nothing."""
+
+import dataclasses
+import itertools
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from helpers.floating_oracle import Oracle, block_on_table, random_body
+
+import enumsol
+from enumsol.errors import NotHeldError
+
+
+def difference_from_oracle(problem, alpha, arithmetic):
+    """What enumerate_roots says other than the oracle, or None."""
+    oracle = Oracle(problem, alpha)
+    roots = enumsol.enumerate_roots(problem, alpha, arithmetic=arithmetic)
+    if not roots.complete:
+        return f"not complete: {roots.completeness()}"
+    if (len(roots), len(roots.families)) != (len(oracle.points), oracle.families):
+        return f"{len(roots)} roots and {len(roots.families)} families, not {len(oracle.points)} and {oracle.families}"
+    forces, u = oracle.forces
+    for wanted in np.hstack([forces, u]):
+        found = [np.concatenate([root.lambda_n, root.lambda_t, root.u]) for root in roots]
+        if min(np.max(np.abs(row - wanted)) for row in found) > 1e-7 * (1 + np.max(np.abs(wanted))):
+            return "a root is not where it should be"
+    for root in roots:
+        if root.enclosure is not None and not np.all(root.enclosure.lambda_n[:, 0] <= root.enclosure.lambda_n[:, 1]):
+            return "an enclosure is empty"
+    if arithmetic == "verified":
+        report = enumsol.verify(problem, roots.proof)
+        counts = report.roots, report.families, report.within is not None
+        if not report.complete or counts != (len(roots), len(roots.families), roots.rigid_bound.needed):
+            return f"the checker says {report}"
+    return None
+
+
+def failures(seeds, alpha):
+    found = {}
+    for seed in seeds:
+        problem = random_body(seed)
+        for arithmetic in ("verified", "exact"):
+            if (said := difference_from_oracle(problem, alpha, arithmetic)) is not None:
+                found[seed, arithmetic] = said
+    return found
+
+
+@pytest.mark.parametrize(("first", "alpha"), [(0, 0), (10, 0.5)])
+def test_all_solutions_of_random_bodies(first, alpha):
+    assert not failures(range(first, first + 8), alpha)
+
+
+@pytest.mark.slow
+def test_all_solutions_of_many_random_bodies():
+    assert not failures(range(100, 180), 0.25)
+
+
+@pytest.mark.parametrize(
+    ("push", "statuses"),
+    [
+        (0.0, {"stick"}),
+        (0.25, {"stick"}),
+        (0.9, {"stick", "slip+"}),
+    ],
+)
+def test_a_block_below_sliding_has_one_solution(push, statuses):
+    problem = block_on_table(cells=3, push=push)
+    roots = enumsol.enumerate_roots(problem, 0)
+    assert roots.unique
+    assert {status.value for status in roots[0].statuses} <= statuses
+    root = roots[0]
+    # nothing holds it: contact carries the whole load
+    carried = problem.contact_rows.T @ np.r_[root.lambda_n, root.lambda_t]
+    assert np.allclose(problem.rigid_modes.T @ (problem.f - carried), 0)
+    rest = problem.A @ root.u + carried - problem.f
+    assert np.max(np.abs(rest)) < 1e-12
+    held = problem.modes.held
+    assert np.allclose(root.u[held], root.rigid_displacement[held], atol=1e-14)
+    assert enumsol.verify(problem, roots.proof).complete
+
+
+def test_a_block_at_the_limit_slides_as_far_as_is_asked():
+    problem = block_on_table(cells=2, push=1.0, max_rigid_displacement=5.0)
+    roots = enumsol.enumerate_roots(problem, 0)
+    assert roots.complete
+    assert roots.rigid_bound.needed
+    assert not roots.unique
+    (family,) = roots.families
+    assert (len(roots), family.dimension, family.free_modes) == (0, 1, (0,))
+    assert "free to move along mode 0" in repr(roots)
+    assert "within rigid displacements of 5" in repr(roots)
+    assert max(np.max(part.rigid_coordinates[:, 0]) for part in family.polytopes) == 5.0
+
+
+def test_a_block_above_sliding_has_no_solution():
+    problem = block_on_table(cells=3, push=1.25)
+    roots = enumsol.enumerate_roots(problem, 0)
+    assert roots.complete
+    assert not len(roots)
+    assert not roots.families
+    assert roots.at_least == 0
+    assert enumsol.verify(problem, roots.proof).complete
+    assert not enumsol.is_unique(problem, 0)
+
+
+def test_a_block_pulled_off_the_table_has_no_solution():
+    problem = block_on_table(press=-1.0)
+    roots = enumsol.enumerate_roots(problem, 0)
+    assert roots.complete
+    assert not len(roots)
+    assert not roots.families
+
+
+@pytest.mark.parametrize("push", [0.0, 0.5, 0.9])
+def test_weak_springs_tend_to_the_body_that_nothing_holds(push):
+    problem = block_on_table(cells=2, push=push)
+    (free,) = enumsol.enumerate_roots(problem, 0)
+    errors = []
+    for weak in (1e-3, 1e-5, 1e-7, 1e-9):
+        A = sp.csc_array(problem.A + weak * sp.eye_array(problem.n))
+        held = enumsol.ContactProblem(A, problem.Bn, problem.Bt, problem.f, friction=problem.friction)
+        (root,) = enumsol.enumerate_roots(held, 0)
+        assert root.statuses == free.statuses
+        assert root.index == free.index
+        errors.append(max(np.max(np.abs(root.lambda_n - free.lambda_n)), np.max(np.abs(root.u - free.u))))
+    assert errors[-1] < 1e-7
+    assert all(b < 0.1 * a + 1e-7 for a, b in itertools.pairwise(errors))
+
+
+def test_solutions_do_not_depend_on_the_basis_of_the_modes():
+    problem = block_on_table(push=0.5)
+    N = problem.rigid_modes @ np.array([[1, 2, 0], [0, 1, -1], [1, 0, 4]])
+    (one,), (two,) = (enumsol.enumerate_roots(p, 0) for p in (problem, dataclasses.replace(problem, rigid_modes=N)))
+    assert np.allclose(one.u, two.u, atol=1e-12)
+    assert np.allclose(one.lambda_n, two.lambda_n, atol=1e-12)
+
+
+def test_workers_limits_and_resumption(tmp_path):
+    problem, path = block_on_table(cells=4, push=0.5), tmp_path / "block.proof"
+    whole = enumsol.enumerate_roots(problem, 0)
+    cut = enumsol.enumerate_roots(problem, 0, max_nodes=10, proof_path=path)
+    assert not cut.complete
+    assert cut.undecided
+    assert cut.at_least == 0
+    resumed = enumsol.enumerate_roots(problem, 0, proof_path=path, resume=True)
+    assert resumed.complete
+    assert resumed.stats.resumed
+    assert resumed.rigid_bound == whole.rigid_bound
+    with ThreadPoolExecutor(2) as executor:
+        spread = enumsol.enumerate_roots(problem, 0, executor=executor)
+    for other in (resumed, spread):
+        assert np.array_equal(other[0].lambda_n, whole[0].lambda_n)
+        assert enumsol.verify(problem, other.proof).complete
+
+
+def test_what_is_kept_of_a_body_that_nothing_holds(tmp_path):
+    problem = block_on_table(max_rigid_displacement=7.0)
+    for place in ("block.npz", "block"):
+        enumsol.write_problem(problem, tmp_path / place)
+        again = enumsol.read_problem(tmp_path / place)
+        assert again.fingerprint == problem.fingerprint
+        assert again.max_rigid_displacement == 7.0
+    assert pickle.loads(pickle.dumps(problem)).fingerprint == problem.fingerprint
+    assert dataclasses.replace(problem, f=2 * problem.f).rigid_reach == 7.0
+    prints = {problem.fingerprint, dataclasses.replace(problem, max_rigid_displacement=8.0).fingerprint}
+    prints.add(dataclasses.replace(problem, rigid_modes=2 * problem.rigid_modes).fingerprint)
+    prints.add(problem.on_springs.fingerprint)
+    assert len(prints) == 4
+    with pytest.raises(enumsol.EnumsolError, match="fclib has no place for rigid_modes"):
+        enumsol.write_problem(problem, tmp_path / "block.h5")
+
+
+def test_a_sweep_over_loads_factorizes_once():
+    problem = block_on_table()
+    for push in (0.25, 0.9):
+        other = problem.replace(f=block_on_table(push=push).f)
+        assert other.on_springs.factorization is problem.on_springs.factorization
+        afresh = block_on_table(push=push, max_rigid_displacement=other.rigid_reach)
+        (one,), (two,) = (enumsol.enumerate_roots(p, 0) for p in (other, afresh))
+        assert np.allclose(one.u, two.u, atol=1e-12)
+    with pytest.raises(enumsol.InvalidProblemError, match=r"rigid|positive definite"):
+        problem.replace(rigid_modes=None)
+    moved = problem.replace(rigid_modes=2 * problem.rigid_modes)
+    assert np.allclose(enumsol.enumerate_roots(moved, 0)[0].u, enumsol.enumerate_roots(problem, 0)[0].u, atol=1e-12)
+    assert problem.replace(Bn=-problem.Bn).modes.r == 3
+
+
+def test_the_default_bound():
+    data = block_on_table()
+    parts = data.A, data.Bn, data.Bt, data.f
+    at = [(0, 0), (1, 0), (2, 0)]
+    assert enumsol.ContactProblem(*parts, rigid_modes=data.rigid_modes, coordinates=at).rigid_reach == 20.0
+    unloaded = enumsol.ContactProblem(*parts[:3], 0 * data.f, rigid_modes=data.rigid_modes)
+    assert unloaded.rigid_reach == 1.0
+    # a power of two
+    assert np.frexp(data.rigid_reach)[0] == 0.5
+    assert data.rigid_reach > 100
+
+
+N = block_on_table().rigid_modes
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"rigid_modes": N[:3]}, r"rigid_modes has shape \(3, 3\); expected \(n, r\) = \(12, r\), r >= 1"),
+        ({"rigid_modes": N + np.eye(12)[:, :3]}, "column 0 is no rigid mode"),
+        ({"rigid_modes": N[:, [0, 1, 1]]}, "linearly dependent columns"),
+        ({"rigid_modes": N * [1, 0, 1]}, "column 1 is zero"),
+        ({"rigid_modes": N[:, :2]}, "A is singular or indefinite on more than the 2 rigid_modes"),
+        ({"rigid_modes": N * np.nan}, "rigid_modes"),
+        ({"max_rigid_displacement": 0.0}, "max_rigid_displacement is 0"),
+        ({"max_rigid_displacement": np.inf}, "max_rigid_displacement is inf"),
+        ({"rigid_modes": None, "max_rigid_displacement": 3.0}, "max_rigid_displacement is given without rigid_modes"),
+    ],
+)
+def test_modes_that_cannot_be_used(change, words):
+    with pytest.raises(enumsol.InvalidProblemError, match=words):
+        dataclasses.replace(block_on_table(), **change)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda problem: enumsol.branch_graph(problem, (0, 1)),
+        lambda problem: enumsol.link_samples(problem, [0, 1]),
+        lambda problem: enumsol.newton(problem, 0),
+        lambda problem: enumsol.follow(problem, None, 1),
+        lambda problem: enumsol.follow_all(problem, (0, 1)),
+        lambda problem: enumsol.histories(problem, []),
+        lambda problem: enumsol.multiplicity_map(problem, (0, 1), {"friction": [1, 2]}),
+        lambda problem: enumsol.solve_tresca(problem, 0, 1),
+        lambda problem: enumsol.successive_approximations(problem, 0),
+        lambda problem: enumsol.enumerate_roots(problem, 0)[0].condition,
+        lambda problem: enumsol.enumerate_roots(problem, 0)[0].dlambda_dalpha,
+        lambda problem: enumsol.enumerate_roots(problem, 0)[0].local_branch_test(),
+        lambda problem: problem.condensed,
+        lambda problem: problem.enclosure,
+        lambda problem: problem.factorization,
+    ],
+)
+def test_what_cannot_take_such_a_body_says_so(call):
+    with pytest.raises(NotHeldError, match="cannot take a body that nothing holds"):
+        call(block_on_table())
+
+
+def test_fast_arithmetic_is_refused():
+    with pytest.raises(enumsol.InvalidArgumentError, match='arithmetic is "fast" for a body that nothing holds'):
+        enumsol.enumerate_roots(block_on_table(), 0, arithmetic="fast")
+
+
+def test_a_table_of_roots_over_alpha():
+    table = enumsol.multiplicity_table(block_on_table(push=0.5), [0, 1])
+    assert table["roots"].tolist() == [1, 1]
+    assert table["complete"].all()

@@ -1,0 +1,101 @@
+"""How far a body that nothing holds can move: no solution lies beyond what is proven, and what is proven is of use."""
+
+import dataclasses
+from fractions import Fraction
+from itertools import product
+
+import numpy as np
+import pytest
+from helpers.floating_oracle import Oracle, block_on_table, random_body
+
+import enumsol
+from enumsol.condensation.floating import FloatingSystem, RigidRows
+from enumsol.trusted.confinement import is_confined, motion_against, without_bound
+from enumsol.trusted.floating_bounds import is_unbalanced
+
+
+def enclosed(problem):
+    system = problem.on_springs.condensed.at(0).scaled
+    held = problem.on_springs.enclosure.at(0, system.force, system.length)
+    return FloatingSystem.on(held, RigidRows.of(problem, Fraction(0), system.force, system.length))
+
+
+def coordinates(problem, parts):
+    """q of all vertices, (k, r)."""
+    modes = problem.modes
+    u = np.array([[float(Fraction(int(x.p), int(x.q))) for x in v[: problem.n]] for _, vs in parts for v in vs])
+    return np.linalg.solve(modes.N[modes.held], u.reshape(-1, problem.n)[:, modes.held].T).T
+
+
+def test_no_solution_lies_beyond_what_is_proven():
+    proven = beyond = 0
+    for seed in range(15):
+        problem = random_body(seed)
+        free = without_bound(enclosed(problem))
+        if not np.all(np.isfinite(free.reach)):
+            continue
+        proven += 1
+        most = free.reach * free.rows.unit
+        far = dataclasses.replace(problem, max_rigid_displacement=1000 * problem.rigid_reach)
+        q = coordinates(far, Oracle(far).parts)
+        assert np.all(np.abs(q) <= most * (1 + 1e-12))
+        beyond += bool(np.any(np.abs(q) > 0))
+    assert proven > 3
+
+
+def test_a_body_whose_forces_are_not_in_balance_has_no_solution():
+    found = 0
+    for seed in range(15):
+        problem = random_body(seed)
+        system, oracle = enclosed(problem), Oracle(problem)
+        held = {codes for codes, _ in oracle.parts}
+        for codes in product(range(4), repeat=problem.p):
+            final = [0 if c == 0 else (4 if F == 0 else c) for c, F in zip(codes, oracle.F, strict=True)]
+            z = motion_against(system, final)
+            if is_unbalanced(system, final, z):
+                found += 1
+                assert codes not in held
+            # no direction whatever excludes a solution
+            if codes in held:
+                for z in np.random.default_rng(seed).normal(size=(20, problem.modes.r)):
+                    assert not is_unbalanced(system, final, z)
+                    assert not is_unbalanced(system, [6] * problem.p, z)
+    assert found > 50
+
+
+@pytest.mark.parametrize(("push", "confined"), [(0.0, True), (0.5, True), (0.99, True), (1.0, False), (1.25, True)])
+def test_a_block_moves_far_only_at_the_limit(push, confined):
+    problem = block_on_table(cells=3, push=push)
+    assert is_confined(enclosed(problem)) == confined
+    roots = enumsol.enumerate_roots(problem, 0)
+    assert roots.rigid_bound.needed != confined
+    assert ("no bound of rigid displacements was needed" in repr(roots)) == confined
+    within = enumsol.verify(problem, roots.proof).within
+    assert (within is None) == confined
+
+
+def test_a_narrow_bound_is_said_to_be_needed_only_if_it_is():
+    free = block_on_table(push=0.5)
+    narrow = dataclasses.replace(free, max_rigid_displacement=1e-3)
+    wide, cut = (enumsol.enumerate_roots(problem, 0) for problem in (free, narrow))
+    moved = np.max(np.abs(wide[0].rigid_displacement))
+    if moved > 1e-3:
+        assert not len(cut)
+        assert cut.rigid_bound.needed
+    else:
+        assert len(cut) == 1
+        assert not cut.rigid_bound.needed
+
+
+def test_a_root_beyond_the_bound_is_not_listed():
+    problem = block_on_table(push=0.0)
+    # tilted until both nodes touch: the body has to come down by 1/2
+    lifted = dataclasses.replace(problem, gap=0.5)
+    assert len(enumsol.enumerate_roots(lifted, 0)) == 1
+    near = dataclasses.replace(lifted, max_rigid_displacement=0.25)
+    roots = enumsol.enumerate_roots(near, 0)
+    assert roots.complete
+    assert not len(roots)
+    assert roots.rigid_bound.needed
+    assert "within rigid displacements of 0.25" in roots.completeness()
+    assert enumsol.verify(near, roots.proof).within == 0.25
