@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_norm
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.condensed import LARGEST_FRICTION, cholesky_factor, load_unit, node_units
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, nearest_floats
@@ -67,9 +67,14 @@ class FrictionUnits:
         """By what v is multiplied so that its larger component has the size of w_t, shape (p,)."""
         return np.asarray(np.min(self._units, axis=1))
 
+    @cached_property
+    def tau_scale(self) -> Matrix:
+        """By what entries of y are multiplied for ``taus``, shape (p, 2)."""
+        return self._units * self.disc_scale[:, None]
+
     def taus(self, y: Vector) -> Matrix:
         """tau times ``disc_scale``, shape (p, 2)."""
-        return self.tangential(y) * (self._units * self.disc_scale[:, None])
+        return self.tangential(y) * self.tau_scale
 
     def slips(self, w: Vector) -> Matrix:
         """v times ``slip_scale``, shape (p, 2)."""
@@ -173,6 +178,16 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
 
     tau: NDArray[np.intp]
     unit: Vector
+
+    @cached_property
+    def largest_norm(self) -> float:
+        """Upper bound on the norm of every S in the enclosure."""
+        return float(upper_norm(self.S) + upper_norm(self.S_rad)) * SAFE
+
+    @cached_property
+    def product_error(self) -> Matrix:
+        """By how much a computed S y, with the terms of a sum that it is part of, may be off, as a factor of |y|."""
+        return np.asarray((gamma(len(self.g) + 4) * np.abs(self.S) + self.S_rad) * SAFE)
 
     @classmethod
     def of_floats(cls, system: SpaceSystem) -> EnclosedSpace:

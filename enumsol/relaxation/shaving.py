@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from enumsol.model.sectors import SECTORS, width_level, width_of
@@ -39,7 +39,7 @@ class Shaving:
 
     def copy(self) -> Shaving:
         """What a child begins with."""
-        return replace(self, tried=dict(self.tried))
+        return Shaving(dict(self.tried), self.tested)
 
     def sectors(self, codes: Codes, violated: Sequence[bool]) -> list[int]:
         """Nodes whose sectors may be cut, the widest first; ``violated``, by node, where maximum dissipation is."""

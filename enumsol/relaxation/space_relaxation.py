@@ -42,8 +42,8 @@ if TYPE_CHECKING:
 
 #: Level of the directions on which tangents are put where the minimiser leaves the disc, and of those put anyway.
 _FINE, COARSE = 10, 3
-#: Rounds of tangents, and how far outside the disc the minimiser must lie.
-ROUNDS, _OUTSIDE = 4, 1e-3
+#: Rounds of tangents, and how far outside the disc the minimiser must lie: relative to the radius, and at least.
+ROUNDS, _OUTSIDE, _LEAST_OUTSIDE = 4, 1e-3, 1e-9
 #: Sectors of this level and below are halved only where nothing else helps.
 _DEEP = 12
 #: Violations of maximum dissipation below this do not tell which sector to halve.
@@ -102,9 +102,12 @@ class SpaceEngine:
         self._imposed: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
         self.tangents = np.sum(system.tau >= 0, axis=1).tolist()
         self.turning = np.all(system.tau >= 0, axis=1)
+        nodes = np.flatnonzero(self.turning)
+        #: Of the nodes with both tangents: number, places of tau in y, and factors of tau and of the disc's radius.
+        self._discs = nodes, system.tau[nodes].T, system.tau_scale[nodes].T, system.disc_scale[nodes] * (1.0 + _OUTSIDE)
         #: Row by number, for multipliers, and what the program's row is of it.
         self.rows: dict[int, Row] = {}
-        self.scale = np.ones(rows)
+        self.scale, self._unit = np.ones(rows), system.row_unit.tolist()
         self.limit = 400 + 20 * len(system.g)
         self.full = False
 
@@ -124,9 +127,10 @@ class SpaceEngine:
     def _put(self, place: int, row: Row) -> None:
         """Store a row in the units of y and w, scaled so that its largest coefficient stays of size one."""
         indices, coefficients = sector_row_terms(row, self.system.tau, len(self.system.g))
-        units = self.system.row_unit[indices]
-        self.scale[place] = 1.0 / np.max(units)
-        self.data.put_row(place, indices, (coefficients * (units * self.scale[place])).tolist())
+        units = [self._unit[i] for i in indices]
+        scale = self.scale[place] = 1.0 / max(units)
+        values = [value * (unit * scale) for value, unit in zip(coefficients, units, strict=True)]
+        self.data.put_row(place, indices, values)
 
     def imposed(self, node: int, code: int) -> tuple[list[int], list[int]]:
         """Numbers and modes of the rows that a node imposes in a (partial) status."""
@@ -140,6 +144,13 @@ class SpaceEngine:
     def children(self, node: int, code: int) -> tuple[int, ...]:
         """Codes that together cover a partial status of a node."""
         return sector_children(code, self.tangents[node])
+
+    def outside(self, y: Array) -> list[tuple[int, float, float]]:
+        """Nodes whose tau is outside the disc of radius lambda_n, with its direction."""
+        nodes, places, factors, radii = self._discs
+        first, second = y[places] * factors
+        found = np.flatnonzero(np.hypot(first, second) > y[nodes] * radii + _LEAST_OUTSIDE)
+        return list(zip(nodes[found].tolist(), first[found].tolist(), second[found].tolist(), strict=True))
 
     def root(self, rows: list[int], modes: list[int]) -> SpaceRelaxation:
         """The relaxation with the given rows on."""
@@ -213,16 +224,11 @@ class SpaceRelaxation:
 
     def _cuts(self) -> list[int]:
         """Rows of tangents at nodes whose tau is outside the disc of radius lambda_n."""
-        system = self._engine.system
-        y = self.forces
-        tau, p = system.taus(y), system.p
-        size, radius = np.linalg.norm(tau, axis=1), y[:p] * system.disc_scale
-        outside = np.flatnonzero(self._engine.turning & (size > radius * (1.0 + _OUTSIDE) + 1e-9))
-        rows = []
-        for node in outside:
-            slot = self._engine.slot((TANGENT, int(node), nearest(float(tau[node, 0]), float(tau[node, 1]), _FINE)))
-            if slot is not None and not self._state.mode_of(slot * p + int(node)):
-                rows.append(slot * p + int(node))
+        engine, rows = self._engine, []
+        for node, x, y in engine.outside(self.forces):
+            slot = engine.slot((TANGENT, node, nearest(x, y, _FINE)))
+            if slot is not None and not self._state.mode_of(slot * engine.system.p + node):
+                rows.append(slot * engine.system.p + node)
         return rows
 
     @property

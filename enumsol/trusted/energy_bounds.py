@@ -117,4 +117,4 @@ def form_bounds(form: Any, y: Array, c: Array, c_rad: Array, errors: float) -> A
 
 def dots(a: Array, b: Array) -> Array:
     """Inner products of the rows of two arrays."""
-    return np.asarray(np.einsum("ij,ij->i", a, b))
+    return np.asarray(np.vecdot(a, b))

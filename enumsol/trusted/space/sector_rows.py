@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,6 +38,8 @@ OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
 GAP, FORCE, TAU, SLIP, END, ALONG, TANGENT, CHORD, LEFT, RIGHT = range(10)
 FORBIDDEN, NONNEGATIVE, FREE = range(3)
 Row = tuple[int, int, int]
+#: Rows whose terms and signs are kept: the same ones occur in many exclusions.
+_KEPT = 1 << 16
 
 
 def sector_children(code: int, tangents: int) -> tuple[int, ...]:
@@ -65,6 +68,7 @@ def is_sector_covering(code: int, children: Sequence[int], tangents: int) -> boo
     return [a for a, _ in spans] + [end] == [begin] + [b for _, b in spans]
 
 
+@lru_cache(maxsize=_KEPT)
 def row_sign(code: int, row: Row) -> int:
     """What the multiplier of a row may be at a node of this code."""
     kind, _, number = row
@@ -85,7 +89,7 @@ def row_sign(code: int, row: Row) -> int:
     return NONNEGATIVE if code > SECTORS and contains(number, code - SECTORS) else FORBIDDEN
 
 
-def sector_row_terms(row: Row, tau: NDArray[np.intp], size: int) -> tuple[list[int], list[float]]:
+def sector_row_terms(row: Row, tau: NDArray[np.intp], size: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
     """A row as a sum over y and, from ``size`` on, over w: indices and coefficients, off by half a unit at most.
 
     Raises
@@ -93,31 +97,36 @@ def sector_row_terms(row: Row, tau: NDArray[np.intp], size: int) -> tuple[list[i
     ValueError
         The node has no such row.
     """
+    t1, t2 = tau[row[1]]
+    return _terms(row, int(t1), int(t2), size)
+
+
+@lru_cache(maxsize=_KEPT)
+def _terms(row: Row, t1: int, t2: int, size: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
     kind, node, number = row
     if kind == GAP:
-        return [size + node], [-1.0]
+        return (size + node,), (-1.0,)
     if kind == FORCE:
-        return [node], [1.0]
-    t1, t2 = tau[node].tolist()
+        return (node,), (1.0,)
     if kind in (TAU, SLIP):
         t = (t1, t2)[number] if number in (0, 1) else -1
         _exists(t >= 0)
-        return [t if kind == TAU else size + t], [1.0]
+        return (t if kind == TAU else size + t,), (1.0,)
     if kind in (END, ALONG):
         _exists((t1 < 0) != (t2 < 0) and number in (1, -1))
         t = max(t1, t2)
-        return ([node, t], [1.0, -float(number)]) if kind == END else ([size + t], [float(number)])
+        return ((node, t), (1.0, -float(number))) if kind == END else ((size + t,), (float(number),))
     _exists(t1 >= 0 and t2 >= 0 and number >= 4)
     x, y = direction(number)
     if kind == TANGENT:
         _exists(number < RUN)
-        return [node, t1, t2], [1.0, -x, -y]
+        return (node, t1, t2), (1.0, -x, -y)
     _exists(is_sector(number))
     if kind == CHORD:
         along, across, most = chord_of(number)
-        return [t1, t2, node], [along, across, -most]
+        return (t1, t2, node), (along, across, -most)
     p, q = direction(end_number(number))
-    return ([size + t1, size + t2], [-y, x]) if kind == LEFT else ([size + t1, size + t2], [q, -p])
+    return ((size + t1, size + t2), (-y, x)) if kind == LEFT else ((size + t1, size + t2), (q, -p))
 
 
 def _exists(condition: bool) -> None:
@@ -133,14 +142,15 @@ def sector_margin(
 
     ``errors`` as in ``energy_bounds``; -inf where a multiplier has the wrong sign.
     """
-    size, units = len(system.g), system.row_unit.tolist()
+    size, units, tau = len(system.g), system.row_unit.tolist(), system.tau.tolist()
     sums = [[0.0] * size for _ in range(4)]  # numbers of Python: faster one by one than those of arrays
     w_sum, w_sizes, y_sum, y_sizes = sums
     for row, value in zip(rows, values.tolist(), strict=True):
-        sign = row_sign(codes[row[1]], row)
+        node = row[1]
+        sign = row_sign(codes[node], row)
         if sign == FORBIDDEN or (sign == NONNEGATIVE and value < 0) or not math.isfinite(value):
             return -np.inf
-        for i, coefficient in zip(*sector_row_terms(row, system.tau, size), strict=True):
+        for i, coefficient in zip(*_terms(row, *tau[node], size), strict=True):
             # a power of two: nothing is rounded but what underflows, which is less than TINY
             term = value * (coefficient * units[i])
             if i < size:
@@ -150,16 +160,15 @@ def sector_margin(
                 # w = g - S lambda: a row on w acts on S lambda - g with the opposite sign
                 w_sum[i - size] -= term
                 w_sizes[i - size] += abs(term)
-    y, y_size, c, c_size = (np.array(each) for each in sums)
+    y, y_size, c, c_size = np.array(sums)
     k = gamma(len(rows) + 24)
     k *= 1.0 + 2.0 * k  # the sizes are sums as long
-    with np.errstate(over="ignore", invalid="ignore"):
-        c_rad, y_rad = k * c_size * SAFE + TINY, k * y_size * SAFE + TINY
-        bound = float(energy_bounds(system, y[None], c[None], c_rad[None], errors)[0])
-        # rounded y are not quite multipliers: the bound is quadratic in y with the gradient g - v / 2, v = g + c + S y
-        v = np.abs(system.g + c + system.S @ y) + gamma(size + 4) * (np.abs(c) + np.abs(system.S) @ np.abs(y))
-        v += system.g_rad + c_rad + system.S_rad @ np.abs(y) + gamma(size + 4) * np.abs(system.g)
-        slope = np.abs(system.g) + system.g_rad + 0.5 * v * SAFE
-        lost = upper_sum(y_rad * slope) + (upper_norm(system.S) + upper_norm(system.S_rad)) * upper_norm(y_rad) ** 2
-        bound -= errors * float(lost) * SAFE * SAFE
+    c_rad, y_rad = k * c_size * SAFE + TINY, k * y_size * SAFE + TINY
+    bound = float(energy_bounds(system, y[None], c[None], c_rad[None], errors)[0])
+    # rounded y are not quite multipliers: the bound is quadratic in y with the gradient g - v / 2, v = g + c + S y
+    v = np.abs(system.g + c + system.S @ y) + system.product_error @ np.abs(y)
+    v += system.g_rad + c_rad + gamma(size + 4) * (np.abs(c) + np.abs(system.g))
+    slope = np.abs(system.g) + system.g_rad + 0.5 * v * SAFE
+    lost = upper_sum(y_rad * slope) + system.largest_norm * upper_norm(y_rad) ** 2
+    bound -= errors * float(lost) * SAFE * SAFE
     return bound if np.isfinite(bound) else -np.inf
