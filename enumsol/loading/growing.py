@@ -16,7 +16,7 @@ from enumsol.loading.history import History
 from enumsol.loading.history_data import HistoryData
 from enumsol.loading.refinement import refined
 from enumsol.loading.stages import Rounding, Stage, case_of, contact_displacements, start_after
-from enumsol.loading.steps import LoadStep, steps_of
+from enumsol.loading.steps import LoadStep, steps_of, way_to
 from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
 from enumsol.model.restart import SlipStart, restarted
@@ -120,8 +120,9 @@ def histories(
         a ball that holds both ends (from the first of both in fast arithmetic). By default, and in exact arithmetic,
         only equal ends are merged.
     refine : bool
-        Halve all increments until the statuses along all histories, seen at the given steps, no longer change.
-        ``History.refinement`` says what came of it.
+        Halve all increments until the statuses along all histories, seen at the given steps, no longer change. In the
+        first step the load grows from zero. ``History.refinement`` says what came of it, and from which step on the
+        statuses depend on the increments.
     max_halvings : int
         Of ``refine``.
     max_branches : int, optional
@@ -197,7 +198,9 @@ def histories(
 
     if not refine:
         return History(grown(fitted))
-    return History(refined(grown, fitted, optional_count(max_halvings, "max_halvings") or 0))
+    return History(
+        refined(grown, fitted, way_to(problem, fitted[0]), optional_count(max_halvings, "max_halvings") or 0)
+    )
 
 
 @dataclass

@@ -24,14 +24,22 @@ if TYPE_CHECKING:
 _MOST = 20_000
 
 
-def refined(grown: Callable[[Sequence[LoadStep]], HistoryData], steps: Sequence[LoadStep], most: int) -> HistoryData:
-    """The history with the finest increments that were tried: the first of which halving changed nothing, halved."""
+def refined(
+    grown: Callable[[Sequence[LoadStep]], HistoryData],
+    steps: Sequence[LoadStep],
+    way: tuple[LoadStep, LoadStep],
+    most: int,
+) -> HistoryData:
+    """The history with the finest increments that were tried: the first of which halving changed nothing, halved.
+
+    ``way``: from where to where the load goes in the first step.
+    """
     history = grown(steps)
     changes: list[int] = []
     reason = _incomparable(history)
     while reason is None and len(changes) < most and (not changes or changes[-1]):
         parts = 2 ** (len(changes) + 1)
-        finer = grown(halved(steps, parts))
+        finer = grown(halved(steps, way, parts))
         reason = _incomparable(finer)
         if reason is None:
             changes.append(_changed(shapes(history, parts // 2), shapes(finer, parts), len(steps)))
@@ -40,19 +48,19 @@ def refined(grown: Callable[[Sequence[LoadStep]], HistoryData], steps: Sequence[
     return replace(history, refinement=Refinement(len(changes), settled, tuple(changes), reason))
 
 
-def halved(steps: Sequence[LoadStep], parts: int) -> list[LoadStep]:
-    """Every step in so many equal parts, but for the first one: nothing is known of the load before it."""
-    found = [steps[0]]
-    for before, step in pairwise(steps):
-        found += [before.between(step, Fraction(k, parts)) for k in range(1, parts)]
+def halved(steps: Sequence[LoadStep], way: tuple[LoadStep, LoadStep], parts: int) -> list[LoadStep]:
+    """Every step in so many equal parts; ``way``: from where to where the load goes in the first one."""
+    found: list[LoadStep] = []
+    for (start, end), step in zip([way, *pairwise(steps)], steps, strict=True):
+        found += [start.between(end, Fraction(k, parts)) for k in range(1, parts)]
         found.append(step)
     return found
 
 
 def shapes(history: HistoryData, every: int) -> set[Shape]:
-    """The statuses along the histories, seen after the first step and then after every so many."""
+    """The statuses along the histories, seen after every so many steps."""
     statuses = nx.get_node_attributes(history.graph, "statuses")
-    return {tuple(statuses[node] for node in path if (node[0] - 1) % every == 0) for path in history.paths()}
+    return {tuple(statuses[node] for node in path if node[0] % every == 0) for path in history.paths()}
 
 
 def _changed(one: set[Shape], other: set[Shape], steps: int) -> int:

@@ -128,6 +128,13 @@ class LoadStep(Sealed):
         return f"LoadStep({', '.join(parts)})"
 
 
+def way_to(problem: Problem, step: LoadStep) -> tuple[LoadStep, LoadStep]:
+    """From where to where the load goes in a first step: from no load, with the friction of the step throughout."""
+    load = problem.load_at(step.exact_alpha) if step.load is None else step.load
+    start, end = (LoadStep(step.alpha, step.friction, part) for part in (0.0 * load, load))
+    return start, end
+
+
 def steps_of(problem: Problem, steps: Any) -> tuple[LoadStep, ...]:
     """The steps that a user gives, fitted to a problem.
 

@@ -210,6 +210,24 @@ def test_increments_are_halved_until_nothing_changes(pulled_wedge):
     assert histories(coarse, steps, refine=True).refinement.settled
 
 
+def test_the_first_step_is_halved_from_no_load():
+    """Contact closes on the way to the first load, and what slips before it differs from what one step says."""
+    rng = np.random.default_rng(38)
+    X = rng.integers(-2, 3, size=(4, 4))
+    A, f, gap = X @ X.T + np.eye(4), rng.integers(-3, 4, size=4), rng.integers(0, 3, size=2) / 4
+    rows = np.eye(4)
+    problem = ContactProblem(A, rows[:2], rows[2:], np.zeros(4), gap, friction=0.5, load_slope=f)
+    found = histories(problem, [1, 0.5], refine=True, max_halvings=2)
+    assert found.refinement.changed_at == (1, 0)
+    assert "which changed until then, from step 1 on" in str(found.refinement)
+    by_hand = histories(problem, [0.25, 0.5, 0.75, 1, 0.875, 0.75, 0.625, 0.5])
+    for step in range(1, 9):
+        statuses = [[root.statuses for root in history.roots(step)] for history in (found, by_hand)]
+        assert statuses[0] == statuses[1]
+    coarse = histories(problem, [1, 0.5])
+    assert {root.statuses for root in coarse.roots(1)} != {root.statuses for root in found.roots(4)}
+
+
 def test_increments_that_matter_are_told():
     # one step over a turn of the load misses the slip on the way
     problem = ContactProblem(
