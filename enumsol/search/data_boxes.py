@@ -132,7 +132,7 @@ class BoxSearch:
         return data, system
 
     def _one_solution(self, data: DataBox, system: ScaledSystem) -> bool | None:
-        """Whether there is proven to be one throughout; None where no numbers serve the middle."""
+        """Whether there is proven to be one throughout; None where it seems that no numbers serve the middle."""
         proposal = self._proposed(system)
         found = None if proposal is None else _located(data, system, proposal)
         if proposal is None or found is None:
@@ -140,7 +140,7 @@ class BoxSearch:
         if any(only_throughout(data, found, numbers, _MARGIN) for numbers in self._numbers(system.p)):
             return True
         if not self._tries:
-            return False
+            return None
         self._tries -= 1
         self._last = _sought(data, proposal)
         return None if self._last is None else only_throughout(data, found, self._last, _MARGIN)

@@ -6,7 +6,9 @@ given in per cent of the largest force, on finer and finer grids of contact node
 is the tangential displacement over that at which everything slips. All histories are enumerated and proven.
 
 Jamming: the wedge of the gallery with friction 1 is pushed in, let go, and pulled in four steps. Maps: the gallery's
-wedge over friction (alpha) and the pull; a clamped block with 16 contact nodes over friction and 20 loads.
+wedge over friction (alpha) and the pull; a clamped block with 64 contact nodes over friction and 20 loads; the wedge
+with a constant pull to the side added, over friction and that. Of each: how much of alpha is proven to have one
+solution between neighbouring values, too.
 
 Cost: the steps of a block that is sheared to and fro, as one history, and by problems built anew from the midpoints of
 the same starts; seconds of one core, measured pair by pair.
@@ -151,15 +153,32 @@ def maps(run: Run) -> None:
     found = enumsol.multiplicity_map(calm, (0, 3), {"load": (wedge.f, values)})
     first = time.perf_counter() - started
     run.figure("map", found.plot())
-    started, p = time.perf_counter(), 8 if run.smoke else 16
+    started = time.perf_counter()
+    aside = np.where(np.arange(wedge.n) % 2 == 0, np.max(np.abs(wedge.f)), 0.0) / wedge.n
+    sideways = enumsol.multiplicity_map(wedge, (0, 3), {"load": (aside, np.linspace(-1, 1, 3 if run.smoke else 9))})
+    between = time.perf_counter() - started
+    started, p = time.perf_counter(), 8 if run.smoke else 64
     block = enumsol.gallery.get(f"clamped-block-{p}").build()
     shear = np.where(np.arange(block.n) % 2 == 0, block.f, 0.0)
     loads = np.linspace(-0.5, 1.5, 3 if run.smoke else 20)
-    other = enumsol.multiplicity_map(block, (0, 0.5), {"load": (shear, loads)}, time_limit=200)
+    other = enumsol.multiplicity_map(block, (0, 3), {"load": (shear, loads)})
     second = time.perf_counter() - started
+    run.figure("map_of_block", other.plot())
     rows = [
-        {"map": "wedge", "p": wedge.p, "values": len(found.rows), "complete": yes(found.complete), "seconds": first},
-        {"map": "block", "p": p, "values": len(other.rows), "complete": yes(other.complete), "seconds": second},
+        {
+            "map": name,
+            "p": size,
+            "values": len(result.rows),
+            "complete": yes(result.complete),
+            "proven between %": 100 * result.unique_between,
+            "seconds for rows": sum(row.seconds for row in result.rows),
+            "seconds": seconds,
+        }
+        for name, size, result, seconds in (
+            ("wedge", wedge.p, found, first),
+            ("wedge pulled aside", wedge.p, sideways, between),
+            ("block", p, other, second),
+        )
     ]
     several = sum(not row.unique for row in found.rows)
     run.table("maps", rows, f"the wedge has several solutions at {several} of {len(found.rows)} pulls")

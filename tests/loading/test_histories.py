@@ -199,6 +199,23 @@ def test_a_tolerance_joins_ends_in_one_ball(pulled_wedge):
         histories(pulled_wedge, [1, 0], merge=1.0, arithmetic="exact")
 
 
+def test_a_load_held_after_an_unstable_slip_has_two_roots_beside_it_or_none(pulled_wedge):
+    """So no ball of starts can decide it; exact arithmetic finds one root of index 0."""
+    history = histories(pulled_wedge, [-1, 0, 0.5])
+    root, start = history.root((3, 1)), history.stages(3)[0].start
+    assert root.index == -1
+    beside = [SlipStart(start.offset + (1 + far) * root.u_t) for far in (1e-3, -1e-3)]
+    found = [enumsol.enumerate_roots(restarted(pulled_wedge, end), 0.5) for end in beside]
+    assert all(roots.complete for roots in found)
+    assert [len(roots) for roots in found] == [1, 3]
+    held = histories(pulled_wedge, [-1, 0, 0.5, 0.5])
+    assert not held.complete
+    assert "because its start is known within" in held.reasons[0]
+    exact = histories(pulled_wedge, [-1, 0, 0.5, 0.5], arithmetic="exact")
+    assert exact.complete
+    assert sorted(root.index for root in exact.roots(4)) == [-1, 0, 1, 1, 1, 1]
+
+
 def test_increments_are_halved_until_nothing_changes(pulled_wedge):
     history = histories(pulled_wedge, [-1, 0, 0.5], refine=True)
     assert history.refinement.settled
