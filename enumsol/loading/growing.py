@@ -132,7 +132,8 @@ def histories(
     time_limit : float, optional
         Stop after this many seconds; what was found by then is kept.
     executor : concurrent.futures.Executor, optional
-        Of `enumerate_roots`.
+        Of `enumerate_roots`: its workers share each search. The starts of a step are searched one after the other, so
+        that limits and ends are counted in one order.
     progress : callable, optional
         Called with a HistoryProgress after every search.
     **options
