@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from enumsol.support.plotting import axes_or_none, figure_of, new_figure
@@ -48,7 +49,7 @@ def draw_map(
     ax.autoscale_view()
     ax.set_xlabel("alpha")
     ax.set_ylabel(name)
-    ax.set_title(title, fontsize=9)
+    ax.set_title(fill(title, 80), fontsize=9)
     handles: list[Any] = []
     for count, exact in sorted(seen.items()):
         words = f"{'' if exact else 'at least '}{count} solution{'' if count == 1 else 's'}"
@@ -61,7 +62,7 @@ def draw_map(
     if curves:
         handles.append(Line2D([], [], linestyle="--", color=_FOLD, marker=".", label="folds, linked by statuses"))
     handles.append(Patch(facecolor="none", label="elsewhere between the values: not proven"))
-    ax.legend(handles=handles, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, frameon=False)
+    ax.legend(handles=handles, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2, frameon=False)
     return figure_of(ax)
 
 

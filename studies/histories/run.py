@@ -163,7 +163,6 @@ def maps(run: Run) -> None:
     loads = np.linspace(-0.5, 1.5, 3 if run.smoke else 20)
     other = enumsol.multiplicity_map(block, (0, 3), {"load": (shear, loads)})
     second = time.process_time() - started
-    run.figure("map_of_block", other.plot())
     rows = [
         {
             "map": name,
