@@ -53,7 +53,7 @@ def refuse_walls(scene: Any) -> None:
         for part in group.parts:
             here = np.intersect1d(touching, mesh.nodes(part))
             if len(here) > _WALL * np.sum(np.isin(nodes[own], mesh.nodes(part))):
-                beside = np.flatnonzero(np.any(seen.weights.toarray()[seen.gaps == 0.0] != 0, axis=0))
+                beside = np.unique(seen.weights[np.flatnonzero(seen.gaps == 0.0)].indices)
                 names = [name for name, rows in mesh.facets.items() if np.all(np.isin(beside, rows))]
                 other = names[0] if names else "OTHER"
                 touched = f"those of {other}" if names else "the boundary of another body"
