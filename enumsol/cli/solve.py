@@ -58,6 +58,10 @@ def _number(text: str, option: str) -> Any:
     return _entry(text, option, text)
 
 
+def _auto_or_number(text: str, option: str) -> Any:
+    return text if text == "auto" else _number(text, option)
+
+
 def _numbers(text: str, option: str) -> list[Any]:
     return [_entry(part, option, text) for part in text.split(",")]
 
@@ -175,6 +179,12 @@ MESH_OPTIONS = {
     ),
     "spring": Given(
         _SUPPORT, "NAME=kn,kt", "Springs per area, along the normal and along the tangents.", _by_part, True
+    ),
+    "max_rigid_displacement": Given(
+        _SUPPORT,
+        "LENGTH|auto",
+        "In 2D, lets bodies that nothing else holds move as a whole, so far or ten times the size of the mesh.",
+        _auto_or_number,
     ),
     "load": Given(_LOAD, _PULL, _FORCE, _by_part, True),
     "load_slope": Given(_LOAD, _PULL, "The same, times alpha.", _by_part, True),

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 #: Positions in a plane of symmetry may differ from it by this share of the extent of the body.
 _SAME = 1e-9
+#: What is smaller in a combination of rigid motions is rounding.
+_ROUNDED = 1e-12
 #: Of the energies of rigid motions in the supports, the least as a share of the largest that holds a body.
 _HELD = 1e-10
 #: How many parts of a boundary are named to say which body it is.
@@ -155,6 +157,31 @@ class Piece:
         values = np.linalg.eigvalsh(motions.T @ (hold @ motions))
         return int(np.sum(values <= _HELD * max(values[-1], np.finfo(np.float64).tiny)))
 
+    def free_modes(self, points: Floats, hold: sp.csc_array) -> Floats:
+        """The rigid motions of a plane body that nothing holds, (2 N, r): translations and turns, as simple as may be.
+
+        Where supports or springs leave only some of them, they are combinations of a turn and translations.
+        """
+        motions = _rigid_motions(points, self.nodes)
+        count = self.free_motions(points, hold)
+        if count == motions.shape[1]:
+            turned = np.where(self.nodes[:, None], points[:, ::-1] * [-1.0, 1.0], 0.0)
+            return np.column_stack([motions[:, :2], turned.ravel()])
+        _, vectors = np.linalg.eigh(motions.T @ (hold @ motions))
+        # echelon form: what is a translation becomes one exactly
+        table, row = vectors[:, :count].T.copy(), 0
+        for place in range(table.shape[1]):
+            best = row + int(np.argmax(np.abs(table[row:, place]))) if row < count else row
+            if row == count or abs(table[best, place]) <= _ROUNDED:
+                continue
+            table[[row, best]] = table[[best, row]]
+            table[row] /= table[row, place]
+            others = np.arange(count) != row
+            table[others] -= np.outer(table[others, place], table[row])
+            table[np.abs(table) <= _ROUNDED] = 0.0
+            row += 1
+        return np.asarray(motions @ table.T)
+
 
 def pieces_of(mesh: PartedMesh) -> list[Piece]:
     """All bodies of a mesh that hang together."""
@@ -195,10 +222,18 @@ def check_held(mesh: PartedMesh, supports: Supports, springs: sp.csc_array) -> N
     hold = holding(supports, springs)
     for piece in pieces_of(mesh):
         if piece.free_motions(mesh.points, hold):
+            alone = "; or max_rigid_displacement, if contact alone is to hold it" if mesh.points.shape[1] == 2 else ""
             raise InvalidProblemError(
                 f"{piece.name} is free to move as a rigid body; expected clamp, symmetry, displacement or spring to "
-                "hold it (contact alone does not)"
+                f"hold it (contact alone does not){alone}"
             )
+
+
+def rigid_modes_of(mesh: PartedMesh, supports: Supports, springs: sp.csc_array) -> Floats | None:
+    """The rigid motions of all bodies of a plane mesh that nothing holds, (2 N, r); None if there are none."""
+    hold = holding(supports, springs)
+    modes = np.hstack([piece.free_modes(mesh.points, hold) for piece in pieces_of(mesh)])
+    return modes if modes.shape[1] else None
 
 
 def _rigid_motions(points: Floats, inside: Mask) -> Floats:

@@ -37,6 +37,7 @@ def problem_of(
     axes: tuple[Floats, ...],
     supports: Supports,
     mesh: Callable[[Integers], BodyMesh] | None = None,
+    modes: Floats | None = None,
     **more: Any,
 ) -> ContactProblem | ContactProblem3D:
     """The problem of a body with these contact rows.
@@ -50,6 +51,8 @@ def problem_of(
         Tangents of the contact rows, see `axes_of`.
     mesh : callable or None
         What the problem keeps of its mesh, from the degrees of freedom that are left.
+    modes : (d N, r) array or None
+        In 2D, rigid motions that nothing holds.
     **more
         As in `ContactProblem` and `ContactProblem3D`.
 
@@ -70,7 +73,7 @@ def problem_of(
     arrays: tuple[Any, ...] = (body.A, *rows, body.f)
     more |= {"load_slope": body.load_slope, "mesh": None if mesh is None else mesh(body.left)}
     if dofs.shape[1] == 2:
-        return ContactProblem(*arrays, **more)
+        return ContactProblem(*arrays, **more | {"rigid_modes": None if modes is None else modes[body.left]})
     from enumsol.model.problem3d import ContactProblem3D  # not for problems in 2D
 
     return ContactProblem3D(*arrays, **more)

@@ -58,6 +58,7 @@ def mesh_problem(
     body_force: ArrayLike | Mapping[str, ArrayLike] | None = None,
     gap: float | Mapping[str, float] = 0.0,
     obstacle: Mapping[str, Sequence[float]] | None = None,
+    max_rigid_displacement: float | Literal["auto"] | None = None,
     groups: str | None = None,
 ) -> ContactProblem | ContactProblem3D:
     """Contact problem of a body whose mesh has named parts.
@@ -119,6 +120,10 @@ def mesh_problem(
         The rigid foundation of the contact parts, where it does not have the shape of the body: ``{"plane": (x, y, nx,
         ny)}`` by a point and the direction from it to the body, ``{"circle": (x, y, r)}``, or ``{"hole": (x, y, r)}``,
         a circle that the body is inside of; in 3D ``plane`` with six numbers, ``sphere`` and ``hole`` with four.
+    max_rigid_displacement : float, "auto" or None
+        In 2D, lets bodies move as a whole that supports and springs leave free: their rigid modes are found, and
+        solutions are sought within this bound of the rigid displacement, ten times the size of the mesh for "auto"
+        (theory, section 14) [length]. By default such a body is refused.
     groups : str, optional
         As in `read_mesh`.
 

@@ -19,6 +19,7 @@ from enumsol.fem.conditions import (
     part_forces,
     part_springs,
     pieces_of,
+    rigid_modes_of,
 )
 from enumsol.fem.construction import axes_of, problem_of
 from enumsol.fem.contacts import contacts_of
@@ -31,7 +32,7 @@ from enumsol.fem.restrained import plain_dofs
 from enumsol.fem.scene_checks import refuse_walls, scene_notes
 from enumsol.fem.scene_text import described
 from enumsol.model.mesh import BodyMesh
-from enumsol.support.arguments import exact_number, finite_number, shown
+from enumsol.support.arguments import exact_number, finite_number, positive_number, shown
 from enumsol.support.array_arguments import short_vector
 
 if TYPE_CHECKING:
@@ -141,16 +142,34 @@ class Scene:
             from enumsol.fem.solid_geometry import outward  # not for plane bodies
 
             surface, more["areas"] = outward(contacts.facets, mesh.cells), contacts.areas
-        check_held(mesh, supports, self.springs)
+        modes = self._modes(more)
         A = sp.csc_array(self.body.stiffness(*self.lame.T) + self.springs)
         axes = _axes(nodes, options["axis"], self.dimension)
         more |= _moved(nodes, axes, offset, more["gap"])
         slopes = self.slope.ravel() if np.any(self.slope) else None
         return problem_of(
             *(A, self.forces.ravel(), slopes, plain_dofs(mesh.points.shape), nodes, axes, supports),
+            modes=modes,
             mesh=lambda left: BodyMesh.of_dofs(mesh.points, mesh.cells, left, offset, surface, lame=self.lame),
             **more,
         )
+
+    def _modes(self, more: dict[str, Any]) -> Floats | None:
+        """Rigid motions that nothing holds, if that is asked for; their bound is put to the other arguments."""
+        largest, supports = self.options["max_rigid_displacement"], self.held.supports
+        if largest is None:
+            check_held(self.mesh, supports, self.springs)
+            return None
+        if self.dimension == 3:
+            raise InvalidArgumentError(
+                f"max_rigid_displacement is {shown(largest)} for a body in 3D; expected None, and supports that hold it"
+            )
+        if largest != "auto":
+            more["max_rigid_displacement"] = positive_number(largest, "max_rigid_displacement")
+        modes = rigid_modes_of(self.mesh, supports, self.springs)
+        if modes is None:
+            more.pop("max_rigid_displacement", None)
+        return modes
 
     def plot(self) -> Any:
         """A figure of the bodies, the parts of their boundaries, forces and contact nodes with their normals.
