@@ -6,7 +6,15 @@ there; `get` finds one by name.
 """
 
 from enumsol.gallery.catalogue import GALLERY, GalleryEntry, close_names, get
-from enumsol.gallery.problems import block_on_table, chain, clamped_block, one_node_triangle, two_node_square, wedge
+from enumsol.gallery.problems import (
+    block_on_table,
+    chain,
+    clamped_block,
+    one_node_triangle,
+    taper,
+    two_node_square,
+    wedge,
+)
 from enumsol.gallery.solid_gallery import block3d, one_node_3d, wedge3d
 
 __all__ = [
@@ -20,6 +28,7 @@ __all__ = [
     "get",
     "one_node_3d",
     "one_node_triangle",
+    "taper",
     "two_node_square",
     "wedge",
     "wedge3d",

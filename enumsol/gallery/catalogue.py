@@ -9,7 +9,15 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.gallery.problems import block_on_table, chain, clamped_block, one_node_triangle, two_node_square, wedge
+from enumsol.gallery.problems import (
+    block_on_table,
+    chain,
+    clamped_block,
+    one_node_triangle,
+    taper,
+    two_node_square,
+    wedge,
+)
 from enumsol.gallery.solid_gallery import block3d, one_node_3d, wedge3d
 from enumsol.support.arguments import shown
 
@@ -125,6 +133,11 @@ def _large() -> Iterator[GalleryEntry]:
     for p, alpha in ((8, 3.0), (14, 2.2), (20, 2.25), (32, 2.2)):
         build = partial(wedge, 4, p // 2, (4e-4, 1e-3))
         yield GalleryEntry(f"wedge-{p}-5", "wedge pulled obliquely: it may hang tilted too", alpha, 5, build)
+    for p in (8, 14):
+        build = partial(taper, 4, p // 2)
+        yield GalleryEntry(
+            f"taper-{p}", "self-holding taper of steel, pulled: it holds, slides or is free", 0.2, 3, build
+        )
     for p in (2, 4, 6, 8):
         yield GalleryEntry(f"chain-{p}", f"{p} separate one-node triangles: 3^{p} roots", 5.0, 3**p, partial(chain, p))
     for p in (2, 4, 6, 8):

@@ -350,6 +350,49 @@ def wedge(
     )
 
 
+def taper(nx: int, ny: int, pull: Pair = (0.0, 50.0), *, friction: Friction = (0.0, 1.0)) -> ContactProblem:
+    """Self-holding taper of steel in N and mm, pressed into its socket and pulled: it holds, slides out or is free.
+
+    A `wedge` of 60 mm, 20 mm wide at its tip, whose sides are inclined by 3 degrees; plane strain, E = 210 GPa and
+    nu = 0.3. It is pressed in by 0.01 mm on both sides. Springs of 100 N/mm along the axis and 200 N/mm across, per mm
+    of depth, hold its top: a drawbar that was released. A pull of 50 N per mm of width and depth is about 1.3 kN per mm
+    of depth; with it there is one solution up to F = 0.12, and there are three from there on, five only near F = 0.15
+    (nx = 4, ny = 4 to 10).
+
+    Parameters
+    ----------
+    nx, ny : int
+        Cells across and along the height, at least 1; p = 2 ny.
+    pull : (float, float)
+        Force per area of the top in x and y; positive y is out of the socket [N / mm^2].
+    friction : float or tuple (F0, F1)
+        As in `ContactProblem`; default F(alpha) = alpha.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> len(enumsol.enumerate_roots(enumsol.gallery.taper(4, 4), alpha=0.2))
+    3
+    """
+    return wedge(
+        nx,
+        ny,
+        pull,
+        0.01,
+        (200.0, 100.0),
+        width=20.0,
+        height=60.0,
+        half_angle=3.0,
+        lame=fem.lame(210e3, 0.3),
+        friction=friction,
+    )
+
+
 def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.0, 1.0)) -> ContactProblem:
     """One-node triangles in a row, weakly coupled: 3^p roots, to measure what an enumeration costs per root.
 

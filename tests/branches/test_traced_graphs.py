@@ -17,7 +17,7 @@ from path_problems import (
 )
 from two_graphs import differences, steps, two_graphs
 
-from enumsol import ContactProblem, branch_graph, verify
+from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
 from enumsol.branches import construction
 from enumsol.branches.enclosed import tracing
 
@@ -217,3 +217,14 @@ def test_boxes_far_from_zero_may_be_long(seed):
     graphs = two_graphs(problem, interval)
     assert all(high - low < 1e-3 for low, high, _ in graphs.open)
     assert differences(graphs) == []
+
+
+def test_many_digits_decide_long_boxes():
+    """Beside a fold of a slender body doubles do not suffice: many digits go on from there, in boxes that grow."""
+    problem = gallery.taper(4, 4, (5.0, 50.0))
+    graph = branch_graph(problem, (0, 0.4))
+    assert graph.complete
+    assert graph.arcs_by == "balls"
+    for alpha in (0.1, 0.15, 0.18, 0.3, 0.4):
+        assert graph.multiplicity_at(alpha) == len(enumerate_roots(problem, alpha))
+    assert verify(problem, graph.proof).complete

@@ -34,7 +34,10 @@ CONCLUSIONS = {
     "fixed_points_scaling": ("all converged: yes", "Newton needed no help: yes"),
     "grazing": ("chains: all complete and checked: yes; at most", "rows of equal discs: 4 of 4 complete"),
     "histories": ("all complete and unique, proven: yes", "unique until step 2, complete: yes"),
-    "jamming_wedge": ("jams from F = 1.37, from coarse to fine; at most 5 solutions", "all complete, proven: yes"),
+    "jamming_wedge": (
+        "jams from F = 1.37, from coarse to fine; at most 5",
+        "holds from F = 0.122, from coarse to fine",
+    ),
     "paper_examples": ("all 19 facts hold", "no arc or continuum missed, no jump"),
     "peers": ("enumsol: ended on 3 of 3", "4^p selections: ended on 3 of 3"),
     "requirements": ("both interpreters import the same enumsol", "import enumsol: "),

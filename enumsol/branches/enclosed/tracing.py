@@ -37,6 +37,8 @@ ERRORS = 2.0
 _SMALLEST_UNITS, _SMALLEST_PRECISE = 64.0, 2.0**-60
 #: Boxes shorter than this share of the interval are traced in many digits.
 _PRECISE_BOX, _PRECISE_ANYWHERE = 2.0**-10, 2.0**-40
+#: Beside a box that many digits decided they are tried first on one so many times as long.
+_GROWTH = 2.0
 #: Boxes on which a selection seems to be singular are not cut below this share.
 _SINGULAR = 2.0**-26
 #: Expansions of one selection, after which what is left stays open.
@@ -108,6 +110,8 @@ class _Tracing:
         self._length = found.high - found.low
         self._spacing = _SMALLEST_UNITS * float(np.spacing(max(abs(found.low), abs(found.high))))
         self._count = 0
+        #: Length of the last box that many digits decided.
+        self._decided = 0.0
         self.finished = False
 
     def run(self) -> Asking:
@@ -130,7 +134,8 @@ class _Tracing:
         short, tiny = (
             share < limit and (share < _PRECISE_ANYWHERE or beside < limit) for limit in (_PRECISE_BOX, _SINGULAR)
         )
-        precise = self._precise() if short and self._count <= _MOST_BOXES else None
+        beside_decided = float(last - first) <= _GROWTH * self._decided
+        precise = self._precise() if (short or beside_decided) and self._count <= _MOST_BOXES else None
         smallest = share < _SMALLEST_PRECISE if precise is not None else float(last - first) <= self._spacing
         whole = self._count > _MOST_BOXES or smallest
         tried: list[tuple[AlphaBox, list[Interval]]] = []
@@ -143,6 +148,8 @@ class _Tracing:
             found = precise.expansion(first, last)
             if found is not None:
                 tried.insert(0, (yield from self._cut(found, whole=whole, flat=share < _PRECISE_BOX)))
+                if _decides(*tried[0]):
+                    self._decided = float(last - first)
         if tried:
             box, rest = tried[0]
             if box.parts:
