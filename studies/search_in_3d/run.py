@@ -7,8 +7,8 @@ Read ``nodes`` against ``slip``, the slipping nodes of the solution: every one o
 column ``leaves`` counts the leaves that were tested by Krawczyk's operator, ``check s`` is the checker's time.
 
 ``wedges`` are held by weak springs, which all their contact nodes together hardly feel: they have several solutions,
-and S has eigenvalues far apart.
-This table was measured before slices were cut off sectors (``slices`` in search_in_3d_choices).
+and S has eigenvalues far apart. ``feet`` are meshes of gmsh on weak springs (``feet.py``), with one solution each;
+``spring`` is the stiffness of all springs by E h, with the body's height h.
 
 ``degenerate`` are problems with three nodes whose search is long all the same: with small integers conditions hold with
 equality, and one region (``largest region``) may take hundreds of leaves; with much friction many selections come near
@@ -19,6 +19,7 @@ solution whose first node just sticks ("limit"), touches without load and slides
 
 from __future__ import annotations
 
+from itertools import product
 from time import process_time
 from typing import TYPE_CHECKING
 
@@ -31,14 +32,15 @@ from search_in_3d.degenerate import (
     known_row,
     row as degenerate_row,
 )
+from search_in_3d.feet import FRICTION as FEET_FRICTION, NAMES as FEET, SPRINGS, foot
 
 if TYPE_CHECKING:
     from shared.results import Run
 
 #: Cells of the blocks, which have 4, 9, 12, 16 and 25 contact nodes.
 BLOCKS, SMOKE_BLOCKS = ((2, 1, 2), (3, 2, 2), (4, 2, 2), (4, 3, 2), (5, 4, 2)), ((2, 1, 2),)
-FRICTION = (0.3, 0.5, 1.0, 3.0)
-MAX_NODES, MOST_WEDGES, MOST_KNOWN = 20_000, 100_000, 200
+FRICTION = (0.3, 0.5, 1.0, 3.0, 5.0)
+MAX_NODES, MOST_WEDGES, MOST_FEET, MOST_KNOWN = 20_000, 100_000, 10_000, 200
 #: Cells of the wedges, which have 8 and 12 contact nodes with multipliers at the nodes.
 WEDGES = (1, 1, 2), (2, 1, 2), (2, 2, 2)
 WEDGE_FRICTION = (1.0, 2.0, 3.0)
@@ -84,6 +86,7 @@ def main(run: Run) -> None:
         f"every proof accepted: {all(r['accepted'] for r in rows)}",
     )
     wedges(run)
+    feet(run)
     degenerate(run)
 
 
@@ -95,6 +98,23 @@ def wedges(run: Run) -> None:
             problem = enumsol.gallery.wedge3d(*cells, friction=F, multipliers="nodes")
             rows.append({"wedge": "x".join(map(str, cells)), **row(problem, 0, max_nodes=most), "F": F})
     run.table("wedges", rows, f"every proof accepted: {all(r['accepted'] for r in rows)}")
+
+
+def feet(run: Run) -> None:
+    """The table of bodies on weak springs."""
+    most = SMOKE_NODES if run.smoke else MOST_FEET
+    cases = product(FEET[:1] if run.smoke else FEET, SPRINGS, FEET_FRICTION)
+    rows = [
+        {"body": name, "spring": spring, **row(foot(name, spring, F), 0, max_nodes=most), "F": F}
+        for name, spring, F in cases
+    ]
+    cut = [f"{r['body']}, {r['spring']:g} E h, F = {r['F']:g}" for r in rows if not r["complete"]]
+    run.table(
+        "feet",
+        rows,
+        f"cut at {most} nodes: {'; '.join(cut) or 'none'}",
+        f"every proof accepted: {all(r['accepted'] for r in rows)}",
+    )
 
 
 def degenerate(run: Run) -> None:

@@ -51,6 +51,12 @@ def wedges_in_3d(p, column):
     return numbers(found[found["p"] == str(p)][column])
 
 
+def feet_in_3d(column):
+    """Of those that take a tree and were finished, the least and the largest."""
+    found = table("search_in_3d/results/feet.csv")
+    return rounded(numbers(found[(found["complete"] == "True") & (numbers(found["nodes"]) > 1)][column]))
+
+
 def rounded(values, digits=2):
     """The least and the largest, to so many digits."""
     return tuple(float(f"{value:.{digits}g}") for value in (min(values), max(values)))
@@ -75,7 +81,7 @@ CLAIMS = {
     "12 discs": (r"12 discs take (\d+) nodes", lambda: rounded(nodes_of_discs(12), 3)[1:]),
     "20 discs": (r"20 discs (\d+) to (\d+)", lambda: rounded(nodes_of_discs(20), 3)),
     "3D wedges, nodes": (
-        r"take ([\d,]+) to ([\d,]+) nodes of the tree and 2 to",
+        r"take ([\d,]+) to ([\d,]+) nodes of the tree and \d+ to \d+ s with eight",
         lambda: rounded(wedges_in_3d(8, "nodes")),
     ),
     "3D wedges, time": (
@@ -89,6 +95,10 @@ CLAIMS = {
     "3D wedges, p = 12, time": (
         r"nodes and (\d+) to (\d+) s with twelve",
         lambda: rounded(wedges_in_3d(12, "search s").round()),
+    ),
+    "3D feet": (
+        r"with (\d+) to (\d+) contact nodes they take ([\d,]+) to ([\d,]+) nodes of the tree where no certificate",
+        lambda: feet_in_3d("p") + feet_in_3d("nodes"),
     ),
 }
 
