@@ -261,9 +261,7 @@ class SpaceRelaxation:
     def choose(self, codes: Codes) -> int:
         """The node to branch on; -1 when the leaf is to be tested.
 
-        All children of a candidate are solved, where complementarity is violated most first. The first candidate with
-        at most one child that is not excluded is taken, or else the one that promises the smallest tree. Once all
-        statuses are final, slices are cut off the sectors first, and leaves with narrow sectors are tested.
+        Once all statuses are final, slices are cut off the sectors first, and leaves with narrow sectors are tested.
         """
         self.cut = None
         score = self.violations(codes)
@@ -273,6 +271,14 @@ class SpaceRelaxation:
             node = self.shaved(codes, (score > 0.0).tolist())
             if node >= 0:
                 return node
+        return self.most_promising(codes, score)
+
+    def most_promising(self, codes: Codes, score: Array) -> int:
+        """The node with the best children, given its violation of complementarity; -1 where nothing is violated.
+
+        All children of a candidate are solved, where complementarity is violated most first. The first candidate with
+        at most one child that is not excluded is taken, or else the one that promises the smallest tree.
+        """
         candidates = [node for node in np.argsort(-score, kind="stable").tolist() if score[node] > 0.0]
         for node in candidates:
             if sum(rows not in self._excluded for rows, _ in self._parts(node, codes[node])) <= 1:

@@ -18,9 +18,14 @@ statuses are final, below level 8 only where maximum dissipation is violated), o
 there (from level 8, and when nothing else is left to do): no slices at all, halves only, eighths, too; leaves last, or
 from level 6; slices at every node of the tree.
 
-The results of ``slices`` are those of the three smallest wedges. All other tables are of the version before it, which
-cut no slices. They have one choice that is gone, "no contraction": leaves tested without halving sectors that are wider
-than others and have an excluded half.
+The results of ``slices`` are those of the three smallest wedges. All other tables but ``forms`` are of a version
+that cut no slices. They have one choice that is gone, "no contraction": leaves tested without halving sectors that are
+wider than others and have an excluded half.
+
+``forms`` has wedges whose relaxations bound by another quadratic form than the energy: the one with the largest minimum
+at a node of the tree, which a semidefinite program finds among all sums of products of two rows of one contact node.
+Its children inherit it. It is made at the root of the tree, and anew wherever six or three decisions (contact or not,
+what a node in contact does, two halvings of a sector) were made since the last one. These bounds are in floats.
 
 ``bounds`` tells how many of the children that the programs exclude are excluded by less: by the disc around the
 minimiser's slip or force in which the energy bound holds all solutions, without regard to other rows, and by one dual
@@ -64,6 +69,7 @@ from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import distinct_roots
 from enumsol.trusted.space.sector_rows import LEFT, RIGHT, SLIP, sector_row_terms
 from search_in_3d_choices.early import early
+from search_in_3d_choices.products import forms
 from search_in_3d_choices.slices import slices
 
 if TYPE_CHECKING:
@@ -99,9 +105,8 @@ class StatusesFirst(SpaceRelaxation):
 
     __slots__ = ()
 
-    def choose(self, codes):
+    def most_promising(self, codes, score):
         """The node to branch on."""
-        score = self.violations(codes)
         undecided = np.isin(codes, (CONTACT, UNDECIDED))
         self._engine.noted = int(np.argmax(score)) if np.max(score) > 0 else -1
         return int(np.argmax(np.where(undecided, score, -np.inf))) if np.any(undecided) else -1
@@ -112,9 +117,8 @@ class MostViolated(SpaceRelaxation):
 
     __slots__ = ()
 
-    def choose(self, codes):
+    def most_promising(self, codes, score):
         """The node to branch on."""
-        score = self.violations(codes)
         return int(np.argmax(score)) if np.max(score) > 0 else -1
 
 
@@ -123,9 +127,8 @@ class DualStep(SpaceRelaxation):
 
     __slots__ = ()
 
-    def choose(self, codes):
+    def most_promising(self, codes, score):
         """The node to branch on."""
-        score = self.violations(codes)
         best, most = -1, 0.0
         for node in np.argsort(-score, kind="stable")[:CANDIDATES].tolist():
             if not score[node] > 0:
@@ -165,7 +168,7 @@ class Counted(DualStep):
     """The product's choice; counts how the children that were solved are excluded."""
 
     __slots__ = ()
-    choose = SpaceRelaxation.choose
+    most_promising = SpaceRelaxation.most_promising
 
     def solved_children(self, node, code):
         """The same, counted."""
@@ -322,6 +325,7 @@ def main(run: Run) -> None:
             rows.append({"choice": choice, **summed(name, results)})
     report(run, rows)
     slices(run, Solvers, SMOKE_SLICES if run.smoke else MOST_SLICES)
+    forms(run, MOST_SLICES)
     others = bodies if run.smoke else bodies | MORE
     bounds(run, others)
     turns(run, others)
