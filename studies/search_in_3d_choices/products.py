@@ -6,6 +6,7 @@ that is at most zero there, and stays so in all children. The best multipliers c
 
 from __future__ import annotations
 
+import warnings
 from functools import cached_property
 from time import process_time
 from typing import TYPE_CHECKING
@@ -134,7 +135,10 @@ def best_form(system, codes):
     limits += [z[np.flatnonzero(signed)] >= 0] if np.any(signed) else []
     limits += [cvxpy.norm(z[pair]) <= z[first] for first, *pair in cones]
     try:
-        cvxpy.Problem(cvxpy.Maximize(least), limits).solve(solver=cvxpy.CLARABEL)
+        with warnings.catch_warnings():
+            # an inaccurate form is one, too
+            warnings.simplefilter("ignore", UserWarning)
+            cvxpy.Problem(cvxpy.Maximize(least), limits).solve(solver=cvxpy.CLARABEL)
     except cvxpy.SolverError:
         return None
     if z.value is None:
