@@ -21,17 +21,20 @@ if TYPE_CHECKING:
 _REFINEMENTS = 3
 
 
-def energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array, errors: float = 1.0) -> Array:
+def energy_bounds(
+    system: EnclosedSystem, y: Array, c: Array, c_rad: Array, errors: float = 1.0, enough: float = 0.0
+) -> Array:
     """Lower bounds on the energy for multipliers y (m, 2p) on S lambda - g and c, a ball, on lambda.
 
     By theory, (6.2); where that proves nothing, by (6.1), which loses less to large multipliers: with v = g + c + S y
     and any x, e >= y'g - (2 x'v - x'S x + r'S^{-1}r) / 4, r = v - S x.
 
     ``errors`` is how often the error bound is subtracted: once proves the bound. A writer of proofs subtracts it twice,
-    so that a checker, which sums in another order, finds a positive bound too.
+    so that a checker, which sums in another order, finds a positive bound too. The second bound is not sought where the
+    first one is more than ``enough``.
     """
     bounds = _energy_bounds(system, y, c, c_rad, errors)
-    short = np.flatnonzero(~(bounds > 0))
+    short = np.flatnonzero(~(bounds > enough))
     if len(short):
         second = form_bounds(EnergyForm.of(system), y[short], c[short], c_rad[short], errors)
         bounds[short] = np.fmax(bounds[short], second)

@@ -49,7 +49,8 @@ def _held_bounds(system: FloatingSystem, y: Array, c: Array, c_rad: Array, error
     size = np.abs(c) + z_abs @ np.abs(G)
     all_c, all_c_rad = c + z @ G, (c_rad + z_abs @ G_rad + k * size) * (1 + k) * SAFE
     lifted = z @ h - errors * (z_abs @ (h_rad + k * np.abs(h))) * (1 + k) * SAFE - TINY
-    own = energy_bounds(system, y, all_c, all_c_rad, errors)
+    # the better one of both: what is added may be less than zero
+    own = energy_bounds(system, y, all_c, all_c_rad, errors, enough=np.inf)
     bounds = own + lifted - 4 * UNIT * (np.abs(own) + np.abs(lifted))
     return bounds, np.abs(system.g) + system.g_rad + np.abs(all_c) + all_c_rad
 

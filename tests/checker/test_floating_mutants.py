@@ -117,6 +117,14 @@ def test_a_direction_of_imbalance_means_nothing_for_a_body_that_is_held():
     assert "unknown kind" in " ".join(report.failures)
 
 
+def test_a_proof_with_huge_multipliers_is_accepted():
+    # once a bound that was positive, but too small, was taken in place of a better one
+    problem = random_body(32146)
+    roots = enumsol.enumerate_roots(problem, 0)
+    assert roots.complete
+    assert enumsol.verify(problem, roots.proof).complete
+
+
 def test_a_family_is_as_long_as_the_bound():
     records = records_of(enumsol.enumerate_roots(SLIDING, 0).proof)
     assert enumsol.verify(SLIDING, proof_of(records)).within == 4.0
