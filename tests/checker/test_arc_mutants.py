@@ -25,7 +25,7 @@ ORIGINALS = {
     "open": lambda: (planted_corner(np.random.default_rng(5), 1, "both"), (0.0, 4.0)),
 }
 #: Mutants of every original in the suite.
-MUTANTS = 220
+MUTANTS = 120
 
 
 @functools.cache

@@ -174,7 +174,7 @@ class TestBranchGraph:
 
     @pytest.mark.slow
     @pytest.mark.parametrize("loading", [False, True])
-    @pytest.mark.parametrize("seed", range(10))
+    @pytest.mark.parametrize("seed", range(5))
     def test_follow_all_visits_every_arc(self, branch_graph, seed, loading, random_problems):
         problem = random_problems(seed, loading)
         interval = (-5.0, 5.0) if loading else (0.0, 20.0)
