@@ -181,6 +181,11 @@ def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) 
     ...     fem.rectangle(4, 2).parted(), young=2.5, poisson=0.25, contact="bottom", clamp="left", friction=0.5
     ... )
     >>> print(scene)
+    mesh      15 nodes, 16 triangles, from (0, 0) to (1, 1)
+    bodies    the body: 16 cells, area 1, held
+    ...
+    contact   4 contact nodes of bottom, gap 0
+    ...
     """
     check_keys(options)
     known = inspect.signature(mesh_problem).parameters.items()

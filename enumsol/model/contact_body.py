@@ -217,8 +217,11 @@ class ContactBody(Immutable):
         >>> import enumsol
         >>> problem = enumsol.gallery.one_node_triangle()
         >>> for factor in (1, 2, 3):  # factorized once
-        ...     root = enumsol.enumerate_roots(problem.replace(f=factor * problem.f), alpha=0)[0]
+        ...     root = enumsol.enumerate_roots(problem.replace(f=-factor * problem.f), alpha=0)[0]
         ...     print(root.lambda_n.round(6))
+        [0.5]
+        [1.]
+        [1.5]
         """
         other = object.__new__(type(self))
         given = {name: getattr(self, name) for name in self.__dataclass_fields__} | changes

@@ -28,6 +28,7 @@ from enumsol.trusted.space.sector_rows import (
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from typing import Self
 
     from numpy.typing import NDArray
 
@@ -367,6 +368,9 @@ class SpaceRelaxation:
         found = self._excluded.get(key) or self._found.pop(key, None)
         if found is None:
             found = type(self)(self._engine, self._state if last else self._state.copy(), rows, modes)
-        if not found.pruned:
-            found._excluded, found._shaving = self._excluded, self._shaving.copy()
-        return found
+        return found if found.pruned else found.inheriting(self)
+
+    def inheriting(self, other: SpaceRelaxation) -> Self:
+        """Itself, with what is known above it, or at the same node of the tree."""
+        self._excluded, self._shaving = other._excluded, other._shaving.copy()
+        return self

@@ -136,6 +136,12 @@ class RigidBound:
         Bound of the components of the rigid displacement [length].
     needed : bool
         Whether anything rests on it. Otherwise there are no other solutions at all.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> enumsol.enumerate_roots(enumsol.gallery.block_on_table(), alpha=0).rigid_bound
+    RigidBound(largest=..., needed=False)
     """
 
     largest: float

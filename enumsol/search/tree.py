@@ -296,7 +296,7 @@ class TreeSearch:
         outcome.nodes += 1
         codes = item.codes
         relaxation: Relaxation | None
-        relaxation = solved = self._relax(item)
+        relaxation = solved = self.relax(item)
         if solved.stalled:
             # the fallback costs more than a try
             if self.closed(item, None):
@@ -393,7 +393,7 @@ class TreeSearch:
 
     # -- relaxations -----------------------------------------------------------------------------------------------
 
-    def _relax(self, item: TreeNode) -> Relaxation:
+    def relax(self, item: TreeNode) -> Relaxation:
         """The relaxation, solved or stalled."""
         codes = item.codes
         self.outcome.qps += 1

@@ -18,7 +18,6 @@ import scipy.linalg
 from enumsol import gallery
 from enumsol.model.sectors import SECTORS, direction, end_number, width_level
 from enumsol.model.statuses import CONTACT, OPEN, STICK, UNDECIDED
-from enumsol.relaxation import _active_set
 from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
 from enumsol.relaxation.imposed_rows import EQUALITY
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation, imposed
@@ -173,7 +172,7 @@ class FormEngine(SpaceEngine):
         rows, zeros = data.m, np.zeros(3 * data.m)
         start = 3 * np.arange(rows + 1, dtype=np.intp)
         places = np.zeros(3 * rows, dtype=np.intp)
-        self.data = _active_set.QPData(H, h, -system.S, system.g, start, places, zeros, zeros[:rows])
+        self.data = type(self.data)(H, h, -system.S, system.g, start, places, zeros, zeros[:rows])
         self.rows, self.there = other.rows, set()
 
     def need(self, places):
@@ -216,11 +215,6 @@ class FormRelaxation(SpaceRelaxation):
         """Where its form was made."""
         return self._engine.codes
 
-    def inheriting(self, other):
-        """Itself, with what is known at the same node of the tree."""
-        self._excluded, self._shaving = other._excluded, other._shaving.copy()
-        return self
-
 
 class Certifier(SpaceCertifier):
     """Believes what a form excludes."""
@@ -248,8 +242,9 @@ class Search(TreeSearch):
 
     every, made, seconds = None, 0, 0.0
 
-    def _relax(self, item):
-        found = super()._relax(item)
+    def relax(self, item):
+        """The relaxation, with a new form where it is time."""
+        found = super().relax(item)
         if self.every is None or found.pruned or found.stalled:
             return found
         begun = (UNDECIDED,) * self.system.p
