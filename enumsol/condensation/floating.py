@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, gamma
+from enumsol.arithmetic.balls import SAFE, TINY, gamma, upper_norm
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, float_at
 
 if TYPE_CHECKING:
@@ -121,14 +121,18 @@ class FloatingSystem(EnclosedSystem):
         return replace(self, rows=replace(self.rows, reach=reach))
 
     @cached_property
+    def largest_forces(self) -> float:
+        """A bound of the norm of lambda at a solution within the bounds (theory, (14.5))."""
+        h, k = self.rows.h.size, gamma(len(self.reach) + 8)
+        # what no load works on may be infinite
+        load = float(h[h > 0] @ self.reach[h > 0]) * (1 + k) * SAFE
+        mu, g = self.smallest_eigenvalue, float(upper_norm(np.abs(self.g) + self.g_rad))
+        return float((g + np.sqrt(g * g + 4 * mu * load)) / (2 * mu) * (1 + k) * SAFE)
+
+    @cached_property
     def largest_unknowns(self) -> float:
-        """A bound of the norm of (lambda, q) at a solution (theory, (14.5))."""
-        G, h = self.rows.G, self.rows.h
-        del G
-        load = float(self.reach @ h.size) * (1 + gamma(len(self.reach) + 2)) * SAFE if np.any(h.size) else 0.0
-        mu, g = self.smallest_eigenvalue, float(np.linalg.norm(np.abs(self.g) + self.g_rad)) * SAFE * (1 + 1e-12)
-        forces = (g + np.sqrt(g * g + 4 * mu * load)) / (2 * mu)
-        return float(np.hypot(forces, np.linalg.norm(self.reach)) * (1 + 1e-12) * SAFE)
+        """A bound of the norm of (lambda, q) at a solution within the bounds."""
+        return float(np.hypot(self.largest_forces, upper_norm(self.reach)) * SAFE)
 
     @cached_property
     def mode_inverse(self) -> Array:

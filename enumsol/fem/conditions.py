@@ -19,6 +19,8 @@ from enumsol.support.arguments import finite_number, one_of, shown
 from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.named_parts import PartedMesh
     from enumsol.support.array_types import Floats, Integers, Mask
@@ -211,28 +213,26 @@ def holding(supports: Supports, springs: sp.csc_array) -> sp.csc_array:
     return sp.csc_array(hold + springs / largest) if largest > 0 else hold
 
 
-def check_held(mesh: PartedMesh, supports: Supports, springs: sp.csc_array) -> None:
-    """Refuse a body, or a part of it that hangs together with no other, that can move as a rigid body.
+def check_held(pieces: Sequence[Piece], points: Floats, hold: sp.csc_array) -> None:
+    """Refuse bodies of which one can move as a rigid body; ``hold`` is a stiffness of supports and springs.
 
     Raises
     ------
     InvalidProblemError
         It says which.
     """
-    hold = holding(supports, springs)
-    for piece in pieces_of(mesh):
-        if piece.free_motions(mesh.points, hold):
-            alone = "; or max_rigid_displacement, if contact alone is to hold it" if mesh.points.shape[1] == 2 else ""
+    for piece in pieces:
+        if piece.free_motions(points, hold):
+            alone = "; or max_rigid_displacement, if contact alone is to hold it" if points.shape[1] == 2 else ""
             raise InvalidProblemError(
                 f"{piece.name} is free to move as a rigid body; expected clamp, symmetry, displacement or spring to "
                 f"hold it (contact alone does not){alone}"
             )
 
 
-def rigid_modes_of(mesh: PartedMesh, supports: Supports, springs: sp.csc_array) -> Floats | None:
-    """The rigid motions of all bodies of a plane mesh that nothing holds, (2 N, r); None if there are none."""
-    hold = holding(supports, springs)
-    modes = np.hstack([piece.free_modes(mesh.points, hold) for piece in pieces_of(mesh)])
+def rigid_modes_of(pieces: Sequence[Piece], points: Floats, hold: sp.csc_array) -> Floats | None:
+    """The rigid motions of plane bodies that nothing holds, (2 N, r); None if there are none."""
+    modes = np.hstack([piece.free_modes(points, hold) for piece in pieces])
     return modes if modes.shape[1] else None
 
 

@@ -114,10 +114,8 @@ def _loaded_contact(scene: Any) -> list[str]:
 
 def _reach(scene: Any) -> list[str]:
     """Gaps and press fits as large as a body."""
-    extent, notes, start = _extent(scene), [], 0
-    for group in scene.contacts.groups:
-        gaps = scene.gaps[start : start + group.count]
-        start += group.count
+    extent, notes = _extent(scene), []
+    for group, gaps in scene.gaps_of_groups:
         if gaps.min() > extent:
             notes.append(
                 f"the smallest gap of {group} is {gaps.min():.3g}, more than the extent {extent:.3g} of the body: it "

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.conditions import holding
 from enumsol.model.cells import KINDS, by_kind
 from enumsol.support.messages import counted
 
@@ -52,7 +51,7 @@ def _mesh(scene: Any) -> list[str]:
 
 
 def _bodies(scene: Any) -> list[str]:
-    mesh, hold = scene.mesh, holding(scene.held.supports, scene.springs)
+    mesh = scene.mesh
     sizes = np.empty(len(mesh.cells))
     for block in scene.body.blocks:
         sizes[block.rows] = np.sum(block.basis.dx, axis=1)
@@ -63,7 +62,7 @@ def _bodies(scene: Any) -> list[str]:
 
     lines, said = [], set()
     for piece in scene.pieces:
-        free = piece.free_motions(mesh.points, hold)
+        free = piece.free_motions(mesh.points, scene.hold)
         modes = f"{counted(free, 'rigid mode')} that nothing but contact holds" if free else "held"
         lines.append(f"{piece.name}: {size(np.flatnonzero(np.all(piece.nodes[mesh.cells], axis=1)))}, {modes}")
         said.add(piece.name)
@@ -106,10 +105,8 @@ def _resultant(forces: Floats) -> str:
 
 
 def _contact(scene: Any) -> list[str]:
-    lines, start = [], 0
-    for group in scene.contacts.groups:
-        gaps = scene.gaps[start : start + group.count]
-        start += group.count
+    lines = []
+    for group, gaps in scene.gaps_of_groups:
         gap = f"gap {gaps[0]:.6g}" if np.ptp(gaps) == 0 else f"gaps from {gaps.min():.6g} to {gaps.max():.6g}"
         lines.append(f"{counted(group.count, 'contact node')} of {group}, {gap}")
     return [*lines, f"friction {_said(scene.options['friction'])}"]

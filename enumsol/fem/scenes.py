@@ -15,6 +15,7 @@ from enumsol.fem.conditions import (
     Held,
     by_part,
     check_held,
+    holding,
     names_of,
     part_forces,
     part_springs,
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.conditions import Piece
-    from enumsol.fem.contacts import Contacts
+    from enumsol.fem.contacts import Contacts, Group
     from enumsol.fem.restrained import ContactNodes
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
@@ -116,6 +117,17 @@ class Scene:
         """Gaps of the contact nodes, (p,) [length]."""
         return self.contacts.gaps + of_rows(self.options["gap"], "gap", self.contacts.parts, finite_number, 0.0)
 
+    @property
+    def gaps_of_groups(self) -> list[tuple[Group, Floats]]:
+        """The groups of contact nodes, each with the gaps of its own."""
+        groups = self.contacts.groups
+        return list(zip(groups, np.split(self.gaps, np.cumsum([group.count for group in groups])[:-1]), strict=True))
+
+    @cached_property
+    def hold(self) -> sp.csc_array:
+        """A stiffness of supports and springs, (d N, d N)."""
+        return holding(self.held.supports, self.springs)
+
     @cached_property
     def notes(self) -> list[str]:
         """What may be meant otherwise, each in a sentence."""
@@ -156,9 +168,9 @@ class Scene:
 
     def _modes(self, more: dict[str, Any]) -> Floats | None:
         """Rigid motions that nothing holds, if that is asked for; their bound is put to the other arguments."""
-        largest, supports = self.options["max_rigid_displacement"], self.held.supports
+        largest, about = self.options["max_rigid_displacement"], (self.pieces, self.mesh.points, self.hold)
         if largest is None:
-            check_held(self.mesh, supports, self.springs)
+            check_held(*about)
             return None
         if self.dimension == 3:
             raise InvalidArgumentError(
@@ -166,7 +178,7 @@ class Scene:
             )
         if largest != "auto":
             more["max_rigid_displacement"] = positive_number(largest, "max_rigid_displacement")
-        modes = rigid_modes_of(self.mesh, supports, self.springs)
+        modes = rigid_modes_of(*about)
         if modes is None:
             more.pop("max_rigid_displacement", None)
         return modes

@@ -117,13 +117,12 @@ def restarted(
 
 def afresh(problem: _Body) -> _Body:
     """The same problem without what it has computed, but for the factors of A, on whose accuracy no bound rests."""
-    other = object.__new__(type(problem))
+    other, kind = object.__new__(type(problem)), type(problem)
     # not copy.copy, which leaves the factorization behind as pickles have to
-    other.__dict__.update({name: value for name, value in problem.__dict__.items() if not _computed(problem, name)})
+    other.__dict__.update({
+        name: value
+        for name, value in problem.__dict__.items()
+        if name == "factorization" or not isinstance(getattr(kind, name, None), cached_property)
+    })  # fmt: skip
+    other.__dict__.pop("_origin", None)
     return other
-
-
-def _computed(problem: ContactBody, name: str) -> bool:
-    """Whether an attribute was computed of data that another step may change, or is by whom it is computed."""
-    kept = name == "factorization" or not isinstance(getattr(type(problem), name, None), cached_property)
-    return name == "_origin" or not kept

@@ -94,7 +94,12 @@ class FloatingSolvers(Solvers):
     @cached_property
     def exact_certifier(self) -> FloatingExactCertifier | None:
         """The certifier in rationals; None when the problem is too large."""
-        return None if self.exact is None else FloatingExactCertifier(self.exact, self.scaled, self._enclosed[0])
+        return None if self.exact is None else FloatingExactCertifier(self.exact, self.scaled, self.exclusions)
+
+    @cached_property
+    def exclusions(self) -> Exclusions | None:
+        """What excludes assignments, for the certifiers of both arithmetics; None without balls."""
+        return None if self._enclosed[0] is None else Exclusions(self._enclosed[0])
 
     @cached_property
     def _enclosed(self) -> tuple[FloatingSystem | None, str]:
@@ -115,7 +120,7 @@ class FloatingSolvers(Solvers):
         if recorder is None:
             raise AssertionError("verified arithmetic writes a proof")
         ids = self.problem.node_ids
-        return FloatingCertifier(self.scaled, self._enclosed[0], lambda: self.exact_certifier, recorder, ids)
+        return FloatingCertifier(self.scaled, self.exclusions, lambda: self.exact_certifier, recorder, ids)
 
     def search(
         self,
@@ -141,10 +146,6 @@ class FloatingSolvers(Solvers):
     @cached_property
     def _relaxations(self) -> Engine:
         return make_engine(self.on_weak_springs, self.engine)
-
-    def remake(self) -> Callable[[], Solvers]:
-        """Makes the same again, also in another process."""
-        return partial(FloatingSolvers, self.problem, self.alpha, self.arithmetic, self.floats.tolerance, self.engine)
 
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""
@@ -236,21 +237,27 @@ class Exclusions:
 
 
 class FloatingCertifier(VerifiedCertifier):
-    """Proves prunings and complete selections of a body that nothing holds; parameters as of VerifiedCertifier."""
+    """Proves prunings and complete selections of a body that nothing holds.
+
+    Parameters
+    ----------
+    exclusions : Exclusions or None
+        Without balls everything is sent to rationals.
+    scaled, exact, recorder, node_ids : as of VerifiedCertifier
+    """
 
     lone = False
 
     def __init__(
         self,
         scaled: ScaledSystem,
-        enclosed: FloatingSystem | None,
+        exclusions: Exclusions | None,
         exact: Callable[[], FloatingExactCertifier | None],
         recorder: Recorder,
         node_ids: Any,
     ) -> None:
         super().__init__(scaled, None, exact, recorder, node_ids)
-        self._floating, self._exactly = enclosed, exact
-        self._exclusions = None if enclosed is None else Exclusions(enclosed)
+        self._exclusions, self._exactly = exclusions, exact
         #: Some conclusion rests on the bound of the rigid displacement.
         self.bounded = False
 
@@ -275,8 +282,9 @@ class FloatingCertifier(VerifiedCertifier):
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in a complete selection."""
-        system, ball = self._floating, None
-        if system is not None and self._exclusions is not None:
+        ball = None
+        if self._exclusions is not None:
+            system = self._exclusions.system
             ball = solve_selection(system, codes)
             if ball is not None and ball.is_root:
                 self._escalations.balls += 1
@@ -315,11 +323,9 @@ def _holds_none(system: FloatingSystem, codes: Codes) -> bool:
 class FloatingExactCertifier(ExactCertifier):
     """Complete selections in rationals; prunings by balls, which prove them as well (theory, section 14.3)."""
 
-    def __init__(
-        self, selections: ExactSelections, scaled: ScaledSystem, enclosed: FloatingSystem | None = None
-    ) -> None:
+    def __init__(self, selections: ExactSelections, scaled: ScaledSystem, exclusions: Exclusions | None = None) -> None:
         super().__init__(selections, scaled)
-        self._exclusions = None if enclosed is None else Exclusions(enclosed)
+        self._exclusions = exclusions
         #: As of FloatingCertifier.
         self.bounded = False
 

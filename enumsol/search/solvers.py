@@ -198,7 +198,7 @@ class Solvers:
 
     def remake(self) -> Callable[[], Solvers]:
         """Makes the same again, also in another process."""
-        return partial(Solvers, self.problem, self.alpha, self.arithmetic, self.floats.tolerance, self.engine)
+        return partial(type(self), self.problem, self.alpha, self.arithmetic, self.floats.tolerance, self.engine)
 
     def fresh(self) -> Solvers:
         """The same without anything that searches leave behind and others would depend on: nothing here."""

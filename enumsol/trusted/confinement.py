@@ -120,11 +120,7 @@ class _Cells:
         """Bounds of |g - S lambda| / s, by the energy (theory, (14.5)) or, if it is better, by balance."""
         system, k = self._system, gamma(2 * len(self._system.g) + 8)
         S = np.abs(system.S) + system.S_rad
-        mu, g = system.smallest_eigenvalue, np.abs(system.g) + system.g_rad
-        load = float(self._reach @ system.rows.h.size) * (1 + k) * SAFE
-        size = float(upper_norm(g))
-        forces = (size + np.sqrt(size * size + 4 * mu * load)) / (2 * mu) * (1 + k) * SAFE
-        moved = np.asarray(upper_norm(S, axis=1)) * forces
+        g, moved = np.abs(system.g) + system.g_rad, np.asarray(upper_norm(S, axis=1)) * system.largest_forces
         if (most := self._largest_forces()) is not None:
             moved = np.minimum(moved, S @ np.concatenate([most, (system.F + system.F_rad) * most]) * (1 + k) * SAFE)
         return np.asarray((g + moved) * SAFE)

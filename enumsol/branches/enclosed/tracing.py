@@ -37,7 +37,7 @@ ERRORS = 2.0
 _SMALLEST_UNITS, _SMALLEST_PRECISE = 64.0, 2.0**-60
 #: Boxes shorter than this share of the interval are traced in many digits.
 _PRECISE_BOX, _PRECISE_ANYWHERE = 2.0**-10, 2.0**-40
-#: Beside a box that many digits decided they are tried first on one so many times as long.
+#: Many digits are tried, too, on a box at most so many times as long as the last one that they decided.
 _GROWTH = 2.0
 #: Boxes on which a selection seems to be singular are not cut below this share.
 _SINGULAR = 2.0**-26
