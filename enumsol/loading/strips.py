@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from enumsol.arithmetic.balls import UNIT
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.search.data_boxes import BoxSearch, throughout
 from enumsol.support.deadlines import Deadline, TimeOverError, within
@@ -87,14 +88,16 @@ def map_strip(
         search = BoxSearch((make(low), make(high)))
         search.run(ranges, most)
     boxes = [] if search is None else sorted(search.found)
+    slack = 8 * UNIT * max(abs(low), abs(high))
 
-    def value(share: float) -> float:
-        return low if share == 0 else high if share == 1 else low + share * (high - low)
+    def value(share: float, inward: int) -> float:
+        """Of the second parameter; rounded into the box."""
+        return low if share == 0 else high if share == 1 else low + share * (high - low) + inward * slack
 
     return MapStrip(
         low=low,
         high=high,
-        boxes=tuple((box.alphas, (value(box.shares[0]), value(box.shares[1]))) for box in boxes),
+        boxes=tuple((box.alphas, (value(box.shares[0], 1), value(box.shares[1], -1))) for box in boxes),
         unique=tuple(throughout(boxes)),
         tried=0 if search is None else search.tried,
         seconds=time.perf_counter() - started,

@@ -1,12 +1,15 @@
 """Maps over alpha and a second parameter against branch graphs and enumerations at single values."""
 
 from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import enumsol
 from enumsol import Interrupted, InvalidArgumentError, MultiplicityMap, enumerate_roots, multiplicity_map
+from enumsol.loading import strips
+from enumsol.search.data_boxes import Box
 
 
 @pytest.fixture(scope="module")
@@ -189,3 +192,24 @@ def test_the_picture_has_a_line_for_every_range(over_gap, tmp_path):
 def test_parameters_that_cannot_be_used(over, message):
     with pytest.raises((InvalidArgumentError, enumsol.InvalidProblemError), match=message):
         multiplicity_map(enumsol.gallery.one_node_triangle(), (1, 5), over)
+
+
+@pytest.mark.parametrize("ends", [(0.1, 0.7), (-1e3, 1.0), (1.0, 1.0 + 1e-9)], ids=str)
+def test_boxes_are_rounded_inward(ends, monkeypatch):
+    """A value at the border of a box, as it is reported, lies in the box that is proven."""
+    boxes = [Box((0.0, 1.0), (k / 64, (k + 1) / 64)) for k in range(64)]
+
+    class Found:
+        found, tried = boxes, 64
+
+        def __init__(self, problems):
+            pass
+
+        def run(self, ranges, most):
+            pass
+
+    monkeypatch.setattr(strips, "BoxSearch", Found)
+    low, high = map(Fraction, ends)
+    for box, (_, values) in zip(boxes, strips.map_strip(str, ends, [], 1, None).boxes, strict=True):
+        shares = [(Fraction(value) - low) / (high - low) for value in values]
+        assert box.shares[0] <= shares[0] < shares[1] <= box.shares[1]
