@@ -71,19 +71,25 @@ UNTRACED = {
 }
 
 
+def spread(items, count):
+    """So many of the items, at even distances."""
+    return [items[len(items) * k // count] for k in range(min(count, len(items)))]
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """What is slow, and in what coverage is not measured: that, and the tests of `UNTRACED`."""
+    """What is slow or long, and in what coverage is not measured: that, and the tests of `UNTRACED`."""
     cases = defaultdict(list)
     for item in items:
         if item.get_closest_marker("few"):
             cases[item.parent, item.originalname].append(item)
     for found in cases.values():
-        (count,) = found[0].get_closest_marker("few").args
-        quick = {len(found) * k // count for k in range(count)}
-        for k, item in enumerate(found):
-            if k not in quick:
-                item.add_marker("slow")
+        quick, slow = (*found[0].get_closest_marker("few").args, len(found))[:2]
+        for item in set(found) - set(spread(found, quick)):
+            item.add_marker("slow")
+        others = [item for item in found if item.get_closest_marker("slow")]
+        for item in set(others) - set(spread(others, slow)):
+            item.add_marker("long")
     if config.pluginmanager.hasplugin("_cov"):
         for item in items:
             if item.get_closest_marker("slow") or item.path.stem in UNTRACED:

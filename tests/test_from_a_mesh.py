@@ -24,6 +24,7 @@ def seen(tmp_path_factory):
     return {**follow(PAGE, folder), "folder": folder}
 
 
+@pytest.mark.slow
 def test_the_commands(seen):
     assert len(seen["outputs"]) == 3
     for _, text in seen["outputs"]:

@@ -49,7 +49,7 @@ def test_a_problem_loads_sparse_matrices_and_nothing_rare():
     assert "scipy.sparse.linalg" not in modules
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize(
     ("problem", "alpha", "roots"),
     [
@@ -68,6 +68,7 @@ def test_no_rational_arithmetic_where_intervals_decide(problem, alpha, roots):
     assert not modules & (RARE - {"skfem"} if "wedge" in problem else RARE)
 
 
+@pytest.mark.slow
 def test_rational_arithmetic_where_a_sign_is_zero():
     assert "flint" in modules_after("import enumsol; enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), 8/3)")
 

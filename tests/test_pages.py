@@ -57,6 +57,7 @@ def test_tutorial(tutorial):
     assert (tutorial["folder"] / "wedge.html").stat().st_size > 100_000
 
 
+@pytest.mark.slow
 def test_the_wedge_of_the_tutorial_is_that_of_its_study(tutorial):
     mesh = fem.trapezoid(6, 4, bottom=1.0, top=1.8, height=1.0).parted()
     wedge = fem.mesh_problem(

@@ -60,6 +60,7 @@ def test_what_does_not_exist_is_an_error(complaints, line):
     assert "has no attribute" in complaints[line]
 
 
+@pytest.mark.slow
 def test_a_name_that_is_close_is_suggested(complaints):
     assert '"enumerate_roots"' in complaints["enumsol.enumerate_root"]
 

@@ -36,7 +36,7 @@ def test_exact_arithmetic_proves_generic_graphs_complete(seed):
     assert_same_roots(graph.roots_at(alpha), enumerate_roots(problem, alpha, "exact"))
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("block", range(6))
 def test_degenerate_problems_at_their_critical_alphas_too(block):
     for seed in range(20 * block, 20 * block + 20):

@@ -102,7 +102,7 @@ def test_counts_are_the_exact_ones():
     assert closed > 0.4 * graphs
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_many_counts_are_the_exact_ones():
     graphs, closed = check(range(303, 310))
     assert closed > 0.4 * graphs

@@ -166,7 +166,7 @@ def test_files_that_are_no_graphs_are_refused(tmp_path):
             BranchGraph.load(file)
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("quantity", ["lambda_n", "lambda_t", "u_n", "u_t"])
 def test_figures(square, quantity, tmp_path):
     file = tmp_path / "graph.png"

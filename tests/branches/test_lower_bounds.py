@@ -215,7 +215,7 @@ def test_claims_are_true():
     assert sharp > 0.8 * asked
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_many_claims_are_true():
     graphs, cut, asked, sharp = check([*range(110, 116), 201], 50)
     assert graphs > 40
@@ -223,6 +223,7 @@ def test_many_claims_are_true():
     assert sharp > 0.8 * asked
 
 
+@pytest.mark.slow
 def test_the_enumeration_of_roots_agrees():
     full, graph, _ = next(graphs_of(3))
     for alpha in alphas_to_test(full, graph, np.random.default_rng(3), 8):
@@ -292,7 +293,7 @@ def test_where_all_selections_hold_a_search_cut_short_knows_no_kind():
         assert graph.at_least(0.0) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize(("n", "beyond"), [(2, 2.0**-59), (25, 2.0**-59), (25, 2.0**-70), (251, 2.0**-59)])
 def test_an_event_just_outside_the_interval_is_no_solution(n, beyond):
     third, beyond = Fraction(1, 3), Fraction(beyond)

@@ -29,7 +29,7 @@ def numbers_of(axis):
     return [text for text in axis.texts if text.get_gid() == "branch number"]
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize(
     ("name", "quantity"),
     [*((name, q) for name in ("square", "chain", "oblique") for q in (None, "lambda_n", "u_t")), ("spike", None)],
@@ -48,7 +48,7 @@ def test_numbers_neither_overlap_nor_leave_their_panel(graphs, name, quantity):
     assert labelled > 0
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("name", ["square", "chain", "oblique"])
 def test_every_branch_is_named_beside_its_curve_or_in_the_note(graphs, name):
     graph = graphs[name]

@@ -115,7 +115,7 @@ FAMILIES = {
 }
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 def test_graphs_from_balls_are_those_from_exact_algebra(family, monkeypatch):
     count, decided, boxes = FAMILIES[family]
@@ -124,7 +124,7 @@ def test_graphs_from_balls_are_those_from_exact_algebra(family, monkeypatch):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 def test_many_graphs(family, monkeypatch):
     count, _, boxes = FAMILIES[family]
@@ -147,7 +147,7 @@ def _compared(family, seeds, boxes, monkeypatch):
         yield graphs
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("push", [0.0, 1e-16, 1e-12, 1e-6, 1e-3])
 def test_a_pitchfork_is_left_open(push):
     graphs = two_graphs(pair(push), (0, 6))
@@ -219,6 +219,7 @@ def test_boxes_far_from_zero_may_be_long(seed):
     assert differences(graphs) == []
 
 
+@pytest.mark.slow
 def test_many_digits_decide_long_boxes():
     """Beside a fold of a slender body doubles do not suffice: many digits go on from there, in boxes that grow."""
     problem = gallery.taper(4, 4, (5.0, 50.0))

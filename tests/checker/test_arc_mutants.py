@@ -332,7 +332,7 @@ def test_the_oracle_agrees_with_the_originals(name):
             assert not oracle.is_true(codes, side, ["h", part[1], 1], low)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "open" else []) for name in ORIGINALS]
 )
@@ -442,7 +442,7 @@ def test_units_in_which_everything_overflows_prove_nothing(exponents):
     assert not judge("triangle", records)
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(1, 1)
 @pytest.mark.parametrize("part", range(3))
 def test_whole_proofs_have_the_arcs_of_exact_algebra(part):
     whole = 0

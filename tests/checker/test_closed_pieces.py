@@ -141,7 +141,7 @@ def test_both_checkers_agree_on_random_graphs():
     assert agree([302, 304, 309, 311, 317, 328, 330, 339]) > 6
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_both_checkers_agree_on_many_random_graphs():
     assert agree(range(600, 615)) > 5
 
@@ -184,6 +184,7 @@ def test_forged_numbers(name):
                 verify(body, proof_of(forged))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BODIES)
 def test_other_numbers(name):
     """What the checker in floats accepts the one in rationals does; what makes Q indefinite both refuse."""
@@ -219,6 +220,7 @@ def test_nu_at_the_bound_of_friction(name):
 # -- forgeries: the piece ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("name", BODIES)
 def test_what_stands_beside_the_record(name):
     body, records = proven(name)
@@ -389,7 +391,7 @@ def widened(records):
     return changed
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_form_is_asked_of_every_arc():
     """Numbers that serve one of two arcs over a piece, and not the other."""
     body, records = proven("everything")
@@ -466,7 +468,7 @@ def whole(name):
     return body, p, body_records, interval
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("believing", [False, True])
 @pytest.mark.parametrize("name", SEVERAL)
 def test_several_solutions(name, believing, monkeypatch):

@@ -124,7 +124,7 @@ def accepted(problem, records):
 KINDS = ["a", "m", "M", "slides", "sides", "any theta"]
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_both_checkers_accept(kind):
     for problem, records in cases(kind):
@@ -153,7 +153,7 @@ def changed(record, rng):
     return record
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_accepted_mutant_is_still_a_proof(kind):
     rng, refused = np.random.default_rng(5), 0
@@ -259,6 +259,7 @@ def test_a_smaller_core_needs_its_own_proof():
             assert not accepted(problem, [*records[:k], forged, *records[k + 1 :]])
 
 
+@pytest.mark.slow
 def test_the_independent_checker_refuses_as_well():
     problem, records = cases("M")[0]
     (k, *_) = leaves(records, "M")
@@ -267,7 +268,7 @@ def test_the_independent_checker_refuses_as_well():
         check_records(problem, [*records[:k], forged, *records[k + 1 :]])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_proofs_with_closed_subtrees_have_no_stability_radius():
     """Unless the whole problem is closed, and its solution regular: that is a root of all data nearby."""
     for kind in ("m", "M"):

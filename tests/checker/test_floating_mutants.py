@@ -54,6 +54,7 @@ def test_a_body_on_springs_is_another_problem():
     assert "another problem" in refusal(RECORDS, PROBLEM.on_springs)
 
 
+@pytest.mark.slow
 def test_every_exclusion_is_needed_as_it_is():
     for place, _ in leaves_of(RECORDS):
         if RECORDS[place][0] != "x":

@@ -72,7 +72,7 @@ def recount(records):
         records[-1] = claim
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 4)
 @pytest.mark.parametrize("name", [*PATHS, *BY_FORMS])
 def test_accepted_mutants_name_every_selection_that_holds(name):
     problem, original, holding = case(name)
@@ -98,6 +98,7 @@ def test_accepted_mutants_name_every_selection_that_holds(name):
     assert accepted
 
 
+@pytest.mark.slow
 def test_the_originals_name_every_selection_that_holds():
     for name in (*PATHS, *BY_FORMS):
         problem, records, holding = case(name)

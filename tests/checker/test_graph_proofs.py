@@ -41,7 +41,7 @@ def proven(request):
     return problem, branch_graph(problem, interval)
 
 
-@pytest.mark.few(4)
+@pytest.mark.slow
 def test_a_verified_graph_is_complete_and_its_proof_verifies(proven):
     problem, graph = proven
     assert graph.complete

@@ -136,7 +136,7 @@ def test_those_proofs_hold_records_of_every_kind():
 # -- memory and work ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(3, 3)
 @pytest.mark.parametrize("name", ["stopped", "graph in several pieces"])
 @pytest.mark.parametrize("line", ["[]", "null", '["u",""]', '["s","000"]', "{}"])
 def test_a_small_file_of_very_many_records(name, line, monkeypatch):
@@ -151,7 +151,7 @@ def test_a_small_file_of_very_many_records(name, line, monkeypatch):
     assert effort.memory < 20e6
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(2, 3)
 @pytest.mark.parametrize("name", ["stopped", "graph in several pieces"])
 @pytest.mark.parametrize("part", ["[],", '"",', "0,", '["0/1"],', "[" * 1000])
 def test_a_small_file_of_one_long_record(name, part, monkeypatch):
@@ -165,7 +165,7 @@ def test_a_small_file_of_one_long_record(name, part, monkeypatch):
     assert effort.memory < 20e6
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_no_file_is_expanded_beyond_its_size(monkeypatch):
     problem = gallery.chain(8)
     header = {"format": "enumsol-proof", "version": 1, "problem": problem.fingerprint, "alpha": "5", "p": 8}
@@ -210,7 +210,7 @@ def test_what_the_writer_writes_is_far_from_these_bounds():
         assert longest < 0.1 * (proof_module.RECORD_SHARE * data.size + proof_module.SMALL)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", ["stopped", "graph in several pieces"])
 def test_the_header_comes_first(name, monkeypatch):
     other = gallery.clamped_block(8, 4)
@@ -456,7 +456,7 @@ def is_true(name, report, records):
     return all(holding(name, a + (b - a) * Fraction(k, 4)) <= report.selections for k in range(5))
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(2, 2)
 @pytest.mark.usefixtures("enclosed_once")
 @pytest.mark.parametrize("name", [*TODAY, *BEFORE])
 def test_mutants(name, monkeypatch):

@@ -282,6 +282,7 @@ def test_forged_trees_and_counts(name):
         assert refused(problem, records[:count])
 
 
+@pytest.mark.slow
 def test_every_multiplier_counts_by_exact_judgement():
     """Halved, doubled, turned, and those of another leaf: accepted only where they still prove the leaf."""
     for name in ("one-node-6.1", "five roots"):
@@ -347,7 +348,7 @@ def test_another_alpha_makes_other_roots():
     assert refused(problem, [{**records[0], "alpha": "9/2"}, *records[1:]])
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("arcs", [True, False])
 @pytest.mark.parametrize("name", ["friction", "load", "both", "unloaded", "everything"])
 def test_forged_graph_proofs(name, arcs):

@@ -46,7 +46,7 @@ def spread(found, most=7):
 # -- forgeries ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(1, 2)
 @pytest.mark.parametrize("name", GRAPHS)
 def test_forged_parts_that_hold(name):
     problem, records, _ = graph(name)
@@ -55,6 +55,7 @@ def test_forged_parts_that_hold(name):
             assert refused(problem, with_part(records, k, i, other)), other
 
 
+@pytest.mark.few(2, 1)
 @pytest.mark.parametrize("name", EVENTFUL)
 def test_forged_parts_that_hold_nothing(name):
     problem, records, _ = graph(name)
@@ -65,7 +66,7 @@ def test_forged_parts_that_hold_nothing(name):
             assert refused(problem, with_part(records, k, i, other)), other
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", EVENTFUL)
 def test_forged_events(name):
     problem, records, _ = graph(name)
@@ -159,7 +160,7 @@ def test_a_removed_event_makes_arcs_begin_and_end_for_no_reason(name):
             assert refused(problem, merged)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(2, 2)
 @pytest.mark.parametrize("name", GRAPHS)
 def test_parts_left_open(name):
     """What a proof says less it may say; arcs that end there count."""
@@ -173,7 +174,7 @@ def test_parts_left_open(name):
     assert made.complete
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("name", GRAPHS)
 def test_forged_traces_and_boxes(name):
     problem, records, _ = graph(name)
@@ -236,7 +237,7 @@ def random_graph(make, seed, p):
     return ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f, friction=(F, F1), **load), (0.0, 2.0)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(2, 3)
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
     ("make", "p"), [(random_problem, 1), (random_problem, 2), (integer_problem, 2), (singular_problem, 2)]

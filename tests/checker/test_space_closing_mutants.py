@@ -239,7 +239,7 @@ def test_a_root_among_several_is_never_the_only_one(name):
             assert "not proven to be the only one" in " ".join(report.failures)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_random_mutants_are_refused_or_true(name):
     rng, (problem, records), judge = np.random.default_rng(9), proven(name), LeafJudge(name)

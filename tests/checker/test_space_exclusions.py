@@ -194,6 +194,7 @@ def test_sectors_are_cut_otherwise_than_in_halves():
     assert sum(covers(case(name)[0], case(name)[2]) for name in ((2, 0), (2, 5), (2, 20))) > 5
 
 
+@pytest.mark.slow
 def test_what_is_accepted_of_changed_multipliers_holds_in_rationals():
     rng = np.random.default_rng(8)
     counts = [0, 0]

@@ -290,7 +290,7 @@ def test_multipliers_have_to_be_finite():
 # -- mutants -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(
     "name",
     [

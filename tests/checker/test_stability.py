@@ -38,7 +38,7 @@ def condensed(problem):
     return np.array(S, dtype=float), np.array(g, dtype=float), np.array(F, dtype=float)
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("p", "count"), [(1, 12), (2, 8), (3, 4)])
 def test_perturbed_problems_have_the_same_roots(p, count):
     rng = np.random.default_rng([1, p])

@@ -203,7 +203,7 @@ def free(records, k, path, value):
     return isinstance(record, list) and record[0] == "u" and path == (1,) and type(value) is str  # any reason
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in CASES])
 def test_values_of_other_types_and_texts_are_refused(name):
     problem, records = case(name)

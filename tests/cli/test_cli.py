@@ -395,6 +395,7 @@ def test_warnings_are_lines_without_source_code(capsys, monkeypatch):
 # -- interruption and progress -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(1, 1)
 @pytest.mark.parametrize(
     "options",
     [
@@ -424,6 +425,7 @@ def test_ctrl_c_prints_what_was_found(tmp_path, options):
         assert "slip-" in out
 
 
+@pytest.mark.slow
 def test_short_searches_show_no_progress():
     with on_terminal("roots", "gallery:one-node-6.1", "--alpha", 5) as (process, wait_for):
         out, _ = process.communicate(timeout=60)

@@ -128,6 +128,7 @@ def test_graph_files(capsys, tmp_path):
     assert files["plot"].read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_proof_that_leaves_arcs_open_is_not_complete(capsys, tmp_path):
     problem, proof = tmp_path / "pair.npz", tmp_path / "pair.proof"
     write_problem(pair(0.0), problem)  # two conditions vanish at one alpha
@@ -182,7 +183,7 @@ def test_graph_with_jobs(capsys, tmp_path):
     assert run(capsys, "verify", "gallery:two-node-6.4", proof)[0] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_stops_a_graph(jobs):
     with on_terminal("graph", "gallery:wedge-32-5", "--from", 0, "--to", 5, "--jobs", jobs) as (process, wait_for):
@@ -260,7 +261,7 @@ def draw(capsys, tmp_path, name, *options):
     return status, out
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(2, 4)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("nodes", [1, 2, 5, 7])
 def test_after_so_many_nodes(capsys, tmp_path, tree_only, name, nodes):

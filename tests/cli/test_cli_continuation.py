@@ -135,6 +135,7 @@ def test_step_limit_is_status_3(capsys):
     assert "the limit of 3 steps was reached" in out
 
 
+@pytest.mark.slow
 def test_degenerate_starts(capsys):
     example = ("follow", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--start", "8/3")
     # the fold itself: one tangent of each orientation, on both arcs

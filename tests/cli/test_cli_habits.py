@@ -97,7 +97,7 @@ def test_the_table_of_exit_statuses_is_complete():
     assert [(int(number), name) for number, name in rows] == [(status.value, status.name) for status in ExitStatus]
 
 
-@pytest.mark.few(2)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "expected"),
     [

@@ -28,6 +28,7 @@ def pulled_wedge():
     return dataclasses.replace(wedge, f=0 * wedge.f, load_slope=wedge.f)
 
 
+@pytest.mark.slow
 def test_everything_is_written(capsys, wedge, tmp_path, pulled_wedge):
     problem, steps = wedge
     files = {name: tmp_path / f"out.{name}" for name in ("proof", "save", "report", "json", "csv")}

@@ -29,6 +29,7 @@ ROOTS = ("roots", "gallery:one-node-6.1", "--alpha", 5)
 TABLE = ("table", "gallery:one-node-6.1", "--alphas", "1,2")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", [ROOTS, TABLE])
 def test_more_jobs_than_processors(capsys, three_processors, started, verb):
     status, out, err = run(capsys, *verb, "--jobs", 1_000_000)

@@ -128,6 +128,7 @@ def outcomes(place):
     return {where: run_all(where) for where in ("full", "unread")}
 
 
+@pytest.mark.few(0, 4)
 @pytest.mark.parametrize("name", PRINTING)
 def test_stdout_on_a_full_disk(outcomes, name):
     status, err = outcomes["full"][name]
@@ -161,7 +162,7 @@ def closing(*streams):
     return {"preexec_fn": close, **{name: None for k, name in ((1, "stdout"), (2, "stderr")) if k in streams}}
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(1, 2)
 @pytest.mark.parametrize("name", ["nothing", "roots", "roots json", "gallery list"])
 def test_stdout_that_was_closed(place, name):
     done = enumsol_command(place, *PRINTING[name], **closing(1))
@@ -169,7 +170,7 @@ def test_stdout_that_was_closed(place, name):
     assert done.returncode == 74
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", ["help", "roots", "graph", "verify"])
 def test_stderr_that_was_closed_or_is_full_is_not_missed(place, name):
     expected = enumsol_command(place, *PRINTING[name])
@@ -205,7 +206,7 @@ WRITING = [
 ]
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(4, 6)
 @pytest.mark.parametrize(("verb", "option", "file"), WRITING)
 def test_a_file_on_a_full_disk(place, capsys, monkeypatch, verb, option, file):
     monkeypatch.chdir(place)
@@ -256,6 +257,7 @@ def test_a_place_that_is_gone_after_the_search_keeps_no_other_back(tmp_path):
     assert file.exists()
 
 
+@pytest.mark.slow
 def test_json_is_written_when_nobody_reads_stdout(place, tmp_path):
     reading, writing = os.pipe()
     os.close(reading)

@@ -21,7 +21,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("call", "wait"),
     [("bytes, 2**27", "futures[0].result()"), ("len, bytes(2**26)", "time.sleep(0.5)"), ("time.sleep, 600", "pass")],

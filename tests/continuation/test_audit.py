@@ -172,7 +172,7 @@ class TestBranchGraph:
     def branch_graph(self):
         return pytest.importorskip("enumsol.branches.construction").branch_graph
 
-    @pytest.mark.slow
+    @pytest.mark.few(0, 3)
     @pytest.mark.parametrize("loading", [False, True])
     @pytest.mark.parametrize("seed", range(5))
     def test_follow_all_visits_every_arc(self, branch_graph, seed, loading, random_problems):

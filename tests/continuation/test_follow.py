@@ -202,7 +202,7 @@ def test_smooth_path_wrong_derivative_is_named():
         follow(problem, (2.0, [0.0], [0.0]), 1, (1, 3), smooth_path=smooth)
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(6, 6)
 @pytest.mark.parametrize("loading", [False, True])
 @pytest.mark.parametrize("seed", range(12))
 def test_points_are_enumerated_roots(seed, loading, random_problems):
@@ -274,6 +274,7 @@ def test_point_where_four_selections_meet():
     assert names(other)[-1] != names(path)[-1] or len(transition.alternatives) == 2
 
 
+@pytest.mark.slow
 def test_large_sparse_problem_is_factorised_once(monkeypatch):
     from enumsol.condensation import factorization
 

@@ -143,6 +143,7 @@ def test_all_roots_on_tetrahedra_of_second_order():
     assert np.allclose(roots[0].lambda_n, enumsol.successive_approximations(problem, 0).lambda_n, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_first_and_second_order_agree():
     """A clamped block that is pushed along the floor: forces come nearer to each other on finer meshes."""
     data = {**STEEL, "contact": "bottom", "clamp": "left", "load": {"top": (0.05, 0.0, -0.2)}, "friction": 0.3}

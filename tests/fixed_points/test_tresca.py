@@ -23,7 +23,7 @@ def random_2d(rng):
     return from_condensed(dense_compliance(rng, p), rng.normal(size=2 * p), F), np.abs(rng.normal(size=p))
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [random_2d, random_3d])
 def test_three_solvers_agree(rng, make):
     for _ in range(10):

@@ -53,7 +53,7 @@ def hard(rng, coefficients):
     return problem, size * rng.choice([0, 1e-300, 1e-12, 1e-3, 1, 1, 1e3, 1e12], size=p), F
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("solver", ["newton", "clarabel"])
 def test_hard_problems_are_solved(rng, solver):
     for _ in range(150):
@@ -65,7 +65,7 @@ def test_hard_problems_are_solved(rng, solver):
         assert violation(S, g, bound, F, found) < 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_extreme_coefficients_are_solved_or_refused(rng):
     unsolved = 0
     for _ in range(60):

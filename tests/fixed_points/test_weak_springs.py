@@ -101,7 +101,7 @@ def planted(rng, spring):
     return problem, SimpleNamespace(lambda_n=normal, lambda_t=tangential.T)
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(5, 5)
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("spring", [1e-4, 1e-6, 1e-8])
 def test_planted_solutions_in_3d(spring, seed):
@@ -143,7 +143,7 @@ def moved(rng, problem, found, size):
     return SimpleNamespace(alpha=0, lambda_n=normal, lambda_t=lambda_t, u_t=found.u_t)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(2, 4)
 @pytest.mark.parametrize("spring", [1e-1, 1e-4, 1e-5, 1e-6, 1e-7])
 @pytest.mark.parametrize("body", [square, block_on_springs])
 def test_roots_and_limits_are_fixed_points_and_nothing_beside_them(body, spring):

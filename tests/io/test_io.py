@@ -250,6 +250,7 @@ def test_a_file_that_is_no_problem_file(tmp_path, name, content):
     assert_one_sentence(caught.value, place)
 
 
+@pytest.mark.slow
 def test_truncated_and_damaged_archives(tmp_path):
     # an unreadable file is named as such; where the damage leaves it readable, checksums see to it that it is the same
     good, place = tmp_path / "good.npz", tmp_path / "bad.npz"

@@ -29,6 +29,7 @@ def test_a_history_is_read_back_to_the_last_bit(arithmetic, tmp_path):
         History.load(tmp_path / "h.json", enumsol.gallery.one_node_triangle(f=(1, -4)))
 
 
+@pytest.mark.slow
 def test_a_history_in_space_with_families_and_open_parts_is_read_back(tmp_path, pulled_wedge):
     for problem, steps in (
         (enumsol.gallery.get("wedge3d-2-3").build(), [1, 1.5]),

@@ -17,6 +17,7 @@ def over_gap():
     return multiplicity_map(enumsol.gallery.two_node_square(), (0, 5), {"gap": [0.0, 0.05, 0.1]})
 
 
+@pytest.mark.slow
 def test_every_value_is_what_enumerate_roots_counts(over_gap):
     import dataclasses
 
@@ -59,6 +60,7 @@ def test_uniqueness_between_values_is_proven_or_said_not_to_be(over_gap):
     assert "for one solution over 35 % of alpha" in repr(over_gap)
 
 
+@pytest.mark.slow
 def test_a_block_is_unique_between_all_values():
     block = enumsol.gallery.get("clamped-block-8").build()
     shear = np.where(np.arange(block.n) % 2 == 0, block.f, 0.0)
@@ -73,6 +75,7 @@ def test_a_block_is_unique_between_all_values():
     assert by_friction.to_frame()["to_next"].tolist() == [1.0, 0.0]
 
 
+@pytest.mark.slow
 def test_strips_are_left_out_on_request_and_where_nothing_can_be_proven(over_gap):
     square = enumsol.gallery.two_node_square()
     none = multiplicity_map(square, (0, 2), {"gap": [0.0, 0.05]}, max_boxes=0)
@@ -130,6 +133,7 @@ def test_folds_are_linked_between_neighbours(over_gap):
     assert linked == sorted((k, fold.alpha) for k, row in enumerate(over_gap.rows) for fold in row.folds)
 
 
+@pytest.mark.slow
 def test_other_parameters_and_an_executor():
     node = enumsol.gallery.one_node_triangle(f=(1.5, -4.0))
     path = enumsol.ContactProblem(node.A, node.Bn, node.Bt, 0 * node.f, friction=5.0, load_slope=node.f)

@@ -344,6 +344,7 @@ SCALARS = st.one_of(
 NESTED = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.tuples(inner, inner), max_leaves=12)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(NESTED)
 def test_any_nested_lists_are_the_numbers_that_they_are_or_refused(value):

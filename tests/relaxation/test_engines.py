@@ -97,7 +97,7 @@ def test_a_stalling_engine_is_replaced(monkeypatch, problem, alpha, share):
     assert not differences(roots, want)
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("share", [0.2, 0.5])
 def test_where_both_fail_the_search_branches_on(monkeypatch, share, seed):

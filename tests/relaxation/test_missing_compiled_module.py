@@ -33,6 +33,7 @@ for call, argument, options in (
 """
 
 
+@pytest.mark.slow
 def test_a_checkout_in_which_nothing_is_compiled_says_so(tmp_path):
     """The warning of the search, the errors of the graph and of the engine asked for."""
     checkout = tmp_path / "checkout"

@@ -167,6 +167,7 @@ def test_every_quantity_and_node_is_drawn(browser, pages, graphs):
     assert browser.complaints() == []
 
 
+@pytest.mark.slow
 def test_more_solutions_than_fit_are_on_further_pages(browser, pages):
     browser.size(1280, 900)
     browser.open(pages["chain"])

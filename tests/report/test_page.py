@@ -65,6 +65,7 @@ def test_the_numbers_are_those_of_the_graph(wedge, wedge_page):
     }
 
 
+@pytest.mark.slow
 def test_interpolated_values_are_near_the_roots(wedge, wedge_page):
     data = data_of(wedge_page)
     for alpha in (1.6, 2.2, 2.9):
@@ -102,6 +103,7 @@ def test_bodies_move_as_the_roots_say(wedge, wedge_page):
     assert [[node for node, _ in row] for row in body["rows"]] == [[node] for node in wedge.problem.node_ids]
 
 
+@pytest.mark.slow
 def test_large_meshes_are_drawn_by_their_boundary_or_not_at_all():
     problem = gallery.clamped_block(80, 80, contact=10)
     body = body_record(problem)

@@ -82,6 +82,7 @@ def test_bodies_and_forces_are_those_of_the_roots(found, pages, name):
     np.testing.assert_allclose(at, problem.coordinates, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_surface_is_closed(pages):
     body = data_of(pages["wedge"].read_text())["body"]
     triangles = np.array(body["triangles"]).T
@@ -195,6 +196,7 @@ def test_second_order_solids_are_drawn_by_their_surface(tmp_path):
     assert np.sum(np.linalg.det(corners)) / 6 == pytest.approx(2 if np.ptp(mesh.points[:, 0]) == 2 else 1, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path, capsys, monkeypatch):
     page, proof = tmp_path / "a page.html", tmp_path / "wedge.proof"
     command = ["roots", "gallery:wedge3d-2-3", "--alpha", "1", "--report", str(page)]
@@ -284,6 +286,7 @@ def check_scenes(browser, roots):
     assert browser.evaluate("scenes.map((s) => s._fullLayout.scene.camera.eye.x)") == [-1.5] * len(roots)
 
 
+@pytest.mark.slow
 @in_a_browser
 def test_many_roots_are_on_several_pages(browser, pages, found):
     browser.size(1280, 900)

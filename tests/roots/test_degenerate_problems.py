@@ -32,7 +32,7 @@ def check(problem, rng, methods=METHODS):
     return components
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize(("seed", "sizes", "count"), [(0, (1, 2), 50), (10, (1, 2), 60), (1, (3,), 15)])
 def test_integer_data(seed, sizes, count):
     rng = np.random.default_rng(seed)
@@ -44,7 +44,7 @@ def test_integer_data(seed, sizes, count):
     assert merged >= count / 10
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(
     ("seed", "sizes", "count"),
     [(2, (1, 2), 20), *(pytest.param(*more, marks=pytest.mark.slow) for more in ((12, (1, 2), 50), (3, (3,), 8)))],
@@ -80,7 +80,7 @@ def test_near_coincidences_in_exact_arithmetic():
         assert not tree.families
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", [5, 6])
 def test_tree_equals_exhaustive_next_to_coincidences_in_fast_arithmetic(seed):
     # around the tolerance neither is right, but a root that one method accepts must not be pruned by the other

@@ -48,6 +48,7 @@ def failures(seeds, alpha):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("first", "alpha"), [(0, 0), (10, 0.5)])
 def test_all_solutions_of_random_bodies(first, alpha):
     assert not failures(range(first, first + 8), alpha)

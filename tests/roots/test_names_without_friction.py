@@ -28,6 +28,7 @@ def test_a_node_whose_slip_is_enclosed_is_named_by_it(arithmetic):
     assert root.signs.tolist() == [[-1, 0, 0], [1, 1, 1]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arithmetic", ["verified", "exact"])
 def test_badly_scaled_nodes_without_friction_are_named_as_the_closed_form_says(arithmetic):
     sizes = (1e-20, 1e-6, 1.0, 1e12)

@@ -74,7 +74,7 @@ def test_random_data_against_the_closed_form(seed):
     assert counts == {1, 3}
 
 
-@pytest.mark.few(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_criterion_for_the_number_of_branches(seed):
     # (j) one root for every alpha; (jj) one below |f_t| / f_n and three above

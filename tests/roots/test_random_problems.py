@@ -32,13 +32,13 @@ def check(seed, count, sizes, methods=("tree", "exhaustive")):
     return several
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", range(3))
 def test_up_to_four_nodes(seed):
     assert check(seed, CHUNK, (1, 2, 3, 4)) >= CHUNK / 3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_six_nodes():
     assert check(100, 25, (6,)) >= 25 / 3
 
@@ -48,6 +48,7 @@ def test_five_nodes_tree_only():
     assert check(200, 50, (5,), methods=("tree",)) >= 50 / 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["tree", "exhaustive"])
 def test_exact_arithmetic(method):
     rng = np.random.default_rng(300)

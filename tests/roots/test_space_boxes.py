@@ -25,7 +25,7 @@ def settled(problem):
     return roots if roots.complete else None
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(1, 1)
 @pytest.mark.parametrize("part", range(3))
 def test_degenerate_problems_are_complete(part):
     rng, complete = np.random.default_rng(part), 0

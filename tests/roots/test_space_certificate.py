@@ -46,7 +46,7 @@ def test_blocks_take_one_leaf(cells, p, F):
     assert np.max(np.abs(limit.lambda_t - root.lambda_t)) < 1e-9 * np.max(root.lambda_n)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 5)
 @pytest.mark.parametrize(("cells", "p"), [((6, 6, 2), 42), ((8, 8, 2), 72)])
 @pytest.mark.parametrize("F", [0.1, 0.3, 0.5, 1])
 def test_larger_blocks_take_one_leaf(cells, p, F):
@@ -121,7 +121,7 @@ def compared(seed):
     return True
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("part", range(3))
 def test_the_same_as_the_tree(part):
     did = [compared(seed) for seed in range(40 * part, 40 * part + 40)]
@@ -182,7 +182,7 @@ def random_numbers(rng, theta):
     return mu, kappa, rng.uniform(0, mu) * nu / np.linalg.norm(nu), theta
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_sum_over_two_solutions_is_not_negative():
     rng, pairs = np.random.default_rng(17), 0
     for _ in range(500):
@@ -241,7 +241,7 @@ def served(root, F):
     return np.where(length > 1 - 1e-9, theta / np.maximum(length, 0.1), theta)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("name", [name for name, roots in RANDOM.items() if roots > 1], ids=str)
 def test_no_numbers_close_a_problem_with_several_roots(name):
     """Whatever is proposed for any of its roots, the right theta among it."""

@@ -9,7 +9,7 @@ import enumsol
 from enumsol import enumerate_roots
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(("seed", "p"), [(4, 2), (6, 2), (3, 3), (6, 3)])
 def test_newton_from_many_starts_finds_no_other(seed, p):
     rng = np.random.default_rng(seed)
@@ -33,7 +33,7 @@ def test_newton_from_many_starts_finds_no_other(seed, p):
     assert complete >= 9
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_successive_approximations_reach():
     # every limit is a root, and roots of index -1 are limits of none
     rng = np.random.default_rng(5)

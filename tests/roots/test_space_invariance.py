@@ -117,7 +117,7 @@ def check(before, S, g, F, image, nodes=(0, 1)):
         assert [twin.statuses for twin in twins] == [tuple(root.statuses[i] for i in nodes)]
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 4)
 def test_axes_turned_at_every_node(case):
     S, g, F, _ = case
     isotropic = np.repeat(F[:, :1], 2, axis=1)
@@ -139,6 +139,7 @@ def test_a_quarter_turn_with_the_coefficients_exchanged(case):
     )
 
 
+@pytest.mark.few(0, 9)
 @pytest.mark.parametrize(("force", "length"), [(1e6, 1.0), (1e-9, 1e3), (3.7, 1e-9)])
 def test_units(case, force, length):
     S, g, F, before = case

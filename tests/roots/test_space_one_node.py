@@ -15,7 +15,7 @@ def solutions(S, g, F):
     return found, [lam for group in found.values() for lam in group], near
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", range(6))
 def test_random_data_against_the_closed_form(seed):
     rng = np.random.default_rng(seed)

@@ -49,7 +49,7 @@ def test_roots_are_near_those_without_friction(F):
         assert np.max(np.abs(root.lambda_t / F - expected)) <= (20 * F + 1e-12) * size
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("orthotropic", [False, True])
 def test_one_node_against_the_closed_form(orthotropic):
     rng = np.random.default_rng(7)

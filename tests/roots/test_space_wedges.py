@@ -26,7 +26,7 @@ KINDS = {
 REACHED = {"wedge3d-2-3": {0, 2}, "wedge3d-4-3": {0, 2}, "wedge3d-4-9": {0, 8}, "wedge3d-8-5": {4}}
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(1, 1)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "wedge3d-8-5" else []) for name in KINDS]
 )
@@ -73,7 +73,7 @@ def test_a_wedge_pulled_straight_is_its_own_mirror_image():
     assert np.all(np.abs(out.slip_angle) < 0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(("size", "friction", "count"), [((1, 1, 2), 2, 5), ((2, 1, 2), 1, 3)], ids=str)
 def test_eight_nodes_on_weak_springs(size, friction, count):
     """The wall hardly resists a motion of all nodes together: S has eigenvalues far apart."""

@@ -55,6 +55,7 @@ def test_a_proof_counts_what_subtrees_proved_and_writes_to_the_recorder_of_the_m
     assert (after.leaves, after.escalations.balls, len(after.verified)) == (leaves + 5, balls + 2, 6)
 
 
+@pytest.mark.slow
 def test_nothing_asks_for_the_class_of_a_certifier_or_keeps_anything_by_the_address_of_an_object():
     files = sorted(Path(enumsol.__file__).parent.rglob("*.py"))
     nodes = (node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))))

@@ -60,7 +60,7 @@ def test_a_row_of_unequal_discs(weights):
     assert verify(problem, roots.proof).complete
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_a_row_of_stiff_discs_of_any_weights(seed):
     problem = row_of_discs(20, weights=np.random.default_rng(seed).uniform(1.5, 3.0, 20), friction=0.9)
@@ -70,6 +70,7 @@ def test_a_row_of_stiff_discs_of_any_weights(seed):
     assert verify(problem, roots.proof).complete
 
 
+@pytest.mark.slow
 def test_the_index_where_very_many_selections_hold():
     # some neighbours have equal weights: those touch at rest
     problem = row_of_discs(20, weights=np.random.default_rng(1).integers(12, 25, 20) / 8, friction=0.9)
@@ -79,6 +80,7 @@ def test_the_index_where_very_many_selections_hold():
     assert verify(problem, roots.proof).complete
 
 
+@pytest.mark.slow
 def test_sixty_four_unloaded_nodes():
     problem = beside_a_loaded_node(64, slides=False, grazing=False)
     for arithmetic in ("verified", "exact"):
@@ -168,7 +170,7 @@ def test_the_roots_are_those_of_all_selections(every_node, seed):
     assert [root.active for root in tree] == [root.active for root in exact]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_roots_without_rationals(monkeypatch, every_node):
     complete = degenerate = 0
     for seed in range(60):

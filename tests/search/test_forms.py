@@ -41,7 +41,7 @@ def kinds_of(proof):
     return [record[0] for record in records_of(proof) if isinstance(record, list)]
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(("first", "last"), [(0, 18), pytest.param(18, 60, marks=pytest.mark.slow)])
 def test_the_roots_are_the_same(first, last, eager, monkeypatch):
     used = 0
@@ -211,7 +211,7 @@ def agrees(problem, records):
     return accepted
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("seed", range(8))
 def test_changed_forms_prove_nothing_false(eager, seed):
     problem, records = proven(seed)

@@ -50,7 +50,7 @@ def arcs(graph):
     return [(arc.tail, arc.head, arc.selections) for arc in graph.arcs]
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_same_graph_and_proof_as_without_workers(name, executors):
     problem, interval = PROBLEMS[name]()
@@ -66,6 +66,7 @@ def test_the_same_graph_and_proof_as_without_workers(name, executors):
         assert graph.stats.nodes == alone.stats.nodes
 
 
+@pytest.mark.slow
 def test_many_small_trees(executors, monkeypatch):
     """One piece searched by many trees; threads, since processes would not see the smaller size."""
     monkeypatch.setattr(interval_search, "LARGEST_TREE", 40)
@@ -109,6 +110,7 @@ def check_partial(partial, whole):
     return len(partial.arcs)
 
 
+@pytest.mark.slow
 def test_an_interruption_keeps_what_was_found(executors, wedge):
     problem, whole = wedge
     calls = []
@@ -144,6 +146,7 @@ def test_an_executor_that_was_shut_down(wedge):
         branch_graph(wedge[0], (0, 5), executor=3)
 
 
+@pytest.mark.slow
 def test_progress_reaches_the_end(executors, wedge):
     seen = []
     branch_graph(wedge[0], (0, 5), progress=lambda *state: seen.append(state), executor=executors[1])

@@ -21,7 +21,7 @@ def kinds(proof):
     return [record[0] for record in records_of(proof)[1:-1]]
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(
     ("size", "traction", "alpha"),
     [((128, 16, 2), (1.0, -0.3), 2.0), pytest.param((256, 16, 4), (0.3, -1.0), 5.0, marks=pytest.mark.slow)],
@@ -55,6 +55,7 @@ def problems(seed):
     return from_condensed(S, random_load(rng, p) if g is None else g, F)
 
 
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 3))])
 def test_all_selections_find_the_same(part):
     lone = several = 0
@@ -77,7 +78,7 @@ def test_all_selections_find_the_same(part):
     assert several > 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_tree_without_them_finds_the_same():
     fewer = 0
     for seed in range(50):

@@ -28,7 +28,7 @@ def whole(problem, alpha):
     return Reduction(system, (UNDECIDED,) * system.p, tuple(range(system.p)), {})
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(1, 1)
 @pytest.mark.parametrize("traction", [(0.3, -1.0), (1.0, -0.3)])
 @pytest.mark.parametrize("nx", [48, pytest.param(100, marks=pytest.mark.slow)])
 def test_blocks_take_one_node(nx, traction):
@@ -58,7 +58,7 @@ def problems(seed):
     return from_condensed(S, random_load(rng, p) if g is None else g, F)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("part", range(3))
 def test_all_selections_find_the_same(part, monkeypatch):
     # other numbers are sought at once, and small bodies are not spared them
@@ -175,7 +175,7 @@ def test_what_descent_finds_is_definite(seed):
     assert found > 5
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", range(1))
 def test_changed_certificates_prove_nothing_false(seed):
     rng = np.random.default_rng(seed)

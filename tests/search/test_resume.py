@@ -161,7 +161,7 @@ def test_a_whole_proof_leaves_nothing_to_search(name, tmp_path):
         assert "from the file, nothing was left to search" in repr(found)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @settings(QUICK, max_examples=25)
 @given(data=st.data())
 def test_a_file_cut_anywhere(data, tmp_path_factory):
@@ -171,7 +171,7 @@ def test_a_file_cut_anywhere(data, tmp_path_factory):
     check(name, resumed(name, whole[:size], tmp_path_factory.mktemp("cut") / "x.proof"))
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(2, 4)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_as_much_is_taken_as_the_file_holds(name, tmp_path):
     whole = bytes_of(known(name)[2].proof)
@@ -328,6 +328,7 @@ def test_a_time_limit_is_about_what_is_searched_anew(tmp_path, monkeypatch):
     check("wedge", found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["wedge", "forms", "closed", "block in space", "closed in space"])
 def test_with_an_executor(name, tmp_path):
     problem, alpha, whole = known(name)

@@ -73,7 +73,7 @@ def assert_equal(one, other):
     assert [values(root) for root in one] == [values(root) for root in other]
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(1, 1)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_same_roots_and_one_proof_whatever_the_number_of_workers(name, executors):
     problem, alpha = PROBLEMS[name]()
@@ -134,6 +134,7 @@ def test_limits(limits, executors, many):
         assert 2 <= len(roots) < 27
 
 
+@pytest.mark.slow
 def test_an_interruption_keeps_what_was_found(executors, many, monkeypatch):
     monkeypatch.setattr(parallel, "NODES", 16)
     problem, whole = many
@@ -152,7 +153,7 @@ def test_an_interruption_keeps_what_was_found(executors, many, monkeypatch):
     assert not partial.complete
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("healthy", [0, 3])
 def test_a_lost_worker_costs_time_and_nothing_else(healthy, many):
     with ProcessPoolExecutor(2) as pool, pytest.warns(RuntimeWarning, match="a worker died"):
@@ -162,7 +163,7 @@ def test_a_lost_worker_costs_time_and_nothing_else(healthy, many):
     assert verify(many[0], found.proof).complete
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_tables(executors):
     problem, alphas = gallery.get("block3d-4").build(), [0.0, 0.5, 1.0, 1.5]
     alone = enumsol.multiplicity_table(problem, alphas)

@@ -178,7 +178,7 @@ def test_what_kills_every_worker_is_done_here():
         assert results(pool, dies_in_workers, (os.getpid(),)) == ([os.getpid()], 3)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_pools_are_made_anew_in_a_process_of_their_own():
     """A process of the tests was once lost beside them, and all that it had still to do."""
     variables = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
@@ -214,7 +214,7 @@ def test_a_table_whose_thread_runs_out_of_memory(square):
     check_table(table, square)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_dask_workers_that_die(square, wedge):
     dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
     with (
@@ -265,6 +265,7 @@ def lives(pid):
         return False
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the workers are found in /proc")
 def test_workers_end_with_a_command_that_is_killed(tmp_path):
     file = tmp_path / "chain.npz"

@@ -31,7 +31,7 @@ def studies(monkeypatch):
     monkeypatch.syspath_prepend(Path(__file__).parents[2] / "studies")
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("group", SOME)
 def test_cases_of_the_study_are_right(group):
     from extremes.run import CASES

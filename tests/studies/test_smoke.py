@@ -116,6 +116,7 @@ def test_a_study_without_its_peer_does_the_rest_and_says_so(name, tmp_path):
     assert all(int(row[column]) > 0 for row in rows)
 
 
+@pytest.mark.slow
 def test_the_profile_knows_every_function_that_it_names(tmp_path):
     """After a renaming in the package the table of functions must follow, or their time counts for others."""
     code = (
@@ -135,6 +136,7 @@ def test_one_part_of_a_study(tmp_path):
     assert {file.name for file in tmp_path.iterdir()} == {"branch_thin.csv", "branch_thin.txt", "branch_thin.png"}
 
 
+@pytest.mark.slow
 def test_a_smoke_run_without_a_folder_leaves_the_results_alone(tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     before = results()

@@ -154,6 +154,7 @@ def at_the_border(rng, body, asked, alphas, bisections):
     return 1, 1, judged + body.judge(codes, side, numbers(*between(yes)), alphas)
 
 
+@pytest.mark.slow
 def test_forms_are_definite_where_the_kernel_says_so():
     yes, bordered, judged, _ = compared(range(14), most=2, bisections=12)
     assert yes > 20

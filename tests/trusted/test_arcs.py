@@ -118,6 +118,7 @@ def check_errors(count, start=0):
     return compared
 
 
+@pytest.mark.slow
 def test_a_stack_says_of_each_what_it_says_alone():
     """Selections of all sizes, singular and overflowing ones among them, and parts of series of both lengths."""
     asked = [(selection, *interval_at(rng, truth)) for rng, selection, truth in selections(200)]
@@ -149,6 +150,7 @@ def test_many_series():
     check_errors(300, 1000)
 
 
+@pytest.mark.slow
 def test_signs_from_bernstein_polynomials_are_right_to_the_last_bit():
     proven = 0
     for seed in range(250):

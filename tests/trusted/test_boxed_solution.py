@@ -38,7 +38,7 @@ def boxed(seed):
     return solvers, y, None if box is None else solution_in_box(solvers.enclosed, box, 2.0), kinds, F
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("part", range(3))
 def test_known_solutions_lie_in_their_boxes(part):
     found = 0
@@ -75,7 +75,7 @@ def natural(problem, y):
     return y - out
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("part", range(2))
 def test_steps_stay_within_their_bounds(part):
     """y - Y N(y) - c is what (12.13) says, and contracts, at random points of sets of all sizes."""
@@ -97,7 +97,7 @@ def test_steps_stay_within_their_bounds(part):
     assert tried > 20
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("part", range(4))
 def test_no_box_holds_two_solutions(part):
     """Newton's method from many points finds no second solution in a box, and no box with two is accepted."""

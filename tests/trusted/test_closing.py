@@ -77,7 +77,7 @@ def test_what_is_proven_is_so(seed):
     assert proven
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_exact_solution_that_is_the_only_one():
     proven = several = 0
     for seed in range(200):

@@ -90,6 +90,7 @@ def test_every_point_of_a_box_has_one_solution(seed):
             assert only.dimension == 0
 
 
+@pytest.mark.slow
 def test_the_cases_are_worth_it():
     """Boxes are found, also where nodes change their status, and beside problems with several solutions."""
     found = several = changes = 0

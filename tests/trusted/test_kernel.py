@@ -70,6 +70,7 @@ def ray(problem, rows, values):
     return values * (0.5 * slope / curvature) if slope > 0 and curvature > 0 else values
 
 
+@pytest.mark.slow
 def test_margins_agree_with_rationals():
     rng = np.random.default_rng(1)
     positive = refused = 0

@@ -98,6 +98,7 @@ def cases(seeds):
                     yield rng, case, codes, root[0], given
 
 
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 2))])
 def test_what_is_proven_is_so(part):
     proven = squares = several = 0
@@ -136,6 +137,7 @@ def changed(rng, case, codes, given):
     return tuple(codes), [weights, strengths, rows, values]
 
 
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 2))])
 def test_what_is_changed_is_refused_or_true(part):
     refused = accepted = 0
@@ -151,7 +153,7 @@ def test_what_is_changed_is_refused_or_true(part):
     assert accepted > 15
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("wrong", ["equations of free nodes", "narrow gaps"])
 def test_a_wrong_test_is_seen(wrong, monkeypatch):
     """Squares of what does not vanish, and gaps that are not bounds: roots are then said to be alone that are not."""

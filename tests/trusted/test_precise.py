@@ -77,6 +77,7 @@ def test_claims_over_parts_are_true():
     assert min(made.values()) > 20, made
 
 
+@pytest.mark.slow
 def test_balls_over_an_interval_hold_the_unknowns_and_their_slopes():
     compared = 0
     for rng, selection, truth in selections(250):

@@ -83,7 +83,7 @@ def test_false_roots_are_refused(seed, load):
     assert (report.roots, report.families) == (len(exact), len(exact.families))
 
 
-@pytest.mark.few(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "load"), HUNTED[1:4])
 def test_exact_count_by_an_oracle_in_fractions(seed, load):
     problem, _ = hunted(seed, load)
@@ -93,7 +93,7 @@ def test_exact_count_by_an_oracle_in_fractions(seed, load):
     assert len(roots.families) == sum(c.dimension > 0 for c in components)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", range(2))
 def test_a_selection_that_holds_a_root_is_never_contradicted(seed):
     rng = np.random.default_rng([seed, 88])

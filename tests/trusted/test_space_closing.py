@@ -111,6 +111,7 @@ def statuses(found, y, w, taus):
             assert found.slip[i] or slip < 1e-8
 
 
+@pytest.mark.slow
 def test_the_form_is_definite_for_all_data_and_theta():
     rng, least = np.random.default_rng(8), []
     for _ in range(80):
