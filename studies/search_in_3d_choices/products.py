@@ -41,7 +41,7 @@ WEDGES = {
     for cells, coefficients in (((2, 1, 2), (1.0, 2.0, 3.0)), ((1, 1, 2), (1.0, 2.0, 3.0)))
     for F in coefficients
 }
-SMOKE, SMOKE_NODES = {"1x1x2, F = 2": ((1, 1, 2), 2.0)}, 60
+SMOKE, SMOKE_NODES = {"1x1x2, F = 2": ((1, 1, 2), 2.0)}, 20
 
 
 def products(system, codes):

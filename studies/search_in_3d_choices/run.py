@@ -76,7 +76,7 @@ if TYPE_CHECKING:
     from shared.results import Run
 
 MAX_NODES, RANDOM = 10_000, 100
-MOST_SLICES, SMOKE_SLICES = 30_000, 200
+MOST_SLICES, SMOKE_SLICES = 30_000, 60
 CANDIDATES = 16  # of one dual step
 BODIES = {
     **{
@@ -315,7 +315,7 @@ def summed(name, results):
 
 def main(run: Run) -> None:
     bodies = SMOKE_BODIES if run.smoke else BODIES
-    seeds = range(3 if run.smoke else RANDOM)
+    seeds = range(1 if run.smoke else RANDOM)
     cases = {name: [(build, alpha)] for name, (build, alpha) in bodies.items()}
     cases[f"{len(seeds)} random, p = 3"] = [((lambda seed=seed: random_problem(seed)), 0.0) for seed in seeds]
     rows = []

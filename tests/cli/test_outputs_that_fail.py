@@ -128,7 +128,7 @@ def outcomes(place):
     return {where: run_all(where) for where in ("full", "unread")}
 
 
-@pytest.mark.few(0, 4)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PRINTING)
 def test_stdout_on_a_full_disk(outcomes, name):
     status, err = outcomes["full"][name]
@@ -136,6 +136,7 @@ def test_stdout_on_a_full_disk(outcomes, name):
     assert status == 74
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PRINTING)
 def test_stdout_that_nobody_reads(outcomes, name):
     status, err = outcomes["unread"][name]
