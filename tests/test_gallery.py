@@ -348,8 +348,6 @@ def test_functions_for_2d_say_what_takes_problems_in_3d():
     calls = [
         lambda: enumsol.branch_graph(problem, (0.0, 1.0)),
         lambda: enumsol.link_samples(problem, [0.0, 1.0]),
-        lambda: enumsol.newton(problem, 1.0),
-        lambda: enumsol.follow(problem, [0.0] * 5, interval=(0.0, 1.0)),
         lambda: enumsol.follow_all(problem, (0.0, 1.0)),
         lambda: enumsol.local_branch_test(problem, [0.0] * 5),
         lambda: enumsol.PiecewiseSmoothEquation(problem),

@@ -147,7 +147,7 @@ def parse_interval(first: str, last: str) -> tuple[Alpha, Alpha]:
     return low, high
 
 
-def node_row(problem: ContactProblem, label: str | None) -> int:
+def node_row(problem: ContactProblem | ContactProblem3D, label: str | None) -> int:
     """Row number of a contact node that is named by its label; the first one for None.
 
     Raises

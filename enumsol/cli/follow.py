@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from enumsol.cli import options
-from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, parse_alpha, parse_interval
+from enumsol.cli.common import ExitStatus, finish, load_any_problem, load_problem, node_row, parse_alpha, parse_interval
 from enumsol.cli.graph import read_graph
 from enumsol.cli.output import check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display, SearchDisplay
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
     from enumsol.continuation import ContinuationOptions, Path
     from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.roots.root import Root
     from enumsol.support.arguments import Alpha
 
@@ -42,6 +43,8 @@ CheckSteps = Annotated[
         None, "Refuse steps that may have left the branch. Otherwise the algorithm runs as printed in the paper."
     ),
 ]
+#: In 3D, forces that are as near to each other, relative to the largest, belong to one root.
+_SAME_ROOT = 1e-7
 #: Ends of a path at which nothing is left to follow.
 _ARRIVED = ("interval left", "closed")
 
@@ -74,7 +77,7 @@ def follow(
     label: Annotated[str | None, options.node("--node", "LABEL", "Contact node to draw; default: the first.")] = None,
     quiet: options.Quiet = False,
 ) -> None:
-    """Follow branches of solutions of PROBLEM from its roots at one alpha.
+    """Follow branches of solutions of PROBLEM, in 2D or 3D, from its roots at one alpha.
 
     A root on a branch that has already been followed is not followed again. Branches that have no root at that alpha
     are not found: compare the result with enumsol graph, or use enumsol audit.
@@ -91,9 +94,9 @@ def follow(
         raise InvalidArgumentError("--tangent is given without --root or --direction; expected one root and direction")
     steps = _steps(h_max, h_min, h_init, eps, max_steps, check_steps)
     interval, alpha, signs = parse_interval(first, last), parse_alpha(start, "--start"), _directions(direction)
-    body = load_problem(problem)
+    body = load_any_problem(problem)
     row = node_row(body, label)
-    over = None if graph_file is None else read_graph(graph_file, body)
+    over = None if graph_file is None else read_graph(graph_file, load_problem(problem))
     followed = _Followed(body, (float(interval[0]), float(interval[1])), steps, tangent)
     ended: Interrupted | None = None
     try:
@@ -138,7 +141,7 @@ def _directions(text: str) -> tuple[int, ...]:
 
 
 def _starts(
-    problem: ContactProblem,
+    problem: ContactProblem | ContactProblem3D,
     interval: tuple[Alpha, Alpha],
     alpha: Alpha,
     arithmetic: options.Arithmetic,
@@ -169,7 +172,7 @@ def _starts(
 class _Followed:
     """Paths from one root after the other."""
 
-    problem: ContactProblem
+    problem: ContactProblem | ContactProblem3D
     interval: tuple[float, float]
     steps: ContinuationOptions
     tangent: int | None
@@ -186,7 +189,7 @@ class _Followed:
         """Follow each start; Interrupted leaves what there is."""
         with Display("following") as display:
             for done, (number, root) in enumerate(starts):
-                earlier = next((k for k, path in enumerate(self.paths) if _passes(path, root)), None)
+                earlier = next((k for k, path in enumerate(self.paths) if _passes(path, root, self.problem)), None)
                 if earlier is not None:
                     self.passed[number] = earlier
                     continue
@@ -258,15 +261,37 @@ class _Followed:
         return figure
 
 
-def _passes(path: Path, root: Root) -> bool:
-    """Whether the path runs through a regular root: its selection has no other solution at that alpha."""
+def _passes(path: Path, root: Root, problem: ContactProblem | ContactProblem3D) -> bool:
+    """Whether the path runs through a regular root, which in 2D is the only one of its selection at that alpha."""
     if not root.regular:
         return False
     alpha = float(root.alpha)
     names = [point.statuses for point in path]
     return any(
-        names[k] == root.statuses and (path.alpha[k] - alpha) * (path.alpha[k + 1] - alpha) <= 0
+        names[k] == root.statuses
+        and (path.alpha[k] - alpha) * (path.alpha[k + 1] - alpha) <= 0
+        and (root.lambda_t.ndim == 1 or _leads_to(path, k, root, problem))
         for k in range(len(path) - 1)
+    )
+
+
+def _leads_to(path: Path, k: int, root: Root, problem: ContactProblem | ContactProblem3D) -> bool:
+    """Whether Newton's method from between two points of a path finds a root."""
+    import numpy as np  # not for --help
+
+    from enumsol.continuation import NotConverged, newton
+
+    first, last = path.alpha[k], path.alpha[k + 1]
+    share = 0.5 if first == last else (float(root.alpha) - first) / (last - first)
+    forces = [np.column_stack([path.lambda_n[j], path.lambda_t[j]]) for j in (k, k + 1)]
+    try:
+        found = newton(problem, root.alpha, (1 - share) * forces[0] + share * forces[1])
+    except NotConverged:
+        return False
+    near = _SAME_ROOT * max(float(np.max(np.abs(forces))), float(np.max(np.abs(root.lambda_n))))
+    return all(
+        np.max(np.abs(one - other)) <= near
+        for one, other in ((found.lambda_n, root.lambda_n), (found.lambda_t, root.lambda_t))
     )
 
 

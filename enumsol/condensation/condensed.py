@@ -212,6 +212,20 @@ class Condensation(Sealed):
         factor = np.tile(units, len(self.S) // len(units))
         return _definite(self.S * factor[:, None] * factor)
 
+    @cached_property
+    def node_scale(self) -> NDArray[np.float64]:
+        """Roots of the geometric means of every node's normal and tangential compliances, as often, shape (m,)."""
+        p = len(self.problem.gap)
+        compliances = np.diagonal(self.S).reshape(-1, p)
+        count = len(compliances)
+        return sealed(np.tile(np.prod(compliances, axis=0) ** (0.5 / count), count))
+
+    @cached_property
+    def balanced(self) -> NDArray[np.float64]:
+        """S in units in which every node has compliance one, shape (m, m)."""
+        scale = self.node_scale
+        return sealed(np.asarray(self.S / scale[:, None] / scale[None, :]))
+
     def free_displacements(self, alpha: AlphaLike) -> NDArray[np.float64]:
         """g(alpha), shape (m,) [length].
 
@@ -249,19 +263,6 @@ class CondensedProblem(Condensation):
     def F1(self) -> NDArray[np.float64]:  # noqa: N802 (as above)
         """Derivatives of the friction coefficients with respect to alpha, shape (p,) [-]."""
         return self.problem.friction[1]
-
-    @cached_property
-    def node_scale(self) -> NDArray[np.float64]:
-        """Roots of the geometric means of every node's normal and tangential compliance, twice over, shape (2p,)."""
-        p, diagonal = len(self.F0), np.diagonal(self.S)
-        node = (diagonal[:p] * diagonal[p:]) ** 0.25
-        return sealed(np.concatenate([node, node]))
-
-    @cached_property
-    def balanced(self) -> NDArray[np.float64]:
-        """S in units in which every node has compliance one, shape (2p, 2p)."""
-        scale = self.node_scale
-        return sealed(np.asarray(self.S / scale[:, None] / scale[None, :]))
 
     def at(self, alpha: Alpha) -> CondensedSystem:
         """The condensed system at one alpha.

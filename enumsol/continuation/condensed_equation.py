@@ -1,30 +1,15 @@
-"""The equation H = 0 condensed to the contact nodes and without units, on which the continuation works.
-
-The first block of H is linear in u and is eliminated once and for all: w = g(alpha) - S lambda (theory, section 8.1).
-What is left has 2p + 1 unknowns x = (lambda, alpha), scaled so that
-
-- the energy of the load is one: forces are measured by G / s_i and displacements by G s_i, where s_i^2 is the geometric
-  mean of the node's normal and tangential compliance and G^2 the largest g' S^-1 g on the interval,
-- alpha is measured by ``alpha_scale``.
-
-Lengths are those of the metric W = diag(S, 1) in these variables: the arclength ds of a path satisfies
-
-    ds^2 = d lambda' S d lambda / G^2 + (d alpha / alpha_scale)^2.
-
-On a friction path its first part is the elastic energy of the change of displacement. Signs of determinants of the full
-Jacobian of H bordered by a tangent are those of the condensed one, because A is positive definite.
-"""
+"""The condensed equation H = 0 in 2D, on which the continuation works (theory, sections 1.2 and 8.1)."""
 
 from __future__ import annotations
 
-import math
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.continuation.equation import pieces
+from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
 from enumsol.model.statuses import (
+    ACROSS,
     CONDITIONS,
     FRICTIONLESS,
     OPEN,
@@ -36,6 +21,7 @@ from enumsol.model.statuses import (
     active_within,
     contact_status,
 )
+from enumsol.roots.local_branch import coherent_orientation
 from enumsol.trusted.selection import row_values
 
 if TYPE_CHECKING:
@@ -43,130 +29,23 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.continuation.parameter_path import ParameterPath, PathValues
-    from enumsol.model.problem import ContactProblem
     from enumsol.model.statuses import ContactStatus
+    from enumsol.roots.local_branch import LocalBranchTest
 
     Vector = NDArray[np.float64]
     Codes = tuple[int, ...]
-
-#: A condition within this of zero counts as met with equality; forces and displacements are of size one after scaling,
-#: points are converged to about 1e-12.
-STATUS_TOLERANCE = 1e-9
-#: Interval points at which the size of a load that varies is measured.
-_LOAD_SAMPLES = 9
-
 
 #: Rows of the inequalities of every status, -1 where there is one only.
 _KINDS = np.array([[*CONDITIONS[code].inequalities, -1][:2] for code in SIGNS])
 
 
-class CondensedEquation:
-    """H, its selections, their conditions and the metric of the path.
+class CondensedEquation(ScaledEquation):
+    """H in 2D: selections are named by sign rows (p, 3), True where a test function is positive.
 
-    Points x have shape (2p + 1,): scaled lambda_n, lambda_t and alpha. Selections are named by sign rows (p, 3) of
-    booleans (True where a test function is positive) or, at solutions, by status codes.
-
-    Parameters
-    ----------
-    path : ParameterPath
-    interval : (float, float)
-        Where the load is measured; may be infinite.
-    start : float
-        An alpha on the path.
-    r : float or None
-        The r of H [force / length]; None for each node's own stiffness.
-    alpha_scale : float
-        Change of alpha that counts as one.
+    Parameters are those of ScaledEquation.
     """
 
-    def __init__(
-        self,
-        path: ParameterPath,
-        interval: tuple[float, float] = (-math.inf, math.inf),
-        start: float = 0.0,
-        r: float | None = None,
-        alpha_scale: float = 1.0,
-    ) -> None:
-        self.path = path
-        self.problem: ContactProblem = path.problem
-        self.p = p = self.problem.p
-        self.alpha_scale = alpha_scale
-        condensed = self.problem.condensed
-        sigma, self.S = condensed.node_scale, condensed.balanced
-        self.frictionless = path.frictionless
-        load = self._load_energy(interval, start, sigma)
-        self.force, self.length = load / sigma, load * sigma
-        # the r of each row in scaled variables
-        self.r = np.ones(2 * p) if r is None else r * sigma**2
-        self._last: tuple[float, PathValues] | None = None
-
-    def _load_energy(self, interval: tuple[float, float], start: float, sigma: Vector) -> float:
-        low, high = interval
-        samples = [start]
-        if math.isfinite(low) and math.isfinite(high):
-            samples += list(np.linspace(low, high, _LOAD_SAMPLES))
-        loads = np.array([self.path.at(alpha).g for alpha in samples]) / sigma
-        loads = loads[np.all(np.isfinite(loads), axis=1)]
-        size = float(np.max(np.abs(loads), initial=0.0))
-        if size == 0:
-            return 1.0
-        # loads of size one: their squares neither overflow nor underflow
-        loads = loads / size
-        try:
-            forces = np.linalg.solve(self.S, loads.T)
-        except np.linalg.LinAlgError:  # S is singular within rounding
-            forces = np.linalg.lstsq(self.S, loads.T, rcond=None)[0]
-        energy = float(np.max(np.einsum("ij,ji->i", loads, forces)))
-        return size * math.sqrt(energy) if energy > 0 else size
-
-    # -- values ----------------------------------------------------------------------------------------------------
-
-    @cached_property
-    def metric(self) -> Vector:
-        """W, shape (2p + 1, 2p + 1)."""
-        W = np.zeros((2 * self.p + 1, 2 * self.p + 1))
-        W[:-1, :-1] = self.S
-        W[-1, -1] = 1.0
-        return W
-
-    def dot(self, a: Vector, b: Vector) -> float:
-        """Inner product of two vectors in the metric W."""
-        return float(a[:-1] @ (self.S @ b[:-1]) + a[-1] * b[-1])
-
-    def norm(self, a: Vector) -> float:
-        """Length of a vector."""
-        return math.sqrt(max(self.dot(a, a), 0.0))
-
-    def point(self, alpha: float, forces: Vector) -> Vector:
-        """The scaled point x of unscaled alpha and lambda (2p,)."""
-        return np.concatenate([forces / self.force, [alpha / self.alpha_scale]])
-
-    def alpha(self, x: Vector) -> float:
-        """Unscaled alpha."""
-        return float(x[-1] * self.alpha_scale)
-
-    def forces(self, x: Vector) -> Vector:
-        """Unscaled lambda, shape (2p,)."""
-        return np.asarray(x[:-1] * self.force)
-
-    def at(self, x: Vector) -> PathValues:
-        """Scaled values of the paths; derivatives are with respect to the scaled alpha."""
-        alpha = self.alpha(x)
-        if self._last is None or self._last[0] != alpha:
-            raw = self.path.at(alpha)
-            a = self.alpha_scale
-            scaled = type(raw)(raw.g / self.length, raw.F, raw.dg * a / self.length, raw.dF * a)
-            self._last = (alpha, scaled)
-        return self._last[1]
-
-    def w(self, x: Vector) -> Vector:
-        """Scaled (u_n, u_t), shape (2p,)."""
-        return np.asarray(self.at(x).g - self.S @ x[:-1])
-
-    def displacements(self, x: Vector) -> Vector:
-        """Unscaled (u_n, u_t), shape (2p,)."""
-        return self.w(x) * self.length
+    single_valued = True
 
     # -- H and its selections ----------------------------------------------------------------------------------------
 
@@ -180,12 +59,12 @@ class CondensedEquation:
         bound = self.at(x).F * x[:p]
         return np.column_stack([trial[:p], trial[p:] - bound, trial[p:] + bound])
 
-    def residual(self, x: Vector) -> Vector:
-        """H(x) for each node's own r, shape (2p,).
+    def selection_at(self, x: Vector) -> NDArray[np.bool_]:
+        """Sign rows of the selection that is active at x, shape (p, 3)."""
+        return np.asarray(self.test_functions(x) > 0)
 
-        Solutions do not depend on r, and neither may the decision whether x is one: a tiny r would make any
-        displacement small, and a huge one any rounding error large.
-        """
+    def residual(self, x: Vector) -> Vector:
+        """H(x) for each node's own r, shape (2p,)."""
         return self._projected(x, np.ones(2 * self.p))
 
     def merit(self, x: Vector) -> float:
@@ -283,6 +162,20 @@ class CondensedEquation:
         rows = np.concatenate([tangent[:-1], plus, minus, -dw[:p], dw[p:], -dw[p:]]).reshape(-1, p)
         return self._of_inequalities(codes, rows, 0.0)
 
+    def across(self, code: int, k: int) -> Sequence[int]:
+        """The statuses on the other side of the k-th condition of a status."""
+        conditions = CONDITIONS[code].inequalities
+        return [other for other, _ in ACROSS[code, conditions[k]]] if k < len(conditions) else []
+
+    def flip(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Codes:
+        """Statuses after one slack vanished: the selection whose sign row has that one sign changed."""
+        i, k = which
+        new = self.across(codes[i], k)[0]
+        if codes[i] == OPEN:
+            slip = self.w(x)[self.p + i]
+            new = FRICTIONLESS if self.frictionless[i] else (SLIP_PLUS if slip > 0 else SLIP_MINUS)
+        return (*codes[:i], new, *codes[i + 1 :])
+
     def active(self, x: Vector, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
         return active_within(self._row_values(x), ~self.frictionless, tolerance)
@@ -309,3 +202,8 @@ class CondensedEquation:
     def statuses(self, codes: Sequence[int], slip: Vector) -> tuple[ContactStatus, ...]:
         """Names of the statuses; a frictionless node in contact is named by the sign of its u_t."""
         return tuple(contact_status(code, float(u)) for code, u in zip(codes, slip, strict=True))
+
+    def local_test(self, x: Vector) -> LocalBranchTest:
+        """The local branch test at a point of a path; see ScaledEquation."""
+        F, slip = self.at(x).F, self.w(x)[self.p :]
+        return coherent_orientation(self.S, F, self.active(x), slip, self.alpha(x))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
     from enumsol.continuation.continuation_options import ContinuationOptions
+    from enumsol.continuation.scaled_equation import Codes, ScaledEquation, Vector
 
 #: Smooth Newton iterations inside a selection; quadratic convergence needs about five.
 MAX_SMOOTH_ITERATIONS = 20
@@ -25,13 +25,13 @@ class Correction:
 
     Attributes
     ----------
-    x : (2p + 1,) array
+    x : (m + 1,) array
     count : int
         Number of corrections.
     converged : bool
     residual : float
         Norm of H at x.
-    tangent : (2p + 1,) array
+    tangent : (m + 1,) array
         Unit tangent of the last selection, turned from the prediction's by less than a right angle a correction.
     """
 
@@ -42,13 +42,13 @@ class Correction:
     tangent: Vector
 
 
-def moore_penrose(equation: CondensedEquation, x: Vector, tangent: Vector, options: ContinuationOptions) -> Correction:
+def moore_penrose(equation: ScaledEquation, x: Vector, tangent: Vector, options: ContinuationOptions) -> Correction:
     """Steps 3-6 of the paper's Algorithm 5.1 from x: Newton's method across selections with a rotating tangent."""
-    size = 2 * equation.p
+    size = len(equation.S)
     T: Vector = tangent
     residual = np.inf
     for count in range(1, options.k_max + 2):
-        rows = equation.test_functions(x) > 0
+        rows = equation.selection_at(x)
         J = equation.jacobian(rows, x)
         bordered = np.vstack([J, equation.metric @ T])
         right = np.zeros((size + 1, 2))
@@ -75,21 +75,21 @@ def moore_penrose(equation: CondensedEquation, x: Vector, tangent: Vector, optio
 
 
 def smooth_newton(
-    equation: CondensedEquation, codes: Codes, x: Vector, row: Vector | tuple[int, int], value: float, tolerance: float
+    equation: ScaledEquation, codes: Codes, x: Vector, row: Vector | tuple[int, int], value: float, tolerance: float
 ) -> Vector | None:
     """Point of a selection's solution curve at which one more condition holds, by Newton's method from x.
 
     Parameters
     ----------
     codes : statuses that name the selection
-    row : (2p + 1,) array, or (node, k)
-        The condition: ``row @ x = value``, or a slack of `CondensedEquation.slacks` that shall be ``value``.
+    row : (m + 1,) array, or (node, k)
+        The condition: ``row @ x = value``, or a slack of `ScaledEquation.slacks` that shall be ``value``.
     tolerance : float
         Length of the last correction.
 
     Returns
     -------
-    (2p + 1,) array, or None when it does not converge
+    (m + 1,) array, or None when it does not converge
     """
     rows = equation.selection(codes)
     last = np.inf

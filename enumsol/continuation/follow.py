@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import AlphaLike
 
 
 def follow(
-    problem: ContactProblem,
+    problem: ContactProblem | ContactProblem3D,
     start: Any,
     direction: int = +1,
     interval: tuple[AlphaLike, AlphaLike] | None = None,
@@ -41,11 +42,13 @@ def follow(
     the proven-in-floats continuation of the one before, so that long steps cannot jump to another branch unnoticed.
 
     Works on the problem condensed to its contact nodes: A is factorised once for 2p + a few right-hand sides, a
-    correction costs one dense solve of size 2p + 1. The arclength is defined in ContinuationOptions.
+    correction costs one dense solve of size 2p + 1 (3p in place of 2p in 3D). The arclength is defined in
+    ContinuationOptions. In 3D a slipping node keeps its status whatever the direction, and a path may turn back while
+    all statuses stay the same: such folds are located and are among ``path.transitions`` (theory, section 8.12).
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     start : Root, PathPoint, or tuple (alpha, lambda_n, lambda_t)
         A root, for example of enumerate_roots, newton or ``graph.starting_points()``.
     direction : {+1, -1}
@@ -54,7 +57,7 @@ def follow(
         Range of alpha; infinite ends are allowed. None: all alpha with F >= 0.
     options : ContinuationOptions or None
     smooth_path : SmoothPath or None
-        Friction and load that are not affine in alpha.
+        Friction and load that are not affine in alpha; in 2D only.
     tangent : int or None
         Index into `start_tangents` of the direction to take, at a start where several are admissible.
     visited : sequence of Path
@@ -94,7 +97,7 @@ def follow(
 
 
 def start_tangents(
-    problem: ContactProblem,
+    problem: ContactProblem | ContactProblem3D,
     start: Any,
     interval: tuple[AlphaLike, AlphaLike] | None = None,
     options: ContinuationOptions | None = None,

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
-from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
 from enumsol.continuation.path_data import PathData, PathStatus, PointKind
 from enumsol.continuation.recorder import PathRecorder
+from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
 from enumsol.continuation.tangents import curve_tangent, orientation
 from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
@@ -22,6 +22,7 @@ from enumsol.continuation.transitions import (
     next_kink,
     passed_kink,
     same_curve,
+    turning_point,
 )
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
 from enumsol.support.messages import counted
@@ -29,7 +30,7 @@ from enumsol.support.messages import counted
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
+    from enumsol.continuation.scaled_equation import Codes, ScaledEquation, Vector
     from enumsol.continuation.start import Start
     from enumsol.continuation.tangents import Tangent
 
@@ -276,7 +277,18 @@ class Follower(Generic[_Path]):
         return arrived
 
     def _piece(self, start: CurvePoint, end: CurvePoint) -> _Stop | None:
-        """Stop conditions met between two points of one curve; the path is ended there."""
+        """Stop conditions met between two points of one curve; the path is ended there. A fold is recorded."""
+        fold = turning_point(self.equation, start, end, self.options.transition_tolerance)
+        if fold is not None:
+            stop = self._border(start, fold) or self._return(start, fold)
+            if stop is not None:
+                return stop
+            arrived = self._known(Kink(fold, fold))
+            self.record.add_kink(Kink(fold, fold))
+            self.current = start = fold
+            self._landmarks.append((fold.x, fold.codes, False))
+            if arrived is not None:
+                return arrived
         return self._border(start, end) or self._return(start, end)
 
     def _inside(self, x: Vector) -> bool:
@@ -322,7 +334,19 @@ class Follower(Generic[_Path]):
         if tangent is None:
             return False
         middle = CurvePoint(x, codes, tangent)
+        if not equation.single_valued and not self._on_piece(start, end, middle):
+            return False
         return same_curve(equation, start, middle, sharp=True) and same_curve(equation, middle, end, sharp=True)
+
+    def _on_piece(self, start: CurvePoint, end: CurvePoint, point: CurvePoint) -> bool:
+        """Whether the curve between two points runs through a third one, and not beside it on another curve."""
+        equation, row = self.equation, self.equation.metric @ point.tangent
+        chord = end.x - start.x
+        along = float(row @ chord)
+        share = float(row @ (point.x - start.x)) / along if along > 0 else 0.5
+        near = start.x + min(max(share, 0.0), 1.0) * chord
+        x = smooth_newton(equation, point.codes, near, row, float(row @ point.x), self.options.transition_tolerance)
+        return x is not None and equation.norm(x - point.x) <= SAME_POINT
 
     def _known(self, kink: Kink) -> _Stop | None:
         """A transition point that is the start, or was passed before in the same or the opposite direction."""
@@ -367,13 +391,15 @@ class Follower(Generic[_Path]):
         )
 
 
-def _landmarks(equation: CondensedEquation, visited: Sequence[PathData]) -> Iterator[tuple[Vector, Codes, bool]]:
+def _landmarks(equation: ScaledEquation, visited: Sequence[PathData]) -> Iterator[tuple[Vector, Codes, bool]]:
     """Starts, transition points and ends of other paths, with the statuses on both sides."""
     for path in visited:
         for k, kind in enumerate(path.kinds):
             if kind is PointKind.STEP:
                 continue
-            x = equation.point(float(path.alpha[k]), np.concatenate([path.lambda_n[k], path.lambda_t[k]]))
+            x = equation.point(
+                float(path.alpha[k]), np.concatenate([path.lambda_n[k], path.lambda_t[k].ravel(order="F")])
+            )
             if not math.isfinite(float(np.sum(x))):
                 continue
             codes = {tuple(int(c) for c in path.codes[k]), tuple(int(c) for c in path.codes[max(k - 1, 0)])}

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.continuation.condensed_equation import CondensedEquation
+from enumsol.continuation.equations import check_problem, equation_on
 from enumsol.continuation.not_converged import NewtonIteration, NotConverged
-from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
+from enumsol.continuation.space_equation import SLIP, SpaceEquation
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.problem import ContactProblem
 from enumsol.model.statuses import FRICTIONLESS, STATUSES, STICK
+from enumsol.roots.local_branch import SINGULAR_TOLERANCE
 from enumsol.roots.root import Root
-from enumsol.support.arguments import alpha_value, instance_of, positive_integer, positive_number
+from enumsol.support.arguments import alpha_value, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from enumsol.continuation.condensed_equation import Vector
-    from enumsol.continuation.parameter_path import ParameterPath
+    from enumsol.continuation.parameter_path import SmoothPath
+    from enumsol.continuation.scaled_equation import ScaledEquation, Vector
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import Alpha, AlphaLike
 
 #: Norm of H, relative to the load, at which an iterate is a root: well above rounding for any conditioning seen.
@@ -33,7 +36,7 @@ SUFFICIENT_DECREASE = 1e-4
 
 
 def newton(
-    problem: ContactProblem,
+    problem: ContactProblem | ContactProblem3D,
     alpha: AlphaLike,
     start: Root | ArrayLike | None = None,
     *,
@@ -45,19 +48,19 @@ def newton(
 
     Every iteration solves the selection of H that is active at the iterate. Full steps are taken until a selection
     recurs; from then on a line search lowers the norm of H. Which root is found depends on the start; a start near a
-    regular root leads to it in one step. Each iteration costs one dense solve of size 2p.
+    regular root leads to it in one step, in 3D in a few. Each iteration costs one dense solve of size 2p, or 3p.
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     alpha : float, Fraction or whatever enumerate_roots accepts as alpha
-    start : Root, (2p,) or (p, 2) array_like, or None
-        Contact forces: those of a root, lambda_n followed by lambda_t, or a row (lambda_n, lambda_t) per node [force].
-        None: zero.
+    start : Root, (2p,) or (p, 2) array_like, in 3D (3p,) or (p, 3), or None
+        Contact forces: those of a root, lambda_n followed by lambda_t (in 3D all along the first axis, then all along
+        the second), or a row (lambda_n, lambda_t) per node [force]. None: zero.
     r : float or None
         Parameter of H [force / length]; None for each node's own stiffness.
     smooth_path : SmoothPath or None
-        Friction and load at alpha come from here.
+        Friction and load at alpha come from here; in 2D only.
     max_iterations : int
 
     Returns
@@ -79,47 +82,48 @@ def newton(
     >>> [enumsol.newton(problem, 5, start=start).statuses for start in (None, (1.0, -1.5))]
     [(ContactStatus.OPEN,), (ContactStatus.STICK,)]
     """
-    instance_of(problem, ContactProblem, "problem")
-    problem.check_held("newton")
+    check_problem(problem, smooth_path, "newton")
     exact = alpha_value(alpha)
     value = float(exact)
     r = None if r is None else positive_number(r, "r")
-    if smooth_path is not None:
-        instance_of(smooth_path, SmoothPath, "smooth_path")
     max_iterations = positive_integer(max_iterations, "max_iterations")
-    frozen = problem if smooth_path is None else smooth_path.problem_at(problem, value)
+    frozen: Any = problem if smooth_path is None else smooth_path.problem_at(problem, value)  # type: ignore[arg-type]
     frozen.friction_at(exact)
-    path: ParameterPath = AffinePath(problem) if smooth_path is None else CallablePath(problem, smooth_path, value)
-    equation = CondensedEquation(path, start=value, r=r)
-    x = equation.point(value, _start_forces(start, problem.p))
+    equation = equation_on(problem, smooth_path, value, r=r)
+    x = equation.point(value, _start_forces(start, problem.p, len(equation.S) // problem.p))
     x = _iterate(equation, x, value, max_iterations)
+    if isinstance(equation, SpaceEquation):
+        return _root_in_space(frozen, exact, equation, x)
+    assert isinstance(equation, CondensedEquation)
     return build_root(frozen, exact if smooth_path is None else value, equation, x)
 
 
-def _start_forces(start: Root | ArrayLike | None, p: int) -> NDArray[np.float64]:
+def _start_forces(start: Root | ArrayLike | None, p: int, d: int) -> NDArray[np.float64]:
+    """Forces in d components at every node, (d p,)."""
     if start is None:
-        return np.zeros(2 * p)
+        return np.zeros(d * p)
     if isinstance(start, Root):
-        forces = np.concatenate([start.lambda_n, start.lambda_t])
+        forces = np.concatenate([start.lambda_n, start.lambda_t.ravel(order="F")])
     else:
         forces = real_array(start, "start", error=InvalidArgumentError)
-        if forces.shape == (p, 2):
+        if forces.shape == (p, d):
             forces = forces.T.ravel()
-    if forces.shape != (2 * p,):
+    if forces.shape != (d * p,):
         raise InvalidArgumentError(
-            f"start has shape {forces.shape}; expected a Root or finite contact forces of shape ({2 * p},) or ({p}, 2)"
+            f"start has shape {forces.shape}; expected a Root or finite contact forces of shape ({d * p},) or ({p}, "
+            f"{d})"
         )
     return forces
 
 
-def _iterate(equation: CondensedEquation, x: Vector, alpha: float, max_iterations: int) -> Vector:
+def _iterate(equation: ScaledEquation, x: Vector, alpha: float, max_iterations: int) -> Vector:
     history: list[NewtonIteration] = []
     seen: set[bytes] = set()
-    rows = equation.test_functions(x) > 0
+    rows = equation.selection_at(x)
     damped = False
     for _ in range(max_iterations):
         residual = float(np.linalg.norm(equation.residual(x)))
-        now = equation.test_functions(x) > 0
+        now = equation.selection_at(x)
         changes = int(np.sum(np.any(now != rows, axis=1)))
         rows = now
         if residual <= RESIDUAL_TOLERANCE:
@@ -136,7 +140,7 @@ def _iterate(equation: CondensedEquation, x: Vector, alpha: float, max_iteration
     raise NotConverged(alpha, history, f"the limit of {counted(max_iterations, 'iteration')} was reached")
 
 
-def _newton_step(equation: CondensedEquation, rows: NDArray[np.bool_], x: Vector) -> Vector:
+def _newton_step(equation: ScaledEquation, rows: NDArray[np.bool_], x: Vector) -> Vector:
     """Newton step in the active selection; the shortest least-squares one where it is singular."""
     J = equation.jacobian(rows, x)[:, :-1]
     residual = equation.selection_residual(rows, x)
@@ -149,7 +153,7 @@ def _newton_step(equation: CondensedEquation, rows: NDArray[np.bool_], x: Vector
     return np.asarray(step)
 
 
-def _fraction(equation: CondensedEquation, x: Vector, step: Vector) -> float:
+def _fraction(equation: ScaledEquation, x: Vector, step: Vector) -> float:
     """Largest 2^-k that lowers the residual sufficiently."""
     fraction, residual = 1.0, equation.merit(x)
     while fraction >= MIN_FRACTION:
@@ -199,4 +203,36 @@ def _family_point(problem: ContactProblem, alpha: Alpha, equation: CondensedEqua
         enclosure=None,
         _condensed=problem.condensed,
         _tangent=None,
+    )
+
+
+def _root_in_space(problem: ContactProblem3D, alpha: Alpha, equation: SpaceEquation, x: Vector) -> Root:
+    """The Root in 3D at a point x of the condensed equation; not regular where a condition holds with equality."""
+    codes, active = equation.codes(x), equation.active(x)
+    index = equation.index(codes, x, SINGULAR_TOLERANCE)
+    regular = bool(index) and all(len(held) == 1 for held in active)
+    (lambda_n, lambda_t), (u_n, u_t) = equation.split(equation.forces(x)), equation.split(equation.displacements(x))
+    closed, held = (np.array([code in chosen for code in codes]) for chosen in ((STICK, SLIP, FRICTIONLESS), (STICK,)))
+    lambda_n, lambda_t = np.where(closed, lambda_n, 0.0), np.where(closed[:, None] & ~equation.without, lambda_t, 0.0)
+    u_n, u_t = np.where(closed, 0.0, u_n), np.where(held[:, None] & ~equation.without, 0.0, u_t)
+    slips = np.array([code == SLIP for code in codes])[:, None]
+    driven = problem.friction_at(alpha) * u_t
+    angle = np.arctan2(driven[:, 1], driven[:, 0])[:, None]
+    slip = u_t.ravel(order="F")
+    return Root(
+        alpha=alpha,
+        statuses=equation.statuses(codes, slip),
+        active=tuple(
+            frozenset(equation.statuses((code,), u_t[i])[0] for code in codes_of) for i, codes_of in enumerate(active)
+        ),
+        lambda_n=lambda_n,
+        lambda_t=lambda_t,
+        u_n=u_n,
+        u_t=u_t,
+        slip_angle=np.where(slips & np.any(driven != 0, axis=1)[:, None], np.tile(angle, 2), np.nan),
+        index=index if regular else None,
+        regular=regular,
+        margin=float(np.min(equation.slacks(codes, x))) if regular else 0.0,
+        enclosure=None,
+        _condensed=problem.condensed,
     )

@@ -19,6 +19,7 @@ from enumsol.support.array_arguments import real_array
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import AlphaLike
 
 #: A user's derivative may differ from a central difference by this fraction of its size: wrong formulas differ by more.
@@ -94,7 +95,10 @@ class SmoothPath:
 
 @dataclass(frozen=True)
 class PathValues:
-    """Condensed load g, friction F and their derivatives at one alpha: arrays (2p,), (p,), (2p,), (p,)."""
+    """Condensed load g, friction F and their derivatives at one alpha: arrays (2p,), (p,), (2p,), (p,).
+
+    In 3D the shapes are (3p,), (p, 2), (3p,), (p, 2).
+    """
 
     g: NDArray[np.float64]
     F: NDArray[np.float64]
@@ -105,26 +109,43 @@ class PathValues:
 class AffinePath:
     """The problem's own F0 + alpha F1 and f + alpha load_slope, also where friction would be negative (iterates)."""
 
-    def __init__(self, problem: ContactProblem) -> None:
-        self.problem = problem
+    def __init__(self, problem: ContactProblem | ContactProblem3D) -> None:
+        self.problem: Any = problem
         self._condensed = problem.condensed
+        self.friction = affine_friction(problem)
 
     def at(self, alpha: float) -> PathValues:
         """Values at alpha."""
-        c = self._condensed
-        return PathValues(c.g0 + alpha * c.g1, c.F0 + alpha * c.F1, c.g1, c.F1)
+        c, (F0, F1) = self._condensed, self.friction
+        return PathValues(c.g0 + alpha * c.g1, F0 + alpha * F1, c.g1, F1)
 
     @property
     def frictionless(self) -> NDArray[np.bool_]:
-        """Nodes with F0 = F1 = 0."""
-        return np.asarray((self._condensed.F0 == 0) & (self._condensed.F1 == 0))
+        """Nodes, in 3D nodes and axes, with F0 = F1 = 0."""
+        F0, F1 = self.friction
+        return np.asarray((F0 == 0) & (F1 == 0))
+
+
+def affine_friction(problem: ContactProblem | ContactProblem3D) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Coefficients at alpha = 0 and their derivatives, (p,) both, in 3D (p, 2).
+
+    Raises
+    ------
+    InvalidArgumentError
+        They depend on the solution.
+    """
+    if isinstance(problem, ContactProblem):
+        return problem.friction
+    if problem.depends_on_solution:
+        problem.friction_at(0)  # refuses
+    return np.column_stack(problem.friction), np.column_stack(problem.friction_slope)
 
 
 class CallablePath:
     """A SmoothPath condensed to the contact nodes; a load given by callables costs 2 p n multiplications per alpha."""
 
     def __init__(self, problem: ContactProblem, smooth: SmoothPath, alpha: float) -> None:
-        self.problem = problem
+        self.problem: Any = problem
         self._smooth = smooth
         self._affine = AffinePath(problem)
         self._start = alpha

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import AlphaLike
 
 
@@ -28,7 +29,7 @@ class Path(PathData):
     Attributes
     ----------
     alpha : (m,) array
-    lambda_n, lambda_t, u_n, u_t : (m, p) arrays
+    lambda_n, lambda_t, u_n, u_t : (m, p) arrays; in 3D lambda_t and u_t are (m, p, 2)
     codes : (m, p) array of status codes
         On which the path leaves each point.
     kinds : tuple of m PointKind
@@ -80,7 +81,7 @@ class Path(PathData):
 
     def resume(
         self,
-        problem: ContactProblem | None = None,
+        problem: ContactProblem | ContactProblem3D | None = None,
         *,
         interval: tuple[AlphaLike, AlphaLike] | None = None,
         options: ContinuationOptions | None = None,
@@ -90,7 +91,7 @@ class Path(PathData):
 
         Parameters
         ----------
-        problem : ContactProblem or None
+        problem : ContactProblem, ContactProblem3D or None
             Needed for a path that was loaded from a file.
         interval, options : as in follow
             None: as before. The step length is the one with which the path ended.

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.continuation.tangents import Tangent
     from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.model.statuses import ContactStatus
     from enumsol.roots.local_branch import LocalBranchTest
 
@@ -66,7 +67,7 @@ class PathPoint(Sealed):
     Attributes
     ----------
     alpha : float
-    lambda_n, lambda_t, u_n, u_t : (p,) arrays
+    lambda_n, lambda_t, u_n, u_t : (p,) arrays; in 3D lambda_t and u_t are (p, 2)
         As in Root.
     statuses : tuple of p ContactStatus
         The selection on which the path leaves the point.
@@ -85,7 +86,7 @@ class PathPoint(Sealed):
 
 @dataclass(frozen=True)
 class Transition:
-    """A point at which the path changes its selection.
+    """A point at which the path changes its selection, or in 3D a fold within one.
 
     Attributes
     ----------
@@ -94,9 +95,10 @@ class Transition:
     alpha : float
     before, after : tuple of p ContactStatus
     nodes : tuple of int
-        Contact nodes (row numbers) whose status changes.
+        Contact nodes (row numbers) whose status changes; none at a fold within a selection.
     dalpha_before, dalpha_after : float
-        Derivative of alpha with respect to the arclength on both sides; a change of sign is a fold.
+        Derivative of alpha with respect to the arclength on both sides; a change of sign is a fold. Zero, but for
+        rounding, at a fold within a selection.
     local_test : LocalBranchTest or None
         Whether a local Lipschitz branch exists there; None when too many selections hold to tell.
     alternatives : tuple of Tangent
@@ -173,7 +175,7 @@ class PathData(Sequence[PathPoint], Sealed):
     stats: PathStats
     node_ids: tuple[Any, ...]
     _names: tuple[tuple[ContactStatus, ...], ...] = field(repr=False)
-    _problem: ContactProblem | None = field(default=None, repr=False, compare=False)
+    _problem: ContactProblem | ContactProblem3D | None = field(default=None, repr=False, compare=False)
     _smooth_path: SmoothPath | None = field(default=None, repr=False, compare=False)
 
     # -- a sequence of points ----------------------------------------------------------------------------------------
@@ -207,9 +209,13 @@ class PathData(Sequence[PathPoint], Sealed):
 
     @cached_property
     def folds(self) -> tuple[Transition, ...]:
-        """The transitions at which alpha turns back (after a vertical piece: its end)."""
+        """The transitions at which alpha turns back (after a vertical piece: its end), folds within a selection too."""
         found, direction = [], 0
         for transition in self.transitions:
+            if not transition.nodes:  # alpha turns back within a selection
+                found.append(transition)
+                direction = -direction
+                continue
             for value in (transition.dalpha_before, transition.dalpha_after):
                 sign = 0 if abs(value) <= VERTICAL_TOLERANCE * self._alpha_scale else int(np.sign(value))
                 if sign and direction and sign != direction:
@@ -231,6 +237,7 @@ class PathData(Sequence[PathPoint], Sealed):
     def to_frame(self) -> pd.DataFrame:
         """One row per point: alpha, kind, step, corrections, arclength; of every node X lambda_n_X, .., status_X.
 
+        In 3D lambda_t1_X and lambda_t2_X take the place of lambda_t_X, and so for u_t.
         X is the node's label, or its row number where two labels are the same text.
         """
         import pandas as pd
@@ -244,8 +251,11 @@ class PathData(Sequence[PathPoint], Sealed):
             "corrections": self.corrections,
             "arclength": self.arclength,
         }
-        for name in ("lambda_n", "lambda_t", "u_n", "u_t"):
-            columns |= {f"{name}_{node}": column for node, column in zip(nodes, getattr(self, name).T, strict=True)}
+        for quantity in ("lambda_n", "lambda_t", "u_n", "u_t"):
+            values = getattr(self, quantity)
+            axes = [("", values)] if values.ndim == 2 else [("1", values[..., 0]), ("2", values[..., 1])]
+            for axis, part in axes:
+                columns |= {f"{quantity}{axis}_{node}": column for node, column in zip(nodes, part.T, strict=True)}
         columns |= {f"status_{node}": [names[i].value for names in self._names] for i, node in enumerate(nodes)}
         return pd.DataFrame(columns)
 

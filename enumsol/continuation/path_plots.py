@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from enumsol.continuation.path_data import PointKind
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import one_of, row_number
@@ -29,6 +31,7 @@ def draw_path(
     node : int
         Contact node (row number).
     quantity : {"lambda_n", "lambda_t", "u_n", "u_t"}
+        In 3D the tangential ones are drawn as their lengths.
     ax : matplotlib Axes or None
         Draw there, for example in ``figure.axes[0]`` of an earlier plot to add a path to it.
 
@@ -54,6 +57,9 @@ def draw_path(
     elif axes_or_none(ax) is None:
         ax = new_figure().subplots()
     values = getattr(path, quantity)[:, node]
+    name = quantity
+    if values.ndim == 2:
+        values, name = np.linalg.norm(values, axis=1), f"|{quantity}|"
     dots = [k for k, kind in enumerate(path.kinds) if kind in (PointKind.STEP, PointKind.END)]
     ax.plot(path.alpha[dots], values[dots], ".", color="black", markersize=3, label="steps", zorder=3)
     folds = {item.point for item in path.folds}
@@ -68,7 +74,7 @@ def draw_path(
     ax.plot(path.alpha[:1], values[:1], "*", color="tab:red", markersize=10, label="start", zorder=5)
     if not ax.get_ylabel():
         ax.set_xlabel("alpha")
-        ax.set_ylabel(f"{quantity} of node {path.node_ids[node]}")
+        ax.set_ylabel(f"{name} of node {path.node_ids[node]}")
         ax.set_title(f"path for alpha in [{path.alpha.min():g}, {path.alpha.max():g}]: {path.status.value}", fontsize=9)
     named = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))  # of several paths once
     ax.legend(handles=list(named.values()), labels=list(named), fontsize=7, frameon=False)

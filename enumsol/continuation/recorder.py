@@ -11,10 +11,9 @@ import numpy as np
 
 from enumsol.continuation.path_data import PathStats, PointKind, Transition
 from enumsol.errors import TooLargeError
-from enumsol.roots.local_branch import coherent_orientation
 
 if TYPE_CHECKING:
-    from enumsol.continuation.condensed_equation import CondensedEquation, Vector
+    from enumsol.continuation.scaled_equation import ScaledEquation, Vector
     from enumsol.continuation.transitions import CurvePoint, Kink
     from enumsol.roots.local_branch import LocalBranchTest
 
@@ -26,7 +25,7 @@ _AHEAD = 1e-6
 class PathRecorder:
     """The points and counts of a path while it is followed."""
 
-    equation: CondensedEquation
+    equation: ScaledEquation
     points: list[CurvePoint] = field(default_factory=list)
     kinds: list[PointKind] = field(default_factory=list)
     steps: list[float] = field(default_factory=list)
@@ -73,10 +72,9 @@ class PathRecorder:
         lengths = [equation.norm(after.x - before.x) for before, after in pairwise(self.points)]
         return {
             "alpha": np.array([equation.alpha(point.x) for point in self.points]),
-            "lambda_n": forces[:, :p],
-            "lambda_t": forces[:, p:],
-            "u_n": w[:, :p],
-            "u_t": w[:, p:],
+            **dict(
+                zip(("lambda_n", "lambda_t", "u_n", "u_t"), (*equation.split(forces), *equation.split(w)), strict=True)
+            ),
             "codes": np.array([point.codes for point in self.points], dtype=np.int8),
             "kinds": tuple(self.kinds),
             "steps": np.array(self.steps),
@@ -93,9 +91,7 @@ class PathRecorder:
         return self.equation.w(point.x + step * point.tangent)[self.equation.p :]
 
     def _local_test(self, x: Vector) -> LocalBranchTest | None:
-        equation = self.equation
-        F, slip = equation.at(x).F, equation.w(x)[equation.p :]
         try:
-            return coherent_orientation(equation.S, F, equation.active(x), slip, equation.alpha(x))
+            return self.equation.local_test(x)
         except TooLargeError:
             return None

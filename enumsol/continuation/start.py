@@ -7,18 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.continuation_options import ContinuationOptions
-from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
+from enumsol.continuation.equations import check_problem, equation_on
+from enumsol.continuation.parameter_path import affine_friction
 from enumsol.continuation.path_data import PathData
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import alpha_value, instance_of, unbounded_interval
 from enumsol.support.array_arguments import real_array
 
 if TYPE_CHECKING:
-    from enumsol.continuation.condensed_equation import Vector
-    from enumsol.continuation.parameter_path import ParameterPath
+    from enumsol.continuation.parameter_path import SmoothPath
+    from enumsol.continuation.scaled_equation import Vector
+    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import AlphaLike
 
 #: The default alpha scale is this fraction of the interval.
@@ -35,27 +36,24 @@ class Start:
 
     def __init__(
         self,
-        problem: ContactProblem,
+        problem: ContactProblem | ContactProblem3D,
         start: Any,
         interval: tuple[AlphaLike, AlphaLike] | None,
         options: ContinuationOptions | None,
         smooth_path: SmoothPath | None,
     ) -> None:
-        instance_of(problem, ContactProblem, "problem")
-        problem.check_held("follow")
-        if smooth_path is not None:
-            instance_of(smooth_path, SmoothPath, "smooth_path")
+        check_problem(problem, smooth_path, "follow")
         chosen = ContinuationOptions() if options is None else options
         self.options = instance_of(chosen, ContinuationOptions, "options")
         self.smooth_path = smooth_path
-        alpha, forces = _start_values(start, problem.p)
+        space = problem.condensed.S.shape[0] == 3 * problem.p
+        alpha, forces = _start_values(start, (problem.p, 2) if space else (problem.p,))
         self.interval = _interval(problem, interval, alpha, smooth_path)
         low, high = self.interval
         scale = self.options.alpha_scale
         if scale is None:
             scale = ALPHA_FRACTION * (high - low) if math.isfinite(high - low) else 1.0
-        path: ParameterPath = AffinePath(problem) if smooth_path is None else CallablePath(problem, smooth_path, alpha)
-        self.equation = CondensedEquation(path, self.interval, alpha, self.options.r, scale)
+        self.equation = equation_on(problem, smooth_path, alpha, self.interval, self.options.r, scale)
         if smooth_path is None and math.isfinite(high - low):
             self._check_resolution(alpha, (high - low) / scale)
         self.x = self._on_solution(alpha, forces)
@@ -63,7 +61,7 @@ class Start:
     def _check_resolution(self, alpha: float, width: float) -> None:
         """Refuse an interval over which the problem hardly changes."""
         equation = self.equation
-        values = equation.at(equation.point(alpha, np.zeros(2 * equation.p)))
+        values = equation.at(equation.point(alpha, np.zeros(len(equation.S))))
         change = max(np.max(np.abs(values.dg)), np.max(np.abs(values.dF) / (1.0 + values.F))) * width
         if 0 < change < RESOLUTION:
             raise InvalidArgumentError(
@@ -84,7 +82,8 @@ class Start:
         return x
 
 
-def _start_values(start: Any, p: int) -> tuple[float, Vector]:
+def _start_values(start: Any, tangential: tuple[int, ...]) -> tuple[float, Vector]:
+    """alpha and the forces (m,) of a start whose lambda_t has that shape."""
     if isinstance(start, tuple) and len(start) == 3:
         alpha, lambda_n, lambda_t = start
     elif all(hasattr(start, name) for name in ("alpha", "lambda_n", "lambda_t")) and not isinstance(start, PathData):
@@ -94,15 +93,18 @@ def _start_values(start: Any, p: int) -> tuple[float, Vector]:
             f"start is a {type(start).__name__}; expected a Root, a PathPoint or (alpha, lambda_n, lambda_t)"
         )
     parts = []
-    for name, part in (("lambda_n", lambda_n), ("lambda_t", lambda_t)):
+    for name, part, shape in (("lambda_n", lambda_n, tangential[:1]), ("lambda_t", lambda_t, tangential)):
         parts.append(np.atleast_1d(real_array(part, f"{name} of start", error=InvalidArgumentError)))
-        if parts[-1].shape != (p,):
-            raise InvalidArgumentError(f"{name} of start has shape {parts[-1].shape}; expected ({p},)")
-    return float(alpha_value(alpha, "alpha of start")), np.concatenate(parts)
+        if parts[-1].shape != shape:
+            raise InvalidArgumentError(f"{name} of start has shape {parts[-1].shape}; expected {shape}")
+    return float(alpha_value(alpha, "alpha of start")), np.concatenate([part.ravel(order="F") for part in parts])
 
 
 def _interval(
-    problem: ContactProblem, interval: tuple[AlphaLike, AlphaLike] | None, start: float, smooth_path: SmoothPath | None
+    problem: ContactProblem | ContactProblem3D,
+    interval: tuple[AlphaLike, AlphaLike] | None,
+    start: float,
+    smooth_path: SmoothPath | None,
 ) -> tuple[float, float]:
     affine = smooth_path is None or smooth_path.F is None
     if interval is None:
@@ -119,9 +121,9 @@ def _interval(
     return low, high
 
 
-def friction_domain(problem: ContactProblem) -> tuple[float, float]:
+def friction_domain(problem: ContactProblem | ContactProblem3D) -> tuple[float, float]:
     """The range of alpha in which no coefficient F0 + alpha F1 is negative."""
-    F0, F1 = problem.friction
+    F0, F1 = affine_friction(problem)
     with np.errstate(divide="ignore", invalid="ignore"):
         zero = -F0 / F1
     low = np.max(zero[F1 > 0], initial=-math.inf)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
+from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
 from enumsol.errors import TooLargeError
 from enumsol.roots.local_branch import MAX_SELECTIONS
 from enumsol.support.immutable import Sealed
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
+    from enumsol.continuation.scaled_equation import Codes, ScaledEquation, Vector
     from enumsol.model.statuses import ContactStatus
 
 #: A singular value of a selection's balanced gradient below this fraction of the largest counts as zero.
@@ -44,7 +44,7 @@ class Tangent(Sealed):
         Statuses on the curve.
     dalpha : float
         Derivative of alpha with respect to the arclength; 0 on a vertical segment.
-    dlambda : (p, 2) array
+    dlambda : (p, 2) array, in 3D (p, 3)
         Derivatives of (lambda_n, lambda_t) [force].
     orientation : int
         +1 positively oriented (theory, (8.2)), -1 negatively, 0 undecided.
@@ -65,14 +65,14 @@ class Tangent(Sealed):
         return f"Tangent(dalpha={self.dalpha:+.3g}, orientation={self.orientation:+d}, [{names}])"
 
 
-def orientation(equation: CondensedEquation, codes: Codes, x: Vector, tangent: Vector) -> int:
+def orientation(equation: ScaledEquation, codes: Codes, x: Vector, tangent: Vector) -> int:
     """Sign of det [grad H; tangent'] in a selection: +1, -1, or 0 where the matrix is singular."""
     J = equation.jacobian(equation.selection(codes), x)
     bordered = np.vstack([J, equation.metric @ tangent])
     return int(np.linalg.slogdet(bordered)[0])
 
 
-def curve_tangent(equation: CondensedEquation, codes: Codes, x: Vector, sign: int) -> Vector | None:
+def curve_tangent(equation: ScaledEquation, codes: Codes, x: Vector, sign: int) -> Vector | None:
     """Unit tangent of a selection's solution curve with the given orientation; None where it is not unique."""
     J = equation.jacobian(equation.selection(codes), x)
     if not np.all(np.isfinite(J)):
@@ -89,7 +89,7 @@ def curve_tangent(equation: CondensedEquation, codes: Codes, x: Vector, sign: in
 
 
 def admissible_tangents(
-    equation: CondensedEquation, x: Vector, tolerance: float = STATUS_TOLERANCE
+    equation: ScaledEquation, x: Vector, tolerance: float = STATUS_TOLERANCE
 ) -> tuple[Tangent, ...]:
     """All directions in which a solution curve leaves x, in the order of their selections.
 
@@ -119,7 +119,7 @@ def admissible_tangents(
     return tuple(found)
 
 
-def describe(equation: CondensedEquation, codes: Codes, x: Vector, vector: Vector) -> Tangent:
+def describe(equation: ScaledEquation, codes: Codes, x: Vector, vector: Vector) -> Tangent:
     """The tangent in the user's units, with its orientation."""
     p = equation.p
     sign = orientation(equation, codes, x, vector)
@@ -132,14 +132,14 @@ def describe(equation: CondensedEquation, codes: Codes, x: Vector, vector: Vecto
     return Tangent(
         equation.statuses(codes, slip),
         float(vector[-1] * equation.alpha_scale),
-        np.column_stack([change[:p], change[p:]]),
+        change.reshape(-1, p).T,
         sign,
         codes,
         vector,
     )
 
 
-def _leaves_into(equation: CondensedEquation, codes: Codes, x: Vector, vector: Vector, tolerance: float) -> bool:
+def _leaves_into(equation: ScaledEquation, codes: Codes, x: Vector, vector: Vector, tolerance: float) -> bool:
     """Whether the conditions of the selection that vanish at x do not become negative along the vector."""
     at_zero = equation.slacks(codes, x) <= tolerance
     rates = equation.slack_rates(codes, x, vector)
@@ -173,7 +173,7 @@ def _kernel(J: Vector) -> Vector:
     return np.asarray(np.linalg.qr(basis)[0])
 
 
-def _directions(equation: CondensedEquation, codes: Codes, x: Vector) -> Iterator[Vector]:
+def _directions(equation: ScaledEquation, codes: Codes, x: Vector) -> Iterator[Vector]:
     """Unit vectors, up to sign, along which the selection's solution set leaves x (none when it is a surface)."""
     rows = equation.selection(codes)
     J = equation.jacobian(rows, x)
@@ -189,7 +189,7 @@ def _directions(equation: CondensedEquation, codes: Codes, x: Vector) -> Iterato
 
 
 def _second_derivative(
-    equation: CondensedEquation, rows: NDArray[np.bool_], x: Vector, left: Vector, kernel: Vector
+    equation: ScaledEquation, rows: NDArray[np.bool_], x: Vector, left: Vector, kernel: Vector
 ) -> Vector:
     """The bifurcation form left' D2H(x)[a, b] on a two-dimensional kernel, by central differences of the gradient."""
     form = np.empty((2, 2))

@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.continuation.condensed_equation import STATUS_TOLERANCE
 from enumsol.continuation.corrector import smooth_newton
+from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
 from enumsol.continuation.tangents import (
     RATE_TOLERANCE,
     SAME_TANGENT,
     Tangent,
     admissible_tangents,
     curve_tangent,
+    orientation,
 )
-from enumsol.model.statuses import ACROSS, CONDITIONS, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from enumsol.continuation.condensed_equation import Codes, CondensedEquation, Vector
+    from enumsol.continuation.scaled_equation import Codes, ScaledEquation, Vector
 
 
 #: Conditions within this of zero hold with equality at a located transition point.
@@ -35,6 +35,9 @@ ACTIVE_TOLERANCE = 1e-8
 #: Lengths along the path that should be positive may be negative by this much: a condition accepted at -ROUNDING lies
 #: behind its zero by that over its rate, which may be small.
 FORWARD_TOLERANCE = 1e-7
+#: How far the middle of a piece may lie from the cubic through its ends, relative to its length, where a selection may
+#: have several curves: an end on another curve shows as a detour.
+DETOUR_TOLERANCE = 1e-2
 #: Cosine of the largest turn of the tangent along an accepted piece of one selection's curve (60 degrees).
 LEAST_COSINE = 0.5
 
@@ -65,7 +68,7 @@ class Kink:
     alternatives: tuple[Tangent, ...] = ()
 
 
-def same_curve(equation: CondensedEquation, start: CurvePoint, end: CurvePoint, *, sharp: bool = False) -> bool:
+def same_curve(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, *, sharp: bool = False) -> bool:
     """Whether ``end`` lies ahead of ``start`` on one smooth piece of a selection's curve, all of it admissible.
 
     The piece is judged by both tangents and by the cubic Hermite interpolants of all conditions: one that dips below
@@ -84,7 +87,49 @@ def same_curve(equation: CondensedEquation, start: CurvePoint, end: CurvePoint, 
     d0 = length * equation.slack_rates(start.codes, start.x, start.tangent)
     d1 = length * equation.slack_rates(start.codes, end.x, end.tangent)
     least = _hermite_minimum(s0[finite], s1[finite], d0[finite], d1[finite])
-    return bool(np.min(least, initial=0.0) >= -ACTIVE_TOLERANCE)
+    if np.min(least, initial=0.0) < -ACTIVE_TOLERANCE:
+        return False
+    return equation.single_valued or _joined(equation, start, end, length)
+
+
+def _joined(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, length: float) -> bool:
+    """Whether the curve runs near the cubic Hermite interpolant between two of its points, in its middle."""
+    chord = end.x - start.x
+    middle = start.x + 0.5 * chord + length / 8 * (start.tangent - end.tangent)
+    row = equation.metric @ chord / length
+    x = smooth_newton(equation, start.codes, middle, row, float(row @ middle), FORWARD_TOLERANCE)
+    return x is not None and equation.norm(x - middle) <= DETOUR_TOLERANCE * length + FORWARD_TOLERANCE
+
+
+def turning_point(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, tolerance: float) -> CurvePoint | None:
+    """The fold between two points of a smooth piece, at which alpha turns back; None where there is none.
+
+    Only a selection that has several solutions at one alpha turns within itself (theory, section 8.12).
+    """
+    if equation.single_valued or start.tangent[-1] * end.tangent[-1] >= 0 or start.codes != end.codes:
+        return None
+    from scipy.optimize import brentq  # seldom needed
+
+    chord = end.x - start.x
+    row, far = equation.metric @ chord, equation.dot(chord, chord)
+    sign = orientation(equation, start.codes, start.x, start.tangent)
+    found: dict[float, CurvePoint] = {}
+
+    def slope(share: float) -> float:
+        x = smooth_newton(
+            equation, start.codes, start.x + share * chord, row, float(row @ start.x) + share * far, tolerance
+        )
+        tangent = None if x is None else curve_tangent(equation, start.codes, x, sign)
+        if x is None or tangent is None:
+            raise ValueError("no point of the curve")
+        found[share] = CurvePoint(x, start.codes, tangent)
+        return float(tangent[-1])
+
+    try:
+        share = float(brentq(slope, 0.0, 1.0, xtol=tolerance))
+    except ValueError:
+        return None
+    return found.get(share)
 
 
 def _hermite_minimum(s0: Vector, s1: Vector, d0: Vector, d1: Vector) -> Vector:
@@ -103,7 +148,7 @@ def _hermite_minimum(s0: Vector, s1: Vector, d0: Vector, d1: Vector) -> Vector:
 
 
 def locate(
-    equation: CondensedEquation, start: CurvePoint, which: tuple[int, int], sign: int, tolerance: float
+    equation: ScaledEquation, start: CurvePoint, which: tuple[int, int], sign: int, tolerance: float
 ) -> CurvePoint | None:
     """The point ahead on the curve of ``start`` at which this slack vanishes and every other condition still holds."""
     x = smooth_newton(equation, start.codes, start.x, which, 0.0, tolerance)
@@ -119,40 +164,22 @@ def locate(
     return point if same_curve(equation, start, point) else None
 
 
-def _across(code: int, k: int) -> list[int]:
-    """The statuses on the other side of the k-th inequality of a status."""
-    return [other for other, _ in ACROSS[code, CONDITIONS[code].inequalities[k]]]
-
-
-def flip(equation: CondensedEquation, codes: Codes, x: Vector, which: tuple[int, int]) -> Codes:
-    """Statuses after one slack vanished: the selection whose sign row has that one sign changed."""
-    i, k = which
-    new = _across(codes[i], k)[0]
-    if codes[i] == OPEN:
-        slip = equation.w(x)[equation.p + i]
-        new = FRICTIONLESS if equation.frictionless[i] else (SLIP_PLUS if slip > 0 else SLIP_MINUS)
-    return (*codes[:i], new, *codes[i + 1 :])
-
-
-def single_flip(before: Codes, after: Codes) -> tuple[int, int] | None:
+def single_flip(equation: ScaledEquation, before: Codes, after: Codes) -> tuple[int, int] | None:
     """The slack of ``before`` that vanishes when one node changes to a neighbouring status; None for other changes."""
     changed = [i for i in range(len(before)) if before[i] != after[i]]
     if len(changed) != 1:
         return None
     i = changed[0]
-    kinds = range(len(CONDITIONS[before[i]].inequalities))
-    return next(((i, k) for k in kinds if after[i] in _across(before[i], k)), None)
+    return next(((i, k) for k in range(2) if after[i] in equation.across(before[i], k)), None)
 
 
-def confirm(
-    equation: CondensedEquation, start: CurvePoint, end: CurvePoint, sign: int, tolerance: float
-) -> Kink | None:
+def confirm(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, sign: int, tolerance: float) -> Kink | None:
     """The one transition point between two points whose selections differ in one status; None if it is not between."""
-    which = single_flip(start.codes, end.codes)
+    which = single_flip(equation, start.codes, end.codes)
     if which is None:
         return None
     before = locate(equation, start, which, sign, tolerance)
-    if before is None or flip(equation, start.codes, before.x, which) != end.codes:
+    if before is None or equation.flip(start.codes, before.x, which) != end.codes:
         return None
     tangent = curve_tangent(equation, end.codes, before.x, sign)
     if tangent is None or np.min(equation.slacks(end.codes, before.x)) < -ACTIVE_TOLERANCE:
@@ -162,7 +189,7 @@ def confirm(
 
 
 def _vanishing(
-    equation: CondensedEquation, point: CurvePoint, size: Callable[[Vector], Vector]
+    equation: ScaledEquation, point: CurvePoint, size: Callable[[Vector], Vector]
 ) -> Iterator[tuple[int, int]]:
     """Slacks that fall along the tangent, in the order of the distances ``size`` of the slack by its rate."""
     slacks = equation.slacks(point.codes, point.x)
@@ -175,7 +202,7 @@ def _vanishing(
         yield int(i), int(k)
 
 
-def next_kink(equation: CondensedEquation, start: CurvePoint, sign: int, tolerance: float) -> CurvePoint | None:
+def next_kink(equation: ScaledEquation, start: CurvePoint, sign: int, tolerance: float) -> CurvePoint | None:
     """The nearest point ahead at which the curve of ``start`` stops being admissible; near zeros are tried first."""
     for which in _vanishing(equation, start, lambda slacks: np.maximum(slacks, 0.0)):
         point = locate(equation, start, which, sign, tolerance)
@@ -185,7 +212,7 @@ def next_kink(equation: CondensedEquation, start: CurvePoint, sign: int, toleran
 
 
 def passed_kink(
-    equation: CondensedEquation, start: CurvePoint, sign: int, tolerance: float, reach: float
+    equation: ScaledEquation, start: CurvePoint, sign: int, tolerance: float, reach: float
 ) -> CurvePoint | None:
     """The nearest transition point of the curve of ``start`` within ``reach``, be it ahead or just behind.
 
@@ -201,7 +228,7 @@ def passed_kink(
     return None
 
 
-def continuations(equation: CondensedEquation, arrival: CurvePoint, sign: int) -> tuple[list[Tangent], list[Tangent]]:
+def continuations(equation: ScaledEquation, arrival: CurvePoint, sign: int) -> tuple[list[Tangent], list[Tangent]]:
     """Directions that leave a transition point: those that keep the orientation, and all others but the arrival's.
 
     The balance of degrees at a vertex (theory, (7.3)) leaves at least one of the first kind where all solutions
@@ -219,7 +246,7 @@ def continuations(equation: CondensedEquation, arrival: CurvePoint, sign: int) -
 _RANK = 1e-10
 
 
-def selection_distance(equation: CondensedEquation, codes: Codes, x: Vector) -> float:
+def selection_distance(equation: ScaledEquation, codes: Codes, x: Vector) -> float:
     """Distance of x from the solutions of one selection at the alpha of x; infinite when it has none there.
 
     The solutions are x + y for all y that solve the selection's equations and keep its conditions, both affine in y.

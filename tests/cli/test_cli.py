@@ -216,7 +216,6 @@ def test_jobs_in_3d(capsys, tmp_path):
     "arguments",
     [
         ("graph", "gallery:block3d-4", "--from", 0, "--to", 1),
-        ("follow", "gallery:one-node-3d", "--from", 0, "--to", 1, "--start", 1),
         ("audit", "gallery:one-node-3d", "some.csv"),
     ],
 )

@@ -287,3 +287,12 @@ def test_two_node_branches_end_to_end(capsys, tmp_path):
     start = ("follow", tmp_path / "p.npz", "--from", 0, "--to", 10, "--start", 3.5, "--csv", file)
     assert run(capsys, *start)[0] == 0
     assert run(capsys, "audit", tmp_path / "p.npz", file, "--arithmetic", "exact")[0] == 0
+
+
+def test_follow_takes_problems_in_3d(capsys, tmp_path):
+    csv = tmp_path / "points.csv"
+    sliding = ("follow", "gallery:block3d-4", "--from", 0, "--to", 0.5, "--start", 0.25, "--csv", csv)
+    status, out, _ = run(capsys, *sliding)
+    assert status == 0
+    assert "left the interval or closed" in out
+    assert "lambda_t2_" in csv.read_text().splitlines()[0]

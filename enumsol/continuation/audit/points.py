@@ -94,6 +94,8 @@ def read_points(
 
 def _from_path(number: int, path: Path, p: int) -> PointRun:
     _check_nodes(path.lambda_n.shape[1], p)
+    if path.lambda_t.ndim == 3:
+        raise InvalidArgumentError(f"path {number} is one in 3D; expected a path in 2D, as graphs are")
     forces = np.hstack([path.lambda_n, path.lambda_t])
     finite = np.isfinite(path.alpha) & np.all(np.isfinite(forces), axis=1)
     if not np.all(finite):

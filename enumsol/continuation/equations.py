@@ -1,0 +1,51 @@
+"""The condensed equation of a problem in 2D or 3D."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from enumsol.continuation.condensed_equation import CondensedEquation
+from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
+from enumsol.continuation.space_equation import SpaceEquation
+from enumsol.errors import InvalidArgumentError
+from enumsol.model.contact_body import ContactBody
+from enumsol.model.problem import ContactProblem
+from enumsol.support.arguments import instance_of
+
+if TYPE_CHECKING:
+    from enumsol.continuation.scaled_equation import ScaledEquation
+
+
+def check_problem(problem: Any, smooth_path: SmoothPath | None, what: str) -> None:
+    """Refuse what continuation does not take.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The problem is none, is not held, or has friction that depends on the solution; or a smooth path is given in 3D.
+    """
+    if not isinstance(problem, ContactBody):
+        instance_of(problem, ContactProblem, "problem")
+    problem.check_held(what)
+    if smooth_path is not None:
+        instance_of(smooth_path, SmoothPath, "smooth_path")
+        if not isinstance(problem, ContactProblem):
+            raise InvalidArgumentError(
+                "smooth_path is given with a problem in 3D; expected None, and friction and load that are affine in "
+                "alpha"
+            )
+
+
+def equation_on(
+    problem: Any,
+    smooth_path: SmoothPath | None,
+    start: float,
+    interval: tuple[float, float] = (-math.inf, math.inf),
+    r: float | None = None,
+    alpha_scale: float = 1.0,
+) -> ScaledEquation:
+    """The equation of a problem, on its own affine path or a smooth one; for the arguments see ScaledEquation."""
+    path = AffinePath(problem) if smooth_path is None else CallablePath(problem, smooth_path, start)
+    kind = CondensedEquation if isinstance(problem, ContactProblem) else SpaceEquation
+    return kind(path, interval, start, r, alpha_scale)

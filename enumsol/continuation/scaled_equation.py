@@ -1,0 +1,237 @@
+"""What the condensed equations in 2D and 3D share: variables without units, and the metric of the path.
+
+The first block of H is linear in u and is eliminated once and for all: w = g(alpha) - S lambda (theory, section 8.1).
+What is left has m + 1 unknowns x = (lambda, alpha), m = 2p or in 3D 3p, scaled so that
+
+- the energy of the load is one: forces are measured by G / s_i and displacements by G s_i, where s_i^2 is the geometric
+  mean of the node's normal and tangential compliances and G^2 the largest g' S^-1 g on the interval,
+- alpha is measured by ``alpha_scale``.
+
+Lengths are those of the metric W = diag(S, 1) in these variables: the arclength ds of a path satisfies
+
+    ds^2 = d lambda' S d lambda / G^2 + (d alpha / alpha_scale)^2.
+
+On a friction path its first part is the elastic energy of the change of displacement. Signs of determinants of the full
+Jacobian of H bordered by a tangent are those of the condensed one, because A is positive definite.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.continuation.parameter_path import ParameterPath, PathValues
+    from enumsol.model.statuses import ContactStatus
+    from enumsol.roots.local_branch import LocalBranchTest
+
+    Vector = NDArray[np.float64]
+    Codes = tuple[int, ...]
+
+#: A condition within this of zero counts as met with equality; forces and displacements are of size one after scaling,
+#: points are converged to about 1e-12.
+STATUS_TOLERANCE = 1e-9
+#: Interval points at which the size of a load that varies is measured.
+_LOAD_SAMPLES = 9
+
+
+class ScaledEquation(ABC):
+    """H, its selections, their conditions and the metric of the path.
+
+    Points x have shape (m + 1,): scaled lambda (all normals first) and alpha. Selections are named by rows of booleans,
+    one for every node, or, at solutions, by status codes.
+
+    Parameters
+    ----------
+    path : ParameterPath
+    interval : (float, float)
+        Where the load is measured; may be infinite.
+    start : float
+        An alpha on the path.
+    r : float or None
+        The r of H [force / length]; None for each node's own stiffness.
+    alpha_scale : float
+        Change of alpha that counts as one.
+    """
+
+    #: A selection has one solution at most for an alpha at which it is regular.
+    single_valued: bool
+
+    def __init__(
+        self,
+        path: ParameterPath,
+        interval: tuple[float, float] = (-math.inf, math.inf),
+        start: float = 0.0,
+        r: float | None = None,
+        alpha_scale: float = 1.0,
+    ) -> None:
+        self.path = path
+        self.problem = path.problem
+        self.p = self.problem.p
+        self.alpha_scale = alpha_scale
+        condensed = self.problem.condensed
+        sigma, self.S = condensed.node_scale, condensed.balanced
+        self.without = path.frictionless
+        self.frictionless = self.without if self.without.ndim == 1 else np.all(self.without, axis=1)
+        load = self._load_energy(interval, start, sigma)
+        self.force, self.length = load / sigma, load * sigma
+        # the r of each row in scaled variables
+        self.r = np.ones(len(sigma)) if r is None else r * sigma**2
+        self._last: tuple[float, PathValues] | None = None
+
+    def _load_energy(self, interval: tuple[float, float], start: float, sigma: Vector) -> float:
+        low, high = interval
+        samples = [start]
+        if math.isfinite(low) and math.isfinite(high):
+            samples += list(np.linspace(low, high, _LOAD_SAMPLES))
+        loads = np.array([self.path.at(alpha).g for alpha in samples]) / sigma
+        loads = loads[np.all(np.isfinite(loads), axis=1)]
+        size = float(np.max(np.abs(loads), initial=0.0))
+        if size == 0:
+            return 1.0
+        # loads of size one: their squares neither overflow nor underflow
+        loads = loads / size
+        try:
+            forces = np.linalg.solve(self.S, loads.T)
+        except np.linalg.LinAlgError:  # S is singular within rounding
+            forces = np.linalg.lstsq(self.S, loads.T, rcond=None)[0]
+        energy = float(np.max(np.einsum("ij,ji->i", loads, forces)))
+        return size * math.sqrt(energy) if energy > 0 else size
+
+    # -- values ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def metric(self) -> Vector:
+        """W, shape (m + 1, m + 1)."""
+        W = np.zeros((len(self.S) + 1, len(self.S) + 1))
+        W[:-1, :-1] = self.S
+        W[-1, -1] = 1.0
+        return W
+
+    def dot(self, a: Vector, b: Vector) -> float:
+        """Inner product of two vectors in the metric W."""
+        return float(a[:-1] @ (self.S @ b[:-1]) + a[-1] * b[-1])
+
+    def norm(self, a: Vector) -> float:
+        """Length of a vector."""
+        return math.sqrt(max(self.dot(a, a), 0.0))
+
+    def point(self, alpha: float, forces: Vector) -> Vector:
+        """The scaled point x of unscaled alpha and lambda (m,)."""
+        return np.concatenate([forces / self.force, [alpha / self.alpha_scale]])
+
+    def alpha(self, x: Vector) -> float:
+        """Unscaled alpha."""
+        return float(x[-1] * self.alpha_scale)
+
+    def forces(self, x: Vector) -> Vector:
+        """Unscaled lambda, shape (m,)."""
+        return np.asarray(x[:-1] * self.force)
+
+    def at(self, x: Vector) -> PathValues:
+        """Scaled values of the paths; derivatives are with respect to the scaled alpha."""
+        alpha = self.alpha(x)
+        if self._last is None or self._last[0] != alpha:
+            raw = self.path.at(alpha)
+            a = self.alpha_scale
+            scaled = type(raw)(raw.g / self.length, raw.F, raw.dg * a / self.length, raw.dF * a)
+            self._last = (alpha, scaled)
+        return self._last[1]
+
+    def w(self, x: Vector) -> Vector:
+        """Scaled (u_n, u_t), shape (m,)."""
+        return np.asarray(self.at(x).g - self.S @ x[:-1])
+
+    def displacements(self, x: Vector) -> Vector:
+        """Unscaled (u_n, u_t), shape (m,)."""
+        return np.asarray(self.w(x) * self.length)
+
+    def split(self, values: Vector) -> tuple[Vector, Vector]:
+        """Normal and tangential parts of arrays (..., m): (..., p) both, in 3D (..., p, 2) the latter."""
+        p = self.p
+        normal, tangential = values[..., :p], values[..., p:]
+        if tangential.shape[-1] == p:
+            return normal, tangential
+        return normal, np.stack([tangential[..., :p], tangential[..., p:]], axis=-1)
+
+    # -- H and its selections ----------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def residual(self, x: Vector) -> Vector:
+        """H(x) for each node's own r, shape (m,).
+
+        Solutions do not depend on r, and neither may the decision whether x is one: a tiny r would make any
+        displacement small, and a huge one any rounding error large.
+        """
+
+    @abstractmethod
+    def merit(self, x: Vector) -> float:
+        """Norm of H(x) for the given r, which its Newton directions lower."""
+
+    @abstractmethod
+    def selection_at(self, x: Vector) -> NDArray[np.bool_]:
+        """Rows of the selection that is active at x; they depend on the r of H."""
+
+    @abstractmethod
+    def selection(self, codes: Codes) -> NDArray[np.bool_]:
+        """Rows of the selection in which the nodes have these statuses."""
+
+    @abstractmethod
+    def selection_residual(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
+        """The named selection function of H, shape (m,), its rows scaled by positive factors to size one."""
+
+    @abstractmethod
+    def jacobian(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
+        """Gradient of the named selection function (see selection_residual), shape (m, m + 1)."""
+
+    # -- statuses and their conditions -------------------------------------------------------------------------------
+
+    @abstractmethod
+    def slacks(self, codes: Codes, x: Vector) -> Vector:
+        """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
+
+    @abstractmethod
+    def slack_gradient(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Vector:
+        """Gradient of one slack with respect to x, shape (m + 1,)."""
+
+    @abstractmethod
+    def slack_rates(self, codes: Codes, x: Vector, tangent: Vector) -> Vector:
+        """Derivatives of the slacks along a tangent, shape (p, 2); zero where there is one condition."""
+
+    @abstractmethod
+    def across(self, code: int, k: int) -> Sequence[int]:
+        """The statuses on the other side of the k-th condition of a status; none where it has no such condition."""
+
+    @abstractmethod
+    def flip(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Codes:
+        """Statuses after one slack vanished: the selection next to it across that condition."""
+
+    @abstractmethod
+    def active(self, x: Vector, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
+        """Per node the status codes whose equations and conditions hold within the tolerance."""
+
+    @abstractmethod
+    def codes(self, x: Vector, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
+        """Statuses at a solution by the signs of the test functions; ``prefer`` is kept where it holds too."""
+
+    @abstractmethod
+    def statuses(self, codes: Sequence[int], slip: Vector) -> tuple[ContactStatus, ...]:
+        """Names of the statuses; that of a frictionless node in contact is told by its u_t, ``slip`` (m - p,)."""
+
+    @abstractmethod
+    def local_test(self, x: Vector) -> LocalBranchTest:
+        """The local branch test at a point of a path (theory, section 3.2).
+
+        Raises
+        ------
+        TooLargeError
+            Too many selections hold there.
+        """

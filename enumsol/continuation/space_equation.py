@@ -1,0 +1,290 @@
+"""The condensed equation H = 0 in 3D, on which the continuation works (theory, section 8.12).
+
+At a node with friction let c be the mean of its coefficients, q = F / c their ratios to it, and
+
+    zeta = lambda_t / q + r q w_t,    d = zeta / |zeta|,
+
+component by component. A slipping node has lambda_t = lambda_n F d: one smooth piece holds all directions of slip. It
+stays smooth where F = 0, where lambda_t tells no direction and the slip does, and where the slip vanishes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from math import prod
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
+from enumsol.errors import TooLargeError
+from enumsol.model.sectors import SECTORS
+from enumsol.model.statuses import FRICTIONLESS, OPEN, STICK, ContactStatus
+from enumsol.roots.local_branch import LOCATED_SINGULAR_TOLERANCE, MAX_SELECTIONS, LocalBranchTest
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Vector = NDArray[np.float64]
+    Codes = tuple[int, ...]
+
+#: Slip in any direction: the sector that is the whole circle.
+SLIP = SECTORS + 1
+#: The statuses on the other side of the conditions of a status, in their order.
+_ACROSS = {
+    OPEN: ((SLIP, FRICTIONLESS),),
+    STICK: ((SLIP,),),
+    SLIP: ((OPEN,), (STICK,)),
+    FRICTIONLESS: ((OPEN,),),
+}
+_NAMES = {OPEN: ContactStatus.OPEN, STICK: ContactStatus.STICK, SLIP: ContactStatus.SLIP}
+
+
+@dataclass(frozen=True)
+class _Cone:
+    """Friction at one alpha: F = c q, c (p,) the mean coefficient of a node and q (p, 2), and derivatives."""
+
+    c: Vector
+    q: Vector
+    dc: Vector
+    dq: Vector
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """zeta, its length and its direction, (p, 2), (p,) and (p, 2), and lambda_t / q."""
+
+    length: Vector
+    direction: Vector
+    force: Vector
+
+
+class SpaceEquation(ScaledEquation):
+    """H in 3D: selections are named by rows (p, 2), whether a node is in contact and whether it slips.
+
+    Parameters are those of ScaledEquation.
+    """
+
+    single_valued = False
+
+    # -- friction ----------------------------------------------------------------------------------------------------
+
+    def _cone(self, x: Vector) -> _Cone:
+        values, rubs = self.at(x), ~self.without
+        count = np.maximum(np.sum(rubs, axis=1), 1)
+        F, dF = np.where(rubs, values.F, 0.0), np.where(rubs, values.dF, 0.0)
+        c, dc = np.sum(F, axis=1) / count, np.sum(dF, axis=1) / count
+        # where c = 0 the coefficients vanish together, and keep their ratios
+        some, part = np.where(c != 0, c, dc), np.where((c != 0)[:, None], F, dF)
+        ratio = part / np.where(some != 0, some, 1.0)[:, None]
+        q = np.where(rubs & (some != 0)[:, None], ratio, 1.0)
+        dq = np.where(rubs & (c != 0)[:, None], (dF - q * dc[:, None]) / np.where(c != 0, c, 1.0)[:, None], 0.0)
+        return _Cone(c, q, dc, dq)
+
+    def _inverse(self, cone: _Cone) -> Vector:
+        """1 / q of the components with friction, 0 of the others."""
+        return np.where(self.without | (cone.q == 0), 0.0, 1.0 / np.where(cone.q != 0, cone.q, 1.0))
+
+    def _trial(self, x: Vector, r: Vector, cone: _Cone) -> _Trial:
+        slip, force = self.split(self.w(x))[1], self.split(x[:-1])[1] * self._inverse(cone)
+        zeta = force + self.split(r)[1] * np.where(self.without, 0.0, cone.q * slip)
+        length = np.linalg.norm(zeta, axis=1)
+        return _Trial(length, zeta / np.where(length > 0, length, 1.0)[:, None], force)
+
+    # -- H and its selections ----------------------------------------------------------------------------------------
+
+    def residual(self, x: Vector) -> Vector:
+        """H(x) for each node's own r, shape (3p,)."""
+        return self._projected(x, np.ones(3 * self.p))
+
+    def merit(self, x: Vector) -> float:
+        """Norm of H(x) for the given r, which its Newton directions lower."""
+        return float(np.linalg.norm(self._projected(x, self.r)))
+
+    def _projected(self, x: Vector, r: Vector) -> Vector:
+        """lambda - P(lambda + r w), P into lambda_n >= 0 and the disc of that lambda_n, in units of q."""
+        cone = self._cone(x)
+        trial, (normal, tangential), (w_n, w_t) = self._trial(x, r, cone), self.split(x[:-1]), self.split(self.w(x))
+        (r_n, r_t), rubs = self.split(r), self._inverse(cone) != 0
+        most = np.maximum(normal + r_n * w_n, 0.0)
+        radius = cone.c * most
+        inside = trial.length <= radius
+        left = np.where(inside[:, None], -r_t * cone.q * w_t, trial.force - radius[:, None] * trial.direction)
+        return _flat(np.where(most > 0, -r_n * w_n, normal), np.where(rubs, cone.q * left, tangential))
+
+    def selection_at(self, x: Vector) -> NDArray[np.bool_]:
+        """Rows of the selection that is active at x, shape (p, 2)."""
+        cone = self._cone(x)
+        normal = self.split(x[:-1] + self.r * self.w(x))[0]
+        slips = self._trial(x, self.r, cone).length > cone.c * np.maximum(normal, 0.0)
+        return np.column_stack([normal > 0, slips & ~self.frictionless])
+
+    def selection(self, codes: Codes) -> NDArray[np.bool_]:
+        """Rows of the selection in which the nodes have these statuses, shape (p, 2)."""
+        named = np.array(codes)
+        return np.column_stack([named != OPEN, named == SLIP])
+
+    def selection_residual(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
+        """The named selection function of H, shape (3p,)."""
+        (normal, tangential), (w_n, w_t) = self.split(x[:-1]), self.split(self.w(x))
+        closed, slips = rows[:, 0], (rows[:, 0] & rows[:, 1])[:, None]
+        direction = self._trial(x, self.r, self._cone(x)).direction
+        held = np.where(slips, tangential - normal[:, None] * self.at(x).F * direction, -w_t)
+        free = ~closed[:, None] | self.without
+        return _flat(np.where(closed, -w_n, normal), np.where(free, tangential, held))
+
+    def jacobian(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
+        """Gradient of the named selection function (see selection_residual), shape (3p, 3p + 1)."""
+        p, values, cone = self.p, self.at(x), self._cone(x)
+        closed, slips = rows[:, 0], (rows[:, 0] & rows[:, 1])[:, None, None]
+        dw_n, dw_t = self._slopes(x)
+        force, node = np.eye(3 * p, 3 * p + 1), np.arange(p)
+        dn, dt = force[:p], np.stack([force[p : 2 * p], force[2 * p :]], axis=1)
+        direction, turned = self._turning(x, cone, dw_t, dt)
+        slip = dt - (x[:p, None] * values.F)[:, :, None] * turned
+        slip[node, :, node] -= values.F * direction
+        slip[:, :, -1] -= x[:p, None] * values.dF * direction
+        held = np.where(slips, slip, -dw_t)
+        free = ~closed[:, None] | self.without
+        tangential = np.where(free[:, :, None], dt, held)
+        return np.concatenate([np.where(closed[:, None], -dw_n, dn), tangential[:, 0], tangential[:, 1]])
+
+    def _slopes(self, x: Vector) -> tuple[Vector, Vector]:
+        """Gradients of w_n and w_t with respect to x, (p, 3p + 1) and (p, 2, 3p + 1)."""
+        p = self.p
+        slope = np.column_stack([-self.S, self.at(x).dg])
+        return slope[:p], np.stack([slope[p : 2 * p], slope[2 * p :]], axis=1)
+
+    def _turning(self, x: Vector, cone: _Cone, dw_t: Vector, dt: Vector) -> tuple[Vector, Vector]:
+        """Directions of slip, (p, 2), and their gradients, (p, 2, 3p + 1)."""
+        trial, r, inverse = self._trial(x, self.r, cone), self.split(self.r)[1], self._inverse(cone)
+        slip = self.split(self.w(x))[1]
+        moved = inverse[:, :, None] * dt + np.where(self.without, 0.0, r * cone.q)[:, :, None] * dw_t
+        moved[:, :, -1] += np.where(self.without, 0.0, r * slip * cone.dq) - trial.force * inverse * cone.dq
+        d = trial.direction
+        across = moved - d[:, :, None] * np.einsum("ik,ikj->ij", d, moved)[:, None]
+        with np.errstate(divide="ignore"):
+            return d, across * np.where(trial.length > 0, 1.0 / trial.length, 0.0)[:, None, None]
+
+    # -- statuses and their conditions -------------------------------------------------------------------------------
+
+    def _room(self, x: Vector, cone: _Cone) -> tuple[Vector, Vector]:
+        """c lambda_n - |lambda_t / q| over 1 + c, (p,), and the direction of lambda_t / q."""
+        force = self.split(x[:-1])[1] * self._inverse(cone)
+        size = np.linalg.norm(force, axis=1)
+        return (cone.c * x[: self.p] - size) / (1.0 + cone.c), force / np.where(size > 0, size, 1.0)[:, None]
+
+    def slacks(self, codes: Codes, x: Vector) -> Vector:
+        """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
+        named, cone, (w_n, w_t) = np.array(codes), self._cone(x), self.split(self.w(x))
+        along = np.sum(self._trial(x, self.r, cone).direction * cone.q * w_t, axis=1)
+        first = np.select([named == OPEN, named == STICK], [-w_n, self._room(x, cone)[0]], x[: self.p])
+        return np.column_stack([first, np.where(named == SLIP, along, np.inf)])
+
+    def _slack_gradients(self, codes: Codes, x: Vector) -> Vector:
+        """Gradients of all slacks, shape (p, 2, 3p + 1), 0 where there is one condition."""
+        p, named, cone = self.p, np.array(codes), self._cone(x)
+        dw_n, dw_t = self._slopes(x)
+        force, node = np.eye(3 * p, 3 * p + 1), np.arange(p)
+        dt = np.stack([force[p : 2 * p], force[2 * p :]], axis=1)
+        found = np.zeros((p, 2, 3 * p + 1))
+        found[:, 0] = np.where((named == OPEN)[:, None], -dw_n, force[:p])
+        room, towards = self._room(x, cone)
+        inverse, tangential = self._inverse(cone), self.split(x[:-1])[1]
+        stick = -np.einsum("ik,ikj->ij", towards * inverse, dt)
+        stick[node, node] += cone.c
+        stick[:, -1] += cone.dc * (x[:p] - room) + np.sum(towards * tangential * inverse**2 * cone.dq, axis=1)
+        found[:, 0] = np.where((named == STICK)[:, None], stick / (1.0 + cone.c)[:, None], found[:, 0])
+        direction, turned = self._turning(x, cone, dw_t, dt)
+        slip = self.split(self.w(x))[1]
+        along = np.einsum("ik,ikj->ij", direction * cone.q, dw_t) + np.einsum("ik,ikj->ij", cone.q * slip, turned)
+        along[:, -1] += np.sum(direction * cone.dq * slip, axis=1)
+        found[:, 1] = np.where((named == SLIP)[:, None], along, 0.0)
+        return found
+
+    def slack_gradient(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Vector:
+        """Gradient of one slack with respect to x, shape (3p + 1,)."""
+        return np.asarray(self._slack_gradients(codes, x)[which])
+
+    def slack_rates(self, codes: Codes, x: Vector, tangent: Vector) -> Vector:
+        """Derivatives of the slacks along a tangent, shape (p, 2); zero where there is one condition."""
+        return np.asarray(self._slack_gradients(codes, x) @ tangent)
+
+    def across(self, code: int, k: int) -> Sequence[int]:
+        """The statuses on the other side of the k-th condition of a status."""
+        return _ACROSS[code][k] if k < len(_ACROSS[code]) else ()
+
+    def flip(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Codes:
+        """Statuses after one slack vanished: a node that comes into contact slips at once."""
+        i, k = which
+        new = _ACROSS[codes[i]][k][0]
+        if codes[i] == OPEN and self.frictionless[i]:
+            new = FRICTIONLESS
+        return (*codes[:i], new, *codes[i + 1 :])
+
+    def active(self, x: Vector, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
+        """Per node the status codes whose equations and conditions hold within the tolerance."""
+        found: list[set[int]] = [set() for _ in range(self.p)]
+        for code in (OPEN, STICK, SLIP, FRICTIONLESS):
+            codes = (code,) * self.p
+            broken = np.abs(self.selection_residual(self.selection(codes), x)).reshape(3, -1)
+            broken[1:] /= 1.0 + np.max(np.abs(self.at(x).F), axis=1)
+            least = np.min(self.slacks(codes, x), axis=1)
+            least = least if code == OPEN else np.minimum(least, x[: self.p])
+            fits = self.frictionless if code == FRICTIONLESS else ~self.frictionless if code != OPEN else True
+            holds = fits & np.all(broken <= tolerance, axis=0) & (least >= -tolerance)
+            for i in np.flatnonzero(holds):
+                found[i].add(code)
+        return tuple(map(frozenset, found))
+
+    def codes(self, x: Vector, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
+        """Statuses at a solution; ``prefer`` is kept where it holds too."""
+        ones, cone = np.ones(3 * self.p), self._cone(x)
+        normal = (x[:-1] + self.w(x))[: self.p]
+        slips = self._trial(x, ones, cone).length >= cone.c * np.maximum(normal, 0.0)
+        touching = np.where(self.frictionless, FRICTIONLESS, np.where(slips, SLIP, STICK))
+        found = np.where(normal > 0, touching, OPEN).tolist()
+        if prefer is not None:
+            active = self.active(x, tolerance)
+            found = [old if old in held else new for old, new, held in zip(prefer, found, active, strict=True)]
+        return tuple(found)
+
+    def statuses(self, codes: Sequence[int], slip: Vector) -> tuple[ContactStatus, ...]:
+        """Names of the statuses; a frictionless node in contact slips wherever its u_t is not 0."""
+        moves = np.any(np.reshape(slip, (2, -1)) != 0, axis=0)
+        without = (ContactStatus.STICK, ContactStatus.SLIP)
+        return tuple(_NAMES.get(code, without[bool(move)]) for code, move in zip(codes, moves, strict=True))
+
+    # -- signs of determinants ---------------------------------------------------------------------------------------
+
+    def index(self, codes: Codes, x: Vector, singular: float) -> int:
+        """Sign of the selection's determinant at fixed alpha, 0 where it is singular; rows scaled to length one."""
+        J = self.jacobian(self.selection(codes), x)[:, :-1]
+        size = np.linalg.norm(J, axis=1, keepdims=True)
+        J = J / np.where(size > 0, size, 1.0)
+        if not np.all(np.isfinite(J)) or np.linalg.svd(J, compute_uv=False)[-1] <= singular:
+            return 0
+        return int(np.linalg.slogdet(J)[0])
+
+    def local_test(self, x: Vector) -> LocalBranchTest:
+        """The local branch test at a point of a path; see ScaledEquation."""
+        active, slip = self.active(x), self.w(x)[self.p :]
+        count = prod(len(held) for held in active)
+        if count > MAX_SELECTIONS:
+            raise TooLargeError(
+                f"{count} selections hold at alpha = {self.alpha(x):g}; the local branch test examines at most "
+                f"{MAX_SELECTIONS}"
+            )
+        signs = tuple(
+            (self.statuses(codes, slip), self.index(codes, x, LOCATED_SINGULAR_TOLERANCE))
+            for codes in product(*(sorted(held) for held in active))
+        )
+        return LocalBranchTest.from_signs(signs, premise=bool(np.all(self.at(x).F > 0)))
+
+
+def _flat(normal: Vector, tangential: Vector) -> Vector:
+    """Of (p,) and (p, 2) one array (3p,), all normals first."""
+    return np.concatenate([normal, tangential[:, 0], tangential[:, 1]])

@@ -1,0 +1,320 @@
+"""newton and follow in 3D, against enumerations, closed forms of one node and the conditions written out."""
+
+import numpy as np
+import oracles3d
+import pytest
+from problems3d import from_compliance, random_coupled
+from scipy.optimize import brentq
+
+import enumsol
+from enumsol import InvalidArgumentError
+from enumsol.continuation import SmoothPath, follow, newton, start_tangents
+from enumsol.continuation.equations import equation_on
+from enumsol.continuation.space_equation import SLIP, SpaceEquation
+from enumsol.model.statuses import OPEN, STICK
+
+
+def random_path_problem(seed, p=None, load=True):
+    """A problem with orthotropic friction whose load changes with alpha, or whose friction grows from nothing."""
+    rng = np.random.default_rng([seed, 29])
+    p = int(rng.integers(1, 4)) if p is None else p
+    S, g, F = random_coupled(rng, p)
+    A = np.linalg.inv(S)
+    if load:
+        return from_compliance(S, g, (F[:, 0], F[:, 1]), load_slope=A @ rng.normal(size=3 * p))
+    return from_compliance(S, g, (0 * F[:, 0], 0 * F[:, 1]), friction_slope=(F[:, 0], F[:, 1]))
+
+
+def forces(state):
+    return np.concatenate([state.lambda_n, *state.lambda_t.T])
+
+
+def violation(problem, point):
+    """Of the conditions at one point, by the definitions alone."""
+    S, g = problem.condensed.S, problem.condensed.free_displacements(point.alpha)
+    return oracles3d.violation(S, g, problem.friction_at(point.alpha), forces(point))
+
+
+def crossings(problem, path, alpha):
+    """Roots at alpha where a path crosses it."""
+    found = []
+    for k in range(len(path) - 1):
+        first, last = path.alpha[k], path.alpha[k + 1]
+        if (first - alpha) * (last - alpha) <= 0 and first != last:
+            share = (alpha - first) / (last - first)
+            found.append(newton(problem, alpha, (1 - share) * forces(path[k]) + share * forces(path[k + 1])))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_newton_finds_enumerated_roots_with_their_indices_and_statuses(seed):
+    problem = random_path_problem(seed)
+    for root in enumsol.enumerate_roots(problem, 0.5, "fast"):
+        start = root if seed % 2 else forces(root) * 1.001
+        found = newton(problem, 0.5, start)
+        assert found.statuses == root.statuses
+        assert found.index == root.index
+        assert found.regular
+        assert forces(found) == pytest.approx(forces(root), rel=1e-9, abs=1e-9)
+        assert np.allclose(found.u_t, root.u_t, rtol=1e-8, atol=1e-9)
+        assert violation(problem, found) < 1e-10
+
+
+def test_a_just_sticking_node_has_two_statuses_and_no_index():
+    problem = from_compliance(np.eye(3), np.array([1.0, 0.5, 0.0]), 0.5)
+    root = newton(problem, 0)
+    assert root.active == (frozenset({enumsol.ContactStatus.STICK, enumsol.ContactStatus.SLIP}),)
+    assert (root.index, root.regular, root.margin) == (None, False, 0.0)
+
+
+@pytest.mark.parametrize("r", [None, 0.3])
+@pytest.mark.parametrize("seed", range(4))
+def test_gradients_are_those_of_differences(seed, r):
+    rng = np.random.default_rng(seed)
+    problem = from_compliance(*random_coupled(rng, 2)[:2], (1.3, [0.7, 0.0]), friction_slope=(0.4, [-0.2, 0.0]))
+    equation = equation_on(problem, None, 0.3, (-1, 1), r, 0.7)
+    assert isinstance(equation, SpaceEquation)
+    x, step = rng.normal(size=7), 1e-6
+    x[:2] = np.abs(x[:2])
+    for codes in ((STICK, SLIP), (SLIP, STICK), (SLIP, SLIP), (OPEN, SLIP), (STICK, OPEN)):
+        rows = equation.selection(codes)
+        changes, slopes = [], []
+        for unit in np.eye(7) * step:
+            changes.append(equation.selection_residual(rows, x + unit) - equation.selection_residual(rows, x - unit))
+            ahead, behind = equation.slacks(codes, x + unit), equation.slacks(codes, x - unit)
+            slopes.append(np.where(np.isfinite(ahead), ahead, 0.0) - np.where(np.isfinite(behind), behind, 0.0))
+        assert equation.jacobian(rows, x) == pytest.approx(np.array(changes).T / (2 * step), abs=1e-7)
+        direction = rng.normal(size=7)
+        rates = np.einsum("jik,j->ik", np.array(slopes) / (2 * step), direction)
+        assert equation.slack_rates(codes, x, direction) == pytest.approx(rates, abs=1e-6)
+        assert equation.slack_gradient(codes, x, (1, 0)) @ direction == pytest.approx(rates[1, 0], abs=1e-6)
+
+
+# -- one node: alpha is a function of the angle of slip ----------------------------------------------------------------
+
+
+def cross(a, b):
+    return a[0] * b[1] - a[1] * b[0]
+
+
+class OneNode:
+    """One node with isotropic friction; on its slipping branch alpha is a quotient of functions of the slip angle.
+
+    With d the direction of slip, n = g_n / (S_nn + F S_nt d), and v = g_t - n (S_tn + F S_tt d) has no part across d.
+    """
+
+    def __init__(self, seed, load):
+        rng = np.random.default_rng([seed, 3])
+        X = rng.normal(size=(3, 3))
+        self.S, self.load = X @ X.T + 0.05 * np.eye(3), load
+        self.g, self.slope = rng.normal(size=(2, 3))
+        self.g[0] += 1.0
+        self.F = float(rng.uniform(0.5, 4.0))
+
+    @property
+    def problem(self):
+        if self.load:
+            return from_compliance(self.S, self.g, self.F, load_slope=np.linalg.solve(self.S, self.slope))
+        return from_compliance(self.S, self.g, 0.0, friction_slope=1.0)
+
+    def _terms(self, phi):
+        """Numerator and denominator of alpha, with derivatives."""
+        S, d, e = self.S, np.array([np.cos(phi), np.sin(phi)]), np.array([-np.sin(phi), np.cos(phi)])
+        Sd, Se = S[1:, 1:] @ d, S[1:, 1:] @ e
+
+        def plain(g):
+            """Without friction."""
+            return tuple(cross(g[1:], t) * S[0, 0] - g[0] * cross(S[1:, 0], t) for t in (d, e))
+
+        def rubbing(g):
+            """What friction multiplies."""
+            s, ds = S[0, 1:] @ d, S[0, 1:] @ e
+            return (
+                cross(g[1:], d) * s - g[0] * cross(Sd, d),
+                cross(g[1:], e) * s + cross(g[1:], d) * ds - g[0] * (cross(Se, d) + cross(Sd, e)),
+            )
+
+        if not self.load:
+            return (*plain(self.g), *rubbing(self.g))
+        return tuple(
+            one + self.F * more for g in (self.g, self.slope) for one, more in zip(plain(g), rubbing(g), strict=True)
+        )
+
+    def alpha(self, phi):
+        a, _, b, _ = self._terms(phi)
+        return -a / b
+
+    def turning(self, phi):
+        a, da, b, db = self._terms(phi)
+        return da * b - a * db
+
+    def at(self, phi):
+        """alpha and the forces if the node slips in that direction, else None."""
+        alpha, d = self.alpha(phi), np.array([np.cos(phi), np.sin(phi)])
+        F = self.F if self.load else alpha
+        g = self.g + (alpha * self.slope if self.load else 0.0)
+        n = g[0] / (self.S[0, 0] + F * self.S[0, 1:] @ d)
+        v = g[1:] - n * (self.S[1:, 0] + F * self.S[1:, 1:] @ d)
+        return (alpha, n, n * F * d) if n > 0 and v @ d > 0 and F > 0 else None
+
+    def folds(self):
+        """Angles at which alpha turns back on the slipping branch."""
+        grid = np.linspace(-np.pi, np.pi, 2001)
+        values = self.turning(grid)
+        found = []
+        for k in np.flatnonzero(values[:-1] * values[1:] < 0):
+            phi = brentq(self.turning, grid[k], grid[k + 1], xtol=1e-15)
+            if abs(self.alpha(phi)) < 50 and self.at(phi) is not None:
+                found.append(phi)
+        return found
+
+
+def folds_met(load, most):
+    """Follow the slipping branch through folds of random nodes; how many were passed."""
+    met = 0
+    for seed in range(1000):
+        node = OneNode(seed, load)
+        for phi in node.folds():
+            near, fold = [node.at(phi + turn) for turn in (-0.05, -0.02, 0.02, 0.05)], node.alpha(phi)
+            if None in near or (not load and fold < 0.1):
+                continue
+            span = (fold - 1.0 if load else 0.05, fold + 1.0)
+            if not all(span[0] < one[0] < span[1] for one in near):
+                continue
+            alpha, n, t = near[-1]
+            paths = [follow(node.problem, (alpha, [n], [t]), sign, span) for sign in (1, -1)]
+            inner = [item for path in paths for item in path.folds if not item.nodes]
+            assert min(abs(item.alpha - fold) for item in inner) <= 1e-12 * max(1.0, abs(fold))
+            assert not any(item.local_test.exists for item in inner)
+            met += 1
+            if met == most:
+                return met
+    return met
+
+
+@pytest.mark.parametrize("load", [False, True])
+def test_folds_of_one_node_are_those_of_the_closed_form(load):
+    assert folds_met(load, 1) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("load", [False, True])
+def test_many_folds_of_one_node_are_those_of_the_closed_form(load):
+    assert folds_met(load, 6) == 6
+
+
+# -- paths -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", [1, 4, 9])
+@pytest.mark.parametrize("load", [False, True])
+def test_paths_hold_solutions_and_lead_back(seed, load):
+    problem = random_path_problem(seed, p=2, load=load)
+    span, middle = ((-2.0, 2.0), 0.05) if load else ((0.1, 2.0), 1.05)
+    for root in enumsol.enumerate_roots(problem, middle, "fast"):
+        path = follow(problem, root, 1, span)
+        assert path.status == "interval left"
+        assert max(violation(problem, point) for point in path) < 1e-9
+        back = follow(problem, path[-1], -1, span)
+        found = crossings(problem, back, middle)
+        assert any(np.allclose(forces(one), forces(root), rtol=1e-7, atol=1e-7) for one in found)
+
+
+def test_the_jammed_and_the_sliding_root_lie_on_one_branch_and_the_open_one_on_another():
+    problem = enumsol.gallery.get("one-node-3d-3").build().replace(friction=0.0, friction_slope=1.0)
+    jammed, sliding, free = enumsol.enumerate_roots(problem, 5)
+    path = follow(problem, jammed, -jammed.index, (0.5, 6))
+    assert path.status == "interval left"
+    assert path.alpha[-1] == 6
+    (fold,) = path.folds
+    assert 0.5 < fold.alpha < 5
+    assert any(np.allclose(forces(one), forces(sliding), atol=1e-9) for one in crossings(problem, path, 5.0))
+    apart = follow(problem, free, -free.index, (0.5, 6))
+    assert apart.alpha[-1] == 0.5
+    assert not apart.transitions
+    # as many as the enumeration has on both sides of the fold
+    for alpha, count in ((fold.alpha - 1e-3, 1), (fold.alpha + 1e-3, 3)):
+        assert len(enumsol.enumerate_roots(problem, alpha)) == count
+
+
+def two_dimensional(seed):
+    rng = np.random.default_rng(seed)
+    p = 2
+    M = rng.normal(size=(2 * p, 2 * p))
+    S, g, slope = M @ M.T + 0.3 * np.eye(2 * p), 3 * rng.normal(size=2 * p), rng.normal(size=2 * p)
+    return S, g, slope, rng.uniform(0.3, 3, p)
+
+
+@pytest.mark.parametrize("across", ["friction", "none"])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_problem_in_2d_with_a_second_tangent_that_nothing_loads_has_the_same_path(seed, across):
+    S, g, slope, F = two_dimensional(seed)
+    p, A, rows = len(F), np.linalg.inv(S), np.eye(len(g))
+    flat = enumsol.ContactProblem(0.5 * (A + A.T), rows[:p], rows[p:], A @ g, friction=(F, 0.0), load_slope=A @ slope)
+    solid_S = np.eye(3 * p)
+    solid_S[: 2 * p, : 2 * p] = S
+    zero = np.zeros(p)
+    solid = from_compliance(
+        solid_S,
+        np.concatenate([g, zero]),
+        (F, F if across == "friction" else zero),
+        load_slope=np.concatenate([A @ slope, zero]),
+    )
+    for root in enumsol.enumerate_roots(flat, 0.1, "fast"):
+        plane = follow(flat, root, 1, (-3, 3))
+        start = (0.1, root.lambda_n, np.column_stack([root.lambda_t, zero]))
+        space = follow(solid, start, 1, (-3, 3))
+        assert [item.alpha for item in space.transitions] == pytest.approx(
+            [item.alpha for item in plane.transitions], abs=1e-8
+        )
+        assert len(space.folds) == len(plane.folds)
+        assert space.alpha[-1] == pytest.approx(plane.alpha[-1])
+        assert space.lambda_t[-1, :, 0] == pytest.approx(plane.lambda_t[-1], abs=1e-8)
+        assert not np.any(space.lambda_t[..., 1])
+
+
+def test_files_tables_pictures_and_resumed_paths(tmp_path):
+    problem = random_path_problem(1, p=2)
+    root = enumsol.enumerate_roots(problem, 0.05, "fast")[0]
+    path = follow(problem, root, 1, (-2, 2), enumsol.ContinuationOptions(max_steps=3))
+    assert path.status == "step limit"
+    longer = path.resume(options=enumsol.ContinuationOptions())
+    assert longer.status == "interval left"
+    assert longer.lambda_t.shape == (len(longer), 2, 2)
+    longer.save(tmp_path / "path.npz")
+    again = enumsol.Path.load(tmp_path / "path.npz")
+    assert np.array_equal(again.lambda_t, longer.lambda_t)
+    assert again.selections == longer.selections
+    columns = set(longer.to_frame().columns)
+    assert {"lambda_n_0", "lambda_t1_0", "lambda_t2_1", "u_t2_0", "status_1"} <= columns
+    assert "lambda_t_0" not in columns
+    figure = longer.plot(quantity="lambda_t", node=1)
+    assert figure.axes[0].get_ylabel() == "|lambda_t| of node 1"
+    assert len(start_tangents(problem, root)) == 2
+    assert start_tangents(problem, root)[0].dlambda.shape == (2, 3)
+
+
+def test_what_is_not_offered_in_3d_is_refused():
+    problem = random_path_problem(1, p=1)
+    graph = enumsol.branch_graph(enumsol.gallery.one_node_triangle(), (0, 1), "fast")
+    path = follow(problem, newton(problem, 0.0), 1, (0, 1))
+    with pytest.raises(InvalidArgumentError, match="path 0 is one in 3D; expected a path in 2D"):
+        enumsol.audit(path, graph)
+    smooth = SmoothPath(F=lambda alpha: alpha, dF=lambda alpha: 1.0)
+    for call in (
+        lambda: newton(problem, 0, smooth_path=smooth),
+        lambda: follow(problem, (0, [0.0], [[0.0, 0.0]]), smooth_path=smooth),
+    ):
+        with pytest.raises(InvalidArgumentError, match="smooth_path is given with a problem in 3D"):
+            call()
+    with pytest.raises(InvalidArgumentError, match=r"start has shape \(2,\); expected a Root .* \(3,\) or \(1, 3\)"):
+        newton(problem, 0, [1.0, 2.0])
+    with pytest.raises(InvalidArgumentError, match=r"lambda_t of start has shape \(1,\); expected \(1, 2\)"):
+        follow(problem, (0.0, [0.0], [0.0]))
+    weakening = enumsol.gallery.block3d(1, 1, 1, friction=enumsol.FrictionTable([0, 1], [0.5, 0.4]))
+    for call in (
+        lambda: newton(weakening, 0),
+        lambda: follow(weakening, (0, np.zeros(weakening.p), np.zeros((weakening.p, 2)))),
+    ):
+        with pytest.raises(InvalidArgumentError, match="depends on the solution"):
+            call()
