@@ -1,4 +1,4 @@
-"""Named contact problems for documentation, tests and benchmarks: small closed forms, blocks, wedges and chains.
+"""Named contact problems for documentation, tests and benchmarks: closed forms, blocks, wedges, parts of machines.
 
 Every function returns a `ContactProblem`, those whose names end with 3d a `ContactProblem3D`. `GALLERY` lists
 ready-made ones with a parameter value at which each is worth a look and, where it is known, the number of its roots
@@ -6,6 +6,7 @@ there; `get` finds one by name.
 """
 
 from enumsol.gallery.catalogue import GALLERY, GalleryEntry, close_names, get
+from enumsol.gallery.machine_parts import brake_shoe, clip, dovetail, lap_joint, pressed_rings
 from enumsol.gallery.problems import (
     block_on_table,
     chain,
@@ -22,12 +23,17 @@ __all__ = [
     "GalleryEntry",
     "block3d",
     "block_on_table",
+    "brake_shoe",
     "chain",
     "clamped_block",
+    "clip",
     "close_names",
+    "dovetail",
     "get",
+    "lap_joint",
     "one_node_3d",
     "one_node_triangle",
+    "pressed_rings",
     "taper",
     "two_node_square",
     "wedge",

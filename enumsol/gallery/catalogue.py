@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.gallery.machine_parts import brake_shoe, clip, dovetail, lap_joint, pressed_rings
 from enumsol.gallery.problems import (
     block_on_table,
     chain,
@@ -145,6 +146,18 @@ def _large() -> Iterator[GalleryEntry]:
         yield GalleryEntry(f"chain-{p}-coupled", f"{p} one-node triangles joined by weak springs", 5.0, 3**p, build)
 
 
+def _machine_parts() -> Iterator[GalleryEntry]:
+    yield GalleryEntry("dovetail-14", "dovetail root of a blade, pulled into its slot: one root", 0.2, 1, dovetail)
+    yield GalleryEntry(
+        "brake-shoe-9", "brake shoe, pulled off: it is released, or locked by the drum", 0.4, 3, brake_shoe
+    )
+    yield GalleryEntry("clip-17", "clip on a round bar, pulled off: it grips, or has sprung off", 0.25, 3, clip)
+    yield GalleryEntry(
+        "pressed-rings-16", "two rings with a press fit that transmits a torque: one root", 0.15, 1, pressed_rings
+    )
+    yield GalleryEntry("lap-joint-9", "lap joint of two plates, stretched: its ends slip, one root", 0.3, 1, lap_joint)
+
+
 def _solids() -> Iterator[GalleryEntry]:
     yield GalleryEntry("one-node-3d", "one node by its compliance: a public test", 0.0, 1, one_node_3d, 3)
     jamming = partial(one_node_3d, ((2.0, 1.0, 0.2), (1.0, 2.0, 0.1), (0.2, 0.1, 1.0)), (0.9, 6.45, -0.4), 5.0)
@@ -163,5 +176,5 @@ def _solids() -> Iterator[GalleryEntry]:
 
 #: All named problems, by name.
 GALLERY: Mapping[str, GalleryEntry] = MappingProxyType(
-    {entry.name: entry for entry in (*_small(), *_large(), *_solids())}
+    {entry.name: entry for entry in (*_small(), *_large(), *_machine_parts(), *_solids())}
 )

@@ -161,6 +161,11 @@ CALLS = [
     (gallery.clamped_block, {"nx": 1, "ny": 1}, "nx ny length height lame traction friction gap contact"),
     (gallery.wedge, {"nx": 1, "ny": 1}, "nx ny pull press springs width height half_angle lame friction"),
     (gallery.chain, {"p": 1}, "p coupling f lame"),
+    (gallery.dovetail, {"nx": 1, "ny": 1}, "nx ny pull press flank_angle friction"),
+    (gallery.brake_shoe, {"nx": 1, "ny": 1}, "nx ny pull turn friction"),
+    (gallery.clip, {"nx": 2, "ny": 1}, "nx ny pull press friction"),
+    (gallery.pressed_rings, {"nx": 4, "ny": 1}, "nx ny torque press friction"),
+    (gallery.lap_joint, {"nx": 1, "ny": 1}, "nx ny stretch clamping friction"),
     (fem.lame, {"young": 2.5, "poisson": 0.25}, "young poisson plane"),
     (
         fem.mesh_problem,

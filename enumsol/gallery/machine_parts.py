@@ -1,0 +1,460 @@
+"""Parts of machines in N, mm and MPa, of quadratic quadrilaterals: every function returns a `ContactProblem`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol import fem
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem.meshes import MOST_CELLS
+from enumsol.model.shapes import body_shape
+from enumsol.support.arguments import finite_number, positive_integer, positive_number, shown
+from enumsol.support.array_arguments import short_vector
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from enumsol.gallery.problems import Pair
+    from enumsol.model.problem import ContactProblem
+    from enumsol.support.array_types import Floats, Integers
+
+    Friction = float | tuple[float, float]
+
+_STEEL: dict[str, Any] = {"young": 210e3, "poisson": 0.3}
+
+#: Of the dovetail: widths below and above the flanks, heights of the land below them and of the shank above [mm].
+_FOOT, _NECK, _LAND, _SHANK = 30.0, 14.0, 6.0, 6.0
+#: Of the brake: radius of the drum, width, height and depth of the shoe, its overhang and its lining [mm].
+_DRUM, _SHOE, _HEIGHT, _DEPTH, _OVERHANG, _LINING = 300.0, 40.0, 120.0, 50.0, 10.0, 10.0
+#: Stiffness of its return spring [N / mm].
+_RETURN = 50.0
+#: Of the clip: radius of the bar, thickness and width of the strip [mm], half of the angle that it embraces [degrees].
+_BAR, _STRIP, _WIDTH, _EMBRACED = 10.0, 2.0, 10.0, 80.0
+#: Stiffness of what pulls at the clip [N / mm].
+_LINE = 10.0
+#: Of the rings: radii of the bore, of the joint and of the rim, and the width [mm].
+_BORE, _JOINT, _RIM, _RING = 10.0, 20.0, 30.0, 10.0
+#: Stiffness of the springs that hold the outer ring [N / mm^3]; without them it would be held by contact alone.
+_HELD = 1e-2
+#: Of the lap joint: length of a plate, of the overlap, thickness and width of the plates [mm].
+_PLATE, _LAP, _THICK, _BROAD = 60.0, 30.0, 4.0, 20.0
+
+
+def dovetail(
+    nx: int = 4,
+    ny: int = 3,
+    pull: Pair = (0.0, 100.0),
+    press: float = 0.0,
+    *,
+    flank_angle: float = 45.0,
+    friction: Friction = (0.0, 1.0),
+) -> ContactProblem:
+    """Dovetail root of a blade, pulled into the flanks of its slot by the centrifugal force: one solution.
+
+    The root is 30 mm wide below its flanks and 14 mm above, of steel, in plane strain. Both flanks are contact
+    boundaries: first the left, then the right one, each in the order of the mesh; p = 2 (2 ny + 1). ``pull`` acts on
+    the shank, by default 1.4 kN per mm of the length of the slot. A weak spring below the foot (1 N / mm^3) keeps a
+    blade in place that does not turn.
+
+    If all nodes slip outwards, the flanks carry the pull P by normal forces N and friction F N, and by balance N is
+    P / (sin(a) + F cos(a)) on both together, with the angle a of the flanks. A flank steeper than friction holds,
+    tan(a) < F, would jam; those of blades are not: there is one solution for every F up to 0.5.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Cells across the root and along each flank, at least 1.
+    pull : (float, float)
+        Force per area of the shank in x and y; positive y is out of the slot [N / mm^2].
+    press : float
+        Interference with both flanks, along the normals [mm].
+    flank_angle : float
+        Angle between a flank and the direction of the blade, between 5 and 85 [degrees].
+    friction : float or (F0, F1)
+        Coefficient F0 + alpha F1 of all contact nodes, a number is constant; default F(alpha) = alpha.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> (root,) = enumsol.enumerate_roots(enumsol.gallery.dovetail(friction=0.2), alpha=0)
+    >>> root.lambda_n.sum().round(), set(map(str, root.statuses)) == {"slip+", "slip-"}  # 1400 N / (1.2 sin 45 degrees)
+    (1650.0, True)
+    """
+    rows = positive_integer(ny, "ny", most=MOST_CELLS)
+    angle = positive_number(flank_angle, "flank_angle")
+    if not 5.0 <= angle <= 85.0:
+        raise InvalidArgumentError(f"flank_angle is {shown(flank_angle)}; expected degrees between 5 and 85")
+    flank = (_FOOT - _NECK) / 2.0 / math.tan(math.radians(angle))
+    levels = np.concatenate([[0.0], np.linspace(_LAND, _LAND + flank, rows + 1), [_LAND + flank + _SHANK]])
+
+    def place(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        height = np.interp(y, np.linspace(0.0, 1.0, rows + 3), levels)
+        width = np.interp(height, [_LAND, _LAND + flank], [_FOOT, _NECK])
+        return (x - 0.5) * width, height
+
+    grid = _Grid.of(nx, rows + 2, place)
+    return _problem(
+        grid.mesh({"left": grid.left[1:-1], "right": grid.right[1:-1], "foot": grid.bottom, "shank": grid.top}),
+        **_STEEL,
+        contact=["left", "right"],
+        load={"shank": short_vector(pull, "pull", 2)},
+        spring={"foot": (1.0, 1.0)},
+        gap=-finite_number(press, "press"),
+        friction=friction,
+    )
+
+
+def brake_shoe(
+    nx: int = 4, ny: int = 3, pull: float = 50.0, turn: float = 0.1, *, friction: Friction = (0.0, 1.0)
+) -> ContactProblem:
+    """Brake shoe on a drum, pulled off by its return spring: it is released, or the drum has locked it.
+
+    The shoe stands on a drum of radius 300 mm: 40 mm wide, 120 mm high and 50 mm deep, in plane stress. It hangs from
+    a pin at its upper left corner, and has a lining of 10 mm (E = 500 MPa) on its body of steel. The drum has turned to
+    the left by ``turn`` on its rim, the direction in which friction draws the shoe onto it, and a return spring (50 N /
+    mm) at the upper right pulls the shoe off with the force ``pull``. The contact nodes are those of the lining, p =
+    2 nx + 1.
+
+    About the pin, normal forces have short arms a_n and lift the shoe, while friction has a long arm a_t and draws it
+    onto the drum. Once F is greater than a_n / a_t (0.325 for a rigid shoe with an elastic lining), the brake is
+    self-locking: with the friction of linings, 0.35 to 0.45, it may not release although it is pulled off. With the
+    default arguments there is one solution, the released shoe, up to F = 0.347, and from there on there are three:
+    released, locked, and one between them of index -1.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Cells of the lining along the drum, and of the body of the shoe along its height, at least 1.
+    pull : float
+        Force of the return spring on the shoe at rest; positive lifts it [N].
+    turn : float
+        By how much the drum has turned, on its rim [mm].
+    friction : float or (F0, F1)
+        Coefficient F0 + alpha F1 of all contact nodes, a number is constant; default F(alpha) = alpha.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> shoe = enumsol.gallery.brake_shoe()
+    >>> [len(enumsol.enumerate_roots(shoe, F)) for F in (0.2, 0.3, 0.4)]
+    [1, 1, 3]
+    """
+    columns, rows = (positive_integer(count, name, most=MOST_CELLS) for name, count in (("nx", nx), ("ny", ny)))
+    heights = np.concatenate([[0.0], np.linspace(_LINING / _HEIGHT, 1.0, rows + 1)])
+
+    def place(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        across, share = (x - 0.5) * _SHOE, np.interp(y, np.linspace(0.0, 1.0, rows + 2), heights)
+        rim = np.sqrt(_DRUM**2 - across**2)
+        return across - _OVERHANG * share, rim + share * (_DRUM + _HEIGHT - rim)
+
+    grid = _Grid.of(columns, rows + 1, place)
+    parts = {"lining": np.arange(columns), "body": np.arange(columns, len(grid.cells))}
+    area = _SHOE / columns * _DEPTH
+    shoe = _problem(
+        grid.mesh({"rubbing": grid.bottom, "eye": grid.top[-1:]}, {"pin": grid.number[-1, :1]}, parts),
+        young={"lining": 500.0, "body": 210e3},
+        poisson=0.3,
+        plane="stress",
+        thickness=_DEPTH,
+        contact="rubbing",
+        clamp="pin",
+        load={"eye": (0.0, finite_number(pull, "pull") / area)},
+        spring={"eye": (_RETURN / area, _RETURN / area)},
+        friction=friction,
+    )
+    # the tangent points to the right, and slip is counted from where the drum has gone
+    return shoe.replace(slip_offset=np.full(shoe.p, -finite_number(turn, "turn")))
+
+
+def clip(
+    nx: int = 8, ny: int = 1, pull: float = 10.0, press: float = 0.1, *, friction: Friction = (0.0, 1.0)
+) -> ContactProblem:
+    """Spring clip on a round bar, pulled off: it grips the bar, or it has sprung off.
+
+    A strip of spring steel, 2 mm thick and 10 mm wide, is bent to an arc that embraces 160 degrees of a bar of 20 mm
+    in diameter, less than half of it. It is in plane stress. It is narrower than the bar by ``press``, and a line (10 N
+    / mm) pulls at its crown with the force ``pull``. All nodes of the inner side are contact nodes, p = 2 nx + 1.
+
+    The lips press on the bar 10 degrees above its middle: there, normal forces push the clip off, and friction holds it
+    if F > tan(10 degrees) = 0.176. Up to that coefficient the only solution is the clip that has sprung off. With the
+    default arguments it may grip as well from F = 0.205 on: there are then three solutions, with one between these two
+    of index -1.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Cells along the arc and across the strip, at least 2 and 1; for even nx the mesh is symmetric.
+    pull : float
+        Force on the crown, off the bar [N].
+    press : float
+        By how much the radius of the clip is smaller than that of the bar [mm].
+    friction : float or (F0, F1)
+        Coefficient F0 + alpha F1 of all contact nodes, a number is constant; default F(alpha) = alpha.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> clip = enumsol.gallery.clip()
+    >>> [len(enumsol.enumerate_roots(clip, F)) for F in (0.1, 0.15, 0.25, 0.3)]
+    [1, 1, 3, 3]
+    """
+    columns = positive_integer(nx, "nx", least=2, most=MOST_CELLS)
+    half = math.radians(_EMBRACED)
+
+    def place(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        angle, radius = math.pi / 2.0 + half * (1.0 - 2.0 * x), _BAR + _STRIP * y
+        return radius * np.cos(angle), radius * np.sin(angle)
+
+    grid = _Grid.of(columns, ny, place)
+    middle = columns // 2
+    crown = grid.top[middle - 1 + columns % 2 : middle + 1]
+    area = _WIDTH * float(np.sum(np.linalg.norm(grid.points[crown[:, 0]] - grid.points[crown[:, 1]], axis=1)))
+    unit = _problem(
+        grid.mesh({"inside": grid.bottom, "crown": crown}),
+        **_STEEL,
+        plane="stress",
+        thickness=_WIDTH,
+        contact="inside",
+        load={"crown": (0.0, 1.0)},
+        spring={"crown": (_LINE / area, _LINE / area)},
+        gap=-finite_number(press, "press"),
+        friction=friction,
+    )
+    force = finite_number(pull, "pull")
+    return unit.replace(f=force / np.sum(unit.f) * unit.f)
+
+
+def pressed_rings(
+    nx: int = 8, ny: int = 1, torque: float = 60e3, press: float = 0.01, *, friction: Friction = (0.0, 1.0)
+) -> ContactProblem:
+    """Two rings of steel pressed onto each other, the outer one loaded by a torque: one solution.
+
+    The inner ring reaches from the radius 10 mm, where a rigid spindle holds it, to 20 mm, the outer one from there to
+    30 mm. They are 10 mm wide, in plane stress. Before they were joined, the outer ring was smaller by ``press``. Two
+    deformable bodies touch: the nodes on the inside of the outer ring are the contact nodes, p = 2 nx. A torque acts on
+    the outer ring by forces on four lugs, and very weak springs (0.01 N / mm^3) hold it when it is free to turn.
+
+    The pressure is that of Lame's rings, and friction transmits the torque F N r with the sum N of the normal forces
+    (39 kN) and the radius r of the joint: 118 N m for F = 0.15. Below that, some or all nodes stick; above it the outer
+    ring turns as far as the springs allow. There is one solution for every F up to 0.5.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Cells along the circumference, a multiple of 4, and across each ring, at least 1.
+    torque : float
+        Torque on the outer ring, counterclockwise [N mm].
+    press : float
+        Interference of the radii [mm].
+    friction : float or (F0, F1)
+        Coefficient F0 + alpha F1 of all contact nodes, a number is constant; default F(alpha) = alpha.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> (root,) = enumsol.enumerate_roots(enumsol.gallery.pressed_rings(), alpha=0.15)
+    >>> abs(root.lambda_t.sum() * 20).round(-2)  # but for the springs, the torque
+    60000.0
+    """
+    columns = positive_integer(nx, "nx", least=4, most=MOST_CELLS)
+    if columns % 4:
+        raise InvalidArgumentError(f"nx is {shown(nx)}; expected a multiple of 4, since there are four lugs")
+    moment = finite_number(torque, "torque")
+    inner, outer = (_ring(columns, ny, *radii) for radii in ((_BORE, _JOINT), (_JOINT, _RIM)))
+    both = inner.beside(outer)
+    count = len(inner.points)
+    rim = count + outer.top
+    lugs = {f"lug{k}": rim[k * columns // 4 : k * columns // 4 + 1] for k in range(4)}
+    unit = _problem(
+        both.mesh({"bore": inner.bottom, "seat": inner.top, "inside": count + outer.bottom, "rim": rim, **lugs}),
+        **_STEEL,
+        plane="stress",
+        thickness=_RING,
+        pairs=[("inside", "seat", 0.0)],
+        clamp="bore",
+        load={name: both.points[lug[0, 2]] @ [[0.0, 1.0], [-1.0, 0.0]] for name, lug in lugs.items()},
+        spring={"rim": (_HELD, _HELD)},
+        gap=-finite_number(press, "press"),
+        friction=friction,
+    )
+    shape = body_shape(unit)
+    (x, y), (fx, fy) = shape.points.T, (shape.motion @ unit.f).reshape(-1, 2).T
+    return unit.replace(f=moment / np.sum(x * fy - y * fx) * unit.f)
+
+
+def lap_joint(
+    nx: int = 4, ny: int = 1, stretch: float = 0.01, clamping: float = 20e3, *, friction: Friction = (0.0, 1.0)
+) -> ContactProblem:
+    """Lap joint of two plates that bolts press together and that are pulled apart: one solution.
+
+    Plates of steel, 60 mm long, 4 mm thick and 20 mm wide, overlap by 30 mm; plane stress. The left end of the lower
+    plate is clamped, and a testing machine moves the right end of the upper one to the right, by ``stretch``.
+    Bolts press on both plates evenly along the overlap, with the force ``clamping`` in sum. The nodes of the upper
+    plate on the overlap are the contact nodes, p = 2 nx + 1, and the meshes of both plates match.
+
+    Friction transmits at most F times the force that presses the plates together. Where all nodes stick, the joint is
+    as stiff as if the plates were one body.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Cells along the overlap and across each plate, at least 1.
+    stretch : float
+        Displacement of the end of the upper plate, to the right [mm].
+    clamping : float
+        Force of all bolts, > 0 [N].
+    friction : float or (F0, F1)
+        Coefficient F0 + alpha F1 of all contact nodes, a number is constant; default F(alpha) = alpha.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> (root,) = enumsol.enumerate_roots(enumsol.gallery.lap_joint(), alpha=0.3)
+    >>> root.lambda_t.sum().round()  # what is transmitted; the ends of the overlap slip
+    1504.0
+    >>> [str(root.statuses[k]) for k in (0, 4, 8)]
+    ['slip+', 'stick', 'slip+']
+    """
+    columns = positive_integer(nx, "nx", most=MOST_CELLS)
+    bolt = positive_number(clamping, "clamping")
+    # as many cells on the free part of a plate, which is as long as the overlap
+    lower, upper = (_plate(2 * columns, ny, *corner) for corner in ((0.0, 0.0), (_PLATE - _LAP, _THICK)))
+    both = lower.beside(upper)
+    count = len(lower.points)
+    pressure = bolt / (_LAP * _BROAD)
+    return _problem(
+        both.mesh(
+            {
+                "end": lower.left,
+                "grip": count + upper.right,
+                "lap": count + upper.bottom[:columns],
+                "seat": lower.top[columns:],
+                "nut": lower.bottom[columns:],
+                "head": count + upper.top[:columns],
+            }
+        ),
+        **_STEEL,
+        plane="stress",
+        thickness=_BROAD,
+        pairs=[("lap", "seat")],
+        clamp="end",
+        displacement={"grip": (finite_number(stretch, "stretch"), 0.0)},
+        pressure={"nut": pressure, "head": pressure},
+        friction=friction,
+    )
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Quadrilaterals with 9 nodes, nx along the bottom by ny, at the images of the cells of the unit square.
+
+    Attributes
+    ----------
+    points : (N, 2) array
+    cells : (nx ny, 9) int array
+    number : (2 ny + 1, 2 nx + 1) int array
+        The nodes in their rows, from the bottom up.
+    """
+
+    points: Floats
+    cells: Integers
+    number: Integers
+
+    @classmethod
+    def of(
+        cls, nx: int, ny: int, place: Callable[[Floats, Floats], tuple[Floats, Floats]], *, closed: bool = False
+    ) -> _Grid:
+        """The cells at the places of (0, 1) x (0, 1); if ``closed``, the right side is the left one."""
+        nx, ny = (positive_integer(count, name, most=MOST_CELLS) for name, count in (("nx", nx), ("ny", ny)))
+        x, y = np.meshgrid(np.linspace(0.0, 1.0, 2 * nx + 1), np.linspace(0.0, 1.0, 2 * ny + 1))
+        points = np.stack(place(x, y), axis=-1)
+        if closed:
+            points = points[:, :-1]
+        number = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
+        if closed:
+            number = np.hstack([number, number[:, :1]])
+        # corners, the nodes between them, and the one inside: by row and column in the cell
+        where = ((0, 0), (0, 2), (2, 2), (2, 0), (0, 1), (1, 2), (2, 1), (1, 0), (1, 1))
+        cells = np.stack([number[i : 2 * ny + i : 2, j : 2 * nx + j : 2] for i, j in where], axis=-1)
+        return cls(points.reshape(-1, 2), cells.reshape(-1, 9), number)
+
+    @property
+    def bottom(self) -> Integers:
+        return _edges(self.number[0])
+
+    @property
+    def top(self) -> Integers:
+        return _edges(self.number[-1])
+
+    @property
+    def left(self) -> Integers:
+        return _edges(self.number[:, 0])
+
+    @property
+    def right(self) -> Integers:
+        return _edges(self.number[:, -1])
+
+    def beside(self, other: _Grid) -> _Grid:
+        """Both in one mesh, without a common node: the numbers of the other's come after its own."""
+        cells = np.concatenate([self.cells, len(self.points) + other.cells])
+        return _Grid(np.concatenate([self.points, other.points]), cells, self.number)
+
+    def mesh(
+        self,
+        facets: dict[str, Integers],
+        nodes: dict[str, Integers] | None = None,
+        bodies: dict[str, Integers] | None = None,
+    ) -> fem.PartedMesh:
+        """With named parts of its boundary, sets of nodes and parts of the body."""
+        return fem.PartedMesh(self.points, self.cells, facets, nodes or {}, bodies or {})
+
+
+def _problem(mesh: fem.PartedMesh, **options: Any) -> ContactProblem:
+    problem: Any = fem.mesh_problem(mesh, **options)  # in 2D
+    return problem  # type: ignore[no-any-return]
+
+
+def _edges(line: Integers) -> Integers:
+    """Edges with their middle nodes along a line of nodes, (k, 3)."""
+    return np.stack([line[:-1:2], line[2::2], line[1::2]], axis=1)
+
+
+def _plate(nx: int, ny: int, left: float, level: float) -> _Grid:
+    return _Grid.of(nx, ny, lambda x, y: (left + _PLATE * x, level + _THICK * y))
+
+
+def _ring(nx: int, ny: int, inside: float, outside: float) -> _Grid:
+    def place(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        radius, angle = inside + (outside - inside) * y, -2.0 * math.pi * x
+        return radius * np.cos(angle), radius * np.sin(angle)
+
+    return _Grid.of(nx, ny, place, closed=True)
