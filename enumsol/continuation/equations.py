@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
 from enumsol.continuation.space_equation import SpaceEquation
-from enumsol.errors import InvalidArgumentError
 from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import instance_of
@@ -23,18 +22,13 @@ def check_problem(problem: Any, smooth_path: SmoothPath | None, what: str) -> No
     Raises
     ------
     InvalidArgumentError
-        The problem is none, is not held, or has friction that depends on the solution; or a smooth path is given in 3D.
+        The problem is none or is not held, or the smooth path is none.
     """
     if not isinstance(problem, ContactBody):
         instance_of(problem, ContactProblem, "problem")
     problem.check_held(what)
     if smooth_path is not None:
         instance_of(smooth_path, SmoothPath, "smooth_path")
-        if not isinstance(problem, ContactProblem):
-            raise InvalidArgumentError(
-                "smooth_path is given with a problem in 3D; expected None, and friction and load that are affine in "
-                "alpha"
-            )
 
 
 def equation_on(

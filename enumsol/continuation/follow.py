@@ -57,7 +57,7 @@ def follow(
         Range of alpha; infinite ends are allowed. None: all alpha with F >= 0.
     options : ContinuationOptions or None
     smooth_path : SmoothPath or None
-        Friction and load that are not affine in alpha; in 2D only.
+        Friction and load that are not affine in alpha.
     tangent : int or None
         Index into `start_tangents` of the direction to take, at a start where several are admissible.
     visited : sequence of Path

@@ -60,7 +60,7 @@ def newton(
     r : float or None
         Parameter of H [force / length]; None for each node's own stiffness.
     smooth_path : SmoothPath or None
-        Friction and load at alpha come from here; in 2D only.
+        Friction and load at alpha come from here.
     max_iterations : int
 
     Returns
@@ -87,7 +87,9 @@ def newton(
     value = float(exact)
     r = None if r is None else positive_number(r, "r")
     max_iterations = positive_integer(max_iterations, "max_iterations")
-    frozen: Any = problem if smooth_path is None else smooth_path.problem_at(problem, value)  # type: ignore[arg-type]
+    frozen: Any = problem
+    if smooth_path is not None:
+        frozen = smooth_path.problem_at(frozen, value)
     frozen.friction_at(exact)
     equation = equation_on(problem, smooth_path, value, r=r)
     x = equation.point(value, _start_forces(start, problem.p, len(equation.S) // problem.p))

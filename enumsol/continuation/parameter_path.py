@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-import scipy.sparse as sp
 
 from enumsol.condensation.condensed import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
+from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import alpha_value, instance_of, optional_callable
 from enumsol.support.array_arguments import real_array
@@ -28,6 +28,8 @@ DERIVATIVE_TOLERANCE = 1e-4
 DIFFERENCE_STEP = 1e-5
 
 PathFunction = Callable[[float], Any]
+#: A problem in 2D or 3D.
+Body = TypeVar("Body", "ContactProblem", "ContactProblem3D")
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class SmoothPath:
     Attributes
     ----------
     F, dF : callable or None
-        Friction coefficients and their derivative at alpha: a number or a (p,) array [-].
+        Friction coefficients and their derivative at alpha: a number or a (p,) array, in 3D also (p, 2) [-].
     f, df : callable or None
         Load and its derivative at alpha, (n,) arrays [force].
 
@@ -72,25 +74,18 @@ class SmoothPath:
         if self.F is None and self.f is None:
             raise InvalidArgumentError("SmoothPath has neither F nor f; expected at least one of them")
 
-    def problem_at(self, problem: ContactProblem, alpha: AlphaLike) -> ContactProblem:
-        """The problem with friction and load frozen at alpha, to enumerate roots on the path."""
-        instance_of(problem, ContactProblem, "problem")
+    def problem_at(self, problem: Body, alpha: AlphaLike) -> Body:
+        """The problem, in 2D or 3D, with friction and load frozen at alpha, to enumerate roots on the path."""
+        if not isinstance(problem, ContactBody):
+            instance_of(problem, ContactProblem, "problem")
         problem.check_held("a SmoothPath")
         exact = alpha_value(alpha)
-        value = float(exact)
-        F = problem.friction_at(exact) if self.F is None else _evaluate(self.F, value, "F", problem.p, broadcast=True)
-        f = problem.load_at(exact) if self.f is None else _evaluate(self.f, value, "f", problem.n)
-        return ContactProblem(
-            problem.A,
-            problem.Bn,
-            problem.Bt,
-            f,
-            gap=problem.gap,
-            friction=(F, 0.0),
-            slip_offset=problem.slip_offset,
-            node_ids=problem.node_ids,
-            coordinates=problem.coordinates,
-        )
+        value, shape = float(exact), affine_friction(problem)[0].shape
+        F = problem.friction_at(exact) if self.F is None else _coefficients(self.F, value, "F", shape)
+        f = problem.load_at(exact) if self.f is None else _evaluate(self.f, value, "f", (problem.n,))
+        if len(shape) == 1:
+            return problem.replace(f=f, load_slope=None, friction=(F, 0.0))
+        return problem.replace(f=f, load_slope=None, friction=(F[:, 0], F[:, 1]), friction_slope=0.0)
 
 
 @dataclass(frozen=True)
@@ -144,7 +139,7 @@ def affine_friction(problem: ContactProblem | ContactProblem3D) -> tuple[NDArray
 class CallablePath:
     """A SmoothPath condensed to the contact nodes; a load given by callables costs 2 p n multiplications per alpha."""
 
-    def __init__(self, problem: ContactProblem, smooth: SmoothPath, alpha: float) -> None:
+    def __init__(self, problem: ContactProblem | ContactProblem3D, smooth: SmoothPath, alpha: float) -> None:
         self.problem: Any = problem
         self._smooth = smooth
         self._affine = AffinePath(problem)
@@ -156,9 +151,10 @@ class CallablePath:
         """Refuse values that are not admissible friction or load at the start of the path."""
         values = self.at(alpha)
         if not (np.all(np.isfinite(values.F)) and np.all(values.F >= 0)):
-            node = int(np.argmin(np.isfinite(values.F) & (values.F >= 0)))
+            place = int(np.argmin(np.isfinite(values.F) & (values.F >= 0)))
+            node = place // (values.F.size // self.problem.p)
             raise InvalidArgumentError(
-                f"SmoothPath.F gives {values.F[node]:g} for contact node {self.problem.node_ids[node]} at "
+                f"SmoothPath.F gives {values.F.flat[place]:g} for contact node {self.problem.node_ids[node]} at "
                 f"alpha = {alpha:g}; expected F >= 0"
             )
         if not np.all(np.isfinite(values.g)):
@@ -168,7 +164,7 @@ class CallablePath:
     def _influence(self) -> NDArray[np.float64]:
         """B A^{-1}, shape (2p, n): dense, but only its few rows."""
         problem = self.problem
-        B = sp.csr_array(sp.vstack([problem.Bn, problem.Bt], format="csr"))
+        B = problem.contact_rows
         rows = np.empty(B.shape)
         for start in range(0, B.shape[0], RHS_BLOCK):
             block = B[start : start + RHS_BLOCK].T.toarray()
@@ -181,17 +177,17 @@ class CallablePath:
         g, F, dg, dF = values.g, values.F, values.dg, values.dF
         problem, smooth = self.problem, self._smooth
         if smooth.F is not None and smooth.dF is not None:
-            F = _evaluate(smooth.F, alpha, "F", problem.p, broadcast=True)
-            dF = _evaluate(smooth.dF, alpha, "dF", problem.p, broadcast=True)
+            F = _coefficients(smooth.F, alpha, "F", F.shape)
+            dF = _coefficients(smooth.dF, alpha, "dF", F.shape)
         if smooth.f is not None and smooth.df is not None:
-            offset = np.concatenate([problem.gap, problem.slip_offset])
-            g = self._influence @ _evaluate(smooth.f, alpha, "f", problem.n) - offset
-            dg = self._influence @ _evaluate(smooth.df, alpha, "df", problem.n)
+            offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
+            g = self._influence @ _evaluate(smooth.f, alpha, "f", (problem.n,)) - offset
+            dg = self._influence @ _evaluate(smooth.df, alpha, "df", (problem.n,))
         return PathValues(g, F, dg, dF)
 
     @cached_property
     def frictionless(self) -> NDArray[np.bool_]:
-        """Nodes with F = 0 and dF = 0 at the start, assumed to stay without friction."""
+        """Nodes, in 3D nodes and axes, with F = 0 and dF = 0 at the start, assumed to stay without friction."""
         if self._smooth.F is None:
             return self._affine.frictionless
         values = self.at(self._start)
@@ -200,15 +196,15 @@ class CallablePath:
     def _check_derivatives(self, alpha: float) -> None:
         """Compare the derivatives with central differences at the start: a wrong one stalls the corrections later."""
         smooth, step = self._smooth, DIFFERENCE_STEP * max(abs(alpha), 1.0)
-        for name, function, derivative, size, scalar in (
-            ("F", smooth.F, smooth.dF, self.problem.p, True),
-            ("f", smooth.f, smooth.df, self.problem.n, False),
+        for name, function, derivative, shape, evaluate in (
+            ("F", smooth.F, smooth.dF, self._affine.friction[0].shape, _coefficients),
+            ("f", smooth.f, smooth.df, (self.problem.n,), _evaluate),
         ):
             if function is None or derivative is None:
                 continue
-            given = _evaluate(derivative, alpha, f"d{name}", size, broadcast=scalar)
-            ahead = _evaluate(function, alpha + step, name, size, broadcast=scalar)
-            behind = _evaluate(function, alpha - step, name, size, broadcast=scalar)
+            given = evaluate(derivative, alpha, f"d{name}", shape)
+            ahead = evaluate(function, alpha + step, name, shape)
+            behind = evaluate(function, alpha - step, name, shape)
             if not np.all(np.isfinite(ahead) & np.isfinite(behind)):
                 continue  # the start lies on the border of the functions' domain
             scale = max(np.max(np.abs(given)), np.max(np.abs(ahead)) / max(abs(alpha), 1.0))
@@ -224,15 +220,24 @@ class CallablePath:
 ParameterPath = AffinePath | CallablePath
 
 
-def _evaluate(
-    function: PathFunction, alpha: float, name: str, size: int, *, broadcast: bool = False
-) -> NDArray[np.float64]:
+def _evaluate(function: PathFunction, alpha: float, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
     what = f"the value of SmoothPath.{name} at alpha = {alpha:g}"
     value = real_array(function(alpha), what, error=InvalidArgumentError, finite=False)
-    if value.ndim == 0 and broadcast:
-        value = np.full(size, float(value))
-    if value.shape != (size,):
+    if value.shape != shape:
         raise InvalidArgumentError(
-            f"SmoothPath.{name} gives shape {value.shape} at alpha = {alpha:g}; expected ({size},)"
+            f"SmoothPath.{name} gives shape {value.shape} at alpha = {alpha:g}; expected {shape}"
         )
     return value
+
+
+def _coefficients(function: PathFunction, alpha: float, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Coefficients of all nodes, and in 3D of both axes, also where one number, or one for every node, is given."""
+
+    def spread(given: float) -> NDArray[np.float64]:
+        what = f"the value of SmoothPath.{name} at alpha = {given:g}"
+        value = real_array(function(given), what, error=InvalidArgumentError, finite=False)
+        if value.ndim == 0:
+            return np.full(shape, float(value))
+        return np.column_stack([value, value]) if len(shape) == 2 and value.shape == shape[:1] else value
+
+    return _evaluate(spread, alpha, name, shape)

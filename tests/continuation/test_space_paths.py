@@ -273,6 +273,33 @@ def test_a_problem_in_2d_with_a_second_tangent_that_nothing_loads_has_the_same_p
         assert not np.any(space.lambda_t[..., 1])
 
 
+@pytest.mark.parametrize("form", [float, lambda F: [F], lambda F: [[F, F]]])
+def test_a_smooth_path_that_is_affine_after_all_leads_where_the_affine_one_does(form):
+    problem = enumsol.gallery.get("one-node-3d-3").build().replace(friction=0.0, friction_slope=1.0)
+    jammed, *_ = enumsol.enumerate_roots(problem, 5, "fast")
+    path = follow(problem, jammed, -1, (0.5, 6))
+    # the same friction at the square of alpha
+    smooth = SmoothPath(F=lambda alpha: form(alpha**2), dF=lambda alpha: form(2 * alpha))
+    start = (5**0.5, jammed.lambda_n, jammed.lambda_t)
+    squared = follow(problem, start, -1, (0.5**0.5, 6**0.5), smooth_path=smooth)
+    assert squared.folds[0].alpha ** 2 == pytest.approx(path.folds[0].alpha, abs=1e-9)
+    assert squared.lambda_t[-1] == pytest.approx(path.lambda_t[-1], abs=1e-8)
+    frozen = smooth.problem_at(problem, 2.0)
+    assert np.array_equal(frozen.friction_at(0), [[4.0, 4.0]])
+    found = newton(problem, 2.0, smooth_path=smooth)
+    assert violation(frozen, found) < 1e-9
+
+
+def test_smooth_loads_in_3d():
+    problem = random_path_problem(4, p=2)
+    f, slope = problem.f, problem.load_slope
+    smooth = SmoothPath(f=lambda alpha: f + np.sin(alpha) * slope, df=lambda alpha: np.cos(alpha) * slope)
+    root = enumsol.enumerate_roots(problem, 0, "fast")[0]
+    path, bent = follow(problem, root, 1, (-0.5, 0.5)), follow(problem, root, 1, (-0.52, 0.52), smooth_path=smooth)
+    inside = [item.alpha for item in path.transitions if abs(item.alpha) < np.sin(0.5)]
+    assert np.sin([item.alpha for item in bent.transitions])[: len(inside)] == pytest.approx(inside, abs=1e-9)
+
+
 def test_files_tables_pictures_and_resumed_paths(tmp_path):
     problem = random_path_problem(1, p=2)
     root = enumsol.enumerate_roots(problem, 0.05, "fast")[0]
@@ -300,13 +327,9 @@ def test_what_is_not_offered_in_3d_is_refused():
     path = follow(problem, newton(problem, 0.0), 1, (0, 1))
     with pytest.raises(InvalidArgumentError, match="path 0 is one in 3D; expected a path in 2D"):
         enumsol.audit(path, graph)
-    smooth = SmoothPath(F=lambda alpha: alpha, dF=lambda alpha: 1.0)
-    for call in (
-        lambda: newton(problem, 0, smooth_path=smooth),
-        lambda: follow(problem, (0, [0.0], [[0.0, 0.0]]), smooth_path=smooth),
-    ):
-        with pytest.raises(InvalidArgumentError, match="smooth_path is given with a problem in 3D"):
-            call()
+    wrong = SmoothPath(F=lambda alpha: [[alpha, alpha, alpha]], dF=lambda alpha: 1.0)
+    with pytest.raises(InvalidArgumentError, match=r"gives shape \(1, 3\) at alpha = 1; expected \(1, 2\)"):
+        newton(problem, 1, smooth_path=wrong)
     with pytest.raises(InvalidArgumentError, match=r"start has shape \(2,\); expected a Root .* \(3,\) or \(1, 3\)"):
         newton(problem, 0, [1.0, 2.0])
     with pytest.raises(InvalidArgumentError, match=r"lambda_t of start has shape \(1,\); expected \(1, 2\)"):
