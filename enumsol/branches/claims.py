@@ -192,7 +192,9 @@ class Claims:
             line += ", not proven"
         lines = [line]
         if bound is not None:
-            lines.append(f"a bound known before any search: one solution for alpha up to {bound:.8g} (in floats)")
+            lines.append(
+                f"up to alpha = {bound:.8g} the stiffness alone rules out a second solution (estimate in floats)"
+            )
         return lines
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from concurrent.futures import Executor
 
+    from enumsol.fem import Scene
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import Alpha
@@ -44,6 +45,37 @@ class ExitStatus(enum.IntEnum):
     OUTPUT_FAILED = 74
     INTERRUPTED = 130
     BROKEN_PIPE = 141
+
+
+def parse_units(text: str | None) -> tuple[str, str] | None:
+    """Units of forces and lengths, those of --units.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is not two texts with a comma between them.
+    """
+    if text is None:
+        return None
+    force, comma, length = text.partition(",")
+    if not (force and comma and length):
+        raise InvalidArgumentError(f"--units is {text}; expected units of force and length, such as N,mm")
+    return force.strip(), length.strip()
+
+
+def scene_of(name: str) -> Scene | None:
+    """What a TOML file tells of mesh, material, supports and loads; None for other problems, which are matrices.
+
+    Raises
+    ------
+    InvalidProblemError, InvalidArgumentError
+        It cannot be read.
+    """
+    if name.startswith(GALLERY) or not name.endswith(TOML) or Path(name).is_dir():
+        return None
+    from enumsol.fem import read_mesh_scene  # numpy and scikit-fem: not for --help
+
+    return read_mesh_scene(name)
 
 
 def load_problem(name: str) -> ContactProblem:

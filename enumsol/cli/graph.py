@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from enumsol.cli import options
-from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, note, parse_interval, so_far, workers
+from enumsol.cli.common import (
+    ExitStatus,
+    finish,
+    load_problem,
+    node_row,
+    note,
+    parse_interval,
+    parse_units,
+    so_far,
+    workers,
+)
 from enumsol.cli.output import check_named_files, check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
@@ -87,22 +97,6 @@ def graph(
         frame=found.to_frame,
     )
     finish(ended, ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
-
-
-def parse_units(text: str | None) -> tuple[str, str] | None:
-    """Units of forces and lengths, those of --units.
-
-    Raises
-    ------
-    InvalidArgumentError
-        It is not two texts with a comma between them.
-    """
-    if text is None:
-        return None
-    force, comma, length = text.partition(",")
-    if not (force and comma and length):
-        raise InvalidArgumentError(f"--units is {text}; expected units of force and length, such as N,mm")
-    return force.strip(), length.strip()
 
 
 def write_proof(found: BranchGraph, path: str) -> None:

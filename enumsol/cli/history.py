@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from enumsol.cli.common import TOML, ExitStatus, finish, load_any_problem, so_far, workers
+from enumsol.cli.common import TOML, ExitStatus, finish, load_any_problem, scene_of, so_far, workers
 from enumsol.cli.options import (
     OUTPUT,
     PLOT,
@@ -107,7 +107,7 @@ def history(
     def write_page(path: str) -> None:
         from enumsol.report import write_report  # numpy: not for --help
 
-        write_report(found, path, title=problem if title is None else title)
+        write_report(found, path, title=problem if title is None else title, scene=scene_of(problem))
 
     deliver(
         (proof_file, lambda path: _write_proof(found, path)),

@@ -114,6 +114,9 @@ VtuFile = Annotated[
     file("--vtu", "Write deformed bodies with forces and stresses for ParaView; of several roots FILE-0.vtu, ..."),
 ]
 ReportFile = Annotated[str | None, file("--report", "Write an HTML page about the roots, with their deformed bodies.")]
+Units = Annotated[
+    str | None, typer.Option(metavar="FORCE,LENGTH", help="Units of the page, such as N,mm.", rich_help_panel=OUTPUT)
+]
 PlotFile = Annotated[str | None, file("--plot", "Draw a figure: .png, .pdf, .svg.", PLOT)]
 Overview = Literal["norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"]
 DrawnQuantity = Annotated[Quantity, typer.Option(help="What is drawn against alpha.", rich_help_panel=PLOT)]

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from enumsol.cli import options
-from enumsol.cli.common import ExitStatus, finish, load_problem, parse_interval, so_far
-from enumsol.cli.graph import HowExact, as_content, build, graph_as_text, parse_units, write_proof
+from enumsol.cli.common import ExitStatus, finish, load_problem, parse_interval, parse_units, scene_of, so_far
+from enumsol.cli.graph import HowExact, as_content, build, graph_as_text, write_proof
 from enumsol.cli.output import check_named_files, check_outputs, checking_commands, deliver
 from enumsol.errors import MissingDependencyError
 
@@ -31,9 +31,7 @@ def report(
         str | None,
         typer.Option(metavar="TEXT", help="Heading of the page; default: PROBLEM.", rich_help_panel=options.OUTPUT),
     ] = None,
-    units: Annotated[
-        str | None, typer.Option(metavar="FORCE,LENGTH", help="Units, such as N,mm.", rich_help_panel=options.OUTPUT)
-    ] = None,
+    units: options.Units = None,
     proof_file: Annotated[
         str | None, options.file("--proof", "Write the proof (verified), to pass on with the page.")
     ] = None,
@@ -62,7 +60,8 @@ def report(
         # -1 would be read as an option
         place = f"--from={shlex.quote(first)} --to={shlex.quote(last)}"
         commands = checking_commands(found.proof is not None, problem, "graph", place, proof_file)
-        write_report(found, path, title=problem if title is None else title, units=names, commands=commands)
+        heading, scene = problem if title is None else title, scene_of(problem)
+        write_report(found, path, title=heading, units=names, commands=commands, scene=scene)
 
     deliver(
         (proof_file, lambda path: write_proof(found, path)),

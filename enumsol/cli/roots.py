@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 import typer
 
 from enumsol.cli import options, root_report
-from enumsol.cli.common import ExitStatus, finish, load_any_problem, note, parse_alpha, so_far, workers
+from enumsol.cli.common import (
+    ExitStatus,
+    finish,
+    load_any_problem,
+    note,
+    parse_alpha,
+    parse_units,
+    scene_of,
+    so_far,
+    workers,
+)
 from enumsol.cli.output import (
     check_named_files,
     check_outputs,
@@ -25,6 +35,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
+    from enumsol.fem import Scene
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.roots.root_set import RootSet
@@ -98,6 +109,7 @@ class Search:
     csv_file: CsvFile = None
     vtu_file: options.VtuFile = None
     report_file: options.ReportFile = None
+    units: options.Units = None
 
     @classmethod
     def as_options(cls, *without: str) -> list[Parameter]:
@@ -126,17 +138,24 @@ class Search:
             raise InvalidArgumentError(
                 "--resume is given without --proof; expected the file of the proof to resume from"
             )
+        parse_units(self.units)
         if self.unique and self.stop_after is not None:
             raise InvalidArgumentError(
                 f"--stop-after is {self.stop_after} with --unique, which stops at the second root"
             )
 
     def answer(
-        self, name: str, problem: ContactProblem | ContactProblem3D, alpha: Alpha, source: str | None
+        self,
+        name: str,
+        problem: ContactProblem | ContactProblem3D,
+        alpha: Alpha,
+        source: str | None,
+        scene: Scene | None = None,
     ) -> NoReturn:
         """Search, write what was found, and end the command.
 
-        ``source`` is what other commands take for the problem, None where there is no such file.
+        ``source`` is what other commands take for the problem, None where there is no such file; ``scene`` is what the
+        problem was made of, where it was not read from ``source``.
         """
         check_places(self.vtu_file, problem, name)
         check_scripts(self.report_file, problem)
@@ -146,7 +165,7 @@ class Search:
             found = found.mirrored(self.mirror)
         deliver(
             (self.vtu_file, lambda path: _write_vtu(problem, found, path)),
-            (self.report_file, lambda path: self._write_page(found, path, name, source)),
+            (self.report_file, lambda path: self._write_page(found, path, name, source, scene)),
             json_file=self.json_file,
             csv_file=self.csv_file,
             text=lambda: root_report.uniqueness(found) if self.unique else root_report.roots_as_text(found),
@@ -160,13 +179,14 @@ class Search:
             note(f"{' and '.join(partly)} {holds} the isolated roots only, --json the {families} too")
         finish(ended, ExitStatus.DONE if self.unique and found.unique is not None else _status(found))
 
-    def _write_page(self, found: RootSet, path: str, name: str, source: str | None) -> None:
+    def _write_page(self, found: RootSet, path: str, name: str, source: str | None, scene: Scene | None) -> None:
         from enumsol.report import write_report  # numpy: not for --help
 
         # -1 would be read as an option
         place = f"--alpha={shlex.quote(str(found.alpha))}"
         commands = checking_commands(found.proof is not None, source, "roots", place, self.proof_file)
-        write_report(found, path, title=name, commands=commands)
+        about = scene_of(name) if scene is None else scene
+        write_report(found, path, title=name, units=parse_units(self.units), commands=commands, scene=about)
 
     def _found(self, problem: ContactProblem | ContactProblem3D, alpha: Alpha) -> RootSet:
         from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help

@@ -303,7 +303,7 @@ def solve(
             return
         raise InvalidArgumentError("--alpha is missing, on which friction or load depend; expected it, or --output")
     source = output if output is not None else mesh if mesh.endswith(TOML) else None
-    search.answer(mesh, problem, value or 0.0, source)
+    search.answer(mesh, problem, value or 0.0, source, scene)
 
 
 def _scene(mesh: str, options: dict[str, Any]) -> Scene:

@@ -23,9 +23,9 @@ _TITLES = 10
 _ROUNDING = 1e-12
 
 
-def described(scene: Any) -> str:
-    """The lines of a `Scene`."""
-    sections = {
+def sections_of(scene: Any) -> dict[str, list[str]]:
+    """The lines of a `Scene` by their titles."""
+    return {
         "mesh": _mesh(scene),
         "bodies": _bodies(scene),
         "material": _material(scene),
@@ -34,7 +34,11 @@ def described(scene: Any) -> str:
         "contact": _contact(scene),
         "note": scene.notes,
     }
-    return "\n".join(_titled(sections))
+
+
+def described(scene: Any) -> str:
+    """The lines of a `Scene`."""
+    return "\n".join(_titled(sections_of(scene)))
 
 
 def _titled(sections: Mapping[str, Sequence[str]]) -> Iterable[str]:

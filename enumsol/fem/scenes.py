@@ -31,7 +31,7 @@ from enumsol.fem.named_parts import PartedMesh
 from enumsol.fem.pairs import Pair
 from enumsol.fem.restrained import plain_dofs
 from enumsol.fem.scene_checks import refuse_walls, scene_notes
-from enumsol.fem.scene_text import described
+from enumsol.fem.scene_text import described, sections_of
 from enumsol.model.mesh import BodyMesh
 from enumsol.support.arguments import exact_number, finite_number, positive_number, shown
 from enumsol.support.array_arguments import short_vector
@@ -132,6 +132,11 @@ class Scene:
     def notes(self) -> list[str]:
         """What may be meant otherwise, each in a sentence."""
         return scene_notes(self)
+
+    @property
+    def sections(self) -> dict[str, list[str]]:
+        """What is printed of the scene, lines by their titles."""
+        return sections_of(self)
 
     def problem(self) -> ContactProblem | ContactProblem3D:
         """The contact problem; see `mesh_problem`.

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from enumsol.branches import BranchGraph
     from enumsol.branches.elements import Arc, Vertex
+    from enumsol.fem import Scene
     from enumsol.model.statuses import ContactStatus
 
 #: Distance of drawn curves from the arcs, relative to the picture; coarser until the page is small enough.
@@ -32,14 +33,14 @@ _DIGITS = 9
 _COMPARED = 300
 
 
-def report_content(graph: BranchGraph) -> dict[str, Any]:
+def report_content(graph: BranchGraph, scene: Scene | None = None) -> dict[str, Any]:
     """Everything that the script needs: nodes, quantities, arcs with points along them, vertices, steps, the body.
 
     Statuses are texts of one digit per node, the codes of `enumsol.model.statuses`. ``f`` and ``w`` are forces and
     displacements, normal ones first, at the points ``a`` of an arc.
     """
     drawn, tolerance = _sampled(graph)
-    steps, body = graph.claims.steps(), body_record(graph.problem)
+    steps, body = graph.claims.steps(), body_record(graph.problem, scene)
     return {
         "interval": list(graph.interval),
         "complete": graph.complete,

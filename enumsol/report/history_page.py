@@ -11,12 +11,14 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history_text import steps_table, tree_lines
-from enumsol.report.parts import fact_list, filled_page, proof_facts, warning_list
+from enumsol.report.given import given_section
+from enumsol.report.parts import fact_list, filled_page, proof_facts, scrolling, warning_list
 from enumsol.support.messages import counted, html_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from enumsol.fem import Scene
     from enumsol.loading.history import History
 
 #: Lines of the tree, and steps whose bodies are drawn, at most; of more steps the last ones.
@@ -24,7 +26,9 @@ _TREE, _BODIES = 1000, 24
 _DPI = 96
 
 
-def history_page(history: History, title: str, commands: Sequence[str]) -> str:
+def history_page(
+    history: History, title: str, units: tuple[str, str] | None, commands: Sequence[str], scene: Scene | None
+) -> str:
     """The text of the page."""
     words = {
         "title": escape(title),
@@ -34,13 +38,14 @@ def history_page(history: History, title: str, commands: Sequence[str]) -> str:
         "reasons": _reasons(history),
         "answers": "",
         "facts": _facts(history),
-        "steps": f'<div class="scroll">{html_table(*steps_table(history.data))}</div>',
+        "given": given_section(scene, units),
+        "steps": scrolling("Steps", html_table(*steps_table(history.data))),
         "tree": escape("\n".join(tree_lines(history.data, _TREE))),
         "figures": _figures(history),
         "bodies": _bodies(history),
         "certified": _certified(history, commands),
     }
-    return filled_page("history", ("page.history.js",), {}, words)
+    return filled_page("history", ("page.theme.js", "page.history.js"), {}, words)
 
 
 def _reasons(history: History) -> str:
@@ -71,7 +76,7 @@ def _facts(history: History) -> str:
 def _figures(history: History) -> str:
     pairs = (("displacement", "alpha"), ("step", "dissipated"), ("step", "lambda_n"), ("displacement", "lambda_t"))
     moves = any(step.alpha is not None for step in history.steps)
-    return "".join(_image(history.plot(x, y)) for x, y in pairs if moves or y != "alpha")
+    return "".join(_image(history.plot(x, y), f"{y} against {x}") for x, y in pairs if moves or y != "alpha")
 
 
 def _bodies(history: History) -> str:
@@ -81,7 +86,7 @@ def _bodies(history: History) -> str:
     pictures = {}
     for number in shown:
         try:
-            pictures[number] = _image(draw_bodies(history.roots(number)))
+            pictures[number] = _image(draw_bodies(history.roots(number)), f"deformed bodies of step {number}")
         except InvalidArgumentError as error:
             return f"<p>They are not drawn: {escape(str(error))}.</p>"
     if not pictures:
@@ -99,11 +104,11 @@ def _last(number: int, shown: list[int]) -> str:
     return " selected" if number == shown[-1] else ""
 
 
-def _image(figure: Any) -> str:
+def _image(figure: Any, words: str) -> str:
     drawn = BytesIO()
     figure.savefig(drawn, format="png", dpi=_DPI)
     text = base64.b64encode(drawn.getvalue()).decode()
-    return f'<figure><img src="data:image/png;base64,{text}" alt=""></figure>'
+    return f'<figure><img src="data:image/png;base64,{text}" alt="{escape(words)}"></figure>'
 
 
 def _certified(history: History, commands: Sequence[str]) -> str:

@@ -64,7 +64,7 @@ function vertexTraces() {
   }
   const traces = [...kinds].map(([kind, found]) => ({
     x: found.map((v) => v.alpha), y: found.map((v) => valueOf(v.f, v.w)), mode: "markers", type: "scatter",
-    marker: { symbol: SYMBOLS[kind][0], size: 8, color: GREY, line: { width: 1.5, color: GREY } },
+    marker: { symbol: SYMBOLS[kind][0], size: 8, color: ink("ink"), line: { width: 1.5, color: ink("ink") } },
     name: SYMBOLS[kind][1], hovertemplate: `${SYMBOLS[kind][1]}<br>alpha %{x:.12g}<br>${axisName()} %{y:.6g}<extra></extra>`,
   }));
   for (const v of data.vertices) {
@@ -72,7 +72,7 @@ function vertexTraces() {
     const values = v.family.f.map((f, k) => valueOf(f, v.family.w[k]));
     traces.push({
       x: [v.alpha, v.alpha], y: [Math.min(...values), Math.max(...values)], mode: "lines", type: "scatter",
-      line: { color: GREY, width: 4 }, showlegend: false,
+      line: { color: ink("ink"), width: 4 }, showlegend: false,
       hovertemplate: `continuum, dimension ${v.family.dimension}<br>alpha %{x:.12g}<extra></extra>`,
     });
   }
@@ -86,9 +86,9 @@ function stepTraces() {
   const options = { xaxis: "x", yaxis: "y2", type: "scatter", showlegend: false };
   const special = alphas.map((_, k) => k).filter((k) => at[k] !== between[k] && at[k] !== between[k - 1]);
   return [
-    { ...options, x, y, mode: "lines", line: { color: GREY, width: 2 }, hovertemplate: `%{y} ${name}<br>alpha %{x:.8g}<extra></extra>` },
+    { ...options, x, y, mode: "lines", line: { color: ink("ink"), width: 2 }, hovertemplate: `%{y} ${name}<br>alpha %{x:.8g}<extra></extra>` },
     {
-      ...options, x: special.map((k) => alphas[k]), y: special.map((k) => at[k]), mode: "markers", marker: { color: GREY, size: 6 },
+      ...options, x: special.map((k) => alphas[k]), y: special.map((k) => at[k]), mode: "markers", marker: { color: ink("ink"), size: 6 },
       hovertemplate: `%{y} ${name}<br>exactly at alpha %{x:.12g}<extra></extra>`,
     },
   ];
@@ -97,7 +97,7 @@ function stepTraces() {
 function sheetShapes() {
   return data.arcs.filter((arc) => arc.dimension > 0).map((arc) => ({
     type: "rect", xref: "x", yref: "paper", x0: arc.lo, x1: arc.hi, y0: 0.3, y1: 1,
-    fillcolor: GREY, opacity: 0.15, line: { width: 0 }, layer: "below",
+    fillcolor: ink("ink"), opacity: 0.15, line: { width: 0 }, layer: "below",
   }));
 }
 
@@ -108,10 +108,10 @@ const cursor = () => ({
 
 function drawDiagram() {
   const traces = [...data.arcs.filter((arc) => arc.a).map(arcTrace), ...vertexTraces(), ...stepTraces()];
-  const grid = { gridcolor: "#e8ebee", zeroline: false, automargin: true, exponentformat: "power" };
+  const grid = { gridcolor: ink("grid"), linecolor: ink("line"), zeroline: false, automargin: true, exponentformat: "power" };
   const layout = {
-    margin: { l: 50, r: 12, t: 8, b: 40 }, hovermode: "closest", showlegend: true, dragmode: "zoom", font: { size: 12 },
-    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 11 } }, plot_bgcolor: "#fff",
+    ...paperSize(690, 400), margin: { l: 50, r: 12, t: 8, b: 40 }, hovermode: "closest", showlegend: true, dragmode: "zoom", font: { size: 12, color: ink("fg") }, paper_bgcolor: "rgba(0,0,0,0)", modebar: { bgcolor: "rgba(0,0,0,0)", color: ink("dim"), activecolor: ink("fg") },
+    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 11 } }, plot_bgcolor: "rgba(0,0,0,0)",
     xaxis: { ...grid, title: { text: "alpha" }, range: data.interval, anchor: "y2" },
     yaxis: { ...grid, title: { text: axisName() }, domain: [0.3, 1] },
     yaxis2: { ...grid, title: { text: data.exact_counts ? "solutions" : "at least" }, domain: [0, 0.22], rangemode: "tozero", tickformat: "d", dtick: Math.max(1, Math.ceil(Math.max(0, ...data.steps.between, ...data.steps.at) / 4)) },
@@ -157,7 +157,7 @@ function drawKey(beside = false) {
     : [["index +1", "solid"], ["index \u22121", "dash"], ["other index", "dot"]].filter(([, dash]) =>
       data.arcs.some((arc) => (arc.index === 1 ? "solid" : arc.index === -1 ? "dash" : "dot") === dash));
   const entries = used.map(([name, dash]) => {
-    const line = svg("line", { x1: 0, y1: 5, x2: 34, y2: 5, stroke: GREY, "stroke-width": 2, "stroke-dasharray": dashes[dash] });
+    const line = svg("line", { x1: 0, y1: 5, x2: 34, y2: 5, stroke: "var(--ink)", "stroke-width": 2, "stroke-dasharray": dashes[dash] });
     return element("span", {}, svg("svg", { width: 34, height: 10 }, line), name);
   });
   if (beside) entries.push(element("span", {}, "branches that coincide are drawn side by side"));
@@ -186,7 +186,7 @@ function selectBranch(number) {
   });
   place.replaceChildren(
     element("h3", {}, `Branch ${number}: ${rows.length} ${rows.length === 1 ? "arc" : "arcs"}`),
-    table(["arc", "alpha from", "to", "begins", "ends", "index", "statuses, node by node"], rows),
+    table(`Arcs of branch ${number}`, ["arc", "alpha from", "to", "begins", "ends", "index", "statuses, node by node"], rows),
   );
 }
 
@@ -222,10 +222,11 @@ function start() {
   for (const row of document.querySelectorAll("tr[tabindex]")) {
     const act = () => (row.dataset.branch === undefined ? showAlpha(Number(row.dataset.alpha)) : selectBranch(Number(row.dataset.branch)));
     row.addEventListener("click", act);
-    row.addEventListener("keydown", (event) => { if (event.key === "Enter") act(); });
+    row.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); act(); } });
   }
-  byId("marks").append(...data.statuses.filter((_, code) => [...data.arcs, ...data.vertices].some((item) => item.statuses.includes(String(code)))).map((name) =>
-    element("span", {}, svg("svg", { width: 14, height: 14 }, marker(name, 7, 7, 5, name)), name)));
+  byId("marks").append(...bodyKeys([...data.arcs, ...data.vertices]));
+  if (data.body) lookControls(drawCards);
+  repaints.push(drawDiagram);
   drawDiagram();
   // where most solutions are
   const most = data.steps.between.reduce((best, n, k) => (n > data.steps.between[best] ? k : best), 0);

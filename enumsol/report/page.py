@@ -12,6 +12,7 @@ from enumsol.branches.figures.graph_plots import checked_units
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history import History
 from enumsol.report.content import listed, report_content
+from enumsol.report.given import given_section, with_unit
 from enumsol.report.history_page import history_page
 from enumsol.report.parts import (
     fact_list,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.branches.elements import Vertex
+    from enumsol.fem import Scene
 
 
 def write_report(
@@ -42,6 +44,7 @@ def write_report(
     title: str = "Contact problem with Coulomb friction",
     units: tuple[str, str] | None = None,
     commands: Sequence[str] = (),
+    scene: Scene | None = None,
 ) -> None:
     """Write all solutions over an interval of alpha, at one alpha, or after every load step, as one HTML page.
 
@@ -51,6 +54,10 @@ def write_report(
     arcs), the number of solutions, a slider over alpha with the deformed bodies of all solutions (without a mesh:
     forces and displacements of the contact nodes), tables of branches, transitions and folds, and what is certified. It
     says "complete" only where ``graph.complete`` does; of a graph that was cut short it says what is missing.
+
+    Bodies in the plane can be zoomed, enlarged in their displacements one by one or all at once, and coloured by
+    displacement or stress; load, supports, foundation and contact forces are drawn, the latter with a scale, and the
+    statuses along the boundary in a strip. Pages follow the light or dark setting of the browser and print on A4.
 
     The page of a RootSet, in 2D or 3D, has a card for each root with the deformed body (in 3D it can be turned),
     contact forces, statuses, directions of slip and a table over the contact nodes; tables of roots, continua and
@@ -71,6 +78,9 @@ def write_report(
         Of forces and of lengths; the figures of a History have none.
     commands : sequence of str
         Lines of a shell by which a reader can check the proof.
+    scene : fem.Scene, optional
+        What the problem was made of, from `fem.mesh_scene` or `fem.read_mesh_scene`: material, supports, springs, loads
+        and gaps are then told as they were given, with their units.
 
     Raises
     ------
@@ -96,33 +106,46 @@ def write_report(
             f"solutions is a {type(given).__name__}; expected a BranchGraph, a RootSet or a History"
         )
     place = file_path(file, "file")
-    words = (instance_of(title, str, "title"), checked_units(units), tuple(commands))
+    words = (instance_of(title, str, "title"), checked_units(units), tuple(commands), _checked_scene(scene))
     if isinstance(solutions, BranchGraph):
         page = report_page(solutions, *words)
     elif isinstance(solutions, RootSet):
         page = roots_page(solutions, *words)
     else:
-        page = history_page(solutions, words[0], words[2])
+        page = history_page(solutions, *words)
     with writing(place, "file"):
         place.write_text(page, encoding="utf-8")
 
 
-def report_page(graph: BranchGraph, title: str, units: tuple[str, str] | None, commands: Sequence[str]) -> str:
+def _checked_scene(scene: Any) -> Scene | None:
+    if scene is None:
+        return None
+    from enumsol.fem import Scene  # scikit-fem takes a while
+
+    return instance_of(scene, Scene, "scene")
+
+
+def report_page(
+    graph: BranchGraph, title: str, units: tuple[str, str] | None, commands: Sequence[str], scene: Scene | None
+) -> str:
     """The text of the page."""
-    content = report_content(graph) | {"units": units}
+    content = report_content(graph, scene) | {"units": units}
     words = {
         "title": escape(title),
         "plotly": packed_plotly(),
         "badge": "yes" if graph.complete else "no",
         "completeness": escape(graph.completeness()),
         "reasons": _reasons(graph.reasons),
-        "facts": _facts(graph),
+        "facts": _facts(graph, units),
+        "given": given_section(scene, units),
         "answers": "".join(f"<li>{escape(line)}</li>" for line in graph.claims.sentences(graph.uniqueness_bound)),
         "branches": _branches(graph),
         "vertices": _vertices(graph),
         "certified": _certified(graph, commands),
     }
-    return filled_page("graph", ("page.common.js", "page.js", "page.solutions.js"), content, words)
+    return filled_page(
+        "graph", ("page.theme.js", "page.common.js", "page.body.js", "page.js", "page.solutions.js"), content, words
+    )
 
 
 def _reasons(reasons: Sequence[str]) -> str:
@@ -135,7 +158,7 @@ def _reasons(reasons: Sequence[str]) -> str:
     )
 
 
-def _facts(graph: BranchGraph) -> str:
+def _facts(graph: BranchGraph, units: tuple[str, str] | None) -> str:
     problem, (a, b) = graph.problem, graph.interval
     F0, F1 = problem.friction
     load = "constant" if problem.load_slope is None else "f + alpha load_slope"
@@ -144,8 +167,8 @@ def _facts(graph: BranchGraph) -> str:
         ("degrees of freedom", f"{problem.n:,}"),
         ("combinations of statuses", f"4^{problem.p}" + (f" = {4**problem.p:.3g}" if problem.p < 500 else "")),
         ("friction", f"F0 + alpha F1, F0 {span_words(F0)}, F1 {span_words(F1)}"),
-        ("load", f"{load}, max |f| = {np.max(np.abs(problem.f)):.4g}"),
-        ("gap", span_words(problem.gap)),
+        ("load", with_unit(f"{load}, max |f| = {np.max(np.abs(problem.f)):.4g}", units, 1, 0)),
+        ("gap", with_unit(span_words(problem.gap), units, 0, 1)),
         ("alpha", f"from {a:.10g} to {b:.10g}"),
         ("arithmetic", graph.arithmetic),
         ("found", f"{counted(len(graph.branches), 'branch', 'branches')}, {counted(len(graph.arcs), 'arc')}, "
@@ -169,7 +192,7 @@ def _branches(graph: BranchGraph) -> str:
         indices = ", ".join(sorted({"?" if arc.index is None else f"{arc.index:+d}" for arc in branch.arcs}))
         cells = (str(branch.number), f"{lo:.8g}", f"{hi:.8g}", shape(branch), str(len(branch.arcs)), indices, folds)
         rows.append((f' data-branch="{branch.number}" tabindex="0"', cells))
-    return table_text(("branch", "alpha from", "to", "shape", "arcs", "indices", "folds at"), rows)
+    return table_text("All branches", ("branch", "alpha from", "to", "shape", "arcs", "indices", "folds at"), rows)
 
 
 def _vertices(graph: BranchGraph) -> str:
@@ -189,7 +212,7 @@ def _vertices(graph: BranchGraph) -> str:
         change = _change(graph, v, meeting[v.number])
         cells = (repr(v.alpha), error, v.kind.value, ", ".join(map(str, branches)), change)
         rows.append((f' data-alpha="{v.alpha!r}" tabindex="0"', cells))
-    return table_text(("alpha", "width of its bounds", "kind", "branches", "what happens"), rows)
+    return table_text("Critical alphas", ("alpha", "width of its bounds", "kind", "branches", "what happens"), rows)
 
 
 def _change(graph: BranchGraph, v: Vertex, arcs: Sequence[Any]) -> str:

@@ -1,5 +1,4 @@
 // All solutions at one alpha: a card for each root, with its body. Bodies in 3D are drawn by Plotly and can be turned.
-const SLIP = "#6a3d9a", EDGE = "#8796a8", BODY = "#dfe6ee", BEFORE = "#5b6672";
 const SYMBOLS_3D = { open: "circle", stick: "square", slip: "diamond" };
 // a browser keeps about sixteen scenes alive
 const CARDS = 6;
@@ -19,27 +18,34 @@ function drawCards() {
   scenes.forEach((scene) => Plotly.purge(scene));
   scenes = [];
   byId("cards").replaceChildren(...shown.map((item, k) => card(item, first + k)));
-  scenes.forEach(drawScene);
+  drawScenes();
 }
 
 function card(item, number) {
-  const made = element("article", { className: "card", id: `root-${number}` }, element("h3", {}, `Root ${number}`),
+  item.name = `Root ${number}`;
+  item.key = number;
+  const made = element("article", { className: "card", id: `root-${number}` }), heading = element("h3", {}, item.name);
+  made.append(
+    heading,
     element("p", {}, `index ${signed(item.index)}, ${item.regular ? "regular" : "not regular"}, margin ${short(item.margin)}${item.mirror ? `; ${item.mirror}` : ""}`),
-    element("p", {}, runs(item.statuses)));
+    element("p", {}, runs(item.statuses)),
+  );
   if (item.several.length) made.append(element("p", {}, `several statuses hold at: ${item.several.map((k) => data.nodes[k]).join(", ")}`));
   if (data.body !== null && item.u) {
+    heading.append(enlarge(item, made, () => scenes.forEach((scene) => Plotly.Plots.resize(scene))));
     if (solid) {
-      const scene = element("div", { className: "scene" });
+      const scene = element("div", { className: "scene", role: "img", "aria-label": `${item.name}, deformed body; statuses of the contact nodes: ${runs(item.statuses)}` });
       scene.item = item;
       scenes.push(scene);
       made.append(scene);
+      if (data.body.triangles) made.append(element("div", { className: "small" }, enlargementOf(item, drawScenes)));
     } else {
-      made.append(drawBody({ ...item, forces: new Map(item.forces.map(([node, x, y]) => [node, [x, y]])) }, { scale: item.scale, arrow: data.arrow, least: 0 }));
+      made.append(bodyFigure(item, { force: data.largest, alpha: data.alpha }));
     }
-    if (!solid || data.body.triangles) made.append(element("p", {}, `displacements times ${item.scale}`));
   } else if (data.body === null && tangents === 1) {
     made.append(drawBars(item, bars()));
   }
+  if (tangents === 1) made.append(strip(item));
   const details = element("details", {}, element("summary", {}, "values by nodes"));
   const fillIn = () => { if (details.childElementCount < 2) details.append(values(item)); };
   details.addEventListener("toggle", fillIn);
@@ -59,7 +65,7 @@ function values(item) {
     label, status(item.statuses, k), ...parts(item.f, k), ...parts(item.w, k),
     ...(item.angles ? [angle(item.angles[k])] : []),
   ]);
-  return table(heads, rows);
+  return table(`Contact nodes, ${item.name}`, heads, rows);
 }
 
 function angle(bounds) {
@@ -98,7 +104,7 @@ function arrows(tails, tips, colour, head, width) {
   ];
 }
 
-const displaced = (item) => data.body.points.map((point, k) => point.map((x, c) => x + item.scale * item.u[3 * k + c]));
+const displaced = (item) => data.body.points.map((point, k) => point.map((x, c) => x + enlargement(item) * item.u[3 * k + c]));
 
 // what all bodies and their forces take up, for one view of all
 function extent() {
@@ -121,6 +127,18 @@ function proportions() {
   return { x, y, z };
 }
 
+// the surface, plain or coloured by displacement
+function skin(item) {
+  if (look.colour !== "moved") return { color: ink("body"), opacity: 0.35 };
+  const bar = { thickness: 10, len: 0.6, tickfont: { color: ink("dim"), size: 9 }, title: { text: safe(`displacement${unit("length")}`), font: { color: ink("dim"), size: 10 } } };
+  return { intensity: data.body.points.map((_, node) => lengthOf(item.u, node)), colorscale: "Viridis", cmin: 0, cmax: item.largest || 1, opacity: 1, showscale: true, colorbar: bar };
+}
+
+function drawScenes() {
+  if (solid) ranges = extent();
+  scenes.forEach(drawScene);
+}
+
 function drawScene(scene) {
   const item = scene.item, { points, triangles, edges, outline, rows, size } = data.body, moved = displaced(item);
   const at = rows.map((row) => row.reduce((sum, [node, weight]) => plus(sum, moved[node], weight), [0, 0, 0]));
@@ -128,15 +146,15 @@ function drawScene(scene) {
   if (triangles) {
     const [i, j, k] = triangles;
     traces.push(
-      { ...quiet, type: "mesh3d", ...columns(moved), i, j, k, color: BODY, opacity: 0.35, flatshading: true, lighting: { ambient: 0.85, diffuse: 0.3, specular: 0 } },
-      lines(moved, edges, { color: EDGE, width: 1.5 }),
-      lines(points, outline, { color: BEFORE, width: 2.5, dash: "dot" }),
+      { ...quiet, type: "mesh3d", ...columns(moved), i, j, k, ...skin(item), flatshading: true, lighting: { ambient: 0.85, diffuse: 0.3, specular: 0 } },
+      lines(moved, edges, { color: ink("edge"), width: 1.5 }),
+      lines(points, outline, { color: ink("before"), width: 2.5, dash: "dot" }),
     );
   }
   const pressed = item.forces.map(([node, ...force]) => [plus(moved[node], force, -data.arrow), moved[node]]);
-  traces.push(...arrows(pressed.map(([tail]) => tail), pressed.map(([, tip]) => tip), FORCE, 0.045 * size, 5));
+  traces.push(...arrows(pressed.map(([tail]) => tail), pressed.map(([, tip]) => tip), ink("force"), 0.045 * size, 5));
   const slid = item.slips.map(([row, ...way]) => [at[row], plus(at[row], way, data.slip)]);
-  traces.push(...arrows(slid.map(([tail]) => tail), slid.map(([, tip]) => tip), SLIP, 0.045 * size, 6));
+  traces.push(...arrows(slid.map(([tail]) => tail), slid.map(([, tip]) => tip), ink("load"), 0.045 * size, 6));
   for (const [name, symbol] of Object.entries(SYMBOLS_3D)) {
     const nodes = data.nodes.map((_, k) => k).filter((k) => status(item.statuses, k) === name);
     if (!nodes.length) continue;
@@ -146,9 +164,9 @@ function drawScene(scene) {
       marker: { symbol, size: 5, color: COLOURS[name], line: { color: "#111111", width: 1 } },
     });
   }
-  const axis = (title, range) => ({ title: { text: title, font: { size: 11 } }, range, tickfont: { size: 9 }, nticks: 4, showspikes: false, backgroundcolor: "#fff", gridcolor: "#e8ebee" });
+  const axis = (title, range) => ({ title: { text: title, font: { size: 11 } }, range, tickfont: { size: 9 }, nticks: 4, showspikes: false, backgroundcolor: "rgba(0,0,0,0)", gridcolor: ink("grid"), color: ink("dim") });
   const layout = {
-    margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false,
+    ...paperSize(scenes.length > 1 ? 320 : 660, 340), margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, paper_bgcolor: "rgba(0,0,0,0)", modebar: { bgcolor: "rgba(0,0,0,0)", color: ink("dim") },
     scene: { aspectmode: "manual", aspectratio: proportions(), camera: state.camera, dragmode: "turntable", xaxis: axis("x", ranges[0]), yaxis: axis("y", ranges[1]), zaxis: axis("z", ranges[2]) },
   };
   Plotly.newPlot(scene, traces, layout, { responsive: true, displaylogo: false, displayModeBar: "hover", modeBarButtons: [["toImage", "resetCameraDefault3d"]] }).then(() => {
@@ -167,24 +185,19 @@ function turnAll(turned, camera) {
 // -- start --------------------------------------------------------------------------------------------------------
 
 function drawKeys() {
-  const used = data.statuses.filter((_, code) => data.roots.some((item) => item.statuses.includes(String(code))));
-  const keys = used.map((name) => element("span", {}, svg("svg", { width: 14, height: 14 }, marker(name, 7, 7, 5, name)), name));
-  const key = (colour, text, dash = "") => element("span", {}, svg("svg", { width: 30, height: 10 }, svg("line", { x1: 0, y1: 5, x2: 30, y2: 5, stroke: colour, "stroke-width": 2, "stroke-dasharray": dash })), text);
-  const drawn = data.roots.filter((item) => item.u);
-  if (drawn.some((item) => item.forces.length)) keys.push(key(FORCE, "contact force on the body"));
-  if (drawn.some((item) => item.slips.length)) keys.push(key(SLIP, "direction of slip"));
-  if (data.body && data.body.triangles) keys.push(key(BEFORE, "undeformed body", "5 3"));
+  const keys = bodyKeys(data.roots), drawn = data.roots.filter((item) => item.u);
+  if (solid && drawn.some((item) => item.forces.length)) keys.push(keyEntry("force", "contact force on the body"));
+  if (drawn.some((item) => item.slips.length)) keys.push(keyEntry("load", "direction of slip"));
+  if (solid && data.body.triangles) keys.push(keyEntry("before", "undeformed body"));
   byId("marks").append(...keys);
 }
 
 function words() {
-  const unit = (k) => (data.units ? ` ${data.units[k]}` : ""), scales = new Set(data.roots.filter((item) => item.u).map((item) => item.scale));
   const said = [];
-  if (data.arrow) said.push(`Arrows: contact forces on the body, the longest is ${short(data.largest)}${unit(0)}.`);
-  if (scales.size > 1) said.push("The displacements differ much from root to root: every body has an enlargement of its own, which stands below it.");
+  if (data.arrow) said.push(`Arrows: contact forces on the body, the longest is ${short(data.largest)}${unit("force")}.`);
   if (solid) said.push("Drag a body to turn it; all turn with it.");
   if (data.no_body) said.push(`${data.no_body}.`);
-  if (data.body === null && tangents === 1 && data.roots.length) said.push(`Upper bars are forces (largest ${short(bars().f)}${unit(0)}), lower bars displacements (largest ${short(bars().w)}${unit(1)}); left of a node normal, right tangential.`);
+  if (data.body === null && tangents === 1 && data.roots.length) said.push(`Upper bars are forces (largest ${short(bars().f)}${unit("force")}), lower bars displacements (largest ${short(bars().w)}${unit("length")}); left of a node normal, right tangential.`);
   if (data.roots.length < data.all) said.push(`The first ${data.roots.length} of ${data.all} roots have a card: the page holds no more. enumsol roots --json writes all.`);
   byId("scale").textContent = said.join(" ");
 }
@@ -201,9 +214,14 @@ function startRoots() {
       byId(`root-${number}`).scrollIntoView({ block: "center" });
     };
     row.addEventListener("click", act);
-    row.addEventListener("keydown", (event) => { if (event.key === "Enter") act(); });
+    row.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); act(); } });
   }
-  if (solid) ranges = extent();
+  if (data.body) {
+    prepare(data.roots.filter((item) => item.u));
+    data.roots.forEach((item, k) => { item.key = k; });
+    if (!solid || data.body.triangles) lookControls(drawCards);
+  }
+  if (solid) repaints.push(drawScenes);
   drawKeys();
   words();
   drawCards();

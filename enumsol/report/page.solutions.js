@@ -14,15 +14,15 @@ function solutionsAt(alpha) {
     if (!(data.vertices[arc.tail].alpha < alpha && alpha < data.vertices[arc.head].alpha)) continue;
     const name = `branch ${arc.branch}`, colour = branches.get(arc.branch).colour;
     if (arc.dimension > 0) found.push({ name, colour, words: `a sheet: a continuum of dimension ${arc.dimension}` });
-    else found.push({ name, colour, words: `arc ${arc.number}, index ${signed(arc.index)}`, statuses: arc.statuses, several: [], ...between(arc, alpha) });
+    else found.push({ name, key: `arc ${arc.number}`, colour, words: `arc ${arc.number}, index ${signed(arc.index)}`, statuses: arc.statuses, several: [], ...between(arc, alpha) });
   }
   for (const v of data.vertices) {
     if (v.alpha !== alpha) continue;
     const arc = data.arcs.find((other) => other.tail === v.number || other.head === v.number);
     const words = v.family !== null ? `a continuum of dimension ${v.family.dimension}; one point of it is shown` : v.kind === "end" ? "at the end of the interval" : v.kind;
     found.push({
-      name: arc ? `branch ${arc.branch}` : "no branch", colour: arc ? branches.get(arc.branch).colour : GREY,
-      words, statuses: v.statuses, several: v.several, f: v.f, w: v.w,
+      name: arc ? `branch ${arc.branch}` : "no branch", colour: arc ? branches.get(arc.branch).colour : "var(--ink)",
+      key: `vertex ${v.number}`, words, statuses: v.statuses, several: v.several, f: v.f, w: v.w,
     });
   }
   return found;
@@ -45,7 +45,7 @@ function drawCards() {
   const special = data.vertices.some((v) => v.alpha === state.alpha && v.kind !== "end");
   const number = `${found.length} ${found.length === 1 ? "solution" : "solutions"}`;
   byId("count").textContent = (data.complete ? number : data.exact_counts ? `${number} found, not proven` : `${number} found; there may be more`)
-    + (special ? ", at a critical alpha (rounded)" : "");
+    + ` at alpha = ${short(state.alpha)}` + (special ? ", a critical alpha (rounded)" : "");
   byId("pages").hidden = found.length <= CARDS;
   byId("range").textContent = `${state.page * CARDS + 1} to ${state.page * CARDS + shown.length} of ${found.length}`;
   const solved = found.filter((item) => item.f);
@@ -57,16 +57,18 @@ function drawCards() {
 function card(item, scales) {
   const dot = element("span", { className: "dot" });
   dot.style.background = item.colour;
-  const made = element("article", { className: "card" }, element("h3", {}, dot, item.name), element("p", {}, item.words));
+  const made = element("article", { className: "card" }), heading = element("h3", {}, dot, item.name);
+  made.append(heading, element("p", {}, item.words));
   if (!item.f) return made;
   made.append(element("p", {}, runs(item.statuses)));
   if (item.several.length) made.append(element("p", {}, `several statuses hold at: ${item.several.map((k) => data.nodes[k]).join(", ")}`));
-  made.append(data.body ? drawBody(item, scales) : drawBars(item, scales));
+  if (data.body) heading.append(enlarge(item, made));
+  made.append(data.body ? bodyFigure(item, scales) : drawBars(item, scales), strip(item));
   const details = element("details", {}, element("summary", {}, "values by nodes"));
   details.addEventListener("toggle", () => {
     if (details.childElementCount > 1) return;
     const rows = data.nodes.map((label, k) => [label, status(item.statuses, k), ...[item.f, item.w].flatMap((v) => [short(v[k]), short(v[p + k])])]);
-    details.append(table(["node", "status", "lambda_n", "lambda_t", "u_n", "u_t"], rows));
+    details.append(table(`Contact nodes, ${item.name}`, ["node", "status", "lambda_n", "lambda_t", "u_n", "u_t"], rows));
   });
   made.append(details);
   return made;
@@ -86,30 +88,26 @@ function nodalForces(f) {
     const sum = forces.get(node) || [0, 0];
     forces.set(node, [sum[0] + force * x, sum[1] + force * y]);
   }));
-  return forces;
+  return [...forces].map(([node, sum]) => [node, ...sum]);
 }
 
 function bodyScales(solutions) {
-  let moved = 0, force = 0;
+  let force = 0;
   for (const item of solutions) {
     item.u = moves(item.f);
-    for (let i = 0; i < item.u.length; i += 2) moved = Math.max(moved, Math.hypot(item.u[i], item.u[i + 1]));
     item.forces = nodalForces(item.f);
-    for (const [x, y] of item.forces.values()) force = Math.max(force, Math.hypot(x, y));
+    for (const [, x, y] of item.forces) force = Math.max(force, Math.hypot(x, y));
   }
-  const size = data.body.size, wanted = moved > 0 ? 0.08 * size / moved : 1, power = 10 ** Math.floor(Math.log10(wanted));
-  const scale = moved > 0 ? power * Math.max(...[1, 2, 5].filter((step) => step * power <= wanted * (1 + 1e-9))) : 1;
-  const words = `Displacements times ${Number(scale.toPrecision(1))}; arrows: contact forces on the body, the longest is ${short(force)}${data.units ? ` ${data.units[0]}` : ""}`;
-  return { scale, arrow: force > 0 ? 0.16 * size / force : 0, least: 1e-9 * force, words };
+  prepare(solutions);
+  return { force, alpha: state.alpha, words: `Arrows are contact forces on the body; the longest is ${short(force)}${unit("force")}` };
 }
 
 // -- where the body cannot be drawn: forces and displacements of the nodes -------------------------------------------
 
 function barScales(solutions) {
   const largest = (key) => Math.max(1e-300, ...solutions.flatMap((item) => item[key].map(Math.abs)));
-  const unit = (k) => (data.units ? ` ${data.units[k]}` : "");
   return {
     f: largest("f"), w: largest("w"),
-    words: `${data.no_body}. Upper bars are forces (largest ${short(largest("f"))}${unit(0)}), lower bars displacements (largest ${short(largest("w"))}${unit(1)}); left of a node normal, right tangential`,
+    words: `${data.no_body}. Upper bars are forces (largest ${short(largest("f"))}${unit("force")}), lower bars displacements (largest ${short(largest("w"))}${unit("length")}); left of a node normal, right tangential`,
   };
 }

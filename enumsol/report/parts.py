@@ -80,8 +80,21 @@ def warning_list(sentence: str, items: Sequence[str]) -> str:
     return f'<div class="warning" id="incomplete"><p>{escape(sentence)}</p><ul>{lines}{more}</ul></div>'
 
 
-def table_text(heads: Iterable[str], rows: Iterable[tuple[str, Sequence[str]]]) -> str:
-    """A table; a row is its attributes and its cells, which are escaped here."""
-    head = "".join(f"<th>{escape(name)}</th>" for name in heads)
-    body = "".join(f"<tr{kept}>" + "".join(f"<td>{escape(c)}</td>" for c in cells) + "</tr>" for kept, cells in rows)
-    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+def table_text(caption: str, heads: Iterable[str], rows: Iterable[tuple[str, Sequence[str]]]) -> str:
+    """A table with a caption for screen readers; a row is its attributes and its cells, which are escaped here."""
+    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in heads)
+    body = "".join(
+        f'<tr{kept}><th scope="row">{escape(cells[0])}</th>'
+        + "".join(f"<td>{escape(c)}</td>" for c in cells[1:])
+        + "</tr>"
+        for kept, cells in rows
+    )
+    return scrolling(
+        caption,
+        f"<table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>",
+    )
+
+
+def scrolling(caption: str, table: str) -> str:
+    """A box with a table in it that can be scrolled, by the keyboard too."""
+    return f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}">{table}</div>'

@@ -8,15 +8,16 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.model.cells import KINDS, boundary_facets, facet_outlines, outline_edges
-from enumsol.model.shapes import SLIP_ARROW, BodyShape, arrow_scale, body_shape, own_scales, slip_directions
+from enumsol.model.shapes import SLIP_ARROW, BodyShape, arrow_scale, body_shape, slip_directions
 from enumsol.model.statuses import ContactStatus
-from enumsol.report.body import boundary_edges
+from enumsol.report.body import boundary_edges, surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from enumsol.fem import Scene
     from enumsol.roots.root import Root
     from enumsol.roots.root_set import RootSet
 
@@ -32,7 +33,7 @@ _DIGITS = 7
 _ORDER = tuple(ContactStatus)
 
 
-def roots_content(found: RootSet) -> dict[str, Any]:
+def roots_content(found: RootSet, scene: Scene | None = None) -> dict[str, Any]:
     """Everything that the script needs: nodes, roots with their values, and the bodies that are drawn.
 
     Statuses are texts of one digit per node, places in ``statuses``. ``f`` and ``w`` are forces and displacements of
@@ -40,7 +41,7 @@ def roots_content(found: RootSet) -> dict[str, Any]:
     """
     p = len(found.node_ids)
     listed = found[: max(1, _MOST_VALUES // (8 * p))]
-    pictures, bodies = _pictures(listed) if listed else (_nothing(""), [])
+    pictures, bodies = _pictures(listed, scene) if listed else (_nothing(""), [])
     bodies += [{}] * (len(listed) - len(bodies))
     return {
         "nodes": [str(label) for label in found.node_ids],
@@ -71,7 +72,7 @@ def _nothing(why: str) -> dict[str, Any]:
     return {"body": None, "no_body": why, "arrow": 0.0, "largest": 0.0, "slip": 0.0}
 
 
-def _pictures(roots: Sequence[Root]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+def _pictures(roots: Sequence[Root], scene: Scene | None) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """The body, or why there is none, and what moves it and acts on it by root; of many roots the first."""
     problem = roots[0].problem
     if problem.mesh is None:
@@ -79,6 +80,10 @@ def _pictures(roots: Sequence[Root]) -> tuple[dict[str, Any], list[dict[str, Any
     in_space = roots[0].lambda_t.ndim == 2
     shape = body_shape(problem)
     body, nodes = _solid(shape) if in_space else _plane(shape, len(roots))
+    if not in_space:
+        new = np.full(len(shape.points), -1)
+        new[nodes] = np.arange(len(nodes))
+        body |= surroundings(problem, shape, new, scene)
     count = _MOST_NUMBERS // (len(nodes) * shape.points.shape[1]) - 1
     if count < 1:
         return _nothing(f"The mesh is too large to draw: its boundary alone has {len(nodes):,} nodes"), []
@@ -86,10 +91,9 @@ def _pictures(roots: Sequence[Root]) -> tuple[dict[str, Any], list[dict[str, Any
     drawn = roots[:count]
     acting = [shape.contact_forces(problem, root.lambda_n, root.lambda_t) for root in drawn]
     moves = [shape.displacements(root.u) for root in drawn]
-    scales = own_scales([_largest(each) for each in moves], shape.size)
     bodies = [
-        {"u": _short(moved[nodes].ravel()), "forces": _vectors(forces, nodes), "slips": [], "scale": scale}
-        for forces, moved, scale in zip(acting, moves, scales, strict=True)
+        {"u": _short(moved[nodes].ravel()), "forces": _vectors(forces, nodes), "slips": []}
+        for forces, moved in zip(acting, moves, strict=True)
     ]
     if in_space:
         for root, each in zip(drawn, bodies, strict=True):
@@ -118,7 +122,7 @@ def _bare_nodes(roots: Sequence[Root]) -> tuple[dict[str, Any], list[dict[str, A
         return _nothing("The problem has no mesh, and all its contact nodes are at one place: nothing is drawn"), []
     rows = [[[k, 1]] for k in range(len(places))]
     body = {"points": _short(places), "rows": rows, "size": size, "triangles": None, "edges": [], "outline": []}
-    still = {"u": [0] * places.size, "forces": [], "slips": [], "scale": 1.0}
+    still = {"u": [0] * places.size, "forces": [], "slips": []}
     words = "The problem has no mesh: its contact nodes are drawn at their coordinates, without forces"
     return _nothing(words) | {"body": body}, [still] * len(roots)
 
@@ -141,11 +145,11 @@ def _solid(shape: BodyShape) -> tuple[dict[str, Any], Integers]:
 def _plane(shape: BodyShape, bodies: int) -> tuple[dict[str, Any], Integers]:
     """Cells of a plane body, of a large one the edges of its boundary, and the nodes that are drawn."""
     cells = shape.cells[:, KINDS[2, shape.cells.shape[1]].outline]
-    if shape.points.size * (bodies + 1) <= _MOST_NUMBERS:
-        return {"cells": cells.tolist(), "lines": None}, np.arange(len(shape.points))
     edges = boundary_edges(cells)
+    if shape.points.size * (bodies + 1) <= _MOST_NUMBERS:
+        return {"cells": cells.tolist(), "lines": None, "rim": edges.tolist()}, np.arange(len(shape.points))
     nodes, new = _numbered(shape, np.unique(edges))
-    return {"cells": None, "lines": new[edges].tolist()}, nodes
+    return {"cells": None, "lines": new[edges].tolist(), "rim": new[edges].tolist()}, nodes
 
 
 def _numbered(shape: BodyShape, nodes: Integers) -> tuple[Integers, Integers]:

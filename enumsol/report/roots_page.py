@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.report.given import given_section, with_unit
 from enumsol.report.parts import (
     fact_list,
     filled_page,
@@ -24,15 +25,18 @@ from enumsol.support.messages import counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from enumsol.fem import Scene
     from enumsol.roots.root_set import RootSet, Undecided
 
 #: Rows of the tables of roots, continua and undecided parts.
 _MOST_ROWS = 500
 
 
-def roots_page(found: RootSet, title: str, units: tuple[str, str] | None, commands: Sequence[str]) -> str:
+def roots_page(
+    found: RootSet, title: str, units: tuple[str, str] | None, commands: Sequence[str], scene: Scene | None
+) -> str:
     """The text of the page."""
-    content = roots_content(found) | {"units": units, "alpha": float(found.alpha)}
+    content = roots_content(found, scene) | {"units": units, "alpha": float(found.alpha)}
     turned = content["body"] is not None and "triangles" in content["body"]
     words = {
         "title": escape(title),
@@ -40,7 +44,8 @@ def roots_page(found: RootSet, title: str, units: tuple[str, str] | None, comman
         "badge": "yes" if found.complete else "no",
         "completeness": escape(found.completeness()),
         "reasons": _open_parts(found),
-        "facts": _root_facts(found),
+        "facts": _root_facts(found, units),
+        "given": given_section(scene, units),
         "answers": "".join(f"<li>{escape(line)}</li>" for line in _answers(found)),
         "alpha": escape(f"{float(found.alpha):.10g}"),
         "roots": _root_table(found),
@@ -48,7 +53,7 @@ def roots_page(found: RootSet, title: str, units: tuple[str, str] | None, comman
         "undecided": _undecided_table(found),
         "certified": _what_is_certified(found, commands),
     }
-    return filled_page("roots", ("page.common.js", "page.roots.js"), content, words)
+    return filled_page("roots", ("page.theme.js", "page.common.js", "page.body.js", "page.roots.js"), content, words)
 
 
 def _open_parts(found: RootSet) -> str:
@@ -80,7 +85,7 @@ def _answers(found: RootSet) -> list[str]:
     return lines
 
 
-def _root_facts(found: RootSet) -> str:
+def _root_facts(found: RootSet, units: tuple[str, str] | None) -> str:
     alpha = f"{float(found.alpha):.10g}"
     if not isinstance(found.alpha, float):
         alpha += f", which is {found.alpha} exactly"
@@ -92,8 +97,8 @@ def _root_facts(found: RootSet) -> str:
         facts += [
             ("degrees of freedom", f"{problem.n:,}"),
             ("friction", friction),
-            ("load", f"max |f| = {np.max(np.abs(problem.load_at(found.alpha))):.4g}"),
-            ("gap", span_words(problem.gap)),
+            ("load", with_unit(f"max |f| = {np.max(np.abs(problem.load_at(found.alpha))):.4g}", units, 1, 0)),
+            ("gap", with_unit(span_words(problem.gap), units, 0, 1)),
         ]
     facts += [("arithmetic", found.arithmetic), ("searched", counted(found.stats.nodes, "node") + " of the tree")]
     return fact_list(facts)
@@ -111,7 +116,7 @@ def _root_table(found: RootSet) -> str:
         rows.append((f' data-root="{k}" tabindex="0"', [*cells, summary(root.statuses)]))
     if mirrored is not None:
         heads.insert(5, "mirror image")
-    return table_text(heads, rows) + _more(len(found), "roots")
+    return table_text("All roots", heads, rows) + _more(len(found), "roots")
 
 
 def _family_table(found: RootSet) -> str:
@@ -127,9 +132,8 @@ def _family_table(found: RootSet) -> str:
     ]  # fmt: skip
     heads = ("continuum", "dimension", "index", "polytopes", "vertices", "lambda_n", "statuses, node by node")
     words = "<p>Connected sets of infinitely many solutions. They are not drawn.</p>"
-    return (
-        f"<section><h2>Continua</h2>{words}{table_text(heads, rows)}{_more(len(found.families), 'continua')}</section>"
-    )
+    table = table_text("Continua", heads, rows) + _more(len(found.families), "continua")
+    return f"<section><h2>Continua</h2>{words}{table}</section>"
 
 
 def _undecided_table(found: RootSet) -> str:
@@ -137,7 +141,7 @@ def _undecided_table(found: RootSet) -> str:
         return ""
     rows = [("", _undecided_cells(k, item)) for k, item in enumerate(found.undecided[:_MOST_ROWS])]
     heads = (
-        "",
+        "part",
         "what is known of the nodes",
         "leaves",
         "max lambda_n of a root in it",
@@ -146,7 +150,8 @@ def _undecided_table(found: RootSet) -> str:
     )
     words = "<p>Parts of the search without an answer: each may hold solutions or none.</p>"
     more = _more(len(found.undecided), "parts")
-    return f'<section id="undecided"><h2>Undecided</h2>{words}{table_text(heads, rows)}{more}</section>'
+    table = table_text("Undecided parts", heads, rows)
+    return f'<section id="undecided"><h2>Undecided</h2>{words}{table}{more}</section>'
 
 
 def _undecided_cells(k: int, item: Undecided) -> list[str]:

@@ -29,7 +29,7 @@ def html_lines(lines: Iterable[str]) -> str:
 
 def html_table(heads: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     """A table as HTML; what stands in it is escaped."""
-    head = "".join(f"<th>{escape(name)}</th>" for name in heads)
+    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in heads)
     body = "".join("<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 

@@ -172,7 +172,7 @@ def test_more_solutions_than_fit_are_on_further_pages(browser, pages):
     browser.size(1280, 900)
     browser.open(pages["chain"])
     browser.evaluate("showAlpha(5)")
-    assert browser.evaluate("byId('count').textContent") == "27 solutions"
+    assert browser.evaluate("byId('count').textContent") == "27 solutions at alpha = 5"
     assert cards(browser) == 12
     browser.evaluate("byId('more').click(); byId('more').click(); byId('more').click()")
     assert browser.evaluate("byId('range').textContent") == "25 to 27 of 27"

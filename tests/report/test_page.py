@@ -1,6 +1,7 @@
 """The page of a report against the graph it was made of: numbers, words, tables; what is escaped; what is refused."""
 
 import json
+import re
 import sys
 
 import numpy as np
@@ -8,7 +9,15 @@ import pytest
 from pages import Reader, data_of
 
 import enumsol
-from enumsol import InvalidArgumentError, MissingDependencyError, branch_graph, enumerate_roots, gallery, write_report
+from enumsol import (
+    InvalidArgumentError,
+    MissingDependencyError,
+    branch_graph,
+    enumerate_roots,
+    fem,
+    gallery,
+    write_report,
+)
 from enumsol.cli import main
 from enumsol.report import body as bodies, content
 from enumsol.report.body import body_record
@@ -281,3 +290,81 @@ def test_the_command_refuses_before_it_searches(capsys, options, message):
     assert out == ""
     assert message in err
     assert err.count("\n") == 1
+
+
+# -- what was given ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def scene():
+    options = {"young": 210000, "poisson": 0.3, "plane": "stress", "contact": "bottom", "symmetry": "left"}
+    acting = {"spring": {"right": (20, 10)}, "load": {"top": (30, -60)}, "gap": 1e-4, "friction": 0.3}
+    return fem.mesh_scene(fem.rectangle(4, 2).parted(), **options, **acting)
+
+
+def test_the_problem_is_told_as_it_was_given(scene, tmp_path):
+    graph = branch_graph(scene.problem(), (0, 1))
+    cells = {
+        "young": ["210000", "N/mm²"],
+        "poisson": ["0.3", ""],
+        "plane": ["stress", ""],
+        "contact": ["bottom", ""],
+        "symmetry": ["left", ""],
+        "spring": ["right: 20, 10", "N/mm³"],
+        "load": ["top: 30, -60", "N/mm²"],
+        "gap": ["0.0001", "mm"],
+        "friction": ["0.3", ""],
+        "thickness": ["1", "mm"],
+    }
+    page = page_of(graph, tmp_path, units=("N", "mm"), scene=scene)
+    given = page[page.index('<section id="given">') :]
+    rows = re.findall(r'<tr><th scope="row">(.*?)</th>(.*?)</tr>', given[: given.index("</table>")])
+    assert {name: re.findall("<td>(.*?)</td>", row) for name, row in rows} == cells
+    text = Reader(page).text
+    assert "resultant (30, -60)" in text
+    assert "gap 0.0001 mm" in text
+    roots = enumerate_roots(scene.problem(), 0)
+    plain = page_of(roots, tmp_path, scene=scene)
+    assert "Numbers are in the consistent units" in Reader(plain).text
+    assert 'id="given"' not in page_of(roots, tmp_path)
+    with pytest.raises(InvalidArgumentError, match="scene is a str; expected a Scene"):
+        write_report(graph, tmp_path / "page.html", scene="scene.toml")
+
+
+@pytest.mark.slow
+def test_the_page_of_a_history_tells_what_was_given(scene, tmp_path):
+    history = enumsol.histories(scene.problem(), [enumsol.LoadStep(load=[0.0] * scene.problem().n)])
+    page = page_of(history, tmp_path, scene=scene, units=("N", "mm"))
+    assert "N/mm³" in page[page.index('id="given"') :]
+    assert all(attributes["alt"] for tag, attributes in Reader(page).tags if tag == "img")
+
+
+def test_what_acts_on_the_body_and_holds_it(scene):
+    problem = scene.problem()
+    body = body_record(problem, scene)
+    points = np.array(body["points"])
+    load = np.array(body["load"])
+    np.testing.assert_allclose(load[:, 1], 1)  # on top
+    # the horizontal force at the corner on the plane of symmetry is the support's
+    np.testing.assert_allclose(load[:, 2:].sum(axis=0), [30 * 7 / 8, -60, 0, 0], rtol=1e-6)
+    assert [[points[k, 0], abs(x), abs(y)] for k, x, y in body["held"]] == [[0, 1, 0]] * 2  # one more is a contact node
+    assert {points[k, 0] for k in body["springs"]} == {1}
+    assert [wall[1:] for wall in body["walls"]] == [[0, -1, 1e-4]] * problem.p
+    lam, mu = body["lame"][0]
+    E, nu = mu * (3 * lam + 2 * mu) / (lam + mu), lam / (2 * (lam + mu))
+    assert (E, nu) == pytest.approx((210000 * (1 + 2 * 0.3) / 1.3**2, 0.3 / 1.3), rel=1e-6)  # plane stress
+    rim = {tuple(sorted(edge)) for edge in body["rim"]}
+    assert len(rim) == 12
+    assert body_record(problem)["springs"] == []
+
+
+def test_supports_along_slopes_and_many_loads():
+    """A slope moves along it only; a weight is drawn as its resultant."""
+    mesh = fem.rectangle(12, 12).parted()
+    options = {"young": 1, "poisson": 0.3, "contact": "bottom", "clamp": "left", "body_force": (0, -2), "friction": 0.3}
+    body = body_record(fem.mesh_problem(mesh, **options))
+    assert len(body["load"]) == 1
+    x, y, fx, fy, *slope = body["load"][0]
+    assert (x, y, fx, slope) == (pytest.approx(0.5, abs=0.05), pytest.approx(0.5, abs=0.05), 0, [0, 0])
+    assert fy == pytest.approx(-2, rel=0.05)  # without what the clamp takes
+    assert [way for _, *way in body["held"]] == [[0, 0]] * 13
