@@ -22,8 +22,8 @@ def page(name):
     return followed
 
 
-NAMES = ("branches", "command_line", "histories", "results", "three_dimensions", "tutorial")
-branches, command_line, histories, results, three_dimensions, tutorial = (page(name) for name in NAMES)
+NAMES = ("branches", "command_line", "gallery", "histories", "results", "three_dimensions", "tutorial")
+branches, command_line, gallery, histories, results, three_dimensions, tutorial = (page(name) for name in NAMES)
 
 
 def test_no_page_is_forgotten():
@@ -122,3 +122,24 @@ def test_histories(histories):
     assert histories["history"].complete
     assert histories["history"].counts == (1, 1, 3, 5)
     assert histories["found"].complete
+
+
+@pytest.mark.slow
+def test_gallery(gallery):
+    counts = {"taper": 3, "clip": 3, "off": 1, "rough": 1, "rests": 1, "slides": 0, "wedge": 5, "solid": 3}
+    for name, count in counts.items():
+        assert gallery[name].complete
+        assert len(gallery[name]) == count
+    assert gallery["safe"] == pytest.approx(0.347, abs=5e-4)
+    assert gallery["locking"].complete
+    assert gallery["locking"].multiplicity_at(0.4) == 3
+    assert gallery["relief"] == pytest.approx(1 / 1.2, rel=1e-4)
+    assert {str(status) for status in gallery["joint"].statuses} == {"stick"}
+    assert {str(status) for status in gallery["turns"].statuses} <= {"slip+", "slip-"}
+    assert gallery["transmitted"] == pytest.approx(1504, abs=1)
+    assert max(gallery["square"].steps[2]) == 5
+    shown = re.findall(r"\(pictures/(\w+\.png)\)", (DOCS / "gallery.md").read_text(encoding="utf-8"))
+    assert len(shown) == 10
+    for name in shown:
+        assert (DOCS / "pictures" / name).is_file()
+        assert (gallery["folder"] / name).stat().st_size > 1000
