@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from enumsol.checker.plane_checker import Checker
+from enumsol.checker.walk import TreeChecker
 from enumsol.condensation.floating import FloatingSystem, RigidRows
 from enumsol.proof import records
 from enumsol.proof.reading import RefusedError, quoted, same
@@ -30,12 +31,10 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class FloatingChecker(Checker):
-    """Checks one proof of a body that nothing holds."""
+class WithinReach(TreeChecker):
+    """What checkers of bodies that nothing holds in 2D and 3D share: the bound of the rigid displacement."""
 
-    kinds = records.FLOATING_LEAVES
-
-    #: Some leaf rests on the bound of the rigid displacement.
+    #: Some leaf rests on it.
     bounded: bool = False
 
     def _read_header(self, header: Any) -> None:
@@ -54,6 +53,13 @@ class FloatingChecker(Checker):
         """Balls for S and g of the body on springs."""
         enclosure: CondensedEnclosure = self.problem.on_springs.enclosure
         return enclosure
+
+
+@dataclass
+class FloatingChecker(WithinReach, Checker):
+    """Checks one proof of a body that nothing holds."""
+
+    kinds = records.FLOATING_LEAVES
 
     @cached_property
     def system(self) -> FloatingSystem:

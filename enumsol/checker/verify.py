@@ -64,7 +64,7 @@ def verify(
     optional_callable(progress, "progress")
     proof.check_integrity()
     checker: type[TreeChecker] = Checker
-    if problem.modes is not None:
+    if problem.modes is not None and not in_space:
         from enumsol.checker.floating import FloatingChecker  # for bodies that nothing holds only
 
         checker = FloatingChecker
@@ -72,6 +72,10 @@ def verify(
         from enumsol.checker.space_checker import SpaceChecker  # with its trusted core, for problems in 3D only
 
         checker = SpaceChecker
+        if problem.modes is not None:
+            from enumsol.checker.space_floating import FloatingSpaceChecker  # as above
+
+            checker = FloatingSpaceChecker
     lines = proof.records()
     header = next(lines, None)
     if isinstance(header, dict) and header.get("kind") == "history":

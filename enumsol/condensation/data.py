@@ -84,8 +84,8 @@ class ProblemData(CondensableData, Protocol):
         """F(alpha), shape (p,)."""
 
 
-class FloatingData(ProblemData, Protocol):
-    """A 2D problem of a body that nothing holds."""
+class FloatingData(CondensableData, Protocol):
+    """A problem of a body that nothing holds, in 2D or 3D."""
 
     @property
     def on_springs(self) -> Any:

@@ -292,8 +292,18 @@ class EnclosedSystem:
         """Bounds of the coordinates of a rigid displacement; none of a body that is held."""
         return np.zeros(0)
 
-    @cached_property
+    @property
+    def largest_work(self) -> float:
+        """A bound of the work of the load on a rigid displacement; none of a body that is held."""
+        return 0.0
+
+    @property
     def largest_unknowns(self) -> float:
+        """A bound of the norm of all unknowns at a root."""
+        return self.largest_forces
+
+    @cached_property
+    def largest_forces(self) -> float:
         """A bound of the norm of lambda at a root: ||g|| / mu, by theory, (5.2)."""
         return float(upper_norm(np.abs(self.g) + self.g_rad) / self.smallest_eigenvalue * SAFE)
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -116,20 +116,25 @@ class FloatingSystem(EnclosedSystem):
         )
         return Ball(mid, rad), Ball.joined(Ball(self.g, self.g_rad), h), Ball(self.F, self.F_rad)
 
-    def reaching(self, reach: Array) -> FloatingSystem:
+    def reaching(self, reach: Array) -> Self:
         """The same with other bounds of the rigid displacement."""
         return replace(self, rows=replace(self.rows, reach=reach))
+
+    @property
+    def largest_work(self) -> float:
+        """A bound of h'q within the bounds."""
+        h, k = self.rows.h.size, gamma(len(self.reach) + 8)
+        # what no load works on may be infinite
+        return float(h[h > 0] @ self.reach[h > 0]) * (1 + k) * SAFE
 
     @cached_property
     def largest_forces(self) -> float:
         """A bound of the norm of lambda at a solution within the bounds (theory, (14.5))."""
-        h, k = self.rows.h.size, gamma(len(self.reach) + 8)
-        # what no load works on may be infinite
-        load = float(h[h > 0] @ self.reach[h > 0]) * (1 + k) * SAFE
+        load, k = self.largest_work, gamma(len(self.reach) + 8)
         mu, g = self.smallest_eigenvalue, float(upper_norm(np.abs(self.g) + self.g_rad))
         return float((g + np.sqrt(g * g + 4 * mu * load)) / (2 * mu) * (1 + k) * SAFE)
 
-    @cached_property
+    @property
     def largest_unknowns(self) -> float:
         """A bound of the norm of (lambda, q) at a solution within the bounds."""
         return float(np.hypot(self.largest_forces, upper_norm(self.reach)) * SAFE)

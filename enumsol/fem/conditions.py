@@ -160,15 +160,14 @@ class Piece:
         return int(np.sum(values <= _HELD * max(values[-1], np.finfo(np.float64).tiny)))
 
     def free_modes(self, points: Floats, hold: sp.csc_array) -> Floats:
-        """The rigid motions of a plane body that nothing holds, (2 N, r): translations and turns, as simple as may be.
+        """The rigid motions that nothing holds, (d N, r): translations and turns, as simple as may be.
 
         Where supports or springs leave only some of them, they are combinations of a turn and translations.
         """
         motions = _rigid_motions(points, self.nodes)
         count = self.free_motions(points, hold)
         if count == motions.shape[1]:
-            turned = np.where(self.nodes[:, None], points[:, ::-1] * [-1.0, 1.0], 0.0)
-            return np.column_stack([motions[:, :2], turned.ravel()])
+            return np.where(np.repeat(self.nodes, points.shape[1])[:, None], rigid_motions(points), 0.0)
         _, vectors = np.linalg.eigh(motions.T @ (hold @ motions))
         # echelon form: what is a translation becomes one exactly
         table, row = vectors[:, :count].T.copy(), 0
@@ -223,15 +222,14 @@ def check_held(pieces: Sequence[Piece], points: Floats, hold: sp.csc_array) -> N
     """
     for piece in pieces:
         if piece.free_motions(points, hold):
-            alone = "; or max_rigid_displacement, if contact alone is to hold it" if points.shape[1] == 2 else ""
             raise InvalidProblemError(
                 f"{piece.name} is free to move as a rigid body; expected clamp, symmetry, displacement or spring to "
-                f"hold it (contact alone does not){alone}"
+                "hold it (contact alone does not); or max_rigid_displacement, if contact alone is to hold it"
             )
 
 
 def rigid_modes_of(pieces: Sequence[Piece], points: Floats, hold: sp.csc_array) -> Floats | None:
-    """The rigid motions of plane bodies that nothing holds, (2 N, r); None if there are none."""
+    """The rigid motions of bodies that nothing holds, (d N, r); None if there are none."""
     modes = np.hstack([piece.free_modes(points, hold) for piece in pieces])
     return modes if modes.shape[1] else None
 
@@ -239,13 +237,18 @@ def rigid_modes_of(pieces: Sequence[Piece], points: Floats, hold: sp.csc_array) 
 def _rigid_motions(points: Floats, inside: Mask) -> Floats:
     """Displacements (d N, 3) or (d N, 6) by translations and rotations of nodes, in units of their extent."""
     own = points[inside]
-    places = np.where(inside[:, None], (points - own.mean(axis=0)) / np.max(np.ptp(own, axis=0)), 0.0)
-    count, dimension = points.shape
-    motions = [np.outer(inside, axis) for axis in np.eye(dimension)]
+    places = (points - own.mean(axis=0)) / np.max(np.ptp(own, axis=0))
+    return np.where(np.repeat(inside, points.shape[1])[:, None], rigid_motions(places), 0.0)
+
+
+def rigid_motions(places: Floats) -> Floats:
+    """Translations, and turns about the origin, of nodes at these places (N, d): (d N, 3) or (d N, 6)."""
+    count, dimension = places.shape
+    motions = [np.tile(axis, (count, 1)) for axis in np.eye(dimension)]
     for one in range(dimension):
         for two in range(one):
             turned = np.zeros((count, dimension))
-            turned[:, one], turned[:, two] = -places[:, two], places[:, one]
+            turned[:, one], turned[:, two] = places[:, two], -places[:, one]
             motions.append(turned)
     return np.stack([motion.ravel() for motion in motions], axis=1)
 

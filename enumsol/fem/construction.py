@@ -52,7 +52,7 @@ def problem_of(
     mesh : callable or None
         What the problem keeps of its mesh, from the degrees of freedom that are left.
     modes : (d N, r) array or None
-        In 2D, rigid motions that nothing holds.
+        Rigid motions that nothing holds.
     **more
         As in `ContactProblem` and `ContactProblem3D`.
 
@@ -72,8 +72,9 @@ def problem_of(
     rows = (displacements_along(contact.means, axis, dofs, body.left) for axis in (contact.normals, *axes))
     arrays: tuple[Any, ...] = (body.A, *rows, body.f)
     more |= {"load_slope": body.load_slope, "mesh": None if mesh is None else mesh(body.left)}
+    more["rigid_modes"] = None if modes is None else modes[body.left]
     if dofs.shape[1] == 2:
-        return ContactProblem(*arrays, **more | {"rigid_modes": None if modes is None else modes[body.left]})
+        return ContactProblem(*arrays, **more)
     from enumsol.model.problem3d import ContactProblem3D  # not for problems in 2D
 
     return ContactProblem3D(*arrays, **more)

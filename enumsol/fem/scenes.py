@@ -177,10 +177,6 @@ class Scene:
         if largest is None:
             check_held(*about)
             return None
-        if self.dimension == 3:
-            raise InvalidArgumentError(
-                f"max_rigid_displacement is {shown(largest)} for a body in 3D; expected None, and supports that hold it"
-            )
         if largest != "auto":
             more["max_rigid_displacement"] = positive_number(largest, "max_rigid_displacement")
         modes = rigid_modes_of(*about)

@@ -16,13 +16,14 @@ from enumsol.gallery.problems import (
     two_node_square,
     wedge,
 )
-from enumsol.gallery.solid_gallery import block3d, one_node_3d, wedge3d
+from enumsol.gallery.solid_gallery import block3d, block_on_table3d, one_node_3d, wedge3d
 
 __all__ = [
     "GALLERY",
     "GalleryEntry",
     "block3d",
     "block_on_table",
+    "block_on_table3d",
     "brake_shoe",
     "chain",
     "clamped_block",

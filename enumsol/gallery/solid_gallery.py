@@ -6,10 +6,11 @@ import math
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.gallery.problems import holding, inclination
-from enumsol.support.arguments import finite_number, positive_integer
+from enumsol.support.arguments import finite_number, nonnegative_number, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
@@ -134,6 +135,85 @@ def block3d(
         friction_slope=(1.0, 0.6) if friction is None else 0.0,
         multipliers=multipliers,
         ratio=ratio,
+    )
+
+
+def block_on_table3d(
+    nx: int = 2,
+    ny: int = 1,
+    nz: int = 1,
+    lame: tuple[float, float] = (1.0, 1.0),
+    *,
+    size: ArrayLike = (2.0, 1.0, 1.0),
+    cells: Literal["hexahedra", "tetrahedra"] = "hexahedra",
+    pressure: float = 1.0,
+    push: ArrayLike = (0.5, 0.0),
+    friction: float = 0.3,
+    max_rigid_displacement: float | None = None,
+) -> ContactProblem3D:
+    """A block that lies on a table, pressed down and pushed: `block_on_table` in 3D, with six rigid modes.
+
+    All nodes of the bottom (z = 0) touch the table: p = (nx + 1) (ny + 1). The normal is (0, 0, -1), the tangents are x
+    and -y. The top is pressed down; a traction on the bottom pushes the block. While ``push`` is shorter than 1 it has
+    one solution, at 1 it slides as far as one likes, and above it has none.
+
+    Parameters
+    ----------
+    nx, ny, nz : int
+        Cells along x, y and z, at least 1.
+    lame : (float, float)
+        Lame coefficients l, m [force / length^2].
+    size : (3,) array_like
+        Sides of the block [length].
+    cells : {"hexahedra", "tetrahedra"}
+        As in `enumsol.fem.box`.
+    pressure : float
+        Force per area of the top [force / length^2].
+    push : (2,) array_like
+        Sum of the pushing forces along x and y, in parts of what friction can hold [-].
+    friction : float
+        Constant coefficient.
+    max_rigid_displacement : float or None
+        As in `ContactProblem3D`.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> blocks = [enumsol.gallery.block_on_table3d(1, push=(push, 0.0)) for push in (0.5, 1.1)]
+    >>> [len(enumsol.enumerate_roots(block, alpha=0)) for block in blocks]
+    [1, 0]
+    """
+    from enumsol.fem.conditions import rigid_motions  # as above
+    from enumsol.fem.solid_meshes import box
+    from enumsol.fem.solids import facet_forces, solid_stiffness
+    from enumsol.model.mesh import BodyMesh
+    from enumsol.model.problem3d import ContactProblem3D
+
+    mesh = box(nx, ny, nz, size, cells)
+    points, facets = mesh.points, mesh.facets
+    load, mu = positive_number(pressure, "pressure"), nonnegative_number(friction, "friction")
+    across = mu * load * np.append(short_vector(push, "push", 2), 0.0)
+    forces = facet_forces(points, facets["top"], (0.0, 0.0, -load)) + facet_forces(points, facets["bottom"], across)
+    nodes, n = mesh.nodes("bottom"), points.size
+    rows, ones = np.arange(len(nodes)), np.ones(len(nodes))
+    first, second, normal = (
+        sp.csr_array((sign * ones, (rows, 3 * nodes + axis)), shape=(len(nodes), n))
+        for axis, sign in enumerate((1.0, -1.0, -1.0))
+    )
+    return ContactProblem3D(
+        solid_stiffness(points, mesh.cells, lame),
+        *(normal, first, second),
+        forces.ravel(),
+        friction=mu,
+        coordinates=points[nodes],
+        mesh=BodyMesh.of_dofs(points, mesh.cells, np.arange(n)),
+        rigid_modes=rigid_motions(points),
+        max_rigid_displacement=max_rigid_displacement,
     )
 
 

@@ -24,10 +24,10 @@ _FRICTION_SLOPE = ("friction_slope_1", "friction_slope_2")
 def problem_from_arrays(arrays: Mapping[str, Any], layout: Layout) -> ContactProblem | ContactProblem3D:
     """The problem made of arrays whose names have been checked."""
     options: dict[str, Any] = {name: arrays[name] for name in _SAME if name in arrays}
+    options |= _rigid(arrays)
     if layout is LAYOUT_2D:
         options |= _plane_friction(arrays)
         options["mesh"] = _mesh(arrays)
-        options |= _rigid(arrays)
         return ContactProblem(*(arrays[name] for name in layout.required), **options)
     # not for problems in 2D
     from enumsol.model.problem3d import ContactProblem3D
@@ -51,14 +51,12 @@ def arrays_of(problem: ContactProblem | ContactProblem3D) -> dict[str, Any]:
         F0, F1 = problem.friction
         arrays: dict[str, Any] = {name: getattr(problem, name) for name in (*LAYOUT_2D.required, "gap")}
         arrays |= {"friction0": F0, "friction1": F1, "slip_offset": problem.slip_offset}
-        if problem.rigid_modes is not None:
-            arrays["rigid_modes"] = problem.rigid_modes
-        if problem.max_rigid_displacement is not None:
-            arrays["max_rigid_displacement"] = np.array([problem.max_rigid_displacement])
     else:
         arrays = {name: getattr(problem, name) for name in (*LAYOUT_3D.required, "gap", "slip_offset")}
         arrays |= _arrays_of_law(problem) | dict(zip(_FRICTION_SLOPE, problem.friction_slope, strict=True))
-    more = {name: getattr(problem, name, None) for name in ("load_slope", "coordinates", "areas")}
+    more = {name: getattr(problem, name, None) for name in ("load_slope", "coordinates", "areas", "rigid_modes")}
+    if problem.max_rigid_displacement is not None:
+        more["max_rigid_displacement"] = np.array([problem.max_rigid_displacement])
     mean, mesh = getattr(problem, "slip_mean", None), problem.mesh
     if mesh is not None:
         more |= {"mesh_points": mesh.points, "mesh_cells": mesh.cells, "mesh_motion": mesh.motion}

@@ -99,11 +99,11 @@ _SLOPES = ("friction_slope_1", "friction_slope_2")
 LAYOUT_3D = Layout(
     contact=("A", "Bn", "Bt1", "Bt2"),
     matrices=("A", "Bn", "Bt1", "Bt2", *MEAN[:2], MEAN[3], "mesh_motion"),
-    tables=("coordinates", "slip_offset", *_MESH_TABLES, "slip_mean_offset", *TABLE[1:]),
-    broadcast=("gap", "friction", "friction_1", "friction_2", *_SLOPES),
+    tables=("coordinates", "slip_offset", *_MESH_TABLES, "slip_mean_offset", *TABLE[1:], RIGID[0]),
+    broadcast=("gap", "friction", "friction_1", "friction_2", *_SLOPES, RIGID[1]),
     optional=(
         *_COMMON,
-        *("friction_1", "friction_2", *_SLOPES, *TABLE, "areas", *_MESH, *MEAN),
+        *("friction_1", "friction_2", *_SLOPES, *TABLE, "areas", *_MESH, *MEAN, *RIGID),
     ),
     frictions=(("friction",), ("friction_1", "friction_2"), TABLE),
     synonyms=_SYNONYMS

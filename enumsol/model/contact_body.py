@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from enumsol.condensation.affine import exactly_at
 from enumsol.errors import InvalidArgumentError, InvalidProblemError, NotHeldError
+from enumsol.model.rigid_modes import RigidModes, largest_displacement
 from enumsol.support.arguments import alpha_value, shown
 from enumsol.support.array_arguments import real_array, real_matrix
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
@@ -23,10 +24,11 @@ from enumsol.support.messages import counted
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from enumsol.condensation.condensed import Condensation
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.condensation.factorization import Factorization
     from enumsol.condensation.products import Products
-    from enumsol.model.rigid_modes import RigidModes
+    from enumsol.model.mesh import BodyMesh
     from enumsol.support.arguments import AlphaLike
     from enumsol.support.array_types import ArrayLike, Floats, NDArray
 
@@ -63,6 +65,9 @@ class ContactBody(Immutable):
     _origin: ContactBody | None = None
     #: The rigid modes of a body that nothing holds.
     modes: RigidModes | None = None
+    rigid_modes: Floats | None = None
+    max_rigid_displacement: float | None = None
+    mesh: BodyMesh | None = None
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     def __init_subclass__(cls) -> None:
@@ -127,6 +132,57 @@ class ContactBody(Immutable):
     def p(self) -> int:
         """Number of contact nodes."""
         return self._rows["Bn"].shape[0]
+
+    def _hold(self, rigid_modes: ArrayLike | None, max_rigid_displacement: float | None) -> None:
+        """Take the arguments about a body that nothing holds."""
+        self.modes = None if rigid_modes is None else RigidModes.of(rigid_modes, self.A)
+        self.rigid_modes = None if self.modes is None else self.modes.N
+        self.max_rigid_displacement = largest_displacement(max_rigid_displacement, self.modes)
+
+    @cached_property
+    def on_springs(self) -> Self:
+        """The body held by springs at some degrees of freedom, if nothing holds it (theory, section 14.1); or itself.
+
+        Raises
+        ------
+        InvalidProblemError
+            Springs there do not hold it: A is singular not only on the rigid modes.
+        """
+        if self.modes is None:
+            return self
+        # pictures of it are of no use, nor are bounds of a rigid displacement
+        without = {"A", *self._rows, "coordinates", "areas", "mesh", "rigid_modes", "max_rigid_displacement"}
+        data = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in without}
+        if self._origin is not None:
+            return self._origin.on_springs.replace(**data)  # type: ignore[return-value]
+        rows = (matrix.matrix() for matrix in self._rows.values())
+        try:
+            return type(self)(sp.csc_array(self.A + self.modes.springs()), *rows, **data)
+        except InvalidProblemError as error:
+            raise InvalidProblemError(
+                f"A is singular or indefinite on more than the {self.modes.r} rigid_modes, for springs that hold these "
+                f"leave it so ({error})"
+            ) from None
+
+    @cached_property
+    def rigid_reach(self) -> float:
+        """How far the body may move as a whole: ``max_rigid_displacement`` or its default; 0 if it is held [length]."""
+        if self.modes is None:
+            return 0.0
+        if self.max_rigid_displacement is not None:
+            return self.max_rigid_displacement
+        for points in (None if self.mesh is None else self.mesh.points, self.coordinates):
+            if points is not None and np.any(np.ptp(points, axis=0)):
+                return float(10.0 * np.max(np.ptp(points, axis=0)))
+        condensed = self.on_springs.condensed
+        largest = float(np.max(np.abs(condensed.g0)) + np.max(np.abs(condensed.g1)))
+        # a power of two: the same wherever the problem is read, although what is computed may differ in its last bits
+        return float(np.exp2(np.ceil(np.log2(1000.0 * largest)))) if largest > 0 else 1.0
+
+    @property
+    def condensed(self) -> Condensation:
+        """The problem condensed to its contact forces (theory, section 4.1)."""
+        raise NotImplementedError
 
     def check_held(self, what: str) -> None:
         """Nothing for a body that supports or springs hold; ``what`` was asked of it, for the message.
@@ -261,7 +317,7 @@ class ContactBody(Immutable):
         if self.offset_radius is not None:
             kind, vectors = kind + b", from a ball", [*vectors, self.offset_radius.ravel()]
         if self.modes is not None:
-            kind, vectors = kind + b", held by nothing", [*vectors, self.modes.N.ravel(), self._largest_rigid()]
+            kind, vectors = kind + b", held by nothing", [*vectors, self.modes.N.ravel(), np.array([self.rigid_reach])]
         digest = hashlib.sha256(kind)
         parts: list[Any] = [np.array([self.n, self.p])]
         rows = (sp.csc_array(matrix.matrix()).sorted_indices() for matrix in self._rows.values())
@@ -273,20 +329,19 @@ class ContactBody(Immutable):
             digest.update(b"|")
         return digest.hexdigest()
 
-    def _largest_rigid(self) -> Floats:
-        """How far the body may move as a whole, shape (1,)."""
-        raise NotImplementedError
-
     def _text(self, friction: str) -> str:
         """What ``repr`` gives; ``friction`` are the coefficients in words."""
         load = "constant" if self.load_slope is None else "f + alpha load_slope"
-        return (
+        text = (
             f"{type(self).__name__} with {counted(self.p, 'contact node')}\n"
             f"  degrees of freedom  {self.n}  (A: {self.A.nnz} nonzeros)\n"
             f"  friction            {friction}\n"
             f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"
             f"  gap                 {span(self.gap)}"
         )
+        if self.modes is None:
+            return text
+        return f"{text}\n  rigid modes         {self.modes.r}, of displacements up to {self.rigid_reach:g}"
 
     def __getstate__(self) -> dict[str, Any]:
         # the factorization (SuperLU) cannot be pickled; workers that need it compute it again

@@ -13,8 +13,7 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.model.contact_body import ContactBody, friction_values, span, vector
 from enumsol.model.mesh import BodyMesh
-from enumsol.model.rigid_modes import RigidModes
-from enumsol.support.arguments import alpha_value, exact_number, instance_of, positive_number, shown
+from enumsol.support.arguments import alpha_value, exact_number, instance_of, shown
 from enumsol.support.immutable import sealed
 
 if TYPE_CHECKING:
@@ -109,49 +108,9 @@ class ContactProblem(ContactBody):
         self.friction = _friction(friction, self.p)
         self.slip_offset = vector(slip_offset, "slip_offset", self.p, broadcast=True)
         self.mesh = None if mesh is None else instance_of(mesh, BodyMesh, "mesh").check(self.n, self.p, 2)
-        self.modes = None if rigid_modes is None else RigidModes.of(rigid_modes, self.A)
-        self.rigid_modes = None if self.modes is None else self.modes.N
-        self.max_rigid_displacement = _largest(max_rigid_displacement, self.modes)
+        self._hold(rigid_modes, max_rigid_displacement)
         self._freeze()
         self.on_springs.factorization.check_positive_definite()
-
-    @cached_property
-    def on_springs(self) -> ContactProblem:
-        """The body held by springs at some degrees of freedom, if nothing holds it (theory, section 14.1); or itself.
-
-        Raises
-        ------
-        InvalidProblemError
-            Springs there do not hold it: A is singular not only on the rigid modes.
-        """
-        if self.modes is None:
-            return self
-        names = "f", "gap", "friction", "load_slope", "slip_offset", "node_ids"
-        data = {name: getattr(self, name) for name in names}
-        if isinstance(self._origin, ContactProblem):
-            return self._origin.on_springs.replace(**data)
-        try:
-            return ContactProblem(sp.csc_array(self.A + self.modes.springs()), self.Bn, self.Bt, **data)
-        except InvalidProblemError as error:
-            raise InvalidProblemError(
-                f"A is singular or indefinite on more than the {self.modes.r} rigid_modes, for springs that hold these "
-                f"leave it so ({error})"
-            ) from None
-
-    @cached_property
-    def rigid_reach(self) -> float:
-        """How far the body may move as a whole: ``max_rigid_displacement`` or its default; 0 if it is held [length]."""
-        if self.modes is None:
-            return 0.0
-        if self.max_rigid_displacement is not None:
-            return self.max_rigid_displacement
-        for points in (None if self.mesh is None else self.mesh.points, self.coordinates):
-            if points is not None and np.any(np.ptp(points, axis=0)):
-                return float(10.0 * np.max(np.ptp(points, axis=0)))
-        condensed = self.on_springs.condensed
-        largest = float(np.max(np.abs(condensed.g0)) + np.max(np.abs(condensed.g1)))
-        # a power of two: the same wherever the problem is read, although what is computed may differ in its last bits
-        return float(np.exp2(np.ceil(np.log2(1000.0 * largest)))) if largest > 0 else 1.0
 
     @property
     def Bt(self) -> sp.csr_array:  # noqa: N802 (the field's letter)
@@ -197,26 +156,9 @@ class ContactProblem(ContactBody):
         """SHA-256 of all data, as 64 hexadecimal digits; proofs are bound to it."""
         return self._digest(b"enumsol problem 1", self.friction)
 
-    def _largest_rigid(self) -> Floats:
-        return np.array([self.rigid_reach])
-
     def __repr__(self) -> str:
         F0, F1 = self.friction
-        text = self._text(f"F0 + alpha F1,  F0 in {span(F0)}, F1 in {span(F1)}")
-        if self.modes is None:
-            return text
-        return f"{text}\n  rigid modes         {self.modes.r}, of displacements up to {self.rigid_reach:g}"
-
-
-def _largest(value: float | None, modes: RigidModes | None) -> float | None:
-    if value is None:
-        return None
-    if modes is None:
-        raise InvalidProblemError("max_rigid_displacement is given without rigid_modes; expected both")
-    try:
-        return positive_number(value, "max_rigid_displacement")
-    except InvalidArgumentError as error:
-        raise InvalidProblemError(str(error)) from None
+        return self._text(f"F0 + alpha F1,  F0 in {span(F0)}, F1 in {span(F1)}")
 
 
 def _friction(value: Any, p: int) -> tuple[Floats, Floats]:

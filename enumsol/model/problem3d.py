@@ -72,6 +72,8 @@ class ContactProblem3D(ContactBody):
         The mesh the problem was made of.
     slip_mean : SlipMean or None
         The slip that friction depends on, where it is not ``|u_t|`` of the node itself.
+    rigid_modes, max_rigid_displacement
+        Of a body that nothing holds, as in `ContactProblem`.
 
     Raises
     ------
@@ -116,6 +118,8 @@ class ContactProblem3D(ContactBody):
         areas: ArrayLike | None = None,
         mesh: BodyMesh | None = None,
         slip_mean: SlipMean | None = None,
+        rigid_modes: ArrayLike | None = None,
+        max_rigid_displacement: float | None = None,
     ) -> None:
         super().__init__(A, {"Bn": Bn, "Bt1": Bt1, "Bt2": Bt2}, f, gap, load_slope, node_ids, coordinates)
         p = self.p
@@ -127,8 +131,9 @@ class ContactProblem3D(ContactBody):
         self.slip_mean = None if slip_mean is None else instance_of(slip_mean, SlipMean, "slip_mean").check(self.n, p)
         if isinstance(self.law, ConstantFriction) and not np.any(self._slope):
             _check_signs(self.law.values, self.node_ids, "")
+        self._hold(rigid_modes, max_rigid_displacement)
         self._freeze()
-        self.factorization.check_positive_definite()
+        self.on_springs.factorization.check_positive_definite()
 
     @property
     def Bt1(self) -> sp.csr_array:  # noqa: N802 (the field's letter)
@@ -165,6 +170,7 @@ class ContactProblem3D(ContactBody):
     @cached_property
     def condensed(self) -> Condensation:
         """The problem condensed to its 3p contact forces."""
+        self.check_held("condensation")
         from enumsol.condensation.condensed import Condensation  # scipy's solvers come with the first use
 
         return Condensation.from_problem(self)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.errors import InvalidProblemError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.support.arguments import positive_number
 from enumsol.support.array_arguments import real_array
 from enumsol.support.immutable import Sealed, sealed
 
@@ -88,6 +89,24 @@ class RigidModes(Sealed):
         nearest = np.array([float(x) for x in most])
         low = [Fraction(x) < exact for x, exact in zip(nearest.tolist(), most, strict=True)]
         return np.where(low, np.nextafter(nearest, np.inf), nearest)
+
+
+def largest_displacement(value: float | None, modes: RigidModes | None) -> float | None:
+    """The bound of rigid displacements, if it is given.
+
+    Raises
+    ------
+    InvalidProblemError
+        It is no positive number, or given without modes.
+    """
+    if value is None:
+        return None
+    if modes is None:
+        raise InvalidProblemError("max_rigid_displacement is given without rigid_modes; expected both")
+    try:
+        return positive_number(value, "max_rigid_displacement")
+    except InvalidArgumentError as error:
+        raise InvalidProblemError(str(error)) from None
 
 
 def _pivots(N: Floats) -> Any:

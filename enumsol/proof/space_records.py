@@ -20,6 +20,7 @@ from enumsol.proof.records import (
     RecordError,
     RegularRoot,
     Solved,
+    Unbalanced,
     UndecidedRecord,
     Unloaded,
     table_of,
@@ -130,6 +131,8 @@ class BoxedRoot(Solved):
 
 #: All kinds of leaves in 3D.
 LEAVES = table_of(ExcludedInSpace, NoRoot, RegularRoot, BoxedRoot, OnlyRoot, Unloaded, UndecidedRecord)
+#: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
+FLOATING_LEAVES = table_of(ExcludedInSpace, Unbalanced, NoRoot, RegularRoot, UndecidedRecord)
 
 
 def _row(row: Any, p: int) -> Row:

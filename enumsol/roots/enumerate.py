@@ -15,7 +15,7 @@ from enumsol.roots.builder import RootBuilder, in_order, named, root_family
 from enumsol.roots.components import RootComponent, apart, closed_component, connected_components
 from enumsol.roots.enumeration import Enumeration, not_begun
 from enumsol.roots.local_degree import local_degree
-from enumsol.roots.root_set import RigidBound, RootSet
+from enumsol.roots.root_set import RootSet
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
 from enumsol.search.outcome import SearchLimits, SearchProgress, Stop, StopReason
@@ -145,8 +145,7 @@ def enumerate_roots(
     seconds, tolerance = optional_seconds(time_limit), share(tolerance)
     if _is_in_space(problem):
         # not for problems in 2D
-        from enumsol.roots.space_roots import SpaceEnumeration, check_supported
-        from enumsol.search.space.space_setup import SpaceSolvers
+        from enumsol.roots.space_roots import SpaceEnumeration, check_supported, solvers_in_space
 
         check_supported(arithmetic, method, engine)
     _check_proof(arithmetic, method, proof_path, resume)
@@ -154,7 +153,7 @@ def enumerate_roots(
     try:
         with within(Deadline.after(started, seconds)):
             if _is_in_space(problem):
-                in_space = SpaceSolvers(problem, value, arithmetic)
+                in_space = solvers_in_space(problem, value, arithmetic)
                 _ = in_space.enclosed  # before a file is begun
                 search = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
             else:
@@ -342,14 +341,8 @@ class _Enumeration(Enumeration[Solvers]):
             at_least=None if whole else self._at_least(separate + int(joinable)),
             certified_data=solvers.data,
             proof=self._proof(roots=len(roots), families=len(families)),
-            rigid_bound=self._rigid_bound(),
+            rigid_bound=self._rigid_bound(solvers.problem),
         )
-
-    def _rigid_bound(self) -> RigidBound | None:
-        problem = self.solvers.problem
-        if problem.modes is None:
-            return None
-        return RigidBound(problem.rigid_reach, self.certifier.certified.bounded or self.method == "exhaustive")
 
 
 def roots_of_selections(problem: ContactProblem, alpha: Alpha, selections: Sequence[Codes], *, whole: bool) -> RootSet:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from enumsol.errors import Interrupted, OutputError
 from enumsol.proof.begun import begun_proof
 from enumsol.proof.writer import ProofWriter
-from enumsol.roots.root_set import RootSet, SearchStats, Undecided
+from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.outcome import SearchLimits, SearchOutcome, Stop, StopReason
 from enumsol.search.parallel import Searchable, Spread
@@ -143,6 +143,12 @@ class Enumeration(ABC, Generic[_Solvers]):
     @abstractmethod
     def _result(self) -> RootSet:
         """What was found, in the user's terms."""
+
+    def _rigid_bound(self, problem: ContactBody) -> RigidBound | None:
+        """Of a body that nothing holds, within which rigid displacements the solutions are all of them."""
+        if problem.modes is None:
+            return None
+        return RigidBound(problem.rigid_reach, self.certifier.certified.bounded or self.method == "exhaustive")
 
     def _stats(self) -> SearchStats:
         outcome = self.outcome

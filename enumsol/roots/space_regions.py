@@ -139,12 +139,14 @@ def _boxes(system: EnclosedSpace, leaves: Sequence[Codes]) -> _Boxes:
     low, high = np.empty((2, count, 2 * m))
     angle, radius = np.empty((2, count, p))
     everywhere = _energy_bounds(system)
-    S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
+    modes, (S, g, _) = len(system.reach), system.balls
     for k, codes in enumerate(leaves):
         leaf = unsettled(system, codes) if over() else settle(system, codes)
         angle[k], radius[k] = slip_angles(system, codes, leaf)
         y = everywhere if leaf is None or leaf.y is None else smaller(leaf.y, everywhere)
-        w = g - (S @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
+        # with -q, which is known no better here, as the last unknowns of a body that nothing holds
+        all_y = Ball.joined(y, Ball(np.zeros(modes), system.reach))
+        w = (g - (S @ all_y[:, None])[:, 0])[:m]
         y, w = with_zeros(system, codes, y, w if leaf is None or leaf.w is None else smaller(leaf.w, w))
         mid, rad = np.concatenate([y.mid, w.mid]), np.concatenate([y.rad, w.rad]) * SAFE
         low[k], high[k] = mid - rad, mid + rad
@@ -154,14 +156,17 @@ def _boxes(system: EnclosedSpace, leaves: Sequence[Codes]) -> _Boxes:
 
 
 def _energy_bounds(system: EnclosedSpace) -> Ball:
-    """All y with e(y) <= 0: an ellipsoid around S^{-1} g / 2 through 0."""
+    """All y with e(y) <= 0: an ellipsoid around S^{-1} g / 2 through 0.
+
+    Of a body that nothing holds e(y) <= h'q, which is at most the product of the load and the bounds of q.
+    """
     m = len(system.g)
     S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
     inverse = solution(S, Ball.exact(np.eye(m)))
     if inverse is None:
-        return Ball(np.zeros(m), np.full(m, upper_norm(g.size) / max(system.smallest_eigenvalue, TINY) * SAFE * SAFE))
+        return Ball(np.zeros(m), np.full(m, system.largest_forces))
     middle = (inverse @ Ball(0.5 * g.mid[:, None], 0.5 * g.rad[:, None]))[:, 0]
-    energy = float((g[None] @ middle[:, None]).size[0, 0]) * 0.5
+    energy = float((g[None] @ middle[:, None]).size[0, 0]) * 0.5 + system.largest_work
     reach = np.sqrt(np.diagonal(inverse.size) * energy) * (1.0 + 4 * UNIT)
     return Ball(middle.mid, (middle.rad + reach) * SAFE + TINY)
 

@@ -11,6 +11,9 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, UNIT
+from enumsol.condensation.condensed import FloatingCondensation
+from enumsol.condensation.floating import RigidRows
+from enumsol.condensation.floating_space import FloatingSpace
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus
 from enumsol.roots.enumeration import Enumeration
@@ -29,9 +32,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from enumsol.condensation.condensed import Condensation
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.search.certifiers.protocol import UndecidedPart
     from enumsol.search.outcome import SearchProgress
     from enumsol.selections.solution import Codes
+    from enumsol.support.arguments import Alpha
     from enumsol.trusted.space.leaves import SpaceRoot
 
     Array = NDArray[np.float64]
@@ -90,6 +96,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             node_ids=self.problem.node_ids,
             at_least=None if whole else self._at_least(len(roots) - len(doubtful)),
             proof=self._proof(roots=len(roots)),
+            rigid_bound=self._rigid_bound(self.problem),
         )
 
     # -- in the user's terms ---------------------------------------------------------------------------------------
@@ -99,7 +106,8 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         forces, F = found.y.mid, system.F
         lambda_n = forces[:p] * system.force
         lambda_t = system.tangential(forces) * F * system.force[:, None]
-        u_n, u_t = self._displacements(lambda_n, lambda_t)
+        rigid = None if found.rigid is None else self._in_units(found.rigid)
+        u_n, u_t = self._displacements(lambda_n, lambda_t, rigid)
         closed = np.array([code != OPEN for code in codes])
         u_n = np.where(closed, 0.0, np.minimum(u_n, 0.0))
         u_t = np.where((np.array(codes) == STICK)[:, None] & (F > 0), 0.0, u_t)
@@ -116,7 +124,8 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             regular=True,
             margin=found.slack,
             enclosure=self._root_enclosure(codes, found),
-            _condensed=self.problem.condensed,
+            _condensed=self._condensed,
+            _rigid=None if rigid is None else rigid.mid + 0.0,
         )
 
     def _loose(self, found: LooseSolution) -> Root:
@@ -142,7 +151,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             regular=False,
             margin=0.0,
             enclosure=bounds if self.arithmetic == "verified" else None,
-            _condensed=self.problem.condensed,
+            _condensed=self._condensed,
         )
 
     def _loose_bounds(self, found: LooseSolution) -> Enclosure:
@@ -152,19 +161,44 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         return np.array([_around(*pair) for pair in zip(*loose_angles(self.enclosed, found), strict=True)])
 
     @cached_property
+    def _condensed(self) -> Condensation:
+        """What roots compute their displacements with."""
+        if self.problem.modes is None:
+            return self.problem.condensed
+        return FloatingCondensation.of(self.problem)
+
+    def _in_units(self, rigid: Ball) -> Ball:
+        """Coordinates of a rigid displacement, without the units of their rows, which are powers of two."""
+        unit = self._rigid_unit
+        return Ball(rigid.mid * unit, rigid.rad * unit)
+
+    @property
+    def _rigid_unit(self) -> Array:
+        return self.enclosed.rows.unit if isinstance(self.enclosed, FloatingSpace) else np.ones(0)
+
+    @cached_property
+    def _moved(self) -> Ball:
+        """B N in the problem's units, (3p, r), of a body that nothing holds."""
+        ones = np.ones(3 * self.problem.p)
+        rows = RigidRows.of(self.problem, Fraction(self.alpha), ones, ones)
+        return Ball(rows.G.mid / rows.unit[:, None], rows.G.rad / rows.unit[:, None]).T
+
+    @cached_property
     def _in_balls(self) -> tuple[Ball, Ball]:
         """S and g in the problem's units, those of all 3p rows: as enclosed, or in fast arithmetic as computed."""
-        problem, size = self.problem, 3 * self.problem.p
+        problem, size = self.problem.on_springs, 3 * self.problem.p
         if self.arithmetic != "verified":
             return Ball.exact(problem.condensed.S), Ball.exact(problem.condensed.free_displacements(self.alpha))
         ones = np.ones(size)
         S, S_rad, g, g_rad = problem.enclosure.in_units(Fraction(self.alpha), ones, ones)
         return Ball(S, S_rad), Ball(g, g_rad)
 
-    def _displacements(self, lambda_n: Array, lambda_t: Array) -> tuple[Array, Array]:
+    def _displacements(self, lambda_n: Array, lambda_t: Array, rigid: Ball | None = None) -> tuple[Array, Array]:
         """u_n and u_t; floats may have S and g off by more than the root's enclosure is wide."""
         S, g = self._in_balls
         w = g.mid - S.mid @ np.concatenate([lambda_n, lambda_t.ravel(order="F")])
+        if rigid is not None:
+            w += self._moved.mid @ rigid.mid
         return w[: self.problem.p], w[self.problem.p :].reshape(2, -1).T
 
     def _angles(self, codes: Codes, found: SpaceRoot) -> Array:
@@ -172,8 +206,11 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         pairs = zip(*slip_angles(self.enclosed, codes, found), strict=True)
         return np.array([_around(middle, radius) for middle, radius in pairs])
 
-    def _enclosure(self, y: Ball, w: Ball) -> Enclosure:
-        """Bounds in the problem's units, for scaled forces and displacements in balls."""
+    def _enclosure(self, y: Ball, w: Ball, rigid: Ball | None = None) -> Enclosure:
+        """Bounds in the problem's units, for scaled forces and displacements in balls.
+
+        ``rigid``: of a body that nothing holds, coordinates of its rigid displacement, by default all in question.
+        """
         system, exact, p = self.system, self.enclosed, self.problem.p
         S, g = self._in_balls
         forces, known = (Ball(np.zeros(3 * p), np.full(3 * p, radius)) for radius in (0.0, np.inf))
@@ -188,6 +225,9 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
                 ball.mid[k * p + occurs] = product.mid * unit[occurs]
                 ball.rad[k * p + occurs] = np.where(zero, 0.0, product.rad * unit[occurs])
         computed = g - (S @ forces[:, None])[:, 0]
+        if isinstance(exact, FloatingSpace):
+            rigid = self._in_units(Ball(0.0 * exact.reach, exact.reach) if rigid is None else rigid)
+            computed = computed + (self._moved @ rigid[:, None])[:, 0]
         bounds = [(b.mid - b.rad * SAFE, b.mid + b.rad * SAFE) for b in (forces, known, computed)]
         low, high = np.maximum(bounds[1][0], bounds[2][0]), np.minimum(bounds[1][1], bounds[2][1])
         bounds[0][0][:p], high[:p] = np.maximum(bounds[0][0][:p], 0.0), np.minimum(high[:p], 0.0)
@@ -200,7 +240,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             return None
         y, w = with_zeros(self.enclosed, codes, found.y, found.w)
         # displacements are those of the forces
-        return self._enclosure(y, Ball(w.mid, np.where(w.rad > 0, np.inf, 0.0)))
+        return self._enclosure(y, Ball(w.mid, np.where(w.rad > 0, np.inf, 0.0)), found.rigid)
 
     def _rest(self) -> Root:
         """The unloaded body: nothing moves, and every status holds."""
@@ -221,7 +261,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             regular=False,
             margin=0.0,
             enclosure=bounds if self.arithmetic == "verified" else None,
-            _condensed=self.problem.condensed,
+            _condensed=self._condensed,
         )
 
     # -- what stayed undecided -------------------------------------------------------------------------------------
@@ -294,6 +334,15 @@ def _around(middle: float, radius: float) -> Array:
     low = middle - radius
     turns = np.floor((low + np.pi) / (2.0 * np.pi))
     return sealed(np.array([low, middle + radius]) - 2.0 * np.pi * turns)
+
+
+def solvers_in_space(problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> SpaceSolvers:
+    """Those of a body that is held, or that nothing holds."""
+    if problem.modes is None:
+        return SpaceSolvers(problem, alpha, arithmetic)
+    from enumsol.search.space.space_floating import FloatingSpaceSolvers  # for such bodies only
+
+    return FloatingSpaceSolvers(problem, alpha, arithmetic)
 
 
 def check_supported(arithmetic: str, method: str, engine: str | None) -> None:

@@ -190,12 +190,17 @@ class FloatingReader(PlaneReader):
 
 def on_weak_springs(scaled: ScaledSystem, rows: RigidRows) -> ScaledSystem:
     """The body on weak springs, which the relaxations of the search are about (theory, section 14.5)."""
+    S, g = weakly_held(scaled.S, scaled.g, rows)
+    cholesky = np.asarray(np.linalg.cholesky(S), dtype=np.float64)
+    return ScaledSystem(S, g, scaled.F, scaled.force, scaled.length, cholesky)
+
+
+def weakly_held(S: NDArray[np.float64], g: NDArray[np.float64], rows: RigidRows) -> tuple[NDArray[np.float64], ...]:
+    """S and g with weak springs in place of those that they have."""
     G, h = rows.G.mid, rows.h.mid
     soft = G.T / WEAK
-    S = scaled.S + soft @ G
-    S = 0.5 * (S + S.T)
-    cholesky = np.asarray(np.linalg.cholesky(S), dtype=np.float64)
-    return ScaledSystem(S, scaled.g + soft @ h, scaled.F, scaled.force, scaled.length, cholesky)
+    S = S + soft @ G
+    return 0.5 * (S + S.T), g + soft @ h
 
 
 class Exclusions:

@@ -71,9 +71,14 @@ def motion_against(system: FloatingSystem, codes: Sequence[int]) -> Array:
     What is left of the load after its projection onto the cone of resultants G lambda, which is made wider by a share.
     Whether it is one, ``is_unbalanced`` tells.
     """
+    return motion_beside(system, _rays(system, codes))
+
+
+def motion_beside(system: FloatingSystem, resultants: Sequence[Array]) -> Array:
+    """As ``motion_against``, for forces whose resultants are combinations of these with positive coefficients."""
     h = system.rows.h.mid
     size = float(np.linalg.norm(h))
-    rays = [ray for ray in _rays(system, codes) if np.any(ray)]
+    rays = [ray for ray in resultants if np.any(ray)]
     if not rays or size == 0:
         return h
     columns = np.array([ray / np.linalg.norm(ray) for ray in rays])

@@ -21,27 +21,38 @@ from enumsol.trusted.status_rows import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLI
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
+    from enumsol.arithmetic.ball_arrays import Ball
     from enumsol.arithmetic.balls import Array
     from enumsol.condensation.floating import FloatingSystem
 
 
 def floating_bounds(system: FloatingSystem, y: Array, c: Array, c_rad: Array, errors: float = 1.0) -> Array:
     """Lower bounds on e - h'q for multipliers y (m, 2p) and c, a ball; as energy_bounds."""
-    h, h_rad, k = system.rows.h.mid, system.rows.h.rad, gamma(2 * len(system.g) + 8)
-    G, G_rad = system.rows.G.mid, system.rows.G.rad
-    moved = np.abs(h - y @ G.T)
-    slack = h_rad + np.abs(y) @ G_rad.T + k * (np.abs(h) + np.abs(y) @ np.abs(G).T)
-    price = (moved + errors * slack * (1 + k) * SAFE) * SAFE
-    # a mode without load that moves no contact node costs nothing, whatever its bound
-    cost = np.where(price > 0, price * system.reach, 0.0).sum(axis=1) * (1 + k) * SAFE
-    first = _held_bounds(system, y, c, c_rad, errors)[0] - cost
-    return np.asarray(np.fmax(first, _balanced_bounds(system, y, c, c_rad, errors)))
+    none = np.zeros_like(y)
+    first = bounds_within(system, y, none, c, c_rad, errors)
+    y, change, sure = balanced(system.rows.G, system.rows.h, y, errors)
+    second = bounds_within(system, y, change, c, c_rad, errors, at_balance=True)
+    return np.asarray(np.fmax(first, np.where(sure, second, -np.inf)))
 
 
-def _held_bounds(system: FloatingSystem, y: Array, c: Array, c_rad: Array, errors: float) -> tuple[Array, Array]:
-    """B(y, c + G'z) + z'h for the best z, and the size of g, of c + G'z and of their radii."""
+def bounds_within(
+    system: FloatingSystem, y: Array, y_rad: Array, c: Array, c_rad: Array, errors: float, *, at_balance: bool = False
+) -> Array:
+    """Lower bounds on e - h'q for a y and a c, both balls, within the bounds of the rigid displacement.
+
+    ``at_balance``: for the y of the ball with G y = h, which are known to exist, at any displacement.
+    """
     h, h_rad, k = system.rows.h.mid, system.rows.h.rad, gamma(2 * len(system.g) + 8)
     G, G_rad = system.rows.G.mid, system.rows.G.rad
+    y_abs, bounds = np.abs(y), np.zeros(len(y))
+    if not at_balance:
+        moved = np.abs(h - y @ G.T)
+        slack = h_rad + y_abs @ G_rad.T + y_rad @ (np.abs(G) + G_rad).T + k * (np.abs(h) + y_abs @ np.abs(G).T)
+        price = (moved + errors * slack * (1 + k) * SAFE) * SAFE
+        # a mode without load that moves no contact node costs nothing, whatever its bound
+        bounds -= np.where(price > 0, price * system.reach, 0.0).sum(axis=1) * (1 + k) * SAFE
     # any z is a choice
     z = (2 * h - (system.g + c) @ system.inverse.T @ G.T - y @ G.T) @ system.mode_inverse
     z = np.where(np.isfinite(z), z, 0.0)
@@ -51,46 +62,43 @@ def _held_bounds(system: FloatingSystem, y: Array, c: Array, c_rad: Array, error
     lifted = z @ h - errors * (z_abs @ (h_rad + k * np.abs(h))) * (1 + k) * SAFE - TINY
     # the better one of both: what is added may be less than zero
     own = energy_bounds(system, y, all_c, all_c_rad, errors, enough=np.inf)
-    bounds = own + lifted - 4 * UNIT * (np.abs(own) + np.abs(lifted))
-    return bounds, np.abs(system.g) + system.g_rad + np.abs(all_c) + all_c_rad
+    bounds += own + lifted - 4 * UNIT * (np.abs(own) + np.abs(lifted))
+    # the bound is quadratic in y, with the gradient (g - c - S y) / 2
+    slope = np.abs(system.g) + system.g_rad + np.abs(all_c) + all_c_rad
+    slope += (y_abs + y_rad) @ (np.abs(system.S) + system.S_rad)
+    loss = dots(y_rad, 0.5 * slope) * (1 + k) * SAFE * SAFE
+    return np.where(np.isfinite(loss), bounds - errors * loss, -np.inf)
 
 
-def _balanced_bounds(system: FloatingSystem, y: Array, c: Array, c_rad: Array, errors: float) -> Array:
-    """Bounds for the multipliers next to y that satisfy G y = h exactly; -inf where these are not shown to exist.
+def balanced(G: Ball, h: Ball, y: Array, errors: float = 1.0) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Multipliers next to y (m, k) of the same signs that satisfy G y = h exactly, as midpoints and radii.
 
     They are y + |y| G's: every component keeps its sign as long as |G's| <= 1. A first step is taken in floats. What it
     leaves is enclosed: with W = G |y| G' and an approximate inverse R, ||I - R W|| < 1/2 gives ||s|| <= 2 ||R rest||.
+    The third array, (m,), says which of them are shown to exist.
     """
-    G, G_rad = system.rows.G.mid, system.rows.G.rad
-    h, h_rad, k = system.rows.h.mid, system.rows.h.rad, gamma(2 * len(system.g) + 8)
-    G_abs = np.abs(G) + G_rad
+    G_abs, k = np.abs(G.mid) + G.rad, gamma(2 * G.shape[1] + 8)
     # modes without load that move no contact node ask for nothing
-    used = np.flatnonzero(np.any(G_abs > 0, axis=1) | (np.abs(h) + h_rad > 0))
-    G, G_rad, G_abs, h, h_rad = G[used], G_rad[used], G_abs[used], h[used], h_rad[used]
-    m = len(y)
+    used = np.flatnonzero(np.any(G_abs > 0, axis=1) | (np.abs(h.mid) + h.rad > 0))
+    (G_mid, G_rad), G_abs, (h_mid, h_rad) = (G.mid[used], G.rad[used]), G_abs[used], (h.mid[used], h.rad[used])
     if not len(used):
-        return _held_bounds(system, y, c, c_rad, errors)[0]
-    turn = np.einsum("mrs,ms->mr", _inverses(G, np.abs(y)), h - y @ G.T) @ G
+        return y, np.zeros_like(y), np.ones(len(y), dtype=bool)
+    turn = np.einsum("mrs,ms->mr", _inverses(G_mid, np.abs(y)), h_mid - y @ G_mid.T) @ G_mid
     small = np.all(np.abs(turn) < 0.5, axis=1)
     y = y * (1.0 + np.where(small[:, None], turn, 0.0))
     y_abs = np.abs(y)
-    W, R = _weighted(G, y_abs), _inverses(G, y_abs)
+    W, R = _weighted(G_mid, y_abs), _inverses(G_mid, y_abs)
     W_rad = (
-        k * _weighted(np.abs(G), y_abs) + 2 * _product(G_rad, y_abs, G_abs) + 2 * _product(G_abs, y_abs, G_rad)
+        k * _weighted(np.abs(G_mid), y_abs) + 2 * _product(G_rad, y_abs, G_abs) + 2 * _product(G_abs, y_abs, G_rad)
     ) * (1 + k) * SAFE + TINY
     R_abs, j = np.abs(R), gamma(len(used) + 4)
     defect = np.abs(np.eye(len(used)) - R @ W) + j * (R_abs @ np.abs(W)) + R_abs @ W_rad
     sure = np.all(np.sum(defect * (1 + j) * SAFE, axis=2) < 0.5, axis=1)
-    rest = np.abs(h - y @ G.T) + h_rad + y_abs @ G_rad.T + k * (np.abs(h) + y_abs @ np.abs(G).T)
+    rest = np.abs(h_mid - y @ G_mid.T) + h_rad + y_abs @ G_rad.T + k * (np.abs(h_mid) + y_abs @ np.abs(G_mid).T)
     step = 2 * np.max(np.einsum("mrs,ms->mr", R_abs, rest), axis=1) * (1 + k) * (1 + j) * SAFE * SAFE
     share = step[:, None] * G_abs.sum(axis=0) * (1 + j) * SAFE
     sure &= small & np.all(share <= 1.0 / errors, axis=1)
-    change = y_abs * share * SAFE + TINY * (y_abs > 0)
-    bounds, size = _held_bounds(system, y, c, c_rad, errors)
-    S_abs = np.abs(system.S) + system.S_rad
-    slope = 0.5 * (size + (y_abs + change) @ S_abs)
-    loss = dots(change, slope) * (1 + k) * SAFE * SAFE
-    return np.where(sure & (np.isfinite(loss)), bounds - errors * loss, np.full(m, -np.inf))
+    return y, y_abs * share * SAFE + TINY * (y_abs > 0), sure
 
 
 def is_unbalanced(system: FloatingSystem, codes: Sequence[int], z: Array) -> bool:

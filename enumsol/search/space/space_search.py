@@ -171,20 +171,25 @@ class SpaceCertifier(RecordingCertifier):
         if answer is None:
             self._leaf(NoRoot())
         elif isinstance(answer, Open):
-            if (boxed := self._boxes.holding(answer)) is not None:
+            if (boxed := self._boxed(answer)) is not None:
                 self._verified[codes], unit = boxed, self.enclosed.unit
                 box = boxed.box.mid * unit, boxed.box.rad * unit
                 self._leaf(BoxedRoot(*box, self._ball(boxed, wider=_WIDER)))
                 return boxed
             if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
                 return Refine(answer.node)
-            self._leaf(UndecidedRecord(answer.cause.value))
+            reason = answer.cause.value if answer.mode is None else f"{answer.cause.value} (rigid mode {answer.mode})"
+            self._leaf(UndecidedRecord(reason))
             hint = _HOLD if answer.cause is Cause.ROUNDING else _PERTURB
-            return UndecidedPart(codes, answer.cause.value, hint, examined=True)
+            return UndecidedPart(codes, reason, hint, examined=True)
         else:
             self._leaf(RegularRoot(self._ball(answer)))
             answer = self._verified[codes] = self._placed(codes, answer)
         return answer
+
+    def _boxed(self, leaf: Open) -> BoxedSolution | None:
+        """The one solution that an open leaf can have, if that is proven."""
+        return self._boxes.holding(leaf)
 
     def _placed(self, codes: Codes, root: SpaceRoot) -> SpaceRoot:
         """The same root from sectors around it: its numbers then do not depend on how the search came to its leaf."""

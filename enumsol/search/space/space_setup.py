@@ -19,6 +19,7 @@ from enumsol.search.tree import TreeSearch
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from enumsol.arithmetic.balls import Array
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.compressed_parts import Recorder
     from enumsol.search.certifiers.protocol import Certifier
@@ -48,13 +49,18 @@ class SpaceSolvers:
     def __init__(self, problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> None:
         self.problem, self.alpha, self.arithmetic = problem, alpha, arithmetic
         friction = problem.friction_at(alpha)  # refuses what cannot be enumerated before anything is computed
-        condensed = problem.condensed
+        condensed = problem.on_springs.condensed
         self.system = SpaceSystem.scaled(condensed.S, condensed.free_displacements(alpha), friction)
 
     @cached_property
     def _engine(self) -> SpaceEngine:
         """Its rows are numbered in the order in which certifier, splitting and relaxations ask for them."""
-        return SpaceEngine(self.system)
+        return SpaceEngine(self.relaxed)
+
+    @property
+    def relaxed(self) -> SpaceSystem:
+        """What the relaxations are about."""
+        return self.system
 
     @cached_property
     def _enclosed(self) -> tuple[EnclosedSpace, str | None]:
@@ -62,12 +68,15 @@ class SpaceSolvers:
         if self.arithmetic == "fast":
             return floats, None
         try:
-            units = self.system.force, self.system.length
-            enclosed = EnclosedSpace.of_problem(self.problem.enclosure, Fraction(self.alpha), *units)
+            enclosed = self._in_balls(Fraction(self.alpha), self.system.force, self.system.length)
             _ = enclosed.smallest_eigenvalue  # proven positive, or refused
         except NotEnclosedError as error:
             return floats, str(error)
         return enclosed, None
+
+    def _in_balls(self, alpha: Fraction, force: Array, length: Array) -> EnclosedSpace:
+        """The problem in balls; NotEnclosedError where that cannot be."""
+        return EnclosedSpace.of_problem(self.problem.enclosure, alpha, force, length)
 
     @property
     def enclosed(self) -> EnclosedSpace:
@@ -92,7 +101,7 @@ class SpaceSolvers:
         progress: Callable[[SearchProgress], object] | None = None,
     ) -> TreeSearch:
         """A search of the tree with a certifier made here."""
-        engine, closing = self._engine, cast("SpaceClosing", certifier)
+        engine = self._engine
         return TreeSearch(
             self.system,
             certifier,
@@ -100,12 +109,16 @@ class SpaceSolvers:
             splitting=SpaceSplitting(engine),
             limits=limits,
             progress=progress,
-            closer=SpaceCloser(self.system, closing, regular=self.arithmetic == "fast"),
+            closer=self._closer(certifier),
         )
+
+    def _closer(self, certifier: Certifier) -> SpaceCloser | None:
+        """What decides the whole problem without a tree, where that serves."""
+        return SpaceCloser(self.system, cast("SpaceClosing", certifier), regular=self.arithmetic == "fast")
 
     def remake(self) -> Callable[[], SpaceSolvers]:
         """Makes the same again, also in another process."""
-        return partial(SpaceSolvers, self.problem, self.alpha, self.arithmetic)
+        return partial(type(self), self.problem, self.alpha, self.arithmetic)
 
     def fresh(self) -> SpaceSolvers:
         """The same with an engine of its own: which rows it has already changes what it finds."""

@@ -64,6 +64,8 @@ class SpaceRoot:
     index : int
     slack : float
         A lower bound of the least slack.
+    rigid : Ball of shape (r,), or None
+        Of a body that nothing holds, the coordinates q of its rigid displacement.
     """
 
     y: Ball
@@ -74,6 +76,7 @@ class SpaceRoot:
     reach: Array
     index: int
     slack: float
+    rigid: Ball | None = None
 
 
 class Cause(Enum):
@@ -82,6 +85,7 @@ class Cause(Enum):
     EQUALITY = "a condition holds with equality, or nearly so, at what may be a root"
     DIRECTIONS = "slip directions are not isolated, or hardly so, at what may be a root: a fold or a continuum is near"
     EQUATIONS = "the equations of its statuses are singular, or nearly so, for some slip directions: the body may wedge"
+    RIGID = "the equations of its statuses leave the body free to move as a whole, or nearly so"
     ROUNDING = "rounding leaves the forces there open: the body is almost free to move"
 
 
@@ -100,6 +104,8 @@ class Open:
         As in SpaceRoot.
     cause : Cause
         What stands in the way, as computed in the middle of the box; no claim.
+    mode : int or None
+        The rigid mode that is free for that cause.
     """
 
     node: int | None
@@ -109,6 +115,7 @@ class Open:
     angle: Array
     angle_rad: Array
     cause: Cause
+    mode: int | None = None
 
 
 def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | None:
@@ -138,7 +145,8 @@ class _Leaf:
 
     psi are angles of the slip directions d = cos psi c + sin psi c' from a direction c in every sector, c' a quarter
     turn further. P picks w_n of the nodes in contact and the slips of the sticking ones: P (g - S E x) = 0. The
-    directions are zeros of G_i = v_i1 d_i2 - v_i2 d_i1.
+    directions are zeros of G_i = v_i1 d_i2 - v_i2 d_i1. Of a body that nothing holds S and g are bordered (theory,
+    (14.3)): -q is part of x and y, and P picks the rows of its equilibrium, too.
     """
 
     def __init__(self, system: EnclosedSpace, codes: Sequence[int]) -> None:
@@ -150,12 +158,14 @@ class _Leaf:
         self.sliding = [(i, 1.0 if codes[i] == SLIP_PLUS else -1.0) for i in self.closed if codes[i] in (2, 3)]
         self.turning = [i for i, code in enumerate(codes) if code > SECTORS]
         self.numbers = [codes[i] - SECTORS for i in self.turning]
+        size, modes = len(system.g), len(system.reach)
         self.rows = [*self.closed, *(int(t) for i in self.stick for t in tau[i] if t >= 0)]
+        self.rows += range(size, size + modes)
         self.column = [self.closed.index(i) for i in self.turning]
         self.t = tau[self.turning].reshape(-1, 2)
         # v = w / unit; slips as ``slips`` of FrictionUnits has them, which have the same directions
         self.slip_scale = system.slip_scale[self.turning][:, None] / system.unit[self.t]
-        E = np.zeros((len(system.g), len(self.rows)))
+        E = np.zeros((size + modes, len(self.rows)))
         E[self.rows, np.arange(len(self.rows))] = 1.0
         for i, sign in self.sliding:
             along = int(np.max(tau[i]))
@@ -260,15 +270,27 @@ class _Leaf:
         if len(angle) and (state is None or not np.all(radius < _POINT)):
             worth = self._worth_halving(angle, radius, state)
             node = self.turning[int(np.argmax(worth))] if np.any(worth) else None
-        y, w = (None, None) if state is None else (state.y, state.w)
+        m = len(self.system.g)
+        y, w = (None, None) if state is None else (state.y[:m], state.w[:m])
         low, high = np.maximum(angle - radius, -self.half), np.minimum(angle + radius, self.half)
         cause = self._cause(angle, state)
-        return Open(node, y, w, self.centre, 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT, cause)
+        mode = self._free_mode(angle) if cause is Cause.RIGID else None
+        box = 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT
+        return Open(node, y, w, self.centre, *box, cause, mode)
+
+    def _free_mode(self, angle: Array) -> int:
+        """The rigid mode that moves most along what the equations in the middle leave free; no claim."""
+        E, k = self.E.copy(), len(self.system.reach)
+        E[self.t, np.array(self.column, dtype=np.intp)[:, None]] = (
+            turned_by(self.centre, angle)[0] / self.system.unit[self.t]
+        )
+        _, _, rows = np.linalg.svd((self.system.balls[0].mid @ E)[self.rows])
+        return int(np.argmax(np.abs(rows[-1][-k:])))
 
     def _cause(self, angle: Array, state: _State | None) -> Cause:
         point = self._state(angle, np.zeros(len(angle)))
         if state is None or point is None:
-            return Cause.EQUATIONS
+            return Cause.RIGID if len(self.system.reach) else Cause.EQUATIONS
         if not np.all(point.y.rad <= _POINT):
             return Cause.ROUNDING
         return Cause.DIRECTIONS if len(angle) and nearly_singular(point.J.mid) else Cause.EQUALITY
@@ -282,7 +304,7 @@ class _Leaf:
             return np.where(np.any(state.J.size * radius > known, axis=0), self.half, 0.0)
         # the change of the linear system, where it keeps that from being regular
         widths = self._directions(angle, radius)[0].rad / self.system.unit[self.t]
-        changes = np.max(np.sum(np.abs(self.system.S[self.rows][:, self.t]) * widths, axis=2), axis=0)
+        changes = np.max(np.sum(np.abs(self.system.balls[0].mid[self.rows][:, self.t]) * widths, axis=2), axis=0)
         turning = self._turning(angle)
         worth = changes if turning is None else np.max(turning.coupling(radius), axis=0)
         return worth if changes[int(np.argmax(worth))] > _SINGULAR else np.zeros_like(worth)
@@ -298,7 +320,11 @@ class _Leaf:
         if not sign:
             return self._left_open(angle, radius, state)
         least = float(np.min(slack)) if len(slack) else np.inf
-        return SpaceRoot(state.y, state.w, self.centre, angle, radius, reach, sign, least)
+        m, modes = len(self.system.g), len(self.system.reach)
+        # with the columns of q in place of those of -q
+        sign = -sign if modes % 2 else sign
+        rigid = -state.y[m:] if modes else None
+        return SpaceRoot(state.y[:m], state.w[:m], self.centre, angle, radius, reach, sign, least, rigid)
 
     # -- evaluation over a box -------------------------------------------------------------------------------------
 
@@ -379,6 +405,10 @@ class _Leaf:
             along = int(np.max(tau[i]))
             mid.append(sign * w.mid[along])
             rad.append(w.rad[along])
+        if np.all(np.isfinite(self.system.reach)):
+            rigid, reach = y[len(self.system.g) :], Ball.exact(self.system.reach)
+            ends = Ball.joined(reach - rigid, reach + rigid)
+            mid, rad = [*mid, *ends.mid], [*rad, *ends.rad]
         return np.array(mid), np.array(rad)
 
     def _forward(self, w: Ball, angle: Array, radius: Array) -> tuple[Array, Array]:
@@ -411,13 +441,17 @@ def same_root(one: SpaceRoot, other: SpaceRoot) -> bool | None:
     The leaves have the same nodes open, sticking and slipping. They are one if one root's directions lie in the box in
     which the other is the only root; they are two if their forces differ.
     """
-    if np.any(np.abs(one.y.mid - other.y.mid) > (one.y.rad + other.y.rad) * SAFE):
+    if _apart(one.y, other.y) or (one.rigid is not None and other.rigid is not None and _apart(one.rigid, other.rigid)):
         return False
     # the angle of one root's centre from the other's
     c, e = other.centre, one.centre
     shift = np.arctan2(c[:, 0] * e[:, 1] - c[:, 1] * e[:, 0], np.sum(c * e, axis=1))
     away = np.abs(shift + one.angle) + one.angle_rad + 1e-12
     return True if np.all(away < other.reach) else None
+
+
+def _apart(one: Ball, other: Ball) -> bool:
+    return bool(np.any(np.abs(one.mid - other.mid) > (one.rad + other.rad) * SAFE))
 
 
 def distinct_roots(

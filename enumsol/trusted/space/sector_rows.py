@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -134,6 +135,56 @@ def _exists(condition: bool) -> None:
         raise ValueError("a node has no such row")
 
 
+@dataclass(frozen=True)
+class Multiplied:
+    """Rows of a partial assignment, each times its multiplier: y on S y - g and c on the forces, as balls.
+
+    Attributes
+    ----------
+    y, y_rad, c, c_rad : (m,) arrays
+    pushes : list of pairs
+        Of the rows on w, the multiplier and its terms in y by their places, each off by half a unit at most.
+    """
+
+    y: Array
+    y_rad: Array
+    c: Array
+    c_rad: Array
+    pushes: list[tuple[float, list[tuple[int, float]]]]
+
+    @classmethod
+    def of(cls, system: EnclosedSpace, codes: Sequence[int], rows: Sequence[Row], values: Array) -> Multiplied | None:
+        """None where a multiplier has the wrong sign."""
+        size, units, tau = len(system.g), system.row_unit.tolist(), system.tau.tolist()
+        sums = [[0.0] * size for _ in range(4)]  # numbers of Python: faster one by one than those of arrays
+        w_sum, w_sizes, y_sum, y_sizes = sums
+        pushes = []
+        for row, value in zip(rows, values.tolist(), strict=True):
+            node = row[1]
+            sign = row_sign(codes[node], row)
+            if sign == FORBIDDEN or (sign == NONNEGATIVE and value < 0) or not math.isfinite(value):
+                return None
+            push = []
+            for i, coefficient in zip(*_terms(row, *tau[node], size), strict=True):
+                # a power of two: nothing is rounded but what underflows, which is less than TINY
+                factor = coefficient * units[i]
+                term = value * factor
+                if i < size:
+                    y_sum[i] += term
+                    y_sizes[i] += abs(term)
+                else:
+                    # w = g - S lambda: a row on w acts on S lambda - g with the opposite sign
+                    w_sum[i - size] -= term
+                    w_sizes[i - size] += abs(term)
+                    push.append((i - size, -factor))
+            if push:
+                pushes.append((value, push))
+        y, y_size, c, c_size = np.array(sums)
+        k = gamma(len(rows) + 24)
+        k *= 1.0 + 2.0 * k  # the sizes are sums as long
+        return cls(y, k * y_size * SAFE + TINY, c, k * c_size * SAFE + TINY, pushes)
+
+
 @np.errstate(over="ignore", invalid="ignore")
 def sector_margin(
     system: EnclosedSpace, codes: Sequence[int], rows: Sequence[Row], values: Array, errors: float = 1.0
@@ -142,32 +193,14 @@ def sector_margin(
 
     ``errors`` as in ``energy_bounds``; -inf where a multiplier has the wrong sign.
     """
-    size, units, tau = len(system.g), system.row_unit.tolist(), system.tau.tolist()
-    sums = [[0.0] * size for _ in range(4)]  # numbers of Python: faster one by one than those of arrays
-    w_sum, w_sizes, y_sum, y_sizes = sums
-    for row, value in zip(rows, values.tolist(), strict=True):
-        node = row[1]
-        sign = row_sign(codes[node], row)
-        if sign == FORBIDDEN or (sign == NONNEGATIVE and value < 0) or not math.isfinite(value):
-            return -np.inf
-        for i, coefficient in zip(*_terms(row, *tau[node], size), strict=True):
-            # a power of two: nothing is rounded but what underflows, which is less than TINY
-            term = value * (coefficient * units[i])
-            if i < size:
-                y_sum[i] += term
-                y_sizes[i] += abs(term)
-            else:
-                # w = g - S lambda: a row on w acts on S lambda - g with the opposite sign
-                w_sum[i - size] -= term
-                w_sizes[i - size] += abs(term)
-    y, y_size, c, c_size = np.array(sums)
-    k = gamma(len(rows) + 24)
-    k *= 1.0 + 2.0 * k  # the sizes are sums as long
-    c_rad, y_rad = k * c_size * SAFE + TINY, k * y_size * SAFE + TINY
+    added = Multiplied.of(system, codes, rows, values)
+    if added is None:
+        return -np.inf
+    y, y_rad, c, c_rad = added.y, added.y_rad, added.c, added.c_rad
     bound = float(energy_bounds(system, y[None], c[None], c_rad[None], errors)[0])
     # rounded y are not quite multipliers: the bound is quadratic in y with the gradient g - v / 2, v = g + c + S y
     v = np.abs(system.g + c + system.S @ y) + system.product_error @ np.abs(y)
-    v += system.g_rad + c_rad + gamma(size + 4) * (np.abs(c) + np.abs(system.g))
+    v += system.g_rad + c_rad + gamma(len(system.g) + 4) * (np.abs(c) + np.abs(system.g))
     slope = np.abs(system.g) + system.g_rad + 0.5 * v * SAFE
     lost = upper_sum(y_rad * slope) + system.largest_norm * upper_norm(y_rad) ** 2
     bound -= errors * float(lost) * SAFE * SAFE

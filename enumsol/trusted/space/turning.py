@@ -129,6 +129,7 @@ class Turning:
         Parameters
         ----------
         system : EnclosedSpace
+            Of a body that nothing holds m counts its rigid modes, whose rows and unknowns are the last of all.
         E : (m, k) array, without the directions
         rows : of the unknowns in y, k
         column : of the turning nodes' normal forces among the unknowns, q
@@ -138,20 +139,20 @@ class Turning:
         units = system.unit[t]
         d, turned = (part / units for part in directions)
         if not len(rows):  # every node is open
-            none, start = Ball.exact(np.zeros((0, 0))), Ball(system.g, system.g_rad)
-            start = _stacked(Ball.exact(np.zeros_like(system.g)), start)
+            none, start = Ball.exact(np.zeros((0, 0))), system.balls[1]
+            start = _stacked(Ball.exact(np.zeros_like(start.mid)), start)
             change = Ball.exact(np.zeros((len(start.mid), 0)))
             return cls(d, turned, Ball.exact(np.zeros(0)), start, none, change, none, rows, np.zeros(0))
         E = E.copy()
         E[t, np.asarray(column, dtype=np.intp)[:, None]] = d
-        S, sparse, both = Ball(system.S, system.S_rad), Ball.exact(E), t.ravel()
+        (S, g, _), sparse, both = system.balls, Ball.exact(E), t.ravel()
         SE = S @ sparse
         matrix = SE[rows]
         inverse = Inverse.of(matrix)
         if inverse is None:
             return None
         # columns: the load, and unit forces in the sectors
-        load = Ball(np.column_stack([system.g, S.mid[:, both]]), np.column_stack([system.g_rad, S.rad[:, both]]))
+        load = Ball(np.column_stack([g.mid, S.mid[:, both]]), np.column_stack([g.rad, S.rad[:, both]]))
         near = Ball.exact(inverse.near(load.mid[rows]))
         left = load - SE @ near
         # what is left of the equations is rounding; (P S E0)^-1 is taken of that, and S E0 (P S E0)^-1, which is

@@ -1,0 +1,210 @@
+"""The search for a body in 3D that nothing holds: its solvers, and what its certifier concludes (theory, section 14.6).
+
+The tree, its relaxations and leaves are those of other bodies; what rests on a positive definite A is not used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.condensation.floating_space import FloatingSpace
+from enumsol.errors import InvalidArgumentError
+from enumsol.proof.records import Limits, Unbalanced
+from enumsol.proof.space_records import FLOATING_LEAVES, ExcludedInSpace
+from enumsol.relaxation.engine import PRUNE_MARGIN
+from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart, Unrecorded
+from enumsol.search.floating import weakly_held
+from enumsol.search.resume import RecordedBound
+from enumsol.search.space.space_search import SpaceCertifier, SpaceReader
+from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.trusted.confinement import motion_beside
+from enumsol.trusted.space.leaves import Open, settle
+from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, resultants, unbounded
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from fractions import Fraction
+
+    from enumsol.arithmetic.balls import Array
+    from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.proof.compressed_parts import Recorder
+    from enumsol.proof.records import Exclusion
+    from enumsol.relaxation.space_relaxation import SpaceEngine
+    from enumsol.search.certifiers.protocol import Bound, Certifier
+    from enumsol.selections.solution import Codes
+    from enumsol.support.arguments import Alpha
+    from enumsol.trusted.space.boxed_solution import BoxedSolution
+    from enumsol.trusted.space.leaves import SpaceRoot
+    from enumsol.trusted.space.sector_rows import Row
+
+
+class FloatingSpaceSolvers(SpaceSolvers):
+    """Solvers and certifier for a body in 3D that nothing holds, at one alpha; parameters as of SpaceSolvers.
+
+    Raises
+    ------
+    InvalidArgumentError
+        Arithmetic is "fast", which has no solver for such a body, or as SpaceSolvers.
+    """
+
+    has_solution = False
+
+    def __init__(self, problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> None:
+        if arithmetic == "fast":
+            raise InvalidArgumentError('arithmetic is "fast" for a body that nothing holds; expected "verified"')
+        super().__init__(problem, alpha, arithmetic)
+
+    def _in_balls(self, alpha: Fraction, force: Array, length: Array) -> FloatingSpace:
+        return FloatingSpace.of(self.problem, alpha, force, length)
+
+    @cached_property
+    def relaxed(self) -> SpaceSystem:
+        """The body on weak springs (theory, section 14.5)."""
+        if not isinstance(self.enclosed, FloatingSpace):
+            return self.system
+        S, g = weakly_held(self.system.S, self.system.g, self.enclosed.rows)
+        return replace(self.system, S=S, g=g)
+
+    @cached_property
+    def exclusions(self) -> SpaceExclusions | None:
+        """What excludes assignments; None without balls."""
+        return SpaceExclusions(self.enclosed) if isinstance(self.enclosed, FloatingSpace) else None
+
+    def certifier(self, recorder: Recorder | None) -> FloatingSpaceCertifier:
+        """The certifier of this arithmetic."""
+        return FloatingSpaceCertifier(self._engine, self.enclosed, self.exclusions, recorder or Unrecorded())
+
+    def _closer(self, certifier: Certifier) -> None:
+        """There may be no solution: no certificate takes the place of a tree."""
+
+    def reader(self) -> FloatingSpaceReader:
+        """Understands the records of an earlier proof."""
+        return FloatingSpaceReader(self._engine, len(self.problem.modes.held) if self.problem.modes else 0)
+
+    def unloaded(self) -> bool:
+        """Without load the body may be moved: there is no one solution."""
+        return False
+
+    def proof_header(self) -> dict[str, Any]:
+        """First record of a proof: with the bound of the rigid displacement."""
+        return super().proof_header() | {"max_rigid_displacement": self.problem.rigid_reach}
+
+
+class FloatingSpaceReader(SpaceReader):
+    """Of proofs about a body that nothing holds.
+
+    Parameters
+    ----------
+    engine : SpaceEngine
+    modes : number of rigid modes
+    """
+
+    kinds = FLOATING_LEAVES
+
+    def __init__(self, engine: SpaceEngine, modes: int) -> None:
+        super().__init__(engine)
+        self._modes = modes
+
+    def bound(self, codes: Codes, record: list[Any]) -> Bound:
+        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
+        if record[0] != Unbalanced.kind:
+            return super().bound(codes, record)
+        Unbalanced.read(record, Limits(codes, modes=self._modes))
+        # the certifier finds a direction of its own
+        return RecordedBound(np.zeros(0, dtype=np.intp), np.zeros(0))
+
+
+class SpaceExclusions:
+    """What excludes assignments of a body that nothing holds, if possible without a bound of the rigid displacement.
+
+    Parameters
+    ----------
+    enclosed : FloatingSpace
+
+    Attributes
+    ----------
+    system, free : FloatingSpace
+        With its bound, and with one beyond which there are no solutions.
+    """
+
+    def __init__(self, enclosed: FloatingSpace) -> None:
+        self.system, self.free = enclosed, unbounded(enclosed)
+
+    def record(self, codes: Codes, rows: Sequence[Row], values: Array) -> tuple[Exclusion, bool] | None:
+        """A record that excludes a partial assignment, and whether it needs the bound; or None."""
+        if len(rows) and floating_margin(self.free, codes, rows, values, errors=2.0) > 0:
+            return ExcludedInSpace(list(rows), values), False
+        if (unbalanced := self.unbalanced(codes)) is not None:
+            return unbalanced, False
+        if len(rows) and floating_margin(self.system, codes, rows, values, errors=2.0) > 0:
+            return ExcludedInSpace(list(rows), values), True
+        return None
+
+    def unbalanced(self, codes: Codes) -> Unbalanced | None:
+        """A record that no forces below a partial assignment are in balance with the load; or None."""
+        z = motion_beside(self.system, resultants(self.system, codes))
+        return Unbalanced(z) if is_unbalanced_in_space(self.system, codes, z) else None
+
+
+class FloatingSpaceCertifier(SpaceCertifier):
+    """Proves prunings and leaves of a body that nothing holds.
+
+    Parameters
+    ----------
+    exclusions : SpaceExclusions or None
+        Without balls nothing is proven.
+    engine, enclosed, recorder : as of SpaceCertifier
+    """
+
+    def __init__(
+        self, engine: SpaceEngine, enclosed: EnclosedSpace, exclusions: SpaceExclusions | None, recorder: Recorder
+    ) -> None:
+        super().__init__(engine, enclosed, recorder)
+        self._exclusions = exclusions
+        #: Some conclusion rests on the bound of the rigid displacement.
+        self.bounded = False
+
+    @property
+    def certified(self) -> Certified:
+        """What was proven so far."""
+        return Certified(self._verified, None, self._leaves, bounded=self.bounded)
+
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
+        """Whether the relaxation's multipliers, or balance alone, are proven to exclude the partial assignment."""
+        if self._exclusions is None or not relaxation.bound > PRUNE_MARGIN:
+            return False
+        numbers, values = relaxation.multipliers()
+        found = self._exclusions.record(codes, [self._engine.rows[number] for number in numbers.tolist()], values)
+        if found is None:
+            return False
+        self.bounded |= found[1]
+        self._leaf(found[0])
+        return True
+
+    def selection(self, codes: Codes) -> SpaceRoot | BoxedSolution | UndecidedPart | Refine | None:
+        """The root of a leaf, a sector to halve, or why the leaf stays open."""
+        if self._exclusions is not None and (unbalanced := self._exclusions.unbalanced(codes)) is not None:
+            self._leaf(unbalanced)
+            return None
+        answer = super().selection(codes)
+        if answer is None and self._exclusions is not None:
+            self.bounded |= settle(self._exclusions.free, codes) is not None
+        return answer
+
+    def _boxed(self, leaf: Open) -> None:
+        """Boxes rest on a stiffness that is positive definite."""
+
+    def add(self, part: Certified) -> None:
+        """Take over what the certifier of a subtree has proven."""
+        super().add(part)
+        self.bounded |= part.bounded
+
+    def forget(self) -> None:
+        """Forget what was proven."""
+        super().forget()
+        self.bounded = False

@@ -1,0 +1,135 @@
+"""Of a body in 3D that nothing holds: exclusions, and resultants of contact forces (theory, section 14.6)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma
+from enumsol.model.sectors import SECTORS, direction, end_number
+from enumsol.trusted.floating_bounds import balanced, bounds_within
+from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, Multiplied
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from enumsol.arithmetic.balls import Array
+    from enumsol.condensation.floating_space import FloatingSpace
+    from enumsol.trusted.space.sector_rows import Row
+
+#: A disc of forces lies in a polygon of so many corners.
+_CORNERS = 16
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def floating_margin(
+    system: FloatingSpace, codes: Sequence[int], lines: Sequence[Row], multipliers: Array, errors: float = 1.0
+) -> float:
+    """Proven lower bound on e - h'q over a partial assignment, as ``sector_margin``; the better one of both of (14.6).
+
+    ``lines`` are the rows, whose multipliers are given.
+    """
+    rows = Multiplied.of(system, codes, lines, multipliers)
+    if rows is None:
+        return -np.inf
+    c, c_rad = rows.c[None], rows.c_rad[None]
+    first = _finite(bounds_within(system, rows.y[None], rows.y_rad[None], c, c_rad, errors))
+    if first > 0 or not rows.pushes:
+        return first
+    # what changes is the multipliers of the rows on w: each y belongs to several of them
+    size, k = len(system.g), gamma(len(rows.pushes) + 8)
+    T, values = np.zeros((size, len(rows.pushes))), np.array([value for value, _ in rows.pushes])
+    for column, (_, terms) in enumerate(rows.pushes):
+        for i, coefficient in terms:
+            T[i, column] += coefficient
+    T_abs = np.abs(T)
+    along, change, sure = balanced(system.rows.G @ Ball(T, 2 * UNIT * T_abs), system.rows.h, values[None], errors)
+    if not sure[0]:
+        return first
+    y = T @ along[0]
+    y_rad = (T_abs @ (change[0] + k * np.abs(along[0]))) * (1 + k) * SAFE + TINY
+    return max(first, _finite(bounds_within(system, y[None], y_rad[None], c, c_rad, errors, at_balance=True)))
+
+
+def _finite(bounds: Array) -> float:
+    return float(bounds[0]) if np.isfinite(bounds[0]) else -np.inf
+
+
+def is_unbalanced_in_space(system: FloatingSpace, codes: Sequence[int], z: Array) -> bool:
+    """Whether no forces below a partial assignment are in balance with the load, by z (r,); see theory, (14.7).
+
+    z'h > 0, and z'G y <= 0 for all y of every node: (1, tau) with tau in the disc, or on the arc of its sector.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        (G, h), p, k = (system.rows.G, system.rows.h), system.p, gamma(len(z) + 16)
+        z_abs = np.abs(z)
+        load = float(z @ h.mid - (z_abs @ (h.rad + k * np.abs(h.mid))) * (1 + k) * SAFE - TINY)
+        work = z @ G.mid / system.unit
+        size = z_abs @ (np.abs(G.mid) + G.rad) / system.unit
+        # what underflows is less, and nothing of it is left where all is zero
+        slack = np.where(size > 0, (z_abs @ G.rad / system.unit + k * size) * (1 + k) * SAFE + TINY, 0.0)
+        across, spread = system.tangential(work), system.tangential(slack).sum(axis=1)
+        length = np.sqrt(np.sum(across * across, axis=1)) * (1 + 8 * UNIT) * SAFE
+        # a direction in floats, and products with it, are off by less
+        spread = (spread + 8 * UNIT * length) * SAFE
+        most = work[:p] + slack[:p]
+    if not load > 0:
+        return False
+    for i, code in enumerate(codes):
+        if code == OPEN:
+            continue
+        friction = _most_friction(code, across[i], float(length[i]), float(spread[i]))
+        # the sum is rounded by less than its parts' units
+        if not float(most[i]) + friction + 4 * UNIT * (abs(float(work[i])) + abs(friction)) <= 0:
+            return False
+    return True
+
+
+def _most_friction(code: int, across: Array, length: float, spread: float) -> float:
+    """What across . tau is at most for the tau of a node of this code, |tau| <= 1."""
+    if code == FRICTIONLESS:
+        return 0.0
+    if code in (SLIP_PLUS, SLIP_MINUS):  # one component only: the other one is zero
+        return float(across[0] + across[1]) * (1.0 if code == SLIP_PLUS else -1.0) + spread
+    if code > SECTORS:
+        (a1, a2), (b1, b2) = direction(code - SECTORS), direction(end_number(code - SECTORS))
+        x, y = across.tolist()
+        if min(a1 * y - a2 * x, x * b2 - y * b1) < -spread:
+            # it points out of the sector, so that an end is the best
+            return float(max(x * a1 + y * a2, x * b1 + y * b2)) + spread
+    return length + spread
+
+
+def unbounded(system: FloatingSpace) -> FloatingSpace:
+    """The system without bounds of the rigid displacement."""
+    return system.reaching(np.full_like(system.reach, np.inf))
+
+
+def resultants(system: FloatingSpace, codes: Sequence[int]) -> list[Array]:
+    """Resultants G y, (r,) each, whose cone holds all that the forces of an assignment can have, but for rounding."""
+    G = system.rows.G.mid / system.unit
+    found = []
+    for i, code in enumerate(codes):
+        if code == OPEN:
+            continue
+        places = [int(t) for t in system.tau[i] if t >= 0]
+        found += [
+            G[:, i] + sum((x * G[:, t] for x, t in zip(tau, places, strict=True)), 0.0 * G[:, i])
+            for tau in _corners(code, len(places))
+        ]
+    return found
+
+
+def _corners(code: int, tangents: int) -> list[tuple[float, ...]]:
+    """Corners of a polygon around the tau of a node, |tau| <= 1."""
+    if code == FRICTIONLESS or not tangents:
+        return [(0.0,) * tangents]
+    if tangents == 1:
+        return [(sign,) for sign in (1.0, -1.0) if code != (SLIP_MINUS if sign > 0 else SLIP_PLUS)]
+    if code > SECTORS:
+        a, b = (np.array(direction(n)) for n in (code - SECTORS, end_number(code - SECTORS)))
+        return [tuple(corner) for corner in (a, b, (a + b) / (1.0 + a @ b))]
+    angles = 2.0 * np.pi * np.arange(_CORNERS) / _CORNERS
+    return list(zip(*(np.array([np.cos(angles), np.sin(angles)]) / np.cos(np.pi / _CORNERS)).tolist(), strict=True))
