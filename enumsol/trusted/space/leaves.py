@@ -11,8 +11,9 @@ from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.linalg import qr
 
-from enumsol.arithmetic.ball_arrays import Ball, determinant_sign, nearly_singular, rough_inverse, smaller
+from enumsol.arithmetic.ball_arrays import Ball, determinant_sign, nearly_singular, rough_inverse, smaller, solution
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm, upper_sum
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.space.sector_rows import OPEN, SLIP_PLUS, STICK
@@ -35,6 +36,8 @@ _CONTRACTIONS = 10
 _REFINEMENTS = 60
 #: Boxes of directions narrower than this hold a point, and forces known no better are not known; neither is halved for.
 _POINT = 2.0**-24
+#: Rigid modes that move what the equations fix by no more than this, relatively, are left free by them.
+_DEPENDENT = 1e-9
 #: Directions that change no G by more (scaled) are not halved, nor for a linear system that they change by no more.
 _NEGLIGIBLE, _SINGULAR = 2.0**-44, 2.0**-36
 
@@ -145,8 +148,11 @@ class _Leaf:
 
     psi are angles of the slip directions d = cos psi c + sin psi c' from a direction c in every sector, c' a quarter
     turn further. P picks w_n of the nodes in contact and the slips of the sticking ones: P (g - S E x) = 0. The
-    directions are zeros of G_i = v_i1 d_i2 - v_i2 d_i1. Of a body that nothing holds S and g are bordered (theory,
-    (14.3)): -q is part of x and y, and P picks the rows of its equilibrium, too.
+    directions are zeros of G_i = v_i1 d_i2 - v_i2 d_i1.
+
+    Of a body that nothing holds S and g are bordered (theory, (14.3)): -q is part of x and y, and P picks the rows of
+    its equilibrium, too; but for rigid modes that move neither w_n nor the slips that P picks. Theirs are unknowns s
+    beside psi, and their rows of equilibrium are zeros beside G (theory, section 14.6).
     """
 
     def __init__(self, system: EnclosedSpace, codes: Sequence[int]) -> None:
@@ -160,7 +166,9 @@ class _Leaf:
         self.numbers = [codes[i] - SECTORS for i in self.turning]
         size, modes = len(system.g), len(system.reach)
         self.rows = [*self.closed, *(int(t) for i in self.stick for t in tau[i] if t >= 0)]
-        self.rows += range(size, size + modes)
+        free = self._free_modes() if modes else []
+        self.free = [size + mode for mode in free]
+        self.rows += [size + mode for mode in range(modes) if mode not in free]
         self.column = [self.closed.index(i) for i in self.turning]
         self.t = tau[self.turning].reshape(-1, 2)
         # v = w / unit; slips as ``slips`` of FrictionUnits has them, which have the same directions
@@ -173,6 +181,16 @@ class _Leaf:
         self.E = E
         self.centre, self.half = self._boxes()
         self._last: tuple[bytes, Turning | None] | None = None
+
+    def _free_modes(self) -> list[int]:
+        """Rigid modes that the equations leave free, one of those that are no other ones' combinations there."""
+        if not self.rows:
+            return []
+        moved = self.system.balls[0].mid[self.rows][:, len(self.system.g) :]
+        _, R, order = qr(moved, mode="economic", pivoting=True)
+        sizes = np.abs(np.diagonal(R))
+        rank = int(np.sum(sizes > _DEPENDENT * np.max(np.abs(moved))))
+        return sorted(order[rank:].tolist())
 
     def _boxes(self) -> tuple[Array, Array]:
         """A direction in the middle of every sector, and an angle on both sides that covers it."""
@@ -189,17 +207,26 @@ class _Leaf:
     # -- what the leaf holds ---------------------------------------------------------------------------------------
 
     def settle(self) -> SpaceRoot | Open | None:
-        q = len(self.turning)
-        reach = (1.0 + 2.0 * _WIDENED) * self.half
-        angle, radius = np.zeros(q), reach.copy()
+        """Angles in what follows are the values of the free unknowns, too, after those of the directions."""
+        q, modes = len(self.turning), np.array(self.free, dtype=np.intp) - len(self.system.g)
+        turns = (1.0 + 2.0 * _WIDENED) * self.half
+        angle, radius = np.zeros(q + len(modes)), np.r_[turns, self.system.reach[modes]]
         state, rough = None, False
         for _ in range(_CONTRACTIONS):
+            if self.free:
+                cut = self._cut_free(angle, radius)
+                if cut is None:
+                    return None
+                angle, radius = cut
+                if not np.all(np.isfinite(radius)):
+                    break
+            reach = np.r_[turns, np.abs(angle[q:]) + radius[q:]]
             state = self._state(angle, radius) or state
             if state is None:
                 break
             if self._broken(state.y, state.w, angle, radius) or np.any(self._outside(angle, radius)):
                 return None
-            if not q:
+            if not len(angle):
                 return self._root(state, angle, radius, reach)
             new_angle, new_radius = angle, radius
             move = self._move(angle, radius, state, rough=rough)
@@ -218,6 +245,30 @@ class _Leaf:
                 rough = True
         return self._left_open(angle, radius, state)
 
+    def _cut_free(self, angle: Array, radius: Array) -> tuple[Array, Array] | None:
+        """The box with the free unknowns that its angles leave; None if there are none.
+
+        G and the rows of equilibrium are affine in them: G = G_0 + R s, so that (Y R) s = -Y G_0 with any Y.
+        """
+        q = len(self.turning)
+        still = np.r_[angle[:q], 0.0 * angle[q:]]
+        state = self._state(still, np.r_[radius[:q], 0.0 * angle[q:]])
+        if state is None or not (state.G.finite and state.J.finite):
+            return angle, radius
+        R = state.J[:, q:]
+        Y = Ball.exact(np.asarray(np.linalg.pinv(R.mid), dtype=np.float64))
+        found = solution(Y @ R, Y @ -state.G[:, None])
+        if found is None:
+            return angle, radius
+        low = np.maximum((found.mid - found.rad)[:, 0], angle[q:] - radius[q:])
+        high = np.minimum((found.mid + found.rad)[:, 0], angle[q:] + radius[q:])
+        slack = 8 * UNIT * (np.abs(found.mid) + found.rad)[:, 0]
+        if np.any(low - slack > high + slack):
+            return None
+        middle = 0.5 * (low + high)
+        wide = np.maximum(high - middle, middle - low) * SAFE + slack + TINY
+        return np.r_[angle[:q], middle], np.r_[radius[:q], np.maximum(wide, 0.0)]
+
     def _move(self, angle: Array, radius: Array, state: _State, *, rough: bool = False) -> Ball | None:
         """Krawczyk's operator: a ball of psi - angle for all zeros psi in a box over which the state is known.
 
@@ -227,11 +278,15 @@ class _Leaf:
         point = self._state(angle, np.zeros(q))
         if point is None:
             return None
+        if not (state.J.finite and point.J.finite):
+            return None
         try:
             Y = rough_inverse(state.J) if rough else np.linalg.inv(point.J.mid)
         except np.linalg.LinAlgError:
             return None
         inverse, span = Ball.exact(np.asarray(Y, dtype=np.float64)), Ball(np.zeros(q), radius)
+        if self.free:
+            return (Ball.exact(np.eye(q)) - inverse @ state.J) @ span - inverse @ point.G
         # Y times the second derivatives first: they are large where Y is small
         bends = self._bends(state, angle, radius)
         wide = (inverse @ Ball(bends.mid.reshape(q, -1), bends.rad.reshape(q, -1))).size.reshape(q, q, q) * radius
@@ -267,19 +322,25 @@ class _Leaf:
         """What is known of a leaf that is not settled."""
         node = None
         # what is proven does not depend on which sector is halved, and whether any is
-        if len(angle) and (state is None or not np.all(radius < _POINT)):
+        q = len(self.turning)
+        if q and (state is None or not np.all(radius[:q] < _POINT)):
             worth = self._worth_halving(angle, radius, state)
             node = self.turning[int(np.argmax(worth))] if np.any(worth) else None
         m = len(self.system.g)
         y, w = (None, None) if state is None else (state.y[:m], state.w[:m])
-        low, high = np.maximum(angle - radius, -self.half), np.minimum(angle + radius, self.half)
         cause = self._cause(angle, state)
         mode = self._free_mode(angle) if cause is Cause.RIGID else None
+        angle, radius = angle[:q], radius[:q]
+        low, high = np.maximum(angle - radius, -self.half), np.minimum(angle + radius, self.half)
         box = 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT
         return Open(node, y, w, self.centre, *box, cause, mode)
 
     def _free_mode(self, angle: Array) -> int:
         """The rigid mode that moves most along what the equations in the middle leave free; no claim."""
+        point, q = self._state(angle, np.zeros(len(angle))), len(self.turning)
+        if self.free and point is not None and point.J.finite:
+            along = np.linalg.svd(point.J.mid)[2][-1][q:]
+            return self.free[int(np.argmax(np.abs(along)))] - len(self.system.g)
         E, k = self.E.copy(), len(self.system.reach)
         E[self.t, np.array(self.column, dtype=np.intp)[:, None]] = (
             turned_by(self.centre, angle)[0] / self.system.unit[self.t]
@@ -291,6 +352,8 @@ class _Leaf:
         point = self._state(angle, np.zeros(len(angle)))
         if state is None or point is None:
             return Cause.RIGID if len(self.system.reach) else Cause.EQUATIONS
+        if self.free and nearly_singular(point.J.mid):
+            return Cause.RIGID
         if not np.all(point.y.rad <= _POINT):
             return Cause.ROUNDING
         return Cause.DIRECTIONS if len(angle) and nearly_singular(point.J.mid) else Cause.EQUALITY
@@ -301,17 +364,20 @@ class _Leaf:
         if state is not None and point is not None and np.all(point.y.rad <= _POINT):
             # the width, where it changes more than what is not known anyway
             known = np.maximum(_NEGLIGIBLE, point.G.rad)[:, None]
-            return np.where(np.any(state.J.size * radius > known, axis=0), self.half, 0.0)
+            moves = np.any(state.J.size * radius > known, axis=0)
+            # what free unknowns may be depends on all directions
+            return np.where(moves[: len(self.half)] | np.any(moves[len(self.half) :]), self.half, 0.0)
         # the change of the linear system, where it keeps that from being regular
         widths = self._directions(angle, radius)[0].rad / self.system.unit[self.t]
         changes = np.max(np.sum(np.abs(self.system.balls[0].mid[self.rows][:, self.t]) * widths, axis=2), axis=0)
         turning = self._turning(angle)
-        worth = changes if turning is None else np.max(turning.coupling(radius), axis=0)
+        worth = changes if turning is None else np.max(turning.coupling(radius[: len(self.half)]), axis=0)
         return worth if changes[int(np.argmax(worth))] > _SINGULAR else np.zeros_like(worth)
 
     def _outside(self, angle: Array, radius: Array) -> NDArray[np.bool_]:
         """Which directions are outside of their sectors for certain; what lies there belongs to another leaf."""
-        return np.abs(angle) - radius > self.half * (1.0 + 1e-9)
+        q = len(self.turning)
+        return np.abs(angle[:q]) - radius[:q] > self.half * (1.0 + 1e-9)
 
     def _root(self, state: _State, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open:
         slack = self._slacks(state.y, state.w, angle, radius)
@@ -321,8 +387,10 @@ class _Leaf:
             return self._left_open(angle, radius, state)
         least = float(np.min(slack)) if len(slack) else np.inf
         m, modes = len(self.system.g), len(self.system.reach)
-        # with the columns of q in place of those of -q
-        sign = -sign if modes % 2 else sign
+        # with the columns of q in place of those of -q, and with the rows of equilibrium of the other sign
+        sign = -sign if (modes + len(self.free)) % 2 else sign
+        q = len(self.turning)
+        angle, radius, reach = angle[:q], radius[:q], reach[:q]
         rigid = -state.y[m:] if modes else None
         return SpaceRoot(state.y[:m], state.w[:m], self.centre, angle, radius, reach, sign, least, rigid)
 
@@ -330,35 +398,45 @@ class _Leaf:
 
     def _directions(self, angle: Array, radius: Array) -> tuple[Ball, Ball]:
         """d (q, 2) and d' (q, 2) over a box of angles."""
-        mid_d, mid_turned = turned_by(self.centre, angle)
+        q = len(self.turning)
+        mid_d, mid_turned = turned_by(self.centre, angle[:q])
         # |d(psi + r) - d(psi)| <= min(|d'(psi)| r + r^2 / 2, r), and d' likewise; libraries are off by a few units
-        r = np.minimum(radius, 2.0)[:, None]
+        r = np.minimum(radius[:q], 2.0)[:, None]
         bent = 0.5 * r * r
         d = Ball(mid_d, np.minimum(np.abs(mid_turned) * r + bent, r) * SAFE + LIBRARY)
         return d, Ball(mid_turned, np.minimum(np.abs(mid_d) * r + bent, r) * SAFE + LIBRARY)
 
     def _turning(self, angle: Array) -> Turning | None:
         """The linear equations with the directions at these angles in the middle; None if not proven regular there."""
+        angle = angle[: len(self.turning)]
         key = angle.tobytes()
         if self._last is None or self._last[0] != key:
             directions = turned_by(self.centre, angle)
-            self._last = key, Turning.of(self.system, self.E, self.rows, self.column, self.t, directions)
+            self._last = key, Turning.of(self.system, self.E, self.rows, self.column, self.t, directions, self.free)
         return self._last[1]
 
     def _state(self, angle: Array, radius: Array) -> _State | None:
         """y, w, G and dG/dpsi over a box; None where the linear system is not proven regular in it."""
         turning = self._turning(angle)
-        box = None if turning is None else turning.over(radius)
+        q = len(self.turning)
+        box = None if turning is None else turning.over(radius[:q], Ball(angle[q:], radius[q:]))
         if box is None:
             return None
         (v1, v2), (dv1, dv2) = self._slips(box.w), self._slips(box.dw)
         d, turned = self._directions(angle, radius)
         d1, d2 = d[:, 0], d[:, 1]
         J = dv1 * d2[:, None] - dv2 * d1[:, None]
-        diagonal = np.arange(len(angle))
+        diagonal = np.arange(q)
         corrected = J[diagonal, diagonal] + (v1 * turned[:, 1] - v2 * turned[:, 0])
         J.mid[diagonal, diagonal], J.rad[diagonal, diagonal] = corrected.mid, corrected.rad
-        return _State(box.y, box.w, v1 * d2 - v2 * d1, J, box)
+        G = v1 * d2 - v2 * d1
+        if self.free:
+            (s1, s2), w = self._slips(box.ds), box.w[self.free]
+            G = Ball.joined(G, w)
+            across = Ball.joined(s1 * d2[:, None] - s2 * d1[:, None], box.ds[self.free])
+            along = Ball.joined(J, box.dw[self.free])
+            J = Ball(np.hstack([along.mid, across.mid]), np.hstack([along.rad, across.rad]))
+        return _State(box.y, box.w, G, J, box)
 
     def _bends(self, state: _State, angle: Array, radius: Array) -> Ball:
         """Second derivatives of G over a box, (q, q, q)."""

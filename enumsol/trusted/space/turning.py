@@ -40,6 +40,8 @@ class Box:
     y, w : Ball of shape (m,)
         w is zero, exactly, where the equations say so.
     dw : Ball of shape (m, q)
+    ds : Ball of shape (m, k)
+        Derivatives of w with respect to the free unknowns.
     x : Ball of shape (q,)
         The turning nodes' normal forces.
     z : Ball of shape (q, q)
@@ -53,6 +55,7 @@ class Box:
     y: Ball
     w: Ball
     dw: Ball
+    ds: Ball
     x: Ball
     z: Ball
     along: Ball
@@ -82,7 +85,10 @@ class Turning:
 
     x_c the normal forces of the turning nodes, B = (P S E0)^-1 P S T and Pi_0 = I - E0 (P S E0)^-1 P S. S Pi_0 is the
     compliance of what is left free. It is small where weak springs make S large, and known as well as S is: all
-    products are taken before anything is widened by a box.
+    products are taken before anything is widened by a box. Some unknowns s of y may be left free, as those rigid modes
+    are that P does not determine (theory, section 14.6): they are what forces in T are for which x is solved as well,
+
+        x_c = (I + B_c D)^-1 (x_0c - B_s s),     y = y_0 + Pi_0 (T D x_c + T_s s),     w = w_0 - S Pi_0 (T D x_c + T_s s).
 
     Attributes
     ----------
@@ -92,13 +98,13 @@ class Turning:
         x_0c.
     start : Ball of shape (2 m,)
         y_0, then w_0.
-    B : Ball of shape (q, 2 q)
-        B_c; columns are tangential forces, both of one node side by side, as of ``change``.
-    change : Ball of shape (2 m, 2 q)
+    B : Ball of shape (q, 2 q + k)
+        B_c; columns are tangential forces, both of one node side by side, then what is free, as of ``change``.
+    change : Ball of shape (2 m, 2 q + k)
         Pi_0 T, then -S Pi_0 T.
-    matrix : Ball of shape (k, k)
+    matrix : Ball of shape (n, n)
         P S E0.
-    rows : sequence of k ints
+    rows : sequence of n ints
         Those that P picks.
     off : (q,) array
         How much directions may be off in the units of y, for every node.
@@ -123,6 +129,7 @@ class Turning:
         column: Sequence[int],
         t: NDArray[np.intp],
         directions: tuple[Array, Array],
+        free: Sequence[int] = (),
     ) -> Turning | None:
         """None where the equations are not proven regular for these directions.
 
@@ -130,11 +137,12 @@ class Turning:
         ----------
         system : EnclosedSpace
             Of a body that nothing holds m counts its rigid modes, whose rows and unknowns are the last of all.
-        E : (m, k) array, without the directions
-        rows : of the unknowns in y, k
+        E : (m, n) array, without the directions
+        rows : of the unknowns in y, n
         column : of the turning nodes' normal forces among the unknowns, q
         t : (q, 2), the rows of the turning nodes' tangential forces
         directions : as of ``turned_by``
+        free : rows of the free unknowns in y, k
         """
         units = system.unit[t]
         d, turned = (part / units for part in directions)
@@ -145,7 +153,7 @@ class Turning:
             return cls(d, turned, Ball.exact(np.zeros(0)), start, none, change, none, rows, np.zeros(0))
         E = E.copy()
         E[t, np.asarray(column, dtype=np.intp)[:, None]] = d
-        (S, g, _), sparse, both = system.balls, Ball.exact(E), t.ravel()
+        (S, g, _), sparse, both = system.balls, Ball.exact(E), np.r_[t.ravel(), np.asarray(free, dtype=np.intp)]
         SE = S @ sparse
         matrix = SE[rows]
         inverse = Inverse.of(matrix)
@@ -175,15 +183,23 @@ class Turning:
         """That of det P S E over every box in which the equations are regular; 0 where it is not proven."""
         return determinant_sign(self.matrix)
 
-    @cached_property
-    def point(self) -> Box | None:
-        """What holds in the middle; the directions there are known but for rounding."""
-        return self._over(np.zeros(len(self.d)), None)
+    def over(self, radius: Array, free: Ball) -> Box | None:
+        """What holds over all angles up to ``radius``, (q,), from the middle; None if they are not proven regular.
 
-    def over(self, radius: Array) -> Box | None:
-        """What holds over all angles up to ``radius``, (q,), from the middle; None if they are not proven regular."""
-        point = self.point
-        return point if point is None or not np.any(radius) else self._over(radius, point)
+        ``free`` are the values of the free unknowns, (k,). In the middle directions are known but for rounding.
+        """
+        key = free.mid.tobytes()
+        if self._points.get(key) is None:
+            self._points[key] = self._over(np.zeros(len(self.d)), Ball.exact(free.mid), None)
+        point = self._points[key]
+        if point is None or not (np.any(radius) or np.any(free.rad)):
+            return point
+        return self._over(radius, free, point)
+
+    @cached_property
+    def _points(self) -> dict[bytes, Box | None]:
+        """What holds in the middle, by values of the free unknowns."""
+        return {}
 
     def coupling(self, radius: Array) -> Array:
         """Sizes of B_c D over a box, (q, q): nothing is singular in it while they are small."""
@@ -191,7 +207,8 @@ class Turning:
 
     def _turned(self, A: Ball, radius: Array) -> tuple[Ball, Ball, Ball]:
         """A D, A dD/dpsi and A d for directions d and their changes D over a box; A has two columns for every node."""
-        first, second = A[:, 0::2], A[:, 1::2]
+        turning = A[:, : 2 * len(self.d)]
+        first, second = turning[:, 0::2], turning[:, 1::2]
         along, across = (first * Ball.exact(d[:, 0]) + second * Ball.exact(d[:, 1]) for d in (self.d, self.turned))
         rounding = Ball(np.zeros_like(along.mid), (first.size + second.size) * self.off * SAFE)
         # D = turned sin r - d (1 - cos r), dD/dpsi = turned cos r - d sin r
@@ -205,30 +222,38 @@ class Turning:
             along * cos + across * sin + rounding,
         )
 
-    def _over(self, radius: Array, point: Box | None) -> Box | None:
+    def _over(self, radius: Array, free: Ball, point: Box | None) -> Box | None:
         q, m = len(radius), len(self.start.mid) // 2
+        lone, start, base = self.change[:, 2 * q :], self.start, self.x
+        if len(free.mid):
+            start, base = start + (lone @ free[:, None])[:, 0], base - (self.B[:, 2 * q :] @ free[:, None])[:, 0]
         moved, push, ahead = self._turned(self.change, radius)
         B_moved, B_push, B_ahead = self._turned(self.B, radius)
-        x, z, straight = self.x, Ball.exact(np.zeros((q, q))), Ball.exact(np.zeros((q, q)))
+        x, z, straight = base, Ball.exact(np.zeros((q, q))), Ball.exact(np.zeros((q, q)))
+        shift = Ball.exact(np.zeros((q, len(free.mid))))
         if q:
             inverse = Inverse.of(Ball.exact(np.eye(q)) + B_moved)
             if inverse is None:
                 return None
-            both = Ball(np.hstack([B_push.mid, B_ahead.mid]), np.hstack([B_push.rad, B_ahead.rad]))
-            both, x = inverse.solve(both), inverse.solve(self.x[:, None])[:, 0]
-            z, straight = both[:, :q], both[:, q:]
-        span = Ball(np.zeros((q, 1)), radius[:, None])
+            parts = B_push, B_ahead, self.B[:, 2 * q :]
+            both = Ball(np.hstack([part.mid for part in parts]), np.hstack([part.rad for part in parts]))
+            both, x = inverse.solve(both), inverse.solve(base[:, None])[:, 0]
+            z, straight, shift = both[:, :q], both[:, q : 2 * q], both[:, 2 * q :]
+        span, beside = Ball(np.zeros((q, 1)), radius[:, None]), Ball(np.zeros_like(free.mid), free.rad)[:, None]
         if point is not None:
             for _ in range(2):
                 # the mean value form: what the box adds to the values in its middle, dx = -z x dpsi
-                x = smaller(x, point.x - ((z * x) @ span)[:, 0])
+                moves = (z * x) @ span
+                x = smaller(x, point.x - (moves + shift @ beside if len(free.mid) else moves)[:, 0])
         across, along = push - moved @ z, ahead - moved @ straight
-        value, slope = self.start + (moved @ x[:, None])[:, 0], across * x
+        value, slope, lone = start + (moved @ x[:, None])[:, 0], across * x, lone - moved @ shift
         if point is not None:
-            value = smaller(value, _stacked(point.y, point.w) + (slope @ span)[:, 0])
+            moves = slope @ span
+            moves = moves + lone @ beside if len(free.mid) else moves
+            value = smaller(value, _stacked(point.y, point.w) + moves[:, 0])
         w = value[m:]
         w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
-        return Box(value[:m], w, slope[m:], x, z, along[m:], across[m:])
+        return Box(value[:m], w, slope[m:], lone[m:], x, z, along[m:], across[m:])
 
 
 def _stacked(upper: Ball, lower: Ball) -> Ball:
