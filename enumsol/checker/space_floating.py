@@ -12,7 +12,7 @@ from enumsol.condensation.floating_space import FloatingSpace
 from enumsol.proof import records
 from enumsol.proof.reading import RefusedError
 from enumsol.proof.space_records import FLOATING_LEAVES, ExcludedInSpace
-from enumsol.trusted.space.leaves import settle
+from enumsol.trusted.space.leaves import SpaceRoot, settle
 from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, unbounded
 
 if TYPE_CHECKING:
@@ -63,3 +63,7 @@ class FloatingSpaceChecker(WithinReach, SpaceChecker):
             return None
         self.bounded = True
         return super()._no_root(codes, said)
+
+    def _regular_root(self, codes: Codes, said: records.RegularRoot) -> str | None:
+        self.bounded |= not isinstance(settle(self.free, codes), SpaceRoot)
+        return super()._regular_root(codes, said)

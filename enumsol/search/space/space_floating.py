@@ -22,7 +22,7 @@ from enumsol.search.resume import RecordedBound
 from enumsol.search.space.space_search import SpaceCertifier, SpaceReader
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.confinement import motion_beside
-from enumsol.trusted.space.leaves import Open, settle
+from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, resultants, unbounded
 
 if TYPE_CHECKING:
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import Codes
     from enumsol.support.arguments import Alpha
     from enumsol.trusted.space.boxed_solution import BoxedSolution
-    from enumsol.trusted.space.leaves import SpaceRoot
     from enumsol.trusted.space.sector_rows import Row
 
 
@@ -192,8 +191,8 @@ class FloatingSpaceCertifier(SpaceCertifier):
             self._leaf(unbalanced)
             return None
         answer = super().selection(codes)
-        if answer is None and self._exclusions is not None:
-            self.bounded |= settle(self._exclusions.free, codes) is not None
+        if self._exclusions is not None and (answer is None or isinstance(answer, SpaceRoot)):
+            self.bounded |= not isinstance(settle(self._exclusions.free, codes), type(answer))
         return answer
 
     def _boxed(self, leaf: Open) -> None:

@@ -262,7 +262,8 @@ class _Leaf:
             return angle, radius
         low = np.maximum((found.mid - found.rad)[:, 0], angle[q:] - radius[q:])
         high = np.minimum((found.mid + found.rad)[:, 0], angle[q:] + radius[q:])
-        slack = 8 * UNIT * (np.abs(found.mid) + found.rad)[:, 0]
+        known = np.where(np.isfinite(radius[q:]), np.abs(angle[q:]) + radius[q:], 0.0)
+        slack = 8 * UNIT * (found.size[:, 0] + known)
         if np.any(low - slack > high + slack):
             return None
         middle = 0.5 * (low + high)

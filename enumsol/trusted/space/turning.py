@@ -88,7 +88,7 @@ class Turning:
     products are taken before anything is widened by a box. Some unknowns s of y may be left free, as those rigid modes
     are that P does not determine (theory, section 14.6): they are what forces in T are for which x is solved as well,
 
-        x_c = (I + B_c D)^-1 (x_0c - B_s s),     y = y_0 + Pi_0 (T D x_c + T_s s),     w = w_0 - S Pi_0 (T D x_c + T_s s).
+        x_c = (I + B_c D)^-1 (x_0c - B_s s),   y = y_0 + Pi_0 (T D x_c + T_s s),   w = w_0 - S Pi_0 (T D x_c + T_s s).
 
     Attributes
     ----------
