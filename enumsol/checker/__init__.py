@@ -14,8 +14,9 @@ What a verified proof says
     changed rounding modes are excluded.
 
 What checker and search share
-    ``checker.verify``, ``checker.graph_checker``, ``checker.history_checker`` and ``checker.space_checker`` import
-    nothing of the search, neither its trees and relaxations nor its arcs and results, and a test guards that. They
+    The checkers (``checker.verify``, ``checker.graph_checker``, ``checker.history_checker``, ``checker.space_checker``,
+    ``checker.floating``, ``checker.space_floating``) import nothing of the search, neither its trees and relaxations nor
+    its arcs and results, and a test guards that. They
     are not independent of all that it uses. These serve both, and an error in one of them may write a false proof
     and accept it:
 
@@ -44,8 +45,9 @@ What checker and search share
       and which leaves share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution
       only; ``trusted.space.boxed_solution``, the test that a box of forces holds exactly one, and which of these are
       the same; ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
-      variables in which friction is isotropic; ``model.problem3d``, ``model.slip_mean`` and ``model.friction``, the
-      data and their checks;
+      variables in which friction is isotropic; of bodies that nothing holds ``condensation.floating_space``, the same
+      with G and h, and ``trusted.space.resultants``, what multipliers and balance prove; ``model.problem3d``,
+      ``model.slip_mean`` and ``model.friction``, the data and their checks;
     - for histories: ``trusted.positions``, where a root leaves the contact nodes; ``model.restart``, the problem of a
       step;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the

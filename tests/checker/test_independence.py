@@ -23,6 +23,9 @@ CHECKERS = (
 )
 IN_SPACE = {
     "enumsol.checker.space_checker",
+    "enumsol.checker.space_floating",
+    "enumsol.condensation.floating_space",
+    "enumsol.trusted.space.resultants",
     "enumsol.trusted.space.sector_rows",
     "enumsol.trusted.space.leaves",
     "enumsol.trusted.space.boxed_solution",
@@ -53,6 +56,7 @@ SHARED = {
     "condensation.affine": {"exactly_at"},
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
     "condensation.floating": {"FloatingSystem", "RigidRows"},
+    "condensation.floating_space": {"FloatingSpace"},
     "condensation.space_condensed": {"EnclosedSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"only_roots"},
@@ -62,7 +66,7 @@ SHARED = {
     "trusted.arcs.over_parts": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
     "trusted.floating_bounds": {"is_unbalanced"},
-    "trusted.confinement": {"motion_against", "without_bound"},
+    "trusted.confinement": {"motion_against", "motion_beside", "without_bound"},
     "trusted.over_interval": {"EnclosedPiece", "as_computed"},
     "trusted.arcs.precise": None,
     "trusted.positions": {"tangential_positions"},
@@ -74,6 +78,7 @@ SHARED = {
     "trusted.status_rows": None,
     "trusted.space.sector_rows": None,
     "trusted.space.leaves": None,
+    "trusted.space.resultants": None,
     "trusted.space.turning": {"turned_by"},
     "trusted.space.boxed_solution": {
         *("BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "solution_in_box")

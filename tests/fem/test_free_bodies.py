@@ -108,5 +108,3 @@ def test_what_is_refused():
     for wrong in (0.0, -1, "much", float("nan")):
         with pytest.raises(enumsol.InvalidArgumentError, match="max_rigid_displacement is"):
             fem.mesh_problem(mesh, **BLOCK, max_rigid_displacement=wrong)
-    with pytest.raises(enumsol.InvalidArgumentError, match="for a body in 3D"):
-        fem.mesh_problem(fem.box(1, 1, 1), **BLOCK, max_rigid_displacement="auto")

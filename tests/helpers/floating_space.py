@@ -1,0 +1,85 @@
+"""Bodies in 3D that nothing holds, made around a solution: one is known from the start."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+import enumsol
+
+OPEN, STICK, SLIP = "open", "stick", "slip"
+
+
+@dataclass
+class KnownBody:
+    """A problem and the numbers of one of its solutions."""
+
+    problem: enumsol.ContactProblem3D
+    u: np.ndarray
+    lambda_n: np.ndarray
+    lambda_t: np.ndarray
+
+
+def known_body(seed, p=None, r=None, frictions=(0.3, 1.0), plane=False):
+    """A random body with p contact nodes and r rigid modes, whose gap, slip offset and load fit a random solution.
+
+    ``plane``: friction along the first axis only, so that directions of slip are no unknowns.
+    """
+    rng = np.random.default_rng(seed)
+    p = p or int(rng.integers(1, 4))
+    r = r or int(rng.integers(1, 4))
+    n = 3 * p + int(rng.integers(0, 3))
+    N = np.linalg.qr(rng.normal(size=(n, r)))[0]
+    rest = np.linalg.qr(np.hstack([N, rng.normal(size=(n, n - r))]))[0][:, r:]
+    A = (rest * rng.uniform(0.5, 2.0, n - r)) @ rest.T
+    rows = np.eye(n)[: 3 * p] if rng.random() < 0.5 else np.linalg.qr(rng.normal(size=(n, 3 * p)))[0].T
+    Bn, Bt1, Bt2 = rows[:p], rows[p : 2 * p], rows[2 * p :]
+    F = rng.choice(frictions, (p, 2))
+    if plane:
+        F[:, 1] = 0.0
+    u = rng.normal(size=n)
+    lambda_n, lambda_t, gap, offset = np.zeros(p), np.zeros((p, 2)), np.zeros(p), np.zeros((p, 2))
+    for i in range(p):
+        slip = np.zeros(2)
+        gap[i] = Bn[i] @ u
+        kind = rng.choice([OPEN, STICK, STICK, SLIP])
+        if kind == OPEN and i:
+            gap[i] += rng.uniform(0.2, 1.0)
+            slip = rng.normal(size=2)
+        else:
+            lambda_n[i] = rng.uniform(0.5, 2.0)
+            turn = rng.uniform(0, 2 * np.pi)
+            tau = lambda_n[i] * np.array([np.cos(turn), np.sin(turn)])
+            if plane:
+                tau = lambda_n[i] * np.array([rng.choice([-1.0, 1.0]), 0.0])
+            if kind in (STICK, OPEN):
+                tau *= rng.uniform(0.1, 0.8)
+            else:
+                size = rng.uniform(0.2, 1.0)
+                slip = size * np.divide(tau, F[i], out=np.zeros(2), where=F[i] > 0)
+            if plane:
+                slip[1] = rng.normal()
+            lambda_t[i] = F[i] * tau
+        offset[i] = [Bt1[i] @ u, Bt2[i] @ u] - slip
+    f = A @ u + Bn.T @ lambda_n + Bt1.T @ lambda_t[:, 0] + Bt2.T @ lambda_t[:, 1]
+    problem = enumsol.ContactProblem3D(
+        *(0.5 * (A + A.T), Bn, Bt1, Bt2, f),
+        gap=gap,
+        friction=(F[:, 0], F[:, 1]),
+        slip_offset=offset,
+        rigid_modes=N,
+        max_rigid_displacement=30.0,
+    )
+    return KnownBody(problem, u, lambda_n, lambda_t)
+
+
+def on_weak_springs(problem, stiffness):
+    """The same body held by springs at all degrees of freedom, which act on its rigid displacements alone."""
+    N = problem.rigid_modes
+    A = problem.A.toarray() + stiffness * N @ N.T
+    return enumsol.ContactProblem3D(
+        *(sp.csc_array(0.5 * (A + A.T)), problem.Bn, problem.Bt1, problem.Bt2, problem.f),
+        gap=problem.gap,
+        friction=problem.friction,
+        slip_offset=problem.slip_offset,
+    )

@@ -1,0 +1,173 @@
+"""Bodies in 3D that nothing holds: known solutions, the same problems in the plane, weak springs, blocks."""
+
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from helpers.floating_space import known_body, on_weak_springs
+
+import enumsol
+from enumsol.gallery import block_on_table3d
+
+
+def checked(problem, **options):
+    """All roots, whose proof the checker accepts; it may know that a bound was not needed where the search does not."""
+    roots = enumsol.enumerate_roots(problem, 0, **options)
+    report = enumsol.verify(problem, roots.proof)
+    assert report.ok
+    assert (report.roots, report.complete) == (len(roots), roots.complete)
+    assert report.within is None or roots.rigid_bound.needed
+    return roots
+
+
+def nearest(roots, u):
+    return min(roots, key=lambda root: np.max(np.abs(root.u - u)))
+
+
+def disagreement(seed):
+    """What is wrong with the roots of a known body, or None."""
+    known = known_body(seed)
+    problem = known.problem
+    roots = checked(problem)
+    if not roots.complete:
+        return f"not complete: {roots.completeness()}"
+    root = nearest(roots, known.u)
+    if np.max(np.abs(root.u - known.u)) > 1e-9 or np.max(np.abs(root.lambda_t - known.lambda_t)) > 1e-9:
+        return "the known solution is missing"
+    weak = enumsol.enumerate_roots(on_weak_springs(problem, 1e-6), 0)
+    held = problem.modes.held
+    # springs at all degrees of freedom displace what they hold
+    inside = [one for one in weak if np.max(np.abs(one.u[held])) < problem.rigid_reach]
+    found = [one for one in roots if np.max(np.abs(one.u[held])) < 0.99 * problem.rigid_reach]
+    if weak.complete and not len(found) <= len(inside) <= len(roots):
+        return f"{len(roots)} roots, and {len(inside)} with weak springs"
+    if weak.complete and any(np.max(np.abs(nearest(inside, one.u).u - one.u)) > 1e-2 for one in found):
+        return "a root is not that of weak springs"
+    if weak.complete and sorted(nearest(inside, one.u).index for one in found) != sorted(one.index for one in found):
+        return "another index"
+    return None
+
+
+def test_a_body_with_two_solutions():
+    assert disagreement(113) is None
+
+
+@pytest.mark.slow
+def test_more_random_bodies():
+    assert not {seed: said for seed in range(200, 220) if (said := disagreement(seed)) is not None}
+
+
+@pytest.mark.parametrize("seed", [1, 8])
+def test_friction_along_one_axis_is_that_of_the_plane(seed):
+    problem = known_body(seed, plane=True).problem
+    (F, _), offset = problem.friction, problem.slip_offset[:, 0]
+    matrices = problem.A, problem.Bn, problem.Bt1, problem.f
+    given = {"gap": problem.gap, "friction": (F, np.zeros(problem.p)), "slip_offset": offset}
+    modes = {"rigid_modes": problem.rigid_modes, "max_rigid_displacement": problem.max_rigid_displacement}
+    plane = enumsol.enumerate_roots(enumsol.ContactProblem(*matrices, **given, **modes), 0)
+    space = checked(problem)
+    assert plane.complete
+    assert space.complete
+    assert len(plane) == len(space)
+    assert sorted(root.index for root in plane) == sorted(root.index for root in space)
+    for root in space:
+        assert np.allclose(nearest(plane, root.u).u, root.u, atol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("push", "count"), [(0.5, 1), (1.1, 0)])
+def test_a_block_below_and_above_sliding(push, count):
+    problem = block_on_table3d(1, push=(0.8 * push, 0.6 * push))
+    roots = checked(problem)
+    assert roots.complete
+    assert len(roots) == count
+    if count:
+        (root,) = roots
+        carried = problem.contact_rows.T @ np.r_[root.lambda_n, root.lambda_t.ravel(order="F")]
+        assert np.allclose(problem.rigid_modes.T @ (problem.f - carried), 0, atol=1e-12)
+        assert np.max(np.abs(problem.A @ root.u + carried - problem.f)) < 1e-12
+        held = problem.modes.held
+        assert np.allclose(root.u[held], root.rigid_displacement[held], atol=1e-12)
+        assert np.allclose(problem.Bn @ root.u, root.u_n, atol=1e-12)
+        assert np.all(root.enclosure.u_t[..., 0] <= root.u_t)
+        assert np.all(root.u_t <= root.enclosure.u_t[..., 1])
+
+
+@pytest.mark.slow
+def test_as_springs_become_weaker_the_solution_tends_to_that_without_any():
+    problem = block_on_table3d(1, push=(0.5, 0.0))
+    (free,) = enumsol.enumerate_roots(problem, 0)
+    stiff = np.max(np.abs(problem.A.data))
+    far = []
+    for share in (1e-3, 1e-5, 1e-7):
+        (root,) = enumsol.enumerate_roots(on_weak_springs(problem, share * stiff), 0)
+        far.append(max(np.max(np.abs(root.u - free.u)), np.max(np.abs(root.lambda_n - free.lambda_n))))
+    # the search for springs as weak as 1e-9 takes too long
+    weakest = enumsol.successive_approximations(on_weak_springs(problem, 1e-9 * stiff), 0)
+    assert weakest.converged
+    assert np.max(np.abs(weakest.lambda_n - free.lambda_n)) < 1e-6
+    assert far[0] < 0.1
+    assert far[1] < 0.02 * far[0]
+    assert far[2] < 0.02 * far[1]
+
+
+@pytest.mark.slow
+def test_a_block_of_which_all_nodes_but_one_slip():
+    """Its equations leave a turn about that node free, whatever the directions are."""
+    problem = block_on_table3d(2, push=(0.9, 0.225))
+    (root,) = checked(problem)
+    assert sorted(status.value for status in root.statuses) == ["slip"] * 5 + ["stick"]
+    (held,) = enumsol.enumerate_roots(on_weak_springs(problem, 1e-6), 0)
+    assert np.allclose(held.lambda_n, root.lambda_n, atol=1e-5)
+    assert (held.index, root.index) == (1, 1)
+
+
+def test_a_body_that_is_free_to_slide_names_the_mode():
+    roots = checked(block_on_table3d(1, push=(0.0, 0.0), friction=0.0))
+    assert not roots.complete
+    assert any("free to move as a whole" in part.reason and "rigid mode" in part.reason for part in roots.undecided)
+
+
+def test_what_the_text_says():
+    within, at_all = (checked(known_body(seed).problem) for seed in (113, 105))
+    assert "complete: yes (proven, within rigid displacements of 30)" in repr(within)
+    assert "complete: yes (proven, no bound of rigid displacements was needed)" in repr(at_all)
+    assert "rigid modes         6, of displacements up to 4" in repr(block_on_table3d(1, max_rigid_displacement=4.0))
+
+
+def test_executors_and_resumed_searches_find_the_same(tmp_path):
+    problem = known_body(113).problem
+    alone = enumsol.enumerate_roots(problem, 0)
+    with ThreadPoolExecutor(2) as executor:
+        spread = checked(problem, executor=executor)
+    file = tmp_path / "proof.txt"
+    enumsol.enumerate_roots(problem, 0, proof_path=file, max_nodes=12)
+    again = checked(problem, proof_path=file, resume=True)
+    for roots in (spread, again):
+        assert [root.lambda_n.tolist() for root in roots] == [root.lambda_n.tolist() for root in alone]
+        assert roots.rigid_bound == alone.rigid_bound
+    assert again.stats.resumed > 0
+
+
+def test_files_copies_and_other_loads(tmp_path):
+    problem = known_body(1).problem
+    enumsol.write_problem(problem, tmp_path / "body.npz")
+    for copy in (enumsol.read_problem(tmp_path / "body.npz"), pickle.loads(pickle.dumps(problem))):
+        assert copy.fingerprint == problem.fingerprint
+        assert copy.rigid_reach == problem.rigid_reach
+    other = problem.replace(gap=problem.gap + 1e-3)
+    assert other.on_springs.factorization is problem.on_springs.factorization
+    assert other.fingerprint != problem.fingerprint
+
+
+def test_what_is_refused():
+    problem = block_on_table3d(1)
+    with pytest.raises(enumsol.InvalidArgumentError, match='arithmetic is "fast" for a body that nothing holds'):
+        enumsol.enumerate_roots(problem, 0, arithmetic="fast")
+    with pytest.raises(enumsol.NotHeldError, match="a fixed point cannot take a body that nothing holds"):
+        enumsol.successive_approximations(problem, 0)
+    with pytest.raises(enumsol.InvalidProblemError, match="rigid_modes: column 0 is no rigid mode"):
+        problem.replace(rigid_modes=np.eye(problem.n)[:, :2])
+    with pytest.raises(enumsol.InvalidProblemError, match="singular or indefinite on more than the 2 rigid_modes"):
+        problem.replace(rigid_modes=problem.rigid_modes[:, :2])
