@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from generators import integer_problem, through_the_unloaded_state
+from helpers.floating_space import known_body
 
 import enumsol
 from enumsol import branch_graph, checker, enumerate_roots, write_problem
@@ -226,13 +227,14 @@ def test_no_module_of_the_search_is_loaded_by_a_verification(tmp_path):
 
 
 def test_a_proof_in_space_loads_no_more_than_the_checker(tmp_path):
-    problem = enumsol.gallery.block3d(2, 1, 2)
-    write_problem(problem, tmp_path / "0.npz")
-    enumerate_roots(problem, 1.0).proof.save(tmp_path / "0.proof")
+    for k, problem in enumerate((enumsol.gallery.block3d(2, 1, 2), known_body(105).problem)):
+        write_problem(problem, tmp_path / f"{k}.npz")
+        enumerate_roots(problem, 1.0).proof.save(tmp_path / f"{k}.proof")
     code = (
         "import sys, json, enumsol; from enumsol.checker.verify import verify; "
         "from enumsol.proof.proof_file import Proof; "
-        f"assert verify(enumsol.read_problem('{tmp_path}/0.npz'), Proof.load('{tmp_path}/0.proof')).complete; "
+        f"reports = [verify(enumsol.read_problem(f'{tmp_path}/{{k}}.npz'), Proof.load(f'{tmp_path}/{{k}}.proof')) "
+        "for k in range(2)]; assert all(report.complete for report in reports); "
         "print(json.dumps(sorted(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)

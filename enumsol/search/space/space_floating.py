@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from enumsol.arithmetic.balls import Array
+    from numpy.typing import NDArray
+
     from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.compressed_parts import Recorder
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
     from enumsol.support.arguments import Alpha
     from enumsol.trusted.space.boxed_solution import BoxedSolution
     from enumsol.trusted.space.sector_rows import Row
+
+    Array = NDArray[np.float64]
 
 
 class FloatingSpaceSolvers(SpaceSolvers):

@@ -7,6 +7,8 @@ from fractions import Fraction
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.proof.writer import point_header, unit_exponents
@@ -19,13 +21,16 @@ from enumsol.search.tree import TreeSearch
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from enumsol.arithmetic.balls import Array
+    from numpy.typing import NDArray
+
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.compressed_parts import Recorder
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.outcome import SearchLimits, SearchProgress
     from enumsol.search.space.space_fathoming import SpaceClosing
     from enumsol.support.arguments import Alpha
+
+    Array = NDArray[np.float64]
 
 
 class SpaceSolvers:
