@@ -27,7 +27,7 @@ branches, command_line, gallery, histories, results, three_dimensions, tutorial 
 
 
 def test_no_page_is_forgotten():
-    elsewhere = {ROOT / "README.md", DOCS / "from_a_mesh.md"}
+    elsewhere = {ROOT / "README.md", DOCS / "from_a_mesh.md", DOCS / "from_other_codes.md"}
     assert {path for path in DOCUMENTS if runs(path)} == elsewhere | {DOCS / f"{name}.md" for name in NAMES}
 
 

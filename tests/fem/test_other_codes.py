@@ -1,0 +1,90 @@
+"""docs/from_other_codes.md, followed with matrices that CalculiX wrote, and with the same in other formats."""
+
+from pathlib import Path
+from shutil import copy
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from documents import ROOT, follow
+from scipy.io import mmwrite
+
+import enumsol
+from enumsol import fem
+
+#: Of CalculiX 2.20: the model, its stiffness matrix with the names of its rows, and nodal forces.
+FILES = Path(__file__).parent / "calculix"
+LABELS = ("UX", "UY", "UZ")
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("other_codes")
+    for file in FILES.iterdir():
+        copy(file, folder)
+    return {**follow(ROOT / "docs" / "from_other_codes.md", folder), "folder": folder}
+
+
+@pytest.fixture(scope="module")
+def own():
+    """The block of the model, assembled here."""
+    mesh = fem.box(2, 1, 1, (2.0, 1.0, 1.0))
+    return fem.solid_contact_problem(
+        mesh.points,
+        mesh.cells,
+        fem.lame(2.5, 0.25),
+        contact=mesh.facets["bottom"],
+        normals=(0.0, 0.0, -1.0),
+        axes=(1.0, 0.0, 0.0),
+        held=mesh.nodes("left"),
+        forces=fem.facet_forces(mesh.points, mesh.facets["top"], (0.3, 0.1, -0.6)),
+        friction=0.3,
+    )
+
+
+def test_roots_of_the_matrices_of_calculix_are_our_own(seen, own):
+    roots, expected = seen["roots"], enumsol.enumerate_roots(own, 0)
+    assert roots.complete
+    assert len(roots) == len(expected) == 1
+    assert roots[0].statuses == expected[0].statuses
+    for name in ("lambda_n", "lambda_t", "u_n", "u_t"):
+        ours = getattr(expected[0], name)
+        assert np.allclose(getattr(roots[0], name), ours, rtol=0, atol=1e-11 * np.max(np.abs(ours)) + 1e-13)
+    assert enumsol.read_problem(seen["folder"] / "block.npz").fingerprint == seen["block"].fingerprint
+
+
+def same(one, two):
+    """Whether both name the same degrees of freedom and have the same stiffness between them."""
+    (A, first), (B, second) = one, two
+    order = [second[name] for name in first]
+    return set(first) == set(second) and np.array_equal(A.toarray(), B.toarray()[np.ix_(order, order)])
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_the_format_of_abaqus(seen, tmp_path, both):
+    """One triangle or both, nodes in another order, held ones with a large number on the diagonal."""
+    A, places = seen["from_calculix"](str(FILES / "block"))
+    lines = [f"{node},{d}, {node},{d},  1.000000000000000e+36" for node in (1, 4, 7, 10) for d in (1, 2, 3)]
+    names = list(places)
+    for i in reversed(range(len(names))):
+        listed = [j for j in range(len(names) if both else i + 1) if A[i, j]]
+        lines += ["{},{}, {},{},  {!r}".format(*names[i], *names[j], float(A[i, j])) for j in listed]
+    (tmp_path / "block_STIF1.mtx").write_text("\n".join(lines) + "\n")
+    assert same(seen["from_abaqus"](tmp_path / "block_STIF1.mtx", held=(1, 4, 7, 10)), (A, places))
+
+
+@pytest.mark.parametrize("symmetry", ["symmetric", "general"])
+def test_the_format_of_ansys(seen, tmp_path, symmetry):
+    A, places = seen["from_calculix"](str(FILES / "block"))
+    mmwrite(tmp_path / "block.mtx", sp.coo_array(A), symmetry=symmetry, precision=17)
+    lines = [f"{k + 1:>12}{node:>12}{LABELS[d - 1]:>8}" for k, (node, d) in enumerate(places)]
+    (tmp_path / "block.mapping").write_text("\n".join(["  Matrix Eqn     Node     DOF", *lines]) + "\n")
+    assert same(seen["from_ansys"](str(tmp_path / "block")), (A, places))
+
+
+def test_one_triangle_in_matrix_market_that_is_called_general(seen, tmp_path):
+    A, places = seen["from_calculix"](str(FILES / "block"))
+    mmwrite(tmp_path / "block.mtx", sp.coo_array(sp.triu(A)), symmetry="general", precision=17)
+    lines = [f"{k + 1} {node} {LABELS[d - 1]}" for k, (node, d) in enumerate(places)]
+    (tmp_path / "block.mapping").write_text("\n".join(lines) + "\n")
+    assert same(seen["from_ansys"](str(tmp_path / "block")), (A, places))
