@@ -8,6 +8,7 @@ import pytest
 import scipy.sparse as sp
 from documents import ROOT, follow
 from scipy.io import mmwrite
+from two_bodies import shifted, together
 
 import enumsol
 from enumsol import fem
@@ -88,3 +89,63 @@ def test_one_triangle_in_matrix_market_that_is_called_general(seen, tmp_path):
     lines = [f"{k + 1} {node} {LABELS[d - 1]}" for k, (node, d) in enumerate(places)]
     (tmp_path / "block.mapping").write_text("\n".join(lines) + "\n")
     assert same(seen["from_ansys"](str(tmp_path / "block")), (A, places))
+
+
+def test_two_bodies_that_calculix_assembled_have_our_own_roots(seen):
+    """A small block between the nodes of a larger one; what its nodes face is interpolated by hand."""
+    A, places = seen["from_calculix"](str(FILES / "pair"))
+    points = {int(k): at for k, *at in map(numbers, section(FILES / "pair.inp", "*NODE"))}
+    slave = [k for k, at in points.items() if at[2] == 0.5 and k <= 8]
+    under = {(round(at[0], 9), round(at[1], 9)): k for k, at in points.items() if at[2] == 0.5 and k > 8}
+    rows = np.zeros((3, 4, len(places)))
+    for row, k in enumerate(slave):
+        x, y, _ = points[k]
+        left = 0.5 * (x > 0.5)
+        for at, share in ((left, 1 - (x - left) / 0.5), (left + 0.5, (x - left) / 0.5)):
+            for depth, part in ((0.0, 1 - y), (1.0, y)):
+                for d in range(3):
+                    rows[d, row, places[under[at, depth], d + 1]] = -share * part
+        for d in range(3):
+            rows[d, row, places[k, d + 1]] = 1.0
+    f = np.zeros(len(places))
+    for node, d, force in np.loadtxt(FILES / "pair.cload", delimiter=","):
+        if (node, d) in places:
+            f[places[node, d]] = force
+    problem = enumsol.ContactProblem3D(A, -rows[2], rows[0], -rows[1], f, friction=0.3, gap=0.001)
+    found = enumsol.enumerate_roots(problem, 0)
+
+    upper, lower = fem.box(1, 1, 1, (0.8, 0.8, 0.5)), fem.box(2, 1, 1, (1.0, 1.0, 0.5))
+    mesh = together(("upper", shifted(upper, (0.1, 0.1, 0.5))), ("lower", lower))
+    own = fem.mesh_problem(
+        mesh,
+        young=2.5,
+        poisson=0.25,
+        pairs=[("upper.bottom", "lower.top")],
+        clamp=["upper.top", "lower.bottom"],
+        load={"upper.right": (0.3, 0.1, -0.8)},
+        gap=0.001,
+        friction=0.3,
+        axis=(1.0, 0.0, 0.0),
+    )
+    expected = enumsol.enumerate_roots(own, 0)
+    assert found.complete
+    assert expected.complete
+    assert [k - 1 for k in slave] == list(own.node_ids)
+    assert len(found) == len(expected) == 1
+    assert found[0].statuses == expected[0].statuses
+    assert np.max(found[0].lambda_n) > 0.01
+    for name in ("lambda_n", "lambda_t", "u_n", "u_t"):
+        ours = getattr(expected[0], name)
+        assert np.allclose(getattr(found[0], name), ours, rtol=0, atol=1e-11 * np.max(np.abs(ours)) + 1e-13)
+
+
+def numbers(line):
+    return [float(word) for word in line.split(",") if word]
+
+
+def section(file, keyword):
+    """Lines of data below a keyword."""
+    lines = file.read_text().splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith(keyword)) + 1
+    last = next(k for k in range(first, len(lines)) if lines[k].startswith("*"))
+    return lines[first:last]
