@@ -17,7 +17,7 @@ def page(name):
     @pytest.fixture(scope="module", name=name)
     def followed(tmp_path_factory):
         folder = tmp_path_factory.mktemp(name)
-        return {**follow(DOCS / f"{name}.md", folder), "folder": folder}
+        return {**follow(DOCS / f"{name}.md", folder, {"__name__": "__main__"}), "folder": folder}
 
     return followed
 
@@ -114,6 +114,12 @@ def test_reports(command_line):
         "wedge.html",
         "wedge.proof",
     }
+
+
+@pytest.mark.slow
+def test_a_cluster(command_line):
+    assert len(command_line["spread"]) == 5
+    assert command_line["spread"].complete
 
 
 @pytest.mark.slow
