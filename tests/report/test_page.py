@@ -368,3 +368,20 @@ def test_supports_along_slopes_and_many_loads():
     assert (x, y, fx, slope) == (pytest.approx(0.5, abs=0.05), pytest.approx(0.5, abs=0.05), 0, [0, 0])
     assert fy == pytest.approx(-2, rel=0.05)  # without what the clamp takes
     assert [way for _, *way in body["held"]] == [[0, 0]] * 13
+
+
+def test_commands_tell_what_a_toml_file_gave(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    mesh = fem.rectangle(2, 1)
+    meshio = pytest.importorskip("meshio")
+    sides = {"bottom": mesh.bottom, "left": mesh.left, "top": mesh.top}
+    meshio.Mesh(mesh.points, {"triangle": mesh.triangles}, point_sets=sides).write("block.inp")
+    keys = 'mesh = "block.inp"\nyoung = 7\npoisson = 0.3\ncontact = "bottom"\nclamp = "left"\nload.top = [0.1, -0.3]\n'
+    (tmp_path / "block.toml").write_text(keys + "friction = 0.4\n")
+    for verb in ("roots", "solve"):
+        assert main([verb, "block.toml", "--alpha", "0", "--report", f"{verb}.html", "--units", "kN,m"]) == 0
+        text = Reader((tmp_path / f"{verb}.html").read_text(encoding="utf-8")).text
+        assert "top: 0.1, -0.3 kN/m²" in text
+    capsys.readouterr()
+    assert main(["roots", "block.toml", "--alpha", "0", "--units", "kN"]) == 2
+    assert "--units is kN; expected units of force and length" in capsys.readouterr().err
