@@ -8,6 +8,9 @@ the scripts import nothing of this package. All solutions of each file are then 
 A code is looked for in this Python, in the ``python3`` of the system (where Debian's python3-dolfinx and
 python3-getfem are) and in ``--python``; one that is nowhere is left out. ``difference`` is the largest one between
 contact forces and those of scikit-fem, relative to the largest force.
+
+Then two bodies whose meshes do not match, one on the other (``two_bodies_by_scikit_fem.py``), against the pair of
+``enumsol.fem``.
 """
 
 from __future__ import annotations
@@ -40,6 +43,8 @@ CODES = {
 #: Cells along and across the wedge, and alphas at which its roots are enumerated.
 SIZES, SMOKE_SIZES = ((4, 4), (6, 7), (10, 10)), ((4, 4),)
 ALPHAS, SMOKE_ALPHAS = (1.5, 2.5, 4.0), (2.5,)
+#: Cells along the upper and the lower of two bodies.
+TWO_BODIES, SMOKE_TWO_BODIES = ((4, 6), (7, 5), (8, 12)), ((4, 6),)
 #: How near forces are to be.
 CLOSE = 1e-9
 #: The search of the largest wedge stops here; only what is complete is compared.
@@ -110,6 +115,52 @@ def compared(size: tuple[int, int], alpha: float, by_code: dict[str, Any]) -> li
     return rows
 
 
+def two_bodies(place: Path, upper: int, lower: int) -> enumsol.ContactProblem:
+    """One block on another, by `enumsol.fem`; what the other code needs is written to a file."""
+    top, bottom = fem.rectangle(upper, 2, 1.5, 0.5), fem.rectangle(lower, 2, 2.0, 0.5)
+    count = len(bottom.points)
+    points = np.concatenate([bottom.points, top.points + np.array([0.2, 0.5])])
+    triangles = np.concatenate([bottom.triangles, count + top.triangles])
+    parts = {"floor": bottom.bottom, "below": bottom.top, "above": count + top.bottom, "end": count + top.left}
+    facets = {name: fem.edges_along(nodes) for name, nodes in parts.items()} | {
+        "roof": top.parted().part("top") + count
+    }
+    lame, traction, gap = fem.lame(2.5, 0.25), (0.1, -0.3), 1e-3
+    np.savez(
+        place,
+        points=points,
+        triangles=triangles,
+        slave=parts["above"],
+        master=parts["below"],
+        held=np.union1d(parts["floor"], parts["end"]),
+        loaded=facets["roof"],
+        lame=lame,
+        traction=traction,
+        gap=gap,
+    )
+    return fem.mesh_problem(
+        fem.PartedMesh(points, triangles, facets),
+        young=2.5,
+        poisson=0.25,
+        pairs=[("above", "below")],
+        clamp=["floor", "end"],
+        load={"roof": traction},
+        gap=gap,
+    )
+
+
+def both(upper: int, lower: int, alphas: tuple[float, ...]) -> list[dict[str, Any]]:
+    """Rows of the two bodies by scikit-fem and by `enumsol.fem`."""
+    with tempfile.TemporaryDirectory() as folder:
+        mesh, file = Path(folder, "mesh.npz"), Path(folder, "problem.npz")
+        own = two_bodies(mesh, upper, lower)
+        done = call(sys.executable, str(HERE / "two_bodies_by_scikit_fem.py"), str(mesh), str(file))
+        if done.returncode:
+            sys.exit(f"scikit-fem: {done.stderr}")
+        by_code = {"scikit-fem": enumsol.read_problem(file), "enumsol.fem": own}
+    return [row for alpha in alphas for row in compared((upper, lower), alpha, by_code)]
+
+
 def main(run: Run) -> None:
     more = getattr(run.options, "python", None)
     found = {code: interpreter(library, more) for code, (_, library) in CODES.items()}
@@ -126,4 +177,12 @@ def main(run: Run) -> None:
         f"the same roots to {CLOSE:g}, all complete: {yes(same)}",
         f"largest difference {max(row['difference'] for row in rows):.1e}; codes: {', '.join(pythons)}",
         *(f"{code} is not installed: it is left out" for code in CODES if code not in pythons),
+    )
+    rows = [row for sizes in (SMOKE_TWO_BODIES if run.smoke else TWO_BODIES) for row in both(*sizes, (0.2, 0.5, 1.0))]
+    same = all(row["same statuses"] == row["complete"] == "yes" and row["difference"] < CLOSE for row in rows)
+    run.table(
+        "two_bodies",
+        rows,
+        f"two bodies: the same roots to {CLOSE:g}, all complete: {yes(same)}",
+        f"largest difference {max(row['difference'] for row in rows):.1e}",
     )

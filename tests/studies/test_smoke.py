@@ -41,7 +41,10 @@ CONCLUSIONS = {
     "paper_examples": ("all 19 facts hold", "no arc or continuum missed, no jump"),
     "peers": ("enumsol: ended on 3 of 3", "4^p selections: ended on 3 of 3"),
     "requirements": ("both interpreters import the same enumsol", "import enumsol: "),
-    "same_body_by_other_codes": ("the same roots to 1e-09, all complete: yes",),
+    "same_body_by_other_codes": (
+        "the same roots to 1e-09, all complete: yes",
+        "two bodies: the same roots to 1e-09, all complete: yes",
+    ),
     "samples_vs_graph": ("branches of length 0.001 are missed by 50 samples", "20 of 20 root sets agree"),
     "search_profile": ("both interpreters import the same enumsol", "the times"),
     "workers": ("all complete and checked: yes; one proof whatever the number of workers: yes",),
