@@ -105,6 +105,7 @@ def test_brake_shoe_balances_about_its_pin():
     assert set(between) == {"slip+"}
 
 
+@pytest.mark.slow
 def test_brake_shoe_is_self_locking_from_its_arms_on():
     """A rigid shoe that turns about its pin presses on the lining in proportion to a_n; Simpson's rule."""
     problem = gallery.brake_shoe()
@@ -220,7 +221,7 @@ def test_lap_joint_whose_nodes_all_stick_is_one_body():
 
 def test_lap_joint_that_slips_transmits_what_friction_does():
     forces = []
-    for F in (0.01, 0.05, 0.3, 1.0):
+    for F in (0.05, 0.3, 1.0):
         (root,) = proven(gallery.lap_joint(), F)
         forces.append(root.lambda_t.sum())
         assert root.lambda_n.sum() == pytest.approx(20e3, rel=1e-2)
