@@ -4,6 +4,7 @@ from . import (
     arithmetic as arithmetic,
     branches as branches,
     checker as checker,
+    collection as collection,
     condensation as condensation,
     continuation as continuation,
     errors as errors,

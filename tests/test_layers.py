@@ -27,7 +27,7 @@ LAYERS = (
     ("continuation", "loading"),
     ("fem",),
     ("io",),
-    ("gallery", "report"),
+    ("gallery", "report", "collection"),
     (".",),
     ("cli",),
     ("__main__",),
@@ -44,6 +44,7 @@ STRANGERS = {
     "io": {"checker", "search", "roots", "branches", "continuation"},
     "report": {"checker", "search", "continuation"},
     "gallery": {"checker", "search", "roots", "branches", "continuation"},
+    "collection": {"checker", "search", "branches", "continuation", "fem"},
 }
 
 

@@ -22,8 +22,8 @@ def page(name):
     return followed
 
 
-NAMES = ("branches", "command_line", "gallery", "histories", "results", "three_dimensions", "tutorial")
-branches, command_line, gallery, histories, results, three_dimensions, tutorial = (page(name) for name in NAMES)
+NAMES = ("branches", "collection", "command_line", "gallery", "histories", "results", "three_dimensions", "tutorial")
+branches, collection, command_line, gallery, histories, results, three_dimensions, tutorial = map(page, NAMES)
 
 
 def test_no_page_is_forgotten():
@@ -85,6 +85,14 @@ def test_branches_and_continuation(branches):
     assert list(branches["table"]["roots"]) == [1, 1, 1]
     assert enumsol.verify(branches["problem"], graph.proof).complete
     assert {path.name for path in branches["folder"].iterdir()} >= {"branches.png", "graph.json", "POINTS.csv"}
+
+
+@pytest.mark.slow
+def test_collection(collection):
+    assert (collection["folder"] / "FOLDER" / "problems" / "wedge-8-5.h5").exists()
+    printed = dict(collection["outputs"])
+    assert "51 problems tried, 51 of them with all" in printed["enumsol collection check FOLDER/certified"]
+    assert collection["answer"].converged
 
 
 @pytest.mark.slow

@@ -8,7 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from enumsol.cli import audit, fixed_point, follow, gallery, graph, history, report, roots, solve, table, verify
+from enumsol.cli import (
+    audit,
+    collection,
+    fixed_point,
+    follow,
+    gallery,
+    graph,
+    history,
+    report,
+    roots,
+    solve,
+    table,
+    verify,
+)
 from enumsol.cli.common import ExitStatus
 from enumsol.cli.quiet import loud_again
 from enumsol.cli.streams import guarded_streams
@@ -39,6 +52,7 @@ app.command("audit")(audit.audit)
 app.command("fixed-point")(fixed_point.fixed_point)
 app.command("verify")(verify.verify)
 app.add_typer(gallery.app, name="gallery")
+app.add_typer(collection.app, name="collection")
 
 
 def _version(value: bool) -> None:

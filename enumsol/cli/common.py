@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: Beginning of the names of problems in the gallery.
-GALLERY = "gallery:"
+#: Beginnings of the names of problems in the gallery and in the collection.
+GALLERY, COLLECTION = "gallery:", "collection:"
 #: Ending of files that describe a problem by a mesh and what acts on its parts.
 TOML = ".toml"
 #: Usual endings of files that meshio reads and that are no problems.
@@ -79,13 +79,12 @@ def scene_of(name: str) -> Scene | None:
 
 
 def load_problem(name: str) -> ContactProblem:
-    """The problem in 2D in a file or made of a mesh, or the one of the gallery for ``gallery:NAME``.
+    """The problem in 2D in a file or made of a mesh, or that of ``gallery:NAME`` or ``collection:NAME``.
 
     Raises
     ------
     InvalidProblemError, InvalidArgumentError
-        It cannot be read, the gallery has none of that name (the message gives names that are close), or it is one
-        in 3D.
+        It cannot be read, there is none of that name (the message gives names that are close), or it is one in 3D.
     """
     from enumsol.model.problem import ContactProblem
     from enumsol.support.arguments import instance_of  # numpy: not for --help
@@ -99,10 +98,14 @@ def load_any_problem(name: str) -> ContactProblem | ContactProblem3D:
     Raises
     ------
     InvalidProblemError, InvalidArgumentError
-        It cannot be read, or the gallery has none of that name; the message gives names that are close.
+        It cannot be read, or there is none of that name; the message gives names that are close.
     """
+    if name.startswith(COLLECTION):
+        from enumsol import collection  # numpy and scipy: not for --help
+
+        return collection.get(name.removeprefix(COLLECTION)).problem()
     if name.startswith(GALLERY):
-        from enumsol import gallery  # numpy and scipy: not for --help
+        from enumsol import gallery  # as above
 
         return gallery.get(name.removeprefix(GALLERY)).build()
     refuse_misspelt(name)

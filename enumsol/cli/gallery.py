@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from enumsol.cli.listing import list_entries, named_group
 from enumsol.cli.options import JsonFile, Quiet
-from enumsol.cli.output import as_json, check_outputs, deliver, write_text
+from enumsol.cli.output import check_outputs, deliver
 
 if TYPE_CHECKING:
     from enumsol.gallery import GalleryEntry
 
-app = typer.Typer(help="Named problems to experiment with.", no_args_is_help=False)
-
-
-@app.callback(invoke_without_command=True)
-def _gallery(context: typer.Context) -> None:
-    if context.invoked_subcommand is None:
-        typer.echo(context.get_help())
+app = named_group("Named problems to experiment with.")
 
 
 @app.command("list")
@@ -28,37 +22,10 @@ def list_(json_file: JsonFile = None) -> None:
     from enumsol import gallery  # numpy and scipy: not for --help
 
     check_outputs(json=json_file)
-    if json_file is not None:
-        names = ("name", "summary", "alpha", "roots", "dimension")
-        entries = [{name: getattr(entry, name) for name in names} for entry in gallery.GALLERY.values()]
-        write_text(json_file, as_json(entries))
-        if json_file == "-":
-            return
-    rows = [(entry.name, f"{entry.alpha:g}", _count(entry), entry.summary) for entry in gallery.GALLERY.values()]
-    if not sys.stdout.isatty():
-        # for other programs: one line per problem, however long
-        widths = [max(len(row[k]) for row in rows) for k in range(3)]
-        # written at once: nothing is left to write when a reader has read enough (| head)
-        typer.echo(
-            "\n".join(
-                f"{name:<{widths[0]}}  {alpha:>{widths[1]}}  {roots:>{widths[2]}}  {summary}"
-                for name, alpha, roots, summary in rows
-            )
-        )
-        return
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    table.add_column("NAME", no_wrap=True)
-    table.add_column("alpha", justify="right", no_wrap=True)
-    table.add_column("roots", justify="right", no_wrap=True)
-    table.add_column("what it shows")
-    for row in rows:
-        table.add_row(*row)
-    console = Console(highlight=False)
-    console.print(table, markup=False)
-    console.print("\nTry one: enumsol roots gallery:NAME --alpha ALPHA", style="dim", markup=False)
+    entries = list(gallery.GALLERY.values())
+    rows = [(entry.name, f"{entry.alpha:g}", _count(entry), entry.summary) for entry in entries]
+    hint = "Try one: enumsol roots gallery:NAME --alpha ALPHA"
+    list_entries(("NAME", "alpha", "roots", "what it shows"), rows, json_file=json_file, content=entries, hint=hint)
 
 
 def _count(entry: GalleryEntry) -> str:

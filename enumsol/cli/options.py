@@ -68,17 +68,18 @@ def with_options(*options: Parameter, after: int) -> Callable[[Callable[..., Non
 
 
 def problem_names(incomplete: str) -> list[str]:
-    """What an argument PROBLEM may become: problems of the gallery, and files and directories that may hold one."""
+    """What an argument PROBLEM may become: problems of both lists, and files and directories that may hold one."""
     from glob import escape, glob  # for a shell that completes only
 
-    from enumsol import gallery
-    from enumsol.cli.common import TOML
+    from enumsol import collection, gallery
+    from enumsol.cli.common import COLLECTION, GALLERY, TOML
     from enumsol.io import SUFFIXES
 
     kinds = (*SUFFIXES, TOML)
     files = [name for name in sorted(glob(escape(incomplete) + "*")) if isdir(name) or name.endswith(kinds)]
     # a shell that takes the colon for the end of a word asks for what follows it
-    names = [f"gallery:{name}" for name in gallery.GALLERY]
+    names = [f"{GALLERY}{name}" for name in gallery.GALLERY]
+    names += [f"{COLLECTION}{name}" for name in collection.COLLECTION]
     return files + [name for name in (*names, *gallery.GALLERY) if incomplete and name.startswith(incomplete)]
 
 
@@ -86,7 +87,7 @@ ProblemArgument = Annotated[
     str,
     typer.Argument(
         metavar="PROBLEM",
-        help="A file (.npz, .h5, .toml), a directory of MatrixMarket files, or gallery:NAME.",
+        help="A file (.npz, .h5, .toml), a directory of MatrixMarket files, gallery:NAME or collection:NAME.",
         autocompletion=problem_names,
         show_default=False,
     ),

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from enumsol.errors import InvalidArgumentError
 from enumsol.gallery.machine_parts import brake_shoe, clip, dovetail, lap_joint, pressed_rings
 from enumsol.gallery.problems import (
     block_on_table,
@@ -20,7 +18,8 @@ from enumsol.gallery.problems import (
     wedge,
 )
 from enumsol.gallery.solid_gallery import block3d, one_node_3d, wedge3d
-from enumsol.support.arguments import shown
+from enumsol.support import arguments
+from enumsol.support.arguments import entry_named
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -73,13 +72,7 @@ def get(name: str) -> GalleryEntry:
     >>> entry.roots == len(enumsol.enumerate_roots(entry.build(), entry.alpha))
     True
     """
-    if not isinstance(name, str):
-        raise InvalidArgumentError(f"name is {shown(name)}; expected a name of the gallery, such as one-node-6.1")
-    if name in GALLERY:
-        return GALLERY[name]
-    close = close_names(name)
-    known = f"did you mean {', '.join(close)}?" if close else f"expected one of {', '.join(GALLERY)}"
-    raise InvalidArgumentError(f"the gallery has no problem named {shown(name)}; {known}")
+    return entry_named(name, GALLERY, "the gallery", "one-node-6.1")
 
 
 def close_names(name: str) -> list[str]:
@@ -91,9 +84,7 @@ def close_names(name: str) -> list[str]:
     >>> "wedge-8-5" in enumsol.gallery.close_names("wedge8-5")
     True
     """
-    if name.lower() in GALLERY:
-        return [name.lower()]
-    return difflib.get_close_matches(name.lower(), GALLERY, n=5, cutoff=0.5)
+    return arguments.close_names(name, GALLERY)
 
 
 def _small() -> Iterator[GalleryEntry]:

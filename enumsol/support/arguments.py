@@ -12,6 +12,7 @@ Every refusal is one sentence: which argument, what was found, what was expected
 
 from __future__ import annotations
 
+import difflib
 import math
 import numbers
 import operator
@@ -28,7 +29,7 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Mapping
 
     from numpy.typing import NDArray
 
@@ -46,6 +47,8 @@ _FRACTION = re.compile(r"([+-]?\d+)(?:\s*/\s*(\d+))?", re.ASCII)
 _EXPECTED = "expected a finite real number such as 2.5 or a fraction such as 8/3"
 _RANGE = "expected a finite real number in the range of float64: 0, or 5e-324 to 1.8e308 in size"
 _SHOWN = 60
+#: Names that a refused one is answered with.
+_MOST_NAMES = 40
 
 T = TypeVar("T")
 N = TypeVar("N", float, Alpha)
@@ -347,6 +350,26 @@ def one_of(value: Any, name: str, known: Collection[str | None]) -> Any:
     if not (value is None or isinstance(value, str)) or value not in known:
         raise _refusal(value, name, f"one of {', '.join(map(repr, known))}")
     return value
+
+
+def entry_named(name: Any, entries: Mapping[str, T], where: str, example: str) -> T:
+    """The entry of that name; a refusal names similar ones, or all."""
+    if not isinstance(name, str):
+        raise InvalidArgumentError(f"name is {shown(name)}; expected a name of {where}, such as {example}")
+    if name in entries:
+        return entries[name]
+    close = close_names(name, entries)
+    some = list(entries)[:_MOST_NAMES]
+    more = f" and {len(entries) - len(some)} more" if len(entries) > len(some) else ""
+    known = f"did you mean {', '.join(close)}?" if close else f"expected one of {', '.join(some)}{more}"
+    raise InvalidArgumentError(f"{where} has no problem named {shown(name)}; {known}")
+
+
+def close_names(name: str, entries: Collection[str]) -> list[str]:
+    """Up to five names of entries similar to this one, the most similar first; only itself if it is one of them."""
+    if name.lower() in entries:
+        return [name.lower()]
+    return difflib.get_close_matches(name.lower(), entries, n=5, cutoff=0.5)
 
 
 def instance_of(value: Any, kind: type[T], name: str) -> T:

@@ -29,6 +29,7 @@ def place(tmp_path_factory):
     graph.proof.save(place / "graph.proof")
     path = enumsol.follow(graph.problem, graph.starting_points()[0], interval=(0.0, 5.0))
     path.to_frame().to_csv(place / "points.csv", index=False)
+    (place / "triangle-3.csv").write_text("node,lambda_n,lambda_t\n0,0,0\n")
     (place / "directory").mkdir()
     for name in ("full.png", "full.pdf", "full.svg", "full.npz", "full.h5", "directory/A.mtx"):
         (place / name).symlink_to(FULL)
@@ -68,6 +69,9 @@ PRINTING = {
     "gallery": ("gallery",),
     "gallery list": ("gallery", "list"),
     "gallery write": ("gallery", "write", "one-node-6.1", "problem.npz"),
+    "collection list": ("collection", "list"),
+    "collection export": ("collection", "export", "exported", "triangle-3"),
+    "collection check": ("collection", "check", "triangle-3.csv"),
 }
 
 

@@ -8,7 +8,7 @@ from skfem import Basis, ElementTriP1, ElementVector, MeshTri
 from skfem.models.elasticity import linear_elasticity
 
 import enumsol
-from enumsol import EnumsolError, fem, fixed_points, gallery
+from enumsol import EnumsolError, collection, fem, fixed_points, gallery
 from enumsol.continuation import follow_arc, start_tangents
 
 POINTS, TRIANGLES = [[0, 0], [1, 0], [0, 1]], [[0, 1, 2]]
@@ -70,6 +70,11 @@ def by_axes(value):
 def loaded(path="limit.npz", problem=SOLID):
     LIMIT.save("limit.npz")
     return enumsol.FixedPoint.load(path, problem)
+
+
+def answered(solutions="triangle-3.npz", tolerance=1e-4):
+    np.savez("triangle-3.npz", r=[0.0, 0.0])
+    return collection.check(solutions, tolerance)
 
 
 #: Functions with arguments that they accept, and the names of those that are replaced.
@@ -156,6 +161,9 @@ CALLS = [
     (enumsol.read_problem, {}, "path"),
     (enumsol.write_problem, {"problem": PROBLEM, "path": "problem.npz"}, "problem path"),
     (gallery.get, {}, "name"),
+    (collection.get, {}, "name"),
+    (collection.export, {"folder": "collection", "names": ["triangle-3"]}, "folder names"),
+    (answered, {}, "solutions tolerance"),
     (gallery.one_node_triangle, {}, "f lame"),
     (gallery.two_node_square, {}, "f1 f2 lame friction load_slope"),
     (gallery.clamped_block, {"nx": 1, "ny": 1}, "nx ny length height lame traction friction gap contact"),
