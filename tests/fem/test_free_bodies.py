@@ -101,6 +101,18 @@ def test_a_body_on_another_one(rollers, count):
     assert root.u.min() == pytest.approx(-0.1 * 2 / 2.5, abs=1e-12)
 
 
+@pytest.mark.parametrize(("supports", "count"), [([], 6), (["left"], 3), (["left", "front"], 1)])
+def test_a_cube_on_a_table(supports, count):
+    """Planes of symmetry leave three rigid motions of six, and the vertical one."""
+    options = BLOCK | ({"symmetry": supports} if supports else {})
+    problem = fem.mesh_problem(fem.box(1, 1, 1), **options, max_rigid_displacement="auto")
+    assert problem.modes.r == count
+    assert strains(problem) < 1e-14
+    if count == 1:
+        (root,) = enumsol.enumerate_roots(problem, 0)
+        assert root.lambda_n.sum() == pytest.approx(0.1, abs=1e-12)
+
+
 def test_what_is_refused():
     mesh = fem.rectangle(2, 2).parted()
     with pytest.raises(enumsol.InvalidProblemError, match="or max_rigid_displacement, if contact alone is to hold it"):
