@@ -37,9 +37,10 @@ What checker and search share
     - for the arcs of branch graphs: ``trusted.selection``, the numbers of unknowns and conditions;
       ``trusted.arcs.selection_balls``, ``trusted.arcs.series`` and ``trusted.arcs.over_parts``, a selection over an
       interval as a series with bounds of its error; ``trusted.arcs.precise`` and ``trusted.arcs.many_digits``, the same
-      with many digits, loaded only where a box asks for it; ``trusted.arcs.only_branch``, the test by which the roots
-      of arcs are the only solutions over a piece, with the form of ``trusted.piece_form`` (on maps, of which no proof
-      is written, ``trusted.data_box`` has it, too); ``arithmetic.ball_arrays`` (in 3D, too);
+      with many digits, of S and g by ``trusted.arcs.refined``, loaded only where a box asks for it;
+      ``trusted.arcs.only_branch``, the test by which the roots of arcs are the only solutions over a piece, with the
+      form of ``trusted.piece_form`` (on maps, of which no proof is written, ``trusted.data_box`` has it, too);
+      ``arithmetic.ball_arrays`` (in 3D, too);
     - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings and
       the exclusion inequality; ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds
       and which leaves share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution

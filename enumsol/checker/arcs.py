@@ -236,14 +236,14 @@ class ArcChecker:
     @cached_property
     def precise_system(self) -> Any:
         """The problem in many digits."""
-        from enumsol.condensation.data import EXACT_DOF_LIMIT
         from enumsol.trusted.arcs.precise import PreciseSystem  # python-flint, not for all proofs
+        from enumsol.trusted.arcs.refined import affordable
 
-        if self._problem.n > EXACT_DOF_LIMIT:
+        if not affordable(self._problem):
             raise ValueError("a box in many digits belongs to a problem that is too large for it")
         system = PreciseSystem.of(self._problem)
         if system is None:
-            raise ValueError("A is singular within many digits")
+            raise ValueError("A is positive definite only within rounding")
         return system
 
     def fail(self, codes: Codes, alpha: Fraction) -> None:

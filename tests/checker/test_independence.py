@@ -70,6 +70,7 @@ SHARED = {
     "trusted.confinement": {"motion_against", "motion_beside", "without_bound"},
     "trusted.over_interval": {"EnclosedPiece", "as_computed"},
     "trusted.arcs.precise": None,
+    "trusted.arcs.refined": {"affordable"},
     "trusted.positions": {"tangential_positions"},
     "trusted.selection": None,
     "trusted.uniqueness_in_contact": {"lone_root", "numbers_of"},

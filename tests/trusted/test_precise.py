@@ -5,12 +5,14 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from exact_arcs import Truth, beside, exact_of, interval_at, precise_system, random_data, two_zeros
-from flint import arb, arb_mat
+from flint import arb, arb_mat, ctx
 from path_problems import generic_problem
 
+from enumsol import ContactProblem
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.gallery import wedge
-from enumsol.trusted.arcs.many_digits import ball_of, precision, taylor_around, upper
+from enumsol.trusted.arcs import refined
+from enumsol.trusted.arcs.many_digits import PRECISION, ball_of, precision, taylor_around, upper
 from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
 from enumsol.trusted.status_rows import FRICTIONLESS
 
@@ -145,21 +147,47 @@ def test_floats_are_upper_bounds():
         assert not upper(arb("nan")) < np.inf
 
 
-def test_condensed_data_lie_in_their_balls():
+def _lie_in_their_balls(problem, radius):
+    ours, exact = PreciseSystem.of(problem), ExactCondensed.from_problem(problem)
+    assert ours is not None
+    with ctx.workprec(4 * PRECISION):
+        for r, row in enumerate(exact.rows):
+            pairs = [(ours.S[r, k], x) for k, x in enumerate(row)]
+            pairs += [(ours.g0[r], exact.g0[r]), (ours.g1[r], exact.g1[r])]
+            for ball, value in pairs:
+                assert ball.contains(arb(value))
+                assert float(ball.rad()) <= radius * max(1.0, abs(float(arb(value))))
+        for parts in ((ours.F0, exact.F0), (ours.F1, exact.F1)):
+            assert all(ball.contains(arb(value)) for ball, value in zip(*parts, strict=True))
+
+
+@pytest.mark.parametrize(("bits", "radius"), [(refined._RESIDUAL_BITS, 1e-80), (30, 1e-8)])
+def test_condensed_data_lie_in_their_balls(bits, radius, monkeypatch):
+    """Also where residuals are not small: their second order is bounded."""
+    monkeypatch.setattr(refined, "_RESIDUAL_BITS", bits)
     for seed in range(12):
         rng = np.random.default_rng(seed)
         problem = generic_problem(rng, int(rng.integers(1, 4)), ("friction", "load", "both")[seed % 3])
+        _lie_in_their_balls(problem, radius)
+
+
+def test_condensed_data_of_entries_of_all_sizes_lie_in_their_balls():
+    rng = np.random.default_rng(5)
+    for size in (1e-150, 1.0, 1e150):
+        X = rng.normal(size=(6, 6)) * 10.0 ** rng.uniform(-12, 0, size=(6, 6))
+        A = (X @ X.T + np.diag(10.0 ** rng.uniform(-6, 6, size=6))) * size
+        A = (A + A.T) / 2
+        f = np.array([1e-30, 0.0, 1e3, 1.0, -3.0, 1e-300]) * size
+        rows = np.eye(6)[:4]
+        problem = ContactProblem(A, rows[:2], rows[2:], f, load_slope=np.zeros(6), friction=(0.5, 0.0))
         ours, exact = PreciseSystem.of(problem), ExactCondensed.from_problem(problem)
         assert ours is not None
-        with precision():
+        with ctx.workprec(4 * PRECISION):
             for r, row in enumerate(exact.rows):
-                pairs = [(ours.S[r, k], x) for k, x in enumerate(row)]
-                pairs += [(ours.g0[r], exact.g0[r]), (ours.g1[r], exact.g1[r])]
-                for ball, value in pairs:
-                    assert ball.contains(arb(value))
-                    assert float(ball.rad()) <= 1e-80 * max(1.0, abs(float(arb(value))))
-            for parts in ((ours.F0, exact.F0), (ours.F1, exact.F1)):
-                assert all(ball.contains(arb(value)) for ball, value in zip(*parts, strict=True))
+                pairs = [*((ours.S[r, k], x) for k, x in enumerate(row)), (ours.g0[r], exact.g0[r])]
+                assert all(ball.contains(arb(value)) for ball, value in pairs)
+                assert all(ball.rad() <= arb(2) ** -250 * max(abs(arb(x)) for x in row) for ball, x in pairs[:-1])
+                assert ours.g1[r] == 0
 
 
 @pytest.mark.parametrize("gap", [0.0, 2.0**-52, 2.0**-40, 2.0**-20, 2.0**-4])

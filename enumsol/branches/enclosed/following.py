@@ -55,10 +55,9 @@ class Followed:
         """What was left open or contradicts completeness."""
         found = list(self.joined.reasons)
         for place in self.joined.open:
-            members = counted(len(place.members), "selection")
-            found.append(
-                f"what {members} do for alpha in [{float(place.low):.17g}, {float(place.high):.17g}] is not decided"
-            )
+            count = len(place.members)
+            does = f"{counted(count, 'selection')} {'does' if count == 1 else 'do'}"
+            found.append(f"what {does} for alpha in [{float(place.low):.17g}, {float(place.high):.17g}] is not decided")
         return found
 
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.enclosed.tracing import trace
-from enumsol.condensation.data import EXACT_DOF_LIMIT
-from enumsol.support.deadlines import over
+from enumsol.support.deadlines import TimeOverError, over
 from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
+from enumsol.trusted.arcs.refined import affordable
 from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class TracedProblem:
 
     @cached_property
     def _precise_system(self) -> PreciseSystem | None:
-        return PreciseSystem.of(self.problem) if self.problem.n <= EXACT_DOF_LIMIT else None
+        return PreciseSystem.of(self.problem) if affordable(self.problem) else None
 
     def selection(self, codes: Codes, side: float) -> ArcSelection:
         """A selection in double arithmetic."""
@@ -79,8 +79,11 @@ class TracedProblem:
         return self._selections[codes, side]
 
     def precise(self, codes: Codes, side: float) -> PreciseSelection | None:
-        """A selection in many digits; None beyond EXACT_DOF_LIMIT degrees of freedom, and once the time is over."""
-        if over() or self._precise_system is None:
+        """A selection in many digits; None where the body is too large for them, and once the time is over."""
+        try:
+            if over() or self._precise_system is None:
+                return None
+        except TimeOverError:
             return None
         if (codes, side) not in self._precise:
             system = self._precise_system.constant_load(side) if side else self._precise_system
@@ -117,7 +120,7 @@ class TracedProblem:
                 for low, high, side in self.spans(pieces)
             ],
             found,
-            sharpened=self.problem.n <= EXACT_DOF_LIMIT,
+            sharpened=affordable(self.problem),
         )
 
     def sharpen(self, found: Trace, part: ArcPart) -> Bounds | None:

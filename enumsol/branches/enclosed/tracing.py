@@ -39,10 +39,13 @@ _SMALLEST_UNITS, _SMALLEST_PRECISE = 64.0, 2.0**-60
 _PRECISE_BOX, _PRECISE_ANYWHERE = 2.0**-10, 2.0**-40
 #: Many digits are tried, too, on a box at most so many times as long as the last one that they decided.
 _GROWTH = 2.0
+#: A length that they did not decide grows by this with every box that they do.
+_FORGOTTEN = 1.1
 #: Boxes on which a selection seems to be singular are not cut below this share.
 _SINGULAR = 2.0**-26
-#: Expansions of one selection, after which what is left stays open.
-_MOST_BOXES = 200
+#: Boxes of one selection of which nothing is decided, beyond the number of the others, and these others, after which
+#: what is left stays open.
+_MOST_TRIES, _MOST_BOXES = 200, 900
 #: Boxes shorter than this share of the interval are not cut because of a condition that cannot be told from zero.
 _FLAT_BOX = 2.0**-12
 
@@ -109,9 +112,9 @@ class _Tracing:
         self._found, self._selection, self._precise = found, found.selection, precise
         self._length = found.high - found.low
         self._spacing = _SMALLEST_UNITS * float(np.spacing(max(abs(found.low), abs(found.high))))
-        self._count = 0
-        #: Length of the last box that many digits decided.
-        self._decided = 0.0
+        self._tries = 0
+        #: Length of the last box that many digits decided, and one of a box that they did not.
+        self._decided, self._too_long = 0.0, np.inf
         self.finished = False
 
     def run(self) -> Asking:
@@ -120,7 +123,6 @@ class _Tracing:
         while waiting:
             look()
             first, last = waiting.pop()
-            self._count += 1
             rest = yield from self._box(_as_float(first), _as_float(last))
             waiting += reversed(rest)
         self._selection.forget()
@@ -128,18 +130,22 @@ class _Tracing:
 
     def _box(self, first: Number, last: Number) -> Generator[list[Question], list[Any], list[Interval]]:
         """Add a box, or as much of it as is decided; what is left."""
-        share = float(last - first) / self._length
+        length = float(last - first)
+        share = length / self._length
         # short beside alpha too, or so short that this does not matter
-        beside = float(last - first) / max(abs(float(first)), abs(float(last)))
+        beside = length / max(abs(float(first)), abs(float(last)))
         short, tiny = (
             share < limit and (share < _PRECISE_ANYWHERE or beside < limit) for limit in (_PRECISE_BOX, _SINGULAR)
         )
-        beside_decided = float(last - first) <= _GROWTH * self._decided
-        precise = self._precise() if (short or beside_decided) and self._count <= _MOST_BOXES else None
-        smallest = share < _SMALLEST_PRECISE if precise is not None else float(last - first) <= self._spacing
-        whole = self._count > _MOST_BOXES or smallest
+        beside_decided = length <= _GROWTH * self._decided and length < self._too_long
+        # halving has as many boxes that were not decided as there are parts in the end
+        boxes = len(self._found.boxes)
+        exhausted = self._tries - boxes >= _MOST_TRIES or boxes >= _MOST_BOXES
+        precise = self._precise() if (short or beside_decided) and not exhausted else None
+        smallest = share < _SMALLEST_PRECISE if precise is not None else length <= self._spacing
+        whole = exhausted or smallest
         tried: list[tuple[AlphaBox, list[Interval]]] = []
-        if self._count <= _MOST_BOXES and isinstance(first, float) and isinstance(last, float):
+        if not exhausted and isinstance(first, float) and isinstance(last, float):
             (expansion,) = yield [(self._selection, first, last)]
             if expansion is not None:
                 flat = short and share < _FLAT_BOX and precise is None
@@ -149,7 +155,10 @@ class _Tracing:
             if found is not None:
                 tried.insert(0, (yield from self._cut(found, whole=whole, flat=share < _PRECISE_BOX)))
                 if _decides(*tried[0]):
-                    self._decided = float(last - first)
+                    self._decided, self._too_long = length, self._too_long * _FORGOTTEN
+                else:
+                    self._too_long = length
+        self._tries += not (tried and tried[0][0].parts)
         if tried:
             box, rest = tried[0]
             if box.parts:
