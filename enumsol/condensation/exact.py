@@ -69,6 +69,11 @@ class ExactSystem:
         """The system whose g is a direction."""
         return ExactSystem(self.S, direction, self.F)
 
+    def moved(self, point: tuple[Any, ...]) -> list[Any]:
+        """w = g - S lambda."""
+        product = self.S * fmpq_mat([[v] for v in point])
+        return [g - v for g, v in zip(self.g, product.entries(), strict=True)]
+
     @classmethod
     def from_problem(cls, problem: ProblemData, alpha: Alpha) -> ExactSystem:
         """Condense at one alpha without any rounding.
@@ -82,6 +87,107 @@ class ExactSystem:
         """
         problem.friction_at(alpha)
         return ExactCondensed(*_condensed(problem), condensed_exactly=True, zero=None).system(rational(alpha))
+
+
+class UncondensedSystem:
+    """The same at one alpha, condensed only where S or g is asked for: to solve one selection takes neither.
+
+    S has as many digits as det A, and 2p columns; the equations of one selection have the digits of the data and one
+    right-hand side.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+        A body that is held.
+    alpha : float or Fraction
+
+    Attributes
+    ----------
+    F : tuple of fmpq
+
+    Raises
+    ------
+    InvalidArgumentError
+        Friction is negative there.
+    TooLargeError
+        The problem has more than EXACT_DOF_LIMIT degrees of freedom.
+    """
+
+    reach: tuple[Any, ...] = ()
+
+    def __init__(self, problem: ProblemData, alpha: Alpha) -> None:
+        problem.friction_at(alpha)
+        _check_size(problem)
+        self._problem, self._alpha, self.p = problem, alpha, problem.p
+        a = rational(alpha)
+        self.F = tuple(rational(x) + a * rational(y) for x, y in zip(*problem.friction, strict=True))
+        self._moved: dict[tuple[Any, ...], list[Any]] = {}
+
+    @cached_property
+    def _condensed(self) -> ExactSystem:
+        return ExactSystem.from_problem(self._problem, self._alpha)
+
+    @property
+    def S(self) -> Any:  # noqa: N802 (the field's letter)
+        """S, fmpq_mat (2p, 2p)."""
+        return self._condensed.S
+
+    @property
+    def g(self) -> tuple[Any, ...]:
+        """g, a tuple of 2p fmpq."""
+        return self._condensed.g
+
+    def along(self, direction: tuple[Any, ...]) -> ExactSystem:
+        """The system whose g is a direction."""
+        return self._condensed.along(direction)
+
+    @cached_property
+    def _matrices(self) -> tuple[list[Any], list[Any], list[Any], list[Any]]:
+        """A and B, by their rows, f(alpha), and gap and slip offset."""
+        f, slope = _loads(self._problem)
+        alpha = rational(self._alpha)
+        A, B = (rational_matrix(M.toarray()).tolist() for M in (self._problem.A, self._problem.contact_rows))
+        return A, B, [x + alpha * y for x, y in zip(f, slope, strict=True)], _offset(self._problem)
+
+    def solved(self, turned: Any, unknown: Any) -> tuple[list[Any], list[Any], int] | None:
+        """The unknowns y of a selection, u, and the sign of det M; None where M is singular.
+
+        With u the displacements, M y = g_R is what is left when u is eliminated from
+
+            A u + B'E y = f(alpha),      B_R u = o_R       (o: gap and slip offset),
+
+        and det M is det of this matrix times (-1)^k / det A, k the number of unknowns.
+
+        Parameters
+        ----------
+        turned : function that gives K E for the rows of K, an object array of shape (n, 2p)
+        unknown : int array, the k rows R
+        """
+        A, B, f, offset = self._matrices
+        columns = turned(np.array(B, dtype=object).T).tolist()
+        size = len(unknown)
+        K = [[*row, *more] for row, more in zip(A, columns, strict=True)]
+        K += [[*B[r], *([fmpq(0)] * size)] for r in unknown]
+        matrix = fmpq_mat(K)
+        det = matrix.det()
+        if det == 0:
+            return None
+        right = fmpq_mat([[x] for x in (*f, *(offset[r] for r in unknown))])
+        found = matrix.solve(right).entries()
+        return found[len(A) :], found[: len(A)], (1 if det > 0 else -1) * (-1) ** size
+
+    def keep(self, point: tuple[Any, ...], u: list[Any]) -> None:
+        """Keep w = B u - o at a point, for `moved`."""
+        _, B, _, offset = self._matrices
+        self._moved[point] = [
+            sum((x * y for x, y in zip(row, u, strict=True) if x != 0), -o) for row, o in zip(B, offset, strict=True)
+        ]
+
+    def moved(self, point: tuple[Any, ...]) -> list[Any]:
+        """w = g - S lambda."""
+        if point not in self._moved:
+            return self._condensed.moved(point)
+        return self._moved[point]
 
 
 @dataclass(frozen=True)
@@ -267,20 +373,32 @@ def _condensed(problem: ProblemData) -> _Parts:
     TooLargeError
         The problem has more than EXACT_DOF_LIMIT degrees of freedom.
     """
-    n, p = problem.n, problem.p
-    if n > EXACT_DOF_LIMIT:
-        raise TooLargeError(
-            f'arithmetic="exact" condenses at most n = {EXACT_DOF_LIMIT} degrees of freedom in rationals and the '
-            f"problem has n = {n}; use another arithmetic, or condense the body to its contact nodes first"
-        )
+    _check_size(problem)
+    p = problem.p
     B = rational_matrix(problem.contact_rows.toarray())
-    slope = np.zeros(n) if problem.load_slope is None else problem.load_slope
-    loads = rational_matrix(np.column_stack([problem.f, slope]))
-    rhs = [[*row, *load] for row, load in zip(B.transpose().tolist(), loads.tolist(), strict=True)]
+    rhs = [[*row, *load] for row, *load in zip(B.transpose().tolist(), *_loads(problem), strict=True)]
     table = (B * rational_matrix(problem.A.toarray()).solve(fmpq_mat(rhs))).tolist()
-    start = problem.slip_offset if problem.exact_offset is None else problem.exact_offset
-    offset = [rational(v) for v in (*problem.gap, *start)]
-    g0 = tuple(row[2 * p] - o for row, o in zip(table, offset, strict=True))
+    g0 = tuple(row[2 * p] - o for row, o in zip(table, _offset(problem), strict=True))
     g1 = tuple(row[2 * p + 1] for row in table)
     F0, F1 = (tuple(rational(v) for v in part) for part in problem.friction)
     return tuple(tuple(row[: 2 * p]) for row in table), g0, g1, F0, F1
+
+
+def _check_size(problem: ProblemData) -> None:
+    if problem.n > EXACT_DOF_LIMIT:
+        raise TooLargeError(
+            f'arithmetic="exact" condenses at most n = {EXACT_DOF_LIMIT} degrees of freedom in rationals and the '
+            f"problem has n = {problem.n}; use another arithmetic, or condense the body to its contact nodes first"
+        )
+
+
+def _loads(problem: ProblemData) -> tuple[list[Any], list[Any]]:
+    """f and load_slope."""
+    slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
+    return [rational(v) for v in problem.f.tolist()], [rational(v) for v in slope.tolist()]
+
+
+def _offset(problem: ProblemData) -> list[Any]:
+    """Gap and slip offset."""
+    start = problem.slip_offset if problem.exact_offset is None else problem.exact_offset
+    return [rational(v) for v in (*problem.gap, *start)]

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _FORMAT = 1
 _ARRAYS = ("slip_bound", "coefficients", "lambda_n", "lambda_t", "u_n", "u_t", "slip", "increments")
 #: Nodes that a printed result shows, columns of its text, and what is noise beside the largest number of a kind.
-_PRINTED, _WIDTH, _NOISE = 12, 80, 1e-12
+_PRINTED, _WIDTH, _NOISE = 32, 80, 1e-12
 
 
 def _check_shapes(arrays: dict[str, Vector], body: Problem, path: str) -> None:
@@ -235,7 +235,7 @@ class FixedPoint(TrescaState):
         text = frame[shown].head(_PRINTED).to_string(index=False, float_format=lambda value: f"{value:.5g}")
         lines = ["  " + line for line in text.splitlines()]
         if len(frame) > _PRINTED:
-            lines.append(f"  ... {len(frame) - _PRINTED} more nodes; to_frame() has all of them, and where they are")
+            lines.append(f"  ... {counted(len(frame) - _PRINTED, 'more node')}; to_frame(), --csv and --json have all")
         return [f"  {constant} at all nodes", *lines] if constant else lines
 
 

@@ -437,7 +437,11 @@ class RootSet(Sequence[Root], Immutable):
         if len(regions) > _PRINTED_REGIONS:
             lines.append(f"   ... {len(regions) - _PRINTED_REGIONS} more")
         if self.stats.resumed:
-            searched = f"{self.stats.nodes} more searched" if self.stats.nodes else "nothing was left to search"
+            # the file may hold fewer than were searched, and undecided ones
+            missing = " (what the file left undecided, and what had not reached it)"
+            searched = (
+                f"{self.stats.nodes} more searched{missing}" if self.stats.nodes else "nothing was left to search"
+            )
             lines.append(f"resumed: {counted(self.stats.resumed, 'node')} of the tree from the file, {searched}")
         if self.stats.fallback_qps:
             of = counted(self.stats.qps, "relaxation")

@@ -101,12 +101,16 @@ class Solvers:
         InvalidProblemError
             S is not positive definite, exactly.
         """
-        from enumsol.condensation.exact import ExactSystem, check_definite  # python-flint
+        from enumsol.condensation.exact import FAST_EXACT_DOF, ExactSystem, UncondensedSystem, check_definite
         from enumsol.selections.rational_selections import ExactSelections  # python-flint
 
         if self.arithmetic != "exact" and not self._in_rationals:
             return None
-        system = ExactSystem.from_problem(self.problem, self.alpha)
+        # verified arithmetic asks about few selections, exact arithmetic about all
+        apart = self.arithmetic == "verified" and self.problem.n > FAST_EXACT_DOF
+        system = (
+            UncondensedSystem(self.problem, self.alpha) if apart else ExactSystem.from_problem(self.problem, self.alpha)
+        )
         enclosed, data = self._enclosed
         proven = enclosed is not None and data == "problem"
         if not proven:

@@ -57,6 +57,10 @@ class FiberSelections(ExactSelections):
             self.form(RowKind.NORMAL_FORCE, i) for i, code in enumerate(codes) if code == STICK
         ]
 
+    def _slacks(self, codes: Codes, point: Point) -> list[Any]:
+        """Values of the inequalities of ``forms`` at a point."""
+        return super()._slacks(codes, point) + [point[i] for i, code in enumerate(codes) if code == STICK]
+
     def moved(self, point: Point) -> list[Any]:
         """w = g - S lambda."""
         return [g - dot(row, point) for g, row in zip(self.system.g, self._S, strict=True)]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import as_objects, rational, to_fraction
-from enumsol.condensation.exact import ExactSystem
+from enumsol.condensation.exact import ExactSystem, UncondensedSystem
 from enumsol.model.statuses import CONDITIONS, FINAL, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
 from enumsol.selections.polytopes import polytope_vertices, value
 from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
@@ -45,17 +46,21 @@ class ExactSelections:
 
     Parameters
     ----------
-    system : ExactSystem
+    system : ExactSystem or UncondensedSystem
     """
 
-    def __init__(self, system: ExactSystem) -> None:
+    def __init__(self, system: ExactSystem | UncondensedSystem) -> None:
         self.system = system
         self.p = p = system.p
         self.F_positive = tuple(bool(f > 0) for f in system.F)
-        self._S, self._F = as_objects(system.S.tolist()), as_objects(system.F)
+        self._F = as_objects(system.F)
         #: Rigid modes of a body that nothing holds: as many numbers of a point follow its contact forces.
         self.modes = len(system.reach)
         self._zero = [fmpq(0)] * (2 * p + self.modes)
+
+    @cached_property
+    def _S(self) -> NDArray[Any]:  # noqa: N802 (the field's letter)
+        return as_objects(self.system.S.tolist())
 
     # -- linear forms ----------------------------------------------------------------------------------------------
 
@@ -105,17 +110,30 @@ class ExactSelections:
 
     # -- solving ---------------------------------------------------------------------------------------------------
 
-    def solve_equations(self, codes: Codes, target: tuple[Any, ...]) -> tuple[Point, int] | None:
-        """The selection's forces for the right-hand side ``target`` and sign det, or None when it is singular."""
+    def solve_equations(self, codes: Codes, target: tuple[Any, ...] | None = None) -> tuple[Point, int] | None:
+        """The selection's forces and sign det, or None when it is singular; ``target`` takes the place of g."""
         selection = Selection(codes, self.modes)
+        if target is None and isinstance(self.system, UncondensedSystem):
+            return self._solved_apart(self.system, selection)
         if not len(selection.unknown):
             return tuple(self._zero), 1
-        solved = self._solved(selection.matrix(self._S, self._F), [target[r] for r in selection.unknown])
+        right = self.system.g if target is None else target
+        solved = self._solved(selection.matrix(self._S, self._F), [right[r] for r in selection.unknown])
         if solved is None:
             return None
         y, sign = solved
         # the columns of -q change the sign
         return tuple(selection.forces(as_objects(y), self._F, fmpq(0))), -sign if self.modes % 2 else sign
+
+    def _solved_apart(self, system: UncondensedSystem, selection: Selection) -> tuple[Point, int] | None:
+        """The same from the matrices of the problem, for its own load."""
+        solved = system.solved(lambda K: selection.columns(K, self._F), selection.unknown)
+        if solved is None:
+            return None
+        y, u, sign = solved
+        point = tuple(selection.forces(as_objects(y), self._F, fmpq(0)))
+        system.keep(point, u)
+        return point, sign
 
     @staticmethod
     def _solved(M: NDArray[Any], b: Sequence[Any]) -> tuple[Sequence[Any], int] | None:
@@ -128,20 +146,31 @@ class ExactSelections:
 
     def solve(self, codes: Codes) -> SelectionSolution | None:
         """All roots in the selection, or None."""
-        regular = self.solve_equations(codes, self.system.g)
-        equations, inequalities = self.forms(codes)
+        regular = self.solve_equations(codes)
         if regular is not None:
             point, sign = regular
-            values = [value(form, point) for form in inequalities]
+            values = self._slacks(codes, point)
             if any(v < 0 for v in values):
                 return None
             return SelectionSolution(codes, (point,), 0, sign, all(v > 0 for v in values), exact=True)
-        vertices = polytope_vertices(equations, inequalities, self.row_reduced)
+        vertices = polytope_vertices(*self.forms(codes), self.row_reduced)
         if not vertices:
             return None
         differences = [[a - b for a, b in zip(v, vertices[0], strict=True)] for v in vertices[1:]]
         dimension = len(self.row_reduced(differences)[1]) if differences else 0
         return SelectionSolution(codes, tuple(vertices), dimension, 0, strict=False, exact=True)
+
+    def _slacks(self, codes: Codes, point: Point) -> list[Any]:
+        """Values of the inequalities of ``forms`` at a point."""
+        rows = self._rows(point)
+        values = [rows[kind][i] for i, code in enumerate(codes) for kind in CONDITIONS[code].inequalities]
+        pairs = zip(point[2 * self.p :], self.system.reach, strict=True)
+        return values + [most + side * x for x, most in pairs for side in (-1, 1)]
+
+    def _rows(self, point: Point) -> NDArray[Any]:
+        """Values of the seven rows of every node, (7, p)."""
+        rows: NDArray[Any] = row_values(as_objects(point), as_objects(self.moved(point)), self._F)
+        return rows
 
     def rests_on_reach(self, codes: Codes, found: SelectionSolution | None) -> bool:
         """Whether what was found in a selection may be other without the bounds of the rigid displacement."""
@@ -152,7 +181,7 @@ class ExactSelections:
             reach, places = self.system.reach, range(2 * self.p, 2 * self.p + self.modes)
             return any(abs(v[i]) == most for v in found.vertices for i, most in zip(places, reach, strict=True))
         equations, inequalities = self.forms(codes)
-        regular = self.solve_equations(codes, self.system.g)
+        regular = self.solve_equations(codes)
         if regular is not None:
             return all(value(form, regular[0]) >= 0 for form in inequalities[: -2 * self.modes])
         _, pivots = self.row_reduced([[*form, -constant] for form, constant in equations])
@@ -162,15 +191,13 @@ class ExactSelections:
 
     def moved(self, point: Point) -> list[Any]:
         """w = g - S lambda."""
-        product = self.system.S * fmpq_mat([[v] for v in point])
-        return [g - v for g, v in zip(self.system.g, product.entries(), strict=True)]
+        return self.system.moved(point)
 
     def active(self, point: Point) -> ActiveSets:
         """Per node the codes whose conditions hold at the point, exactly."""
-        values = row_values(as_objects(point), as_objects(self.moved(point)), self._F).T
         return tuple(
             frozenset(code for code in FINAL[friction] if rows[0] >= 0 and _holds(CONDITIONS[code], rows))
-            for rows, friction in zip(values, self.F_positive, strict=True)
+            for rows, friction in zip(self._rows(point).T, self.F_positive, strict=True)
         )
 
     def statuses_by_test_functions(self, point: Point, r: NDArray[np.float64]) -> tuple[int, ...]:

@@ -95,7 +95,7 @@ class ExactCertifier(WithoutProof):
         if self._enclosed is None or proposal is None or proposal.weights is None:
             return None
         solver, selection = self._selections, proposal.selection
-        solved = solver.solve_equations(selection, solver.system.g)
+        solved = solver.solve_equations(selection)
         if solved is None:
             return None
         point, determinant = solved
@@ -122,7 +122,7 @@ class ExactCertifier(WithoutProof):
         units = self._scaled.force / self._scaled.length
         for _ in range(_NEWTON_STEPS):
             look()
-            solved = solver.solve_equations(codes, solver.system.g)
+            solved = solver.solve_equations(codes)
             if solved is None:
                 return None
             point, determinant = solved
