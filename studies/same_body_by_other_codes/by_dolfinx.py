@@ -1,8 +1,8 @@
 """The body assembled by FEniCSx (dolfinx): ``python by_dolfinx.py MESH.npz PROBLEM.npz``, by itself, without enumsol.
 
 MESH.npz is what run.py writes: points, triangles, loaded edges, contact nodes with normals, material, springs, load.
-It runs with the interface of dolfinx 0.5, which Debian 12 has, and with that of 0.7 and later: elements come from basix
-since, ``functionspace`` takes the place of the class, and ``create_mesh`` has had its arguments in three orders.
+It takes the interface of dolfinx up to 0.6 (Debian 12 has 0.5) and that of later versions, in which elements come from
+basix, ``functionspace`` takes the place of the class, and an argument of ``create_mesh`` has another name and place.
 """
 
 from __future__ import annotations
