@@ -108,6 +108,14 @@ def write_proof(found: BranchGraph, path: str) -> None:
     found.proof.save(path)
 
 
+#: What is said of the stages of branch_graph, and which part of the bar is theirs; arcs are joined, and the graph is
+#: made of them, after the last one.
+_STEPS = {
+    "search": ("step 1 of 2, search", ("search", 0.0, 0.5)),
+    "arcs": ("step 2 of 2, arcs", ("arcs", 0.5, 0.98)),
+}
+
+
 def build(
     problem: ContactProblem,
     interval: tuple[Alpha, Alpha],
@@ -121,7 +129,7 @@ def build(
     with workers(jobs) as executor, Display("branch graph") as display:
 
         def progress(stage: str, share: float) -> None:
-            display.show(share, stage)
+            display.show(share, *_STEPS[stage])
 
         return branch_graph(problem, interval, arithmetic, progress=progress, executor=executor, **limits)
 

@@ -32,7 +32,8 @@ class Display:
 
     def __init__(self, title: str) -> None:
         self._title = title
-        self._started = time.perf_counter()
+        self._started = self._begun = self._told = time.perf_counter()
+        self._step, self._share, self._note, self._completed = "", 0.0, "", 0.0
         self._progress: Progress | None = None
         self._task: TaskID | None = None
         self._shown = sys.stderr.isatty() and not is_quiet()
@@ -41,16 +42,32 @@ class Display:
         """Nothing is shown yet."""
         return self
 
-    def show(self, share: float, note: str) -> None:
-        """Show how much is done, and a note behind it."""
-        seconds = time.perf_counter() - self._started
-        if not self._shown or (self._progress is None and seconds < _PROGRESS_DELAY):
+    def show(self, share: float, note: str, step: tuple[str, float, float] = ("", 0.0, 1.0)) -> None:
+        """Show how much is done, and a note behind it.
+
+        ``step`` names a step of the work, and says from which to which share of the bar it goes; ``share`` is that of
+        the step, and what is left is said of the step alone.
+        """
+        self._told = time.perf_counter()
+        name, first, last = step
+        if name != self._step:
+            self._begun = self._told if self._step else self._started
+            self._step = name
+        self._share, self._note = share, note
+        if not self._shown or (self._progress is None and self._told - self._started < _PROGRESS_DELAY):
             return
         if self._progress is None or self._task is None:
-            self._progress, self._task = _progress_bar(self._title)
-        counts = f"{note}  {seconds:.0f} s{remaining(seconds, share)}"
-        self._progress.update(self._task, completed=share, counts=counts)
+            self._progress, self._task = _progress_bar(self._title, self.counts)
+        self._completed = max(self._completed, first + share * (last - first))
+        self._progress.update(self._task, completed=self._completed)
         self._progress.start()
+
+    def counts(self) -> str:
+        """What stands behind the bar, as of now: also while nothing new is told, the time goes on."""
+        now = time.perf_counter()
+        left = remaining(self._told - self._begun, self._share, now - self._told)
+        of = " of this step" if self._step and left else ""
+        return f"{self._note}  {now - self._started:.0f} s{left}{of}"
 
     def count(self, unit: str) -> Callable[[int, int], None]:
         """A callback that takes how many are done, and of how many."""
@@ -62,11 +79,16 @@ class Display:
             self._progress.stop()
 
 
-def remaining(seconds: float, share: float) -> str:
-    """How long it will take, if the rest is done as fast as the part so far; nothing before enough is done to tell."""
+def remaining(seconds: float, share: float, since: float = 0.0) -> str:
+    """How long it will take, if the rest is done as fast as the part so far, which was told some time ago.
+
+    Nothing before enough is done to tell, nor once that time has passed.
+    """
     if not _LEAST_SHARE <= share < 1.0:
         return ""
-    left = seconds * (1.0 - share) / share
+    left = seconds * (1.0 - share) / share - since
+    if left < 0.5:
+        return ""
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if left >= 2 * size:
             return f", about {left / size:.0f} {unit} left"
@@ -85,16 +107,24 @@ class SearchDisplay(Display):
         self.show(state.covered, f"nodes {state.nodes:,}{resumed}  roots {state.solutions:,}")
 
 
-def _progress_bar(title: str) -> tuple[Progress, TaskID]:
+def _progress_bar(title: str, counts: Callable[[], str]) -> tuple[Progress, TaskID]:
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn
+    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+    from rich.text import Text
+
+    class Counts(ProgressColumn):
+        """Asked for several times a second."""
+
+        def render(self, task: Task) -> Text:
+            return Text(counts())
 
     progress = Progress(
         TextColumn(title),
         BarColumn(bar_width=24),
-        TextColumn("{task.percentage:.2f}%  {task.fields[counts]}"),
+        TextColumn("{task.percentage:.2f}%"),
+        Counts(),
         console=Console(stderr=True),
         transient=True,
         refresh_per_second=4,
     )
-    return progress, progress.add_task("", total=1.0, counts="")
+    return progress, progress.add_task("", total=1.0)

@@ -14,8 +14,9 @@ from enumsol import gallery
 from enumsol.cli import main
 from enumsol.cli.app import app
 from enumsol.cli.common import ExitStatus
+from enumsol.cli.graph import build
 from enumsol.cli.options import problem_names
-from enumsol.cli.progress import remaining
+from enumsol.cli.progress import Display, remaining
 
 SQUARE = "gallery:two-node-6.4"
 
@@ -163,3 +164,49 @@ def test_files_and_problems_are_completed(tmp_path, monkeypatch):
 )
 def test_the_time_that_is_left(seconds, share, expected):
     assert remaining(seconds, share) == expected
+
+
+def test_a_bar_goes_on_between_two_reports(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("enumsol.cli.progress.time.perf_counter", lambda: clock[0])
+    display, said = Display("graph"), []
+    for now, share, step in ((4.0, 0.5, "search"), (10.0, 1.0, "search"), (12.0, 0.0, "arcs"), (20.0, 0.5, "arcs")):
+        clock[0] = now
+        display.show(share, step, (step, 0.0, 1.0))
+        said.append(display.counts())
+    for clock[0] in (25.0, 29.0):
+        said.append(display.counts())
+    assert said == [
+        "search  4 s, about 4 s left of this step",
+        "search  10 s",
+        "arcs  12 s",
+        "arcs  20 s, about 8 s left of this step",
+        "arcs  25 s, about 3 s left of this step",
+        "arcs  29 s",
+    ]
+
+
+def test_the_bar_of_a_graph_never_falls_back_nor_is_full_before_the_end(monkeypatch):
+    done, stages = [], []
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    monkeypatch.setattr("enumsol.cli.progress._PROGRESS_DELAY", 0.0)
+
+    class Bar:
+        def update(self, _, completed):
+            done.append(completed)
+
+        def start(self):
+            pass
+
+        stop = start
+
+    monkeypatch.setattr("enumsol.cli.progress._progress_bar", lambda *_: (Bar(), 0))
+    monkeypatch.setattr(
+        Display,
+        "show",
+        lambda self, share, note, step, show=Display.show: (stages.append(note), show(self, share, note, step)),
+    )
+    build(gallery.taper(4, 4), (0.0, 0.3))
+    assert list(dict.fromkeys(stages)) == ["step 1 of 2, search", "step 2 of 2, arcs"]
+    assert done == sorted(done)
+    assert done[-1] < 1.0
